@@ -1,0 +1,91 @@
+"""Checks at the door: every array of a dataclass passes here once and is read-only afterwards."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from shellform.errors import InputError
+
+Reals = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+Shape = Sequence[int | None]
+_T = TypeVar("_T", bound=np.generic)
+
+
+def reals(name: str, value: ArrayLike, shape: Shape, *, positive: bool = False) -> Reals:
+    """A read-only float64 copy of `value` with the given shape (None: any length), all finite.
+
+    A scalar is broadcast where the shape has no None. `positive` asks for values above zero.
+    Raises InputError naming `name` and the first offending index.
+    """
+    try:
+        raw = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name} must be numbers", value=_short(value), remedy=f"Give {_wanted(shape)}.") from error
+    raw = _shaped(name, raw, shape)
+    if not np.isfinite(raw).all():
+        where = _first(~np.isfinite(raw))
+        raise InputError(f"{name}{where} is not finite", value=float(raw[where]), remedy="Give finite numbers.")
+    if positive and not (raw > 0).all():
+        where = _first(raw <= 0)
+        raise InputError(f"{name}{where} must be above zero", value=float(raw[where]))
+    return _frozen(raw)
+
+
+def indices(name: str, value: ArrayLike, shape: Shape, *, below: int) -> Indices:
+    """A read-only int64 copy of `value` with the given shape, every entry in [0, below)."""
+    raw = np.asarray(value)
+    if raw.size == 0:
+        raw = raw.astype(np.int64).reshape([0 if n is None else n for n in shape])
+    if raw.dtype.kind not in "iu":
+        raise InputError(f"{name} must be whole numbers", value=_short(value))
+    raw = _shaped(name, raw.astype(np.int64), shape)
+    outside = (raw < 0) | (raw >= below)
+    if outside.any():
+        where = _first(outside)
+        remedy = f"Indices run from 0 to {below - 1}."
+        raise InputError(f"{name}{where} is out of range", value=int(raw[where]), remedy=remedy)
+    return _frozen(raw)
+
+
+def flags(name: str, value: ArrayLike, shape: Shape) -> Flags:
+    """A read-only boolean copy of `value` with the given shape."""
+    raw = np.asarray(value)
+    if raw.dtype.kind != "b":
+        raise InputError(f"{name} must be true or false", value=_short(value))
+    return _frozen(_shaped(name, raw, shape))
+
+
+def _shaped(name: str, raw: NDArray[_T], shape: Shape) -> NDArray[_T]:
+    if raw.ndim == 0 and None not in shape:
+        raw = np.broadcast_to(raw, [n for n in shape if n is not None])
+    if raw.size == 0 and None in shape:
+        raw = raw.reshape([0 if n is None else n for n in shape])
+    if raw.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, raw.shape, strict=True)):
+        raise InputError(f"{name} has the wrong shape", value=raw.shape, remedy=f"Give {_wanted(shape)}.")
+    return raw
+
+
+def _frozen(raw: NDArray[_T]) -> NDArray[_T]:
+    copy = np.array(raw, order="C", copy=True)
+    copy.setflags(write=False)
+    return copy
+
+
+def _first(mask: Flags) -> tuple[int, ...]:
+    return tuple(int(i) for i in np.argwhere(mask)[0])
+
+
+def _wanted(shape: Shape) -> str:
+    return "an array of shape (" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) < 60 else text[:57] + "..."

@@ -1,0 +1,437 @@
+"""Optimising a gridshell with the method of moving asymptotes (operation 3; Svanberg 1987, 2002); the door to NLopt.
+
+MMA replaces the problem by a sequence of convex ones that are solved exactly. Its own separable approximation knows nothing of how
+cables work together, and in the rest lengths it is kinked where a cable goes slack: on a prestressed gridshell its first trials snap
+the shell through and its later ones hardly move (README, "What was tried"). Here each convex problem is the model in tensions
+(tensions.py), exact in first order and with the misfit's Gauss-Newton curvature; NLopt's MMA solves it within a window round the
+present design, and the trial is then evaluated by its true equilibria:
+
+- it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
+- a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
+- additional loads are staged: each accepted design raises them as far as its own stable branch reaches, less a margin, so that a
+  start that doesn't bear them is led to a design that does.
+
+At the end the cables without tension are taken away and the design is loaded along the documented path (loading.py); if it
+should not bear all loads there, the last accepted design that does is returned.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.design.gridshell import Design
+from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, taut, without_slack
+from shellform.design.tensions import TensionModel, tension_model
+from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Term
+from shellform.errors import InputError, NotConverged
+from shellform.structure.loading import Loaded, apply_load
+from shellform.structure.state import State
+
+try:
+    import nlopt
+except ImportError as error:  # pragma: no cover
+    raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
+
+WINDOW = 0.2  # first half-width, in mean tensions of the start
+_MARGIN = 0.15  # of the whole additional load that is left between a stage and the end of the stable branch
+_GROW, _SHRINK = 1.6, 0.4
+_GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
+_SETTLED = 1e-3  # relative improvement predicted for the largest window that ends the optimisation
+_SMALLEST = 1e-3  # window, in mean tensions, at which no better design is to be found
+_MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
+_PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
+FEASIBLE = 1e-3
+
+
+@dataclass(frozen=True)
+class Step:
+    """One trial in the history: `objective` and its weighted `terms`, `constraints` by name (largest value of each), the `cables` in
+    tension, the `stage` of the additional loads, whether it was `accepted`, and `seconds` since the start."""
+
+    evaluation: int
+    objective: float
+    terms: Mapping[str, float]
+    constraints: Mapping[str, float]
+    cables: int
+    stage: float
+    accepted: bool
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """What the optimisation found: the `design` without its slack cables, how it carries each load on the documented path
+    (`loaded`, with "none" first), the `history`, a `status` sentence, and the work it took."""
+
+    problem: Problem
+    design: Design
+    loaded: Mapping[str, Loaded]
+    objective_start: float
+    objective: float
+    constraints: Mapping[str, float]
+    history: Sequence[Step]
+    status: str
+    evaluations: int
+    rejected: int
+    equilibria: int
+    factorisations: int
+
+    @property
+    def states(self) -> dict[str, State]:
+        """The equilibrium state by load case."""
+        return {name: loaded.equilibrium.state for name, loaded in self.loaded.items()}
+
+
+Watch = Callable[[Step], None]
+
+
+def optimize(
+    problem: Problem, start: Design, *, evaluations: int = 80, window: float = WINDOW, progress: Watch | None = None
+) -> Optimum:
+    """The best design found from `start` within a number of design `evaluations`.
+
+    Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
+    """
+    return _Search(problem, start, window, progress).run(evaluations)
+
+
+class _Search:
+    """The state of one optimisation."""
+
+    def __init__(self, problem: Problem, start: Design, window: float, progress: Watch | None) -> None:
+        self.problem, self.progress = problem, progress
+        self.base = next(iter(problem.loads))
+        # Limits on the base load's cable forces are bounds of the model; the others stay constraints.
+        self.bounded = [part for part in problem.limits if self._is_bound(part.term)]
+        inner = replace(problem, limits=[part for part in problem.limits if not self._is_bound(part.term)])
+        self.evaluator = Evaluator(inner, start)
+        self.began = time.perf_counter()
+        reached = self.evaluator.begin()
+        states = {self.base: reached[self.base].equilibrium.state}
+        self.stage = self._stage(start, states[self.base], 0.0)
+        self.point = self.evaluator.seed(start, self._staged(start, states[self.base], self.stage), self.stage)
+        self.tension = float(np.mean(self._tensions(self.point)))
+        self.window = window * self.tension
+        self.objective_start = self.point.objective
+        self.accepted = [self.point]
+        self.history = [self._record(self.point, True)]
+        self.status = "the number of evaluations was reached"
+
+    def run(self, evaluations: int) -> Optimum:
+        """Rounds of model, trial and judgement."""
+        model = self._model()
+        while self.evaluator.evaluations < evaluations:
+            y, predicted = self._propose(model)
+            if self.stage == 1.0 and self._violation(self.point) <= 0.0:
+                if -predicted < _SETTLED * self.point.objective and self.window >= self.tension:
+                    self.status = f"the model predicts less than {_SETTLED:.1%} improvement"
+                    break
+                if self.window < _SMALLEST * self.tension:
+                    self.status = "no better design within the smallest window: the stable branch ends beside it"
+                    break
+            trial = self._try(model, y)
+            if trial is None or self._merit(trial) >= self._merit(self.point):
+                self.window *= _SHRINK
+                self.history.append(self._record(trial or self.point, False))
+                continue
+            ratio = (trial.objective - self.point.objective) / min(predicted, -1e-300)
+            self.window *= _GROW if ratio > _GOOD else (_SHRINK if ratio < _POOR else 1.0)
+            self.point = trial
+            self._raise()
+            self.accepted.append(self.point)
+            self.history.append(self._record(self.point, True))
+            model = self._model()
+        return self._finish()
+
+    def _is_bound(self, term: Term) -> bool:
+        return isinstance(term, CableForces) and term.load == self.base and term.chosen is None
+
+    def _model(self) -> TensionModel:
+        shell, design = self.problem.shell, self.point.design
+        longest = (self.evaluator.bounds()[1][: len(shell.cable_lengths)] * shell.cable_lengths)[design.present]
+        return tension_model(
+            shell,
+            self.evaluator.assembly(design),
+            self.point,
+            self.point.states[self.base],
+            longest,
+            frees_radius=self.problem.frees_radius,
+        )
+
+    def _propose(self, model: TensionModel) -> tuple[Reals, float]:
+        """The model's optimum within the window, and the change of the objective that it predicts."""
+        count = len(model.length)
+        lower, upper = self._box(model)
+        width = np.full(len(model.origin), self.window)
+        if self.problem.frees_radius:
+            width[-1] = 0.1 * model.origin[-1] * min(self.window / self.tension, 1.0)
+        lower = np.maximum(lower, model.origin - width)
+        upper = np.maximum(np.minimum(upper, model.origin + width), lower)
+        slope = self.point.objective_by_variables @ model.variables_by_y
+        curvature = sum(
+            weight * model.misfit_hessian
+            for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True)
+            if isinstance(part.term, Misfit) and part.term.load == self.base
+        )
+        slope = self._exact_in_tension(slope, model)
+        rows = self.point.constraints_by_variables @ model.variables_by_y
+        scaled_slope, scaled_rows = slope * width, rows * width
+        scaled_curvature = np.asarray(curvature) * width * width[:, None]
+
+        def evaluate(u: Reals) -> tuple[float, Reals, Reals, Reals]:
+            bent = scaled_curvature @ u
+            value = float(scaled_slope @ u + 0.5 * u @ bent)
+            return value, scaled_slope + bent, self.point.constraints + scaled_rows @ u, scaled_rows
+
+        start = np.clip(np.zeros(len(width)), (lower - model.origin) / width, (upper - model.origin) / width)
+        u, _ = minimise(
+            evaluate,
+            start,
+            (lower - model.origin) / width,
+            (upper - model.origin) / width,
+            constraints=len(self.point.constraints),
+            evaluations=_MODEL_EVALUATIONS,
+            tolerance=1e-9,
+        )
+        y = model.origin + width * u
+        y[:count][y[:count] < 1e-3 * self.tension] = 0.0
+        return y, evaluate(u)[0]
+
+    def _exact_in_tension(self, slope: Reals, model: TensionModel) -> Reals:
+        """The sum of tensions is linear in them, also for cables that are dead and so have no slope in their rest length."""
+        count = len(model.length)
+        dead = model.origin[:count] <= 0.0
+        if not dead.any():
+            return slope
+        result = slope.copy()
+        away = self.point.states[self.base].positions - self.problem.shell.target.positions
+        free = model.assembly.free
+        moving = free % 6 < 3
+        placed = away.ravel()[3 * (free[moving] // 6) + free[moving] % 6] @ model.state_by_y[moving][:, :count]
+        total = np.zeros(count)
+        for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True):
+            if part.term.load != self.base:
+                continue
+            if isinstance(part.term, Misfit):
+                total += 2.0 * weight * placed
+            elif isinstance(part.term, CableForce):
+                total += weight
+        result[:count][dead] = total[dead]
+        return result
+
+    def _box(self, model: TensionModel) -> tuple[Reals, Reals]:
+        """Bounds of y from bounds (3), (4) and the limits (5) on the base load's cable forces."""
+        stiffness = self.problem.shell.cable.stiffness
+        shortest = self.problem.rest_length_min
+        upper = stiffness * (model.length / shortest - 1.0)
+        for part in self.bounded:
+            upper = np.minimum(upper, part.limit)
+        lower = np.zeros(len(upper))
+        if self.problem.frees_radius:
+            low, high = self.evaluator.bounds()
+            scale = self.evaluator.start.radius
+            lower, upper = np.append(lower, low[-1] * scale), np.append(upper, high[-1] * scale)
+        return lower, upper
+
+    def _try(self, model: TensionModel, y: Reals) -> Point | None:
+        design = model.design(y, self.point.design.present)
+        near = {**self.point.states, self.base: model.predicted(y)}
+        try:
+            return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage)
+        except OffBranch:
+            return None
+
+    def _merit(self, point: Point) -> float:
+        return point.objective + _PENALTY * max(self._violation(point), 0.0)
+
+    def _violation(self, point: Point) -> float:
+        values = [float(point.constraints.max(initial=-1.0))]
+        values += [float(self._tensions(point).max(initial=0.0)) / part.limit - 1.0 for part in self.bounded]
+        largest = max(values)
+        return largest if largest > FEASIBLE else 0.0
+
+    def _tensions(self, point: Point) -> Reals:
+        return self.problem.shell.cables(point.design).tension(point.states[self.base])
+
+    def _stage(self, design: Design, state: State, least: float) -> float:
+        """The stage to which the design's stable branch under the additional loads allows to go."""
+        stages = []
+        for name in self.evaluator.used():
+            if name != self.base:
+                before, after = self.problem.loads[self.base], self.problem.loads[name]
+                assembly = self.evaluator.assembly(design)
+                loaded = apply_load(assembly, state, before, after, step=0.5, smallest=0.125, stay=True)
+                self.evaluator.factorisations += loaded.factorisations
+                stages.append(1.0 if loaded.on_branch else max(least, loaded.share - _MARGIN))
+        return min(stages, default=1.0)
+
+    def _staged(self, design: Design, state: State, stage: float) -> dict[str, State]:
+        """The states of all load cases at a stage, reached step by step from the base load's."""
+        states = {self.base: state}
+        for name in self.evaluator.used():
+            if name != self.base:
+                before, after = self.problem.loads[self.base], self.evaluator.load(name, stage)
+                loaded = apply_load(self.evaluator.assembly(design), state, before, after)
+                self.evaluator.factorisations += loaded.factorisations
+                states[name] = loaded.equilibrium.state
+        return states
+
+    def _raise(self) -> None:
+        if self.stage == 1.0:
+            return
+        design, state = self.point.design, self.point.states[self.base]
+        stage = self._stage(design, state, self.stage)
+        if stage > self.stage:
+            self.stage = stage
+            self.point = self.evaluator.seed(design, self._staged(design, state, stage), stage)
+
+    def _record(self, point: Point, accepted: bool) -> Step:
+        problem = self.evaluator.problem
+        pull = self._tensions(point)
+        terms = {
+            self._name(part.term): float(value) for part, value in zip(problem.minimize, point.terms, strict=True)
+        }
+        constraints = {self._name(part.term): float(pull.max(initial=0.0)) / part.limit - 1.0 for part in self.bounded}
+        constraints |= {
+            self._name(part.term): float(value.max())
+            for part, value in zip(problem.limits, _split(point.constraints, problem), strict=True)
+        }
+        step = Step(
+            self.evaluator.evaluations,
+            point.objective,
+            terms,
+            constraints,
+            int((pull > 0.0).sum()),
+            self.stage,
+            accepted,
+            time.perf_counter() - self.began,
+        )
+        if self.progress is not None:
+            self.progress(step)
+        return step
+
+    def _name(self, term: Term) -> str:
+        kind = {Misfit: "misfit", RmsMisfit: "misfit", CableForce: "cable_force", CableForces: "cable_force"}.get(
+            type(term), "rod_radius"
+        )
+        return kind if term.load in ("", self.base) else f"{kind}.{term.load}"
+
+    def _finish(self) -> Optimum:
+        """The last accepted design that bears all loads on the documented path."""
+        shell, problem = self.problem.shell, self.problem
+        none = np.zeros((len(shell.net.grid.flat), 6))
+        for back, point in enumerate(reversed(self.accepted)):
+            design = without_slack(shell, point.design, point.states[self.base])
+            loaded = follow(shell, design, {"none": none, **problem.loads})
+            if all(each.on_branch for each in loaded.values()):
+                break
+        else:
+            raise NotConverged(
+                "No design was found that carries all loads",
+                state=self.point.design,
+                iterations=self.evaluator.factorisations,
+                remedy="Choose a denser grid, thicker rods, stiffer cables, or more evaluations.",
+            )
+        if back:
+            self.status += f"; the last {back} designs didn't bear all loads and were dropped"
+        final = self._judge(design, loaded)
+        return Optimum(
+            problem,
+            design,
+            loaded,
+            self.objective_start,
+            final.objective,
+            final.constraints,
+            tuple(self.history),
+            self.status,
+            self.evaluator.evaluations,
+            self.evaluator.rejected,
+            self.evaluator.equilibria,
+            self.evaluator.factorisations,
+        )
+
+    def _judge(self, design: Design, loaded: Mapping[str, Loaded]) -> Step:
+        states = {name: loaded[name].equilibrium.state for name in self.problem.loads}
+        judge = Evaluator(self.evaluator.problem, design)
+        judge.start, judge.weights = replace(self.evaluator.start, present=design.present), self.evaluator.weights
+        self.evaluator = _counted(judge, self.evaluator)
+        return self._record(self.evaluator.seed(design, states, 1.0), True)
+
+
+def _counted(judge: Evaluator, counts: Evaluator) -> Evaluator:
+    judge.evaluations, judge.rejected = counts.evaluations, counts.rejected
+    judge.equilibria, judge.factorisations = counts.equilibria, counts.factorisations
+    return judge
+
+
+def _split(values: Reals, problem: Problem) -> list[Reals]:
+    """Constraint values limit by limit."""
+    sizes = []
+    for part in problem.limits:
+        chosen = part.term.chosen if isinstance(part.term, CableForces) else ()
+        sizes.append(
+            1 if not isinstance(part.term, CableForces) else len(problem.shell.cable_ends) if chosen is None else len(chosen)
+        )
+    return np.split(values, np.cumsum(sizes)[:-1]) if sizes else []
+
+
+def minimise(
+    evaluate: Callable[[Reals], tuple[float, Reals, Reals, Reals]],
+    start: Reals,
+    lower: Reals,
+    upper: Reals,
+    *,
+    constraints: int,
+    evaluations: int,
+    tolerance: float = 1e-4,
+) -> tuple[Reals, str]:
+    """NLopt's MMA from `start` (s,) within bounds: the best point and the reason for the stop.
+
+    `evaluate(x)` returns the objective, its gradient (s,), the `constraints` values g <= 0 and their gradients (k, s).
+    """
+    if ((start < lower) | (start > upper)).any():
+        raise InputError("the start lies outside the bounds", where="variables", value=int(np.argmax((start < lower) | (start > upper))))
+    memory: dict[bytes, tuple[float, Reals, Reals, Reals]] = {}
+
+    def at(x: Reals) -> tuple[float, Reals, Reals, Reals]:
+        key = x.tobytes()
+        if key not in memory:
+            memory.clear()  # NLopt asks for objective and constraints at one x, one after the other
+            memory[key] = evaluate(np.array(x))
+        return memory[key]
+
+    def objective(x: Reals, gradient: Reals) -> float:
+        value, slope, _, _ = at(x)
+        if gradient.size:
+            gradient[:] = slope
+        return value
+
+    def limits(result: Reals, x: Reals, gradient: Reals) -> None:
+        _, _, values, slopes = at(x)
+        result[:] = values
+        if gradient.size:
+            gradient[:] = slopes
+
+    optimizer = nlopt.opt(nlopt.LD_MMA, len(start))
+    optimizer.set_min_objective(objective)
+    if constraints:
+        optimizer.add_inequality_mconstraint(limits, np.full(constraints, 1e-8))
+    optimizer.set_lower_bounds(lower)
+    optimizer.set_upper_bounds(upper)
+    optimizer.set_maxeval(evaluations)
+    optimizer.set_ftol_rel(tolerance)
+    best = np.array(optimizer.optimize(start))
+    return best, _REASONS.get(optimizer.last_optimize_result(), "stopped")
+
+
+_REASONS = {
+    nlopt.SUCCESS: "converged",
+    nlopt.FTOL_REACHED: "the objective stopped improving",
+    nlopt.XTOL_REACHED: "the design stopped changing",
+    nlopt.MAXEVAL_REACHED: "the number of evaluations was reached",
+}

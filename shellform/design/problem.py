@@ -1,0 +1,313 @@
+"""The design problem (equations 2 to 6) and its evaluation on the stable branch.
+
+The variables are the rest lengths of the candidate cables over their lengths in the target, and the rod radius over its
+start value where a RodRadius term frees it: all near 1, so that one step length suits them all.
+
+A trial design is evaluated from the nearest design that was evaluated before: its equilibria are where Newton's method starts, and
+it may not lose definiteness on the way (`on_branch`). A trial that leaves the stable branch is given up at once: `OffBranch`.
+Loads other than the first are staged: stage t in [0, 1] stands for first + t (load - first), so that a start that doesn't bear
+an additional load can be led to a design that does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Flags, Reals
+from shellform.design.gridshell import Design, Gridshell
+from shellform.design.sensitivity import gradients, respond
+from shellform.design.terms import AtMost, Misfit, RodRadius, Share
+from shellform.errors import InputError, NotConverged
+from shellform.structure.assembly import Assembly
+from shellform.structure.equilibrium import find_equilibrium
+from shellform.structure.loading import Loaded, apply_load
+from shellform.structure.network import assemble
+from shellform.structure.sparse import NotPositiveDefinite
+from shellform.structure.state import State
+
+_TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
+_FAR = 20.0  # times the larger of the start's misfit: a trial this far off has left the branch unnoticed
+_SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
+
+
+class OffBranch(Exception):
+    """A trial design whose equilibrium isn't on the stable branch."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Minimise the sum of `minimize` subject to `limits` on `shell` under `loads` (name -> (n, 6)), the first being the design load.
+
+    `rest_length_min`, m, and `rest_length_max`, times the initial rest length, are the bounds (3); `radius_bounds`, m, (4).
+    """
+
+    shell: Gridshell
+    loads: Mapping[str, Reals]
+    minimize: Sequence[Share]
+    limits: Sequence[AtMost] = ()
+    rest_length_min: float = 0.01
+    rest_length_max: float = 1.1
+    radius_bounds: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        used = {part.term.load for part in (*self.minimize, *self.limits)} - {""}
+        for name in sorted(used - set(self.loads)):
+            raise InputError(
+                f"there is no load case {name!r}", where="problem", remedy=f"Known: {', '.join(self.loads)}."
+            )
+        total = sum(part.share for part in self.minimize)
+        if abs(total - 1.0) > 1e-9:
+            raise InputError("the shares of the objective must add up to 1", where="problem.minimize", value=total)
+
+    @property
+    def frees_radius(self) -> bool:
+        """Whether the rod radius is a variable."""
+        return any(isinstance(part.term, RodRadius) for part in self.minimize)
+
+
+@dataclass(frozen=True)
+class Point:
+    """A design on the stable branch: `variables` (s,), `states` by load case, `objective`, its weighted `terms`, `constraints`
+    (k,), at most 0 where met, and the derivatives `objective_by_variables` (s,), `constraints_by_variables` (k, s)."""
+
+    variables: Reals
+    design: Design
+    states: Mapping[str, State]
+    objective: float
+    terms: Reals
+    constraints: Reals
+    objective_by_variables: Reals
+    constraints_by_variables: Reals
+    stage: float
+
+
+class Evaluator:
+    """Evaluates designs of one problem; remembers where it was, and counts its work."""
+
+    def __init__(self, problem: Problem, start: Design) -> None:
+        self.problem, self.start = problem, start
+        self.shell = problem.shell
+        self.weights: Reals = np.ones(len(problem.minimize))
+        self.factorisations = self.equilibria = self.evaluations = self.rejected = 0
+        self._assembly: Assembly | None = None
+        self._present: Flags | None = None
+        self._far = np.inf
+
+    def begin(self) -> dict[str, Loaded]:
+        """Loads the start design step by step, sets the objective's weights, and returns how far each load case came.
+
+        Raises NotConverged where the first load case snaps through.
+        """
+        reached = follow(self.shell, self.start, self.problem.loads)
+        first = next(iter(self.problem.loads))
+        for each in reached.values():
+            self._count(each.factorisations)
+        if not reached[first].on_branch:
+            raise NotConverged(
+                f"The initial design doesn't carry the load case {first!r}: it loses stability at "
+                f"{reached[first].share:.2f} of it",
+                state=reached[first].equilibrium.state,
+                remedy="Choose a denser grid, thicker rods or stiffer cables.",
+            )
+        state = reached[first].equilibrium.state
+        self._far = _FAR * float(((state.positions - self.shell.target.positions) ** 2).sum())
+        values = [part.term.measure(self.shell, self.start, state).value[0] for part in self.problem.minimize]
+        self.weights = np.array([part.share for part in self.problem.minimize]) / np.maximum(values, 1e-300)
+        return reached
+
+    def variables(self, design: Design) -> Reals:
+        """Variables (s,) of a design."""
+        lengths = design.rest_length / self.shell.cable_lengths
+        return np.append(lengths, design.radius / self.start.radius) if self.problem.frees_radius else lengths
+
+    def design(self, variables: Reals) -> Design:
+        """The design of variables (s,), with the start's cables."""
+        count = len(self.shell.cable_lengths)
+        radius = float(variables[count] * self.start.radius) if self.problem.frees_radius else self.start.radius
+        return Design(variables[:count] * self.shell.cable_lengths, self.start.present, radius)
+
+    def bounds(self) -> tuple[Reals, Reals]:
+        """Lower and upper bounds (s,) of the variables (3, 4)."""
+        problem, lengths = self.problem, self.shell.cable_lengths
+        lower = problem.rest_length_min / lengths
+        upper = problem.rest_length_max * self.start.rest_length / lengths
+        if problem.frees_radius:
+            radius = problem.radius_bounds or (0.25 * self.start.radius, self.start.radius)
+            lower = np.append(lower, radius[0] / self.start.radius)
+            upper = np.append(upper, radius[1] / self.start.radius)
+        return lower, upper
+
+    def load(self, name: str, stage: float) -> Reals:
+        """The load case at a stage."""
+        first = next(iter(self.problem.loads.values()))
+        return np.asarray(first + stage * (self.problem.loads[name] - first))
+
+    def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Point:
+        """The point of a design whose equilibria `states` at the stage are known. Raises OffBranch where one isn't stable."""
+        self.factorisations += len(states)
+        try:
+            return linearise(
+                self.problem, self.weights, self.assembly(design), self.variables(design), design, states, stage
+            )
+        except NotPositiveDefinite as error:
+            raise OffBranch(str(error)) from error
+
+    def evaluate(self, variables: Reals, near: Mapping[str, State], stage: float) -> Point:
+        """The design at the variables, its equilibria sought from the states `near` them. Raises OffBranch."""
+        self.evaluations += 1
+        design = self.design(variables)
+        assembly = self.assembly(design)
+        try:
+            states = {name: self._settle(assembly, near[name], self.load(name, stage)) for name in self.used()}
+            return self.seed(design, states, stage)
+        except OffBranch:
+            self.rejected += 1
+            raise
+
+    def assembly(self, design: Design) -> Assembly:
+        """The assembly of a design; its pattern is kept while the same cables are present."""
+        parts = (self.shell.beams(design.radius), self.shell.cables(design))
+        if self._assembly is None or not np.array_equal(self._present, design.present):
+            self._assembly, self._present = assemble(self.shell.network(design)), design.present
+            return self._assembly
+        return self._assembly.with_parts(parts)
+
+    def used(self) -> list[str]:
+        """The load cases that objective or constraints need."""
+        names = {part.term.load for part in (*self.problem.minimize, *self.problem.limits)}
+        return [name for name in self.problem.loads if name in names]
+
+    def _settle(self, assembly: Assembly, start: State, load: Reals) -> State:
+        try:
+            found = find_equilibrium(assembly, start, load, limit=_TRIAL, on_branch=True)
+        except NotConverged as error:
+            self._count(error.iterations)
+            raise OffBranch(str(error)) from error
+        self._count(found.factorisations)
+        misfit = float(((found.state.positions - self.shell.target.positions) ** 2).sum())
+        if not found.stable or misfit > self._far:
+            raise OffBranch("the equilibrium found isn't next to the start")
+        return found.state
+
+    def _count(self, factorisations: int) -> None:
+        self.factorisations += factorisations
+        self.equilibria += 1
+
+
+def linearise(
+    problem: Problem,
+    weights: Reals,
+    assembly: Assembly,
+    variables: Reals,
+    design: Design,
+    states: Mapping[str, State],
+    stage: float,
+) -> Point:
+    """Values and derivatives of objective and constraints at a design whose equilibria are known (appendix A)."""
+    shell = problem.shell
+    present = np.flatnonzero(design.present)
+    size = len(shell.cable_ends) + problem.frees_radius
+    scale = np.append(shell.cable_lengths, design.radius / variables[-1]) if problem.frees_radius else shell.cable_lengths
+    cables = shell.cables(design)
+    rate = shell.beams_by_radius(design.radius) if problem.frees_radius else None
+    values: list[Reals] = [np.zeros(0)] * len(problem.limits)
+    rows: list[Reals] = [np.zeros((0, size))] * len(problem.limits)
+    objective = np.zeros(len(problem.minimize))
+    objective_rows = np.zeros((len(problem.minimize), size))
+    any_state = next(iter(states.values()))
+    for name in {part.term.load for part in (*problem.minimize, *problem.limits)}:
+        state = states.get(name, any_state)
+        wanted = [part.term for part in (*problem.minimize, *problem.limits) if part.term.load == name]
+        measures = [term.measure(shell, design, state) for term in wanted]
+        partial = sp.hstack(
+            [
+                sp.vstack([m.by_rest_length for m in measures]),
+                sp.csr_array(np.concatenate([m.by_radius for m in measures])[:, None]),
+            ]
+        ).toarray()[:, :size]
+        if name:
+            response = respond(assembly, state, cables, present, size, rate)
+            by_state = _on_free(sp.vstack([m.by_position for m in measures]), assembly)
+            total = gradients(response, by_state, partial)
+        else:
+            total = partial
+        pieces = np.split(total * scale, np.cumsum([len(m.value) for m in measures])[:-1])
+        found = dict(zip(map(id, wanted), zip(measures, pieces, strict=True), strict=True))
+        for k, part in enumerate(problem.minimize):
+            if id(part.term) in found and part.term.load == name:
+                measure, piece = found[id(part.term)]
+                objective[k], objective_rows[k] = weights[k] * measure.value[0], weights[k] * piece[0]
+        for k, limit in enumerate(problem.limits):
+            if id(limit.term) in found and limit.term.load == name:
+                measure, piece = found[id(limit.term)]
+                values[k], rows[k] = measure.value / limit.scale - 1.0, piece / limit.scale
+    return Point(
+        variables.copy(),
+        design,
+        dict(states),
+        float(objective.sum()),
+        objective,
+        np.concatenate([np.zeros(0), *values]),
+        objective_rows.sum(axis=0),
+        np.vstack([np.zeros((0, size)), *rows]),
+        stage,
+    )
+
+
+def _on_free(by_position: sp.csr_array, assembly: Assembly) -> Reals:
+    """Rows by node coordinates (g, 3 n) as rows by the free freedoms (g, f)."""
+    freedoms = assembly.free
+    moving = freedoms % 6 < 3
+    result = np.zeros((by_position.shape[0], len(freedoms)))
+    result[:, moving] = by_position.tocsc()[:, 3 * (freedoms[moving] // 6) + freedoms[moving] % 6].toarray()
+    return result
+
+
+def follow(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:
+    """The documented path of a design: unloaded from the target shape by relaxation, then the loads one after the other.
+
+    Each load case is followed step by step from the one before it; where one snaps through, the next starts from the last
+    stable state. Raises NotConverged where not even the unloaded shell finds an equilibrium.
+    """
+    assembly = assemble(shell.network(design))
+    none = np.zeros((len(shell.net.grid.flat), 6))
+    unloaded = find_equilibrium(assembly, shell.target, none)
+    result: dict[str, Loaded] = {}
+    state, before = unloaded.state, none
+    for name, load in loads.items():
+        if not load.any():
+            result[name] = Loaded(unloaded, 1.0, unloaded.factorisations)
+            continue
+        loaded = apply_load(assembly, state, before, load)
+        result[name] = loaded
+        if loaded.on_branch:
+            state, before = loaded.equilibrium.state, load
+    return result
+
+
+def taut(shell: Gridshell, design: Design, state: State) -> Flags:
+    """Which candidate cables (c,) are present and under tension in the state."""
+    cables = shell.cables(design)
+    pulled = cables.lengths(state) > cables.rest_length * (1.0 + _SLACK_MARGIN)
+    result = np.zeros(len(shell.cable_ends), dtype=bool)
+    result[np.flatnonzero(design.present)[pulled]] = True
+    return result
+
+
+def without_slack(shell: Gridshell, design: Design, state: State) -> Design:
+    """The design without the cables that are slack in the state: the shell doesn't notice."""
+    return replace(design, present=taut(shell, design, state))
+
+
+def deviations(shell: Gridshell, state: State) -> Reals:
+    """Distance (n,), m, of every node from its place in the target (7)."""
+    return np.linalg.norm(state.positions - shell.target.positions, axis=1)
+
+
+def misfit_only(load: str) -> list[Share]:
+    """The objective that asks for the shape alone."""
+    return [Share(1.0, Misfit(load))]

@@ -1,0 +1,49 @@
+"""The two ways in which shellform says no.
+
+`InputError`: what was given cannot be used; nothing was computed (exit status 2).
+`NotConverged`: a computation ended without a usable result; it carries what was reached (exit status 3).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class ShellformError(Exception):
+    """Base of both, for callers who catch everything that this package says on purpose."""
+
+
+class InputError(ShellformError, ValueError):
+    """Input that cannot be used.
+
+    `what` is wrong, `where` it stands (file, entry, element), which `value` was found, and the `remedy`.
+    The message joins them into one readable sentence or two.
+    """
+
+    def __init__(self, what: str, *, where: str = "", value: object = None, remedy: str = "") -> None:
+        self.what = what
+        self.where = where
+        self.value = value
+        self.remedy = remedy
+        head = f"{where}: {what}" if where else what
+        found = "" if value is None else f" (found {value!r})"
+        tail = f". {remedy}" if remedy else ""
+        super().__init__(f"{head}{found}{tail}")
+
+
+class NotConverged(ShellformError, RuntimeError):
+    """A computation that ended without a usable result.
+
+    `state` is the last state reached (what kind depends on the computation), `residual` how far from the goal it
+    was, `iterations` the work spent, and `remedy` what to try next.
+    """
+
+    def __init__(
+        self, what: str, *, state: Any = None, residual: float = float("nan"), iterations: int = 0, remedy: str = ""
+    ) -> None:
+        self.what = what
+        self.state = state
+        self.residual = residual
+        self.iterations = iterations
+        self.remedy = remedy
+        super().__init__(f"{what}. {remedy}" if remedy else what)

@@ -1,0 +1,145 @@
+"""The flat grid: two layers of straight rods, pinned to each other where they cross.
+
+Crossing (i, j) of the lattice lies at i and j spacings from the origin; rods "u" run along i and share j, rods "v" run along j
+and share i. The u rods lie half a gap below the plane of the grid, the v rods half a gap above it, so that every crossing
+has two nodes, which a short connector joins (section 3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals, indices, reals
+from shellform.structure.beam import Beams, make_beams
+
+KINDS = ("rod", "connector")
+
+
+@dataclass(frozen=True)
+class GridRod:
+    """One straight rod: `direction` "u" or "v", lattice `index` it shares, `nodes` (k,) from end to end, their distances
+    `arc` (k,), m, from the first end, and the numbers of the `crossings` (c,) along it with their places `at` (c,) among the
+    nodes."""
+
+    direction: str
+    index: int
+    nodes: Indices
+    arc: Reals
+    crossings: Indices
+    at: Indices
+
+    @property
+    def length(self) -> float:
+        """m."""
+        return float(self.arc[-1])
+
+    @property
+    def marks(self) -> Reals:
+        """Distances (c,), m, of the crossings from the first end."""
+        return self.arc[self.at]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """`flat` (n, 3), m, all nodes in the stress-free state; `rods`; `lattice` (c, 2) places of the crossings and
+    `crossing_nodes` (c, 2) their nodes on the u rod and on the v rod; `spacing` and `gap`, m."""
+
+    flat: Reals
+    rods: tuple[GridRod, ...]
+    lattice: Indices
+    crossing_nodes: Indices
+    spacing: float
+    gap: float
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "flat", reals("flat", self.flat, (None, 3)))
+        count = len(self.lattice)
+        put(self, "crossing_nodes", indices("crossing_nodes", self.crossing_nodes, (count, 2), below=len(self.flat)))
+
+    @property
+    def rod_ends(self) -> Indices:
+        """Node pairs (m, 2) of all rod elements, rod after rod."""
+        return np.vstack([np.column_stack([rod.nodes[:-1], rod.nodes[1:]]) for rod in self.rods])
+
+    @property
+    def rod_rest_lengths(self) -> Reals:
+        """Rest lengths (m,), m, of all rod elements."""
+        return np.concatenate([np.diff(rod.arc) for rod in self.rods])
+
+    @property
+    def layer(self) -> Reals:
+        """Signed distance (n,), m, of each node from the middle between the layers: -gap/2 for u rods, gap/2 for v rods."""
+        level = np.empty(len(self.flat))
+        for rod in self.rods:
+            level[rod.nodes] = -0.5 * self.gap if rod.direction == "u" else 0.5 * self.gap
+        return level
+
+
+def grid_beams(
+    grid: Grid,
+    rod: tuple[float, float, float, float],
+    connector: tuple[float, float, float, float],
+) -> Beams:
+    """The rods' elements, then the connectors; `rod` and `connector` are (EA, GJ, EI_y, EI_z), N and N·m²."""
+    ends, joints = grid.rod_ends, len(grid.lattice)
+    kind = np.repeat([0, 1], [len(ends), joints])
+    stiffness = np.array([rod, connector])[kind]
+    rest = np.concatenate([grid.rod_rest_lengths, np.full(joints, grid.gap)])
+    return make_beams(
+        grid.flat,
+        np.vstack([ends, grid.crossing_nodes]),
+        axial=stiffness[:, 0],
+        torsion=stiffness[:, 1],
+        bending_y=stiffness[:, 2],
+        bending_z=stiffness[:, 3],
+        rest_length=rest,
+        kind=kind,
+        kinds=KINDS,
+    )
+
+
+def lattice_grid(lattice: Indices, *, spacing: float, gap: float, elements: int) -> Grid:
+    """The grid with crossings at the places `lattice` (c, 2), `elements` elements a segment.
+
+    Neighbouring places of one row are joined; a place without neighbour in both directions is left out.
+    """
+    places = {(int(i), int(j)) for i, j in lattice}
+    while alone := {p for p in places if not (_joined(places, p, 0) and _joined(places, p, 1))}:
+        places -= alone
+    ordered = sorted(places)
+    number = {place: k for k, place in enumerate(ordered)}
+    flat: list[tuple[float, float, float]] = []
+    crossing_nodes = np.full((len(ordered), 2), -1)
+    rods = []
+    for layer, direction in enumerate("uv"):
+        for run in _runs(ordered, layer):
+            share = run[0][1 - layer]
+            along = run[0][layer] + np.arange((len(run) - 1) * elements + 1) / elements
+            nodes = len(flat) + np.arange(len(along))
+            at = np.arange(len(run)) * elements
+            crossings = np.array([number[place] for place in run])
+            crossing_nodes[crossings, layer] = nodes[at]
+            level = (layer - 0.5) * gap
+            flat += [(s * spacing, share * spacing, level) if layer == 0 else (share * spacing, s * spacing, level) for s in along]
+            rods.append(GridRod(direction, share, nodes, (along - along[0]) * spacing, crossings, at))
+    return Grid(np.array(flat), tuple(rods), np.array(ordered), crossing_nodes, spacing, gap)
+
+
+def _joined(places: set[tuple[int, int]], place: tuple[int, int], axis: int) -> bool:
+    i, j = place
+    return ((i + 1, j) in places or (i - 1, j) in places) if axis == 0 else ((i, j + 1) in places or (i, j - 1) in places)
+
+
+def _runs(places: list[tuple[int, int]], axis: int) -> list[list[tuple[int, int]]]:
+    """The places grouped into runs of neighbours along the axis."""
+    runs: list[list[tuple[int, int]]] = []
+    for place in sorted(places, key=lambda p: (p[1 - axis], p[axis])):
+        last = runs[-1][-1] if runs else None
+        if last is not None and last[1 - axis] == place[1 - axis] and last[axis] + 1 == place[axis]:
+            runs[-1].append(place)
+        else:
+            runs.append([place])
+    return runs

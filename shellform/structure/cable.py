@@ -1,0 +1,103 @@
+"""Tension-only cables (section 3 of the paper: no bending, torsion or compression stiffness).
+
+With length l, rest length l0 and axial stiffness EA, the tension is
+
+    N = EA max(l / l0 - 1, 0)
+
+and pulls the two ends together along e = (x_b - x_a) / l. Its energy is N (l - l0) / 2. A cable at l <= l0 is slack: no
+force, no stiffness. The derivatives by l0 are those of the appendix (A.23 to A.26, with seven entries where it prints six).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shellform.arrays import Indices, Reals, indices, reals
+from shellform.errors import InputError
+from shellform.structure.parts import Evaluation
+from shellform.structure.state import State
+
+_LOWER = np.tril_indices(6)
+
+
+@dataclass(frozen=True)
+class Cables:
+    """`ends` (c, 2) node numbers, `rest_length` (c,) m, `stiffness` EA (c,) N."""
+
+    ends: Indices
+    rest_length: Reals
+    stiffness: Reals
+
+    def __post_init__(self) -> None:
+        count = len(self.ends)
+        put = object.__setattr__
+        put(self, "ends", indices("cables.ends", self.ends, (count, 2), below=np.iinfo(np.int64).max))
+        put(self, "rest_length", reals("cables.rest_length", self.rest_length, (count,), positive=True))
+        put(self, "stiffness", reals("cables.stiffness", self.stiffness, (count,), positive=True))
+        looped = self.ends[:, 0] == self.ends[:, 1]
+        if looped.any():
+            cable = int(np.argmax(looped))
+            raise InputError("the cable joins a node to itself", where=f"cables[{cable}]", value=int(self.ends[cable, 0]))
+
+    def freedoms(self) -> Indices:
+        """Translations (c, 6) of the two ends."""
+        return (6 * self.ends[:, :, None] + np.arange(3)).reshape(-1, 6)
+
+    def lengths(self, state: State) -> Reals:
+        """Lengths (c,), m, at the state (14)."""
+        return np.linalg.norm(self._chord(state), axis=1)
+
+    def tension(self, state: State) -> Reals:
+        """Tension (c,), N; exactly zero in slack cables."""
+        return self.stiffness * np.maximum(self.lengths(state) - self.rest_length, 0.0) / self.rest_length
+
+    def tension_by_rest_length(self, state: State) -> Reals:
+        """Partial derivative (c,), N/m, of the tension by the own rest length at fixed geometry: -EA l / l0² if taut."""
+        length = self.lengths(state)
+        return np.where(length > self.rest_length, -self.stiffness * length / self.rest_length**2, 0.0)
+
+    def tension_by_position(self, state: State) -> Reals:
+        """Derivative (c, 6), N/m, of the tension by the coordinates of the two ends: EA/l0 (-e, e) if taut."""
+        chord = self._chord(state)
+        length = np.linalg.norm(chord, axis=1)
+        slope = np.where(length > self.rest_length, self.stiffness / self.rest_length, 0.0)
+        toward = (slope / length)[:, None] * chord
+        return np.hstack([-toward, toward])
+
+    def force_by_rest_length(self, state: State) -> Reals:
+        """Derivative (c, 6), N/m, of the end forces by the own rest length at fixed geometry (A.23)."""
+        chord = self._chord(state)
+        along = self.tension_by_rest_length(state)[:, None] * chord / np.linalg.norm(chord, axis=1)[:, None]
+        return np.hstack([-along, along])
+
+    def evaluate(self, state: State, *, tangent: bool) -> Evaluation:
+        """Energy (c,) J, forces (c, 6) N on the ends, packed lower tangents (c, 21) N/m."""
+        chord = self._chord(state)
+        length = np.linalg.norm(chord, axis=1)
+        stretch = np.maximum(length - self.rest_length, 0.0)
+        pull = self.stiffness * stretch / self.rest_length
+        unit = chord / length[:, None]
+        along = pull[:, None] * unit
+        force = np.hstack([-along, along])
+        if not tangent:
+            return Evaluation(0.5 * pull * stretch, force, None)
+        taut = np.where(stretch > 0.0, self.stiffness / self.rest_length, 0.0)
+        lateral = pull / length
+        outer = unit[:, :, None] * unit[:, None, :]
+        block = (taut - lateral)[:, None, None] * outer + lateral[:, None, None] * np.eye(3)
+        full = np.block([[block, -block], [-block, block]])
+        return Evaluation(0.5 * pull * stretch, force, full[:, _LOWER[0], _LOWER[1]])
+
+    def _chord(self, state: State) -> Reals:
+        return state.positions[self.ends[:, 1]] - state.positions[self.ends[:, 0]]
+
+
+def make_cables(ends: ArrayLike, *, rest_length: ArrayLike, stiffness: ArrayLike) -> Cables:
+    """Cables between node pairs (c, 2); scalars hold for all cables."""
+    pairs = np.asarray(ends, dtype=np.int64).reshape(-1, 2)
+    count = len(pairs)
+    rest = np.broadcast_to(np.asarray(rest_length, dtype=float), (count,))
+    return Cables(pairs, rest, np.broadcast_to(np.asarray(stiffness, dtype=float), (count,)))

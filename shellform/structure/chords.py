@@ -1,0 +1,67 @@
+"""A second-order update that turns chords instead of stretching them.
+
+A step of Newton's kind moves nodes along straight lines; a beam of length l whose chord turns by t grows by l t²/2, and
+slender rods answer with an axial force of EA t²/2 that dwarfs everything else: steps would have to be tiny. After each
+step the new chord ought to be
+
+    d_new = (l + s) (cos t e + sin t n),
+
+with e the old direction, s the axial part of the step and t n its lateral part over l. The correction c of the node positions
+that comes nearest to all new chords, in the sense of least squares weighted by EA / l0, solves L c = B' w (d_new - d - Dd)
+with the weighted graph Laplacian L of the beams, the same in every step and for each axis but for the supports, so that it
+is factorised once. It is of second order in the step, so that nothing changes in the limit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Indices, Reals
+from shellform.structure.beam import Beams
+from shellform.structure.sparse import Factor, Symmetric
+from shellform.structure.state import State
+
+_ANCHOR = 1e-9  # of the largest weight, holds what no support holds
+
+
+class ChordKeeper:
+    """The correction for the beams among the parts of a model, for its free freedoms `free`."""
+
+    def __init__(self, count: int, beams: list[Beams], free: Indices) -> None:
+        self.ends = np.vstack([part.ends for part in beams]) if beams else np.zeros((0, 2), dtype=np.int64)
+        if not len(self.ends):
+            return
+        weight = np.concatenate([part.axial / part.rest_length for part in beams])
+        rows = np.arange(len(self.ends))
+        incidence = sp.coo_array(
+            (np.repeat([-1.0, 1.0], len(rows)), (np.tile(rows, 2), self.ends.T.ravel())), shape=(len(rows), count)
+        ).tocsr()
+        self.weighted = sp.csr_array(incidence.T.tocsr() * weight)
+        laplacian = sp.csc_array(self.weighted @ incidence)
+        self.axes: list[tuple[Indices, Factor]] = []
+        for axis in range(3):
+            nodes = free[free % 6 == axis] // 6
+            block = sp.csc_array(sp.tril(laplacian[nodes][:, nodes] + _ANCHOR * weight.max() * sp.eye_array(len(nodes))))
+            block.sort_indices()
+            family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64))
+            self.axes.append((nodes, family.factor(block.data)))
+
+    def corrected(self, state: State, step: Reals) -> Reals:
+        """The step (n, 6) with its translations corrected."""
+        if not len(self.ends):
+            return step
+        a, b = self.ends.T
+        chord = state.positions[b] - state.positions[a]
+        length = np.linalg.norm(chord, axis=1, keepdims=True)
+        along = chord / length
+        change = step[b, :3] - step[a, :3]
+        axial = np.sum(along * change, axis=1, keepdims=True)
+        lateral = (change - axial * along) / length
+        turn = np.linalg.norm(lateral, axis=1, keepdims=True)
+        turned = (length + axial) * (np.cos(turn) * along + np.sinc(turn / np.pi) * lateral)
+        right = self.weighted @ (turned - chord - change)
+        result = step.copy()
+        for axis, (nodes, factor) in enumerate(self.axes):
+            result[nodes, axis] += factor.solve(right[nodes, axis])
+        return result

@@ -1,0 +1,149 @@
+"""Symmetric sparse factorisation with the symbolic analysis done once.
+
+CHOLMOD's supernodal Cholesky, from the `cvxopt` wheel, is the fastest that pip installs (findings.md); SciPy's SuperLU in
+symmetric mode without pivoting takes its place where cvxopt has no wheel, about six times slower. A Cholesky
+factorisation that fails is information (the state is no stable equilibrium), so it is an exception of its own.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from shellform.arrays import Indices, Reals
+
+try:
+    from cvxopt import cholmod, matrix, spmatrix
+except ImportError:  # no wheel for this platform: SuperLU serves
+    cholmod = None
+
+BACKEND = "SuperLU (SciPy)" if cholmod is None else "CHOLMOD (cvxopt)"
+
+
+class NotPositiveDefinite(ArithmeticError):
+    """The matrix has an eigenvalue that is not positive."""
+
+
+class Factor(Protocol):
+    """A factorised matrix."""
+
+    def solve(self, right: Reals) -> Reals:
+        """The solution for right-hand sides (n,) or (n, k)."""
+
+
+class Symmetric:
+    """A family of symmetric matrices with one pattern: lower triangle in CSC form, `indptr` (n + 1,), `indices` (nnz,)."""
+
+    def __init__(self, indptr: Indices, indices: Indices) -> None:
+        self.size = len(indptr) - 1
+        self.indptr, self.indices = indptr, indices
+        self.columns = np.repeat(np.arange(self.size), np.diff(indptr))
+        self.diagonal = indptr[:-1]  # the first stored entry of each column of a lower triangle
+        self._symbolic: Any = None
+        self._matrix: Any = None
+        self._generation = 0
+
+    def factor(self, values: Reals) -> Factor:
+        """Cholesky factor of the matrix with lower `values` (nnz,). It serves until the next call of `factor`.
+
+        Raises NotPositiveDefinite.
+        """
+        if not np.isfinite(values).all():
+            raise NotPositiveDefinite("the matrix has entries that are not finite")
+        if cholmod is None:
+            return _SuperLU(self._full(values))
+        if self._symbolic is None:
+            self._matrix = spmatrix(
+                matrix(values), matrix(self.indices.astype(np.int64)), matrix(self.columns), (self.size, self.size)
+            )
+            cholmod.options["supernodal"] = 2
+            self._symbolic = cholmod.symbolic(self._matrix)
+        self._matrix.V = matrix(values)
+        self._generation += 1
+        try:
+            cholmod.numeric(self._matrix, self._symbolic)
+        except ArithmeticError as error:
+            raise NotPositiveDefinite("the matrix is not positive definite") from error
+        return _Cholmod(self, self._symbolic, self._generation)
+
+    def negative_eigenvalues(self, values: Reals) -> int:
+        """How many eigenvalues are negative (Sylvester's law on an LDLᵀ factorisation)."""
+        if cholmod is None:
+            return _SuperLU(self._full(values), definite=False).negative
+        _, pivots = self._indefinite(values)
+        return int((pivots < 0.0).sum())
+
+    def newton(self, values: Reals, right: Reals) -> tuple[Reals, bool]:
+        """The solution for `right` (n,) with a matrix that needn't be definite, and whether `right` leaves its negative part
+        untouched: whether below 1e-9 of y'|D|y, L D L' = A and L D y = right, comes from negative pivots."""
+        if cholmod is None:
+            factor = _SuperLU(self._full(values), definite=False)
+            solution = factor.solve(right)
+            return solution, factor.negative == 0
+        symbolic, pivots = self._indefinite(values)
+        lower = matrix(right)
+        cholmod.solve(symbolic, lower, sys=7)
+        cholmod.solve(symbolic, lower, sys=4)
+        share = np.array(lower)[:, 0] ** 2 / np.abs(pivots)
+        untouched = float(share[pivots < 0.0].sum()) <= 1e-9 * float(share.sum())
+        solution = matrix(right)
+        cholmod.solve(symbolic, solution)
+        return np.array(solution)[:, 0], untouched
+
+    def _indefinite(self, values: Reals) -> tuple[Any, Reals]:
+        """CHOLMOD's simplicial LDLᵀ and the pivots D (n,)."""
+        cholmod.options["supernodal"] = 0
+        try:
+            lower = spmatrix(
+                matrix(values), matrix(self.indices.astype(np.int64)), matrix(self.columns), (self.size, self.size)
+            )
+            symbolic = cholmod.symbolic(lower)
+            cholmod.numeric(lower, symbolic)
+            inverse = matrix(1.0, (self.size, 1))
+            cholmod.solve(symbolic, inverse, sys=6)
+        finally:
+            cholmod.options["supernodal"] = 2
+        return symbolic, 1.0 / np.array(inverse)[:, 0]
+
+    def product(self, values: Reals, vector: Reals) -> Reals:
+        """Matrix times `vector` (n,)."""
+        lower = sp.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
+        result: Reals = lower @ vector + lower.T @ vector - values[self.diagonal] * vector
+        return result
+
+    def _full(self, values: Reals) -> sp.csc_array:
+        lower = sp.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
+        return sp.csc_array(lower + sp.tril(lower, -1).T)
+
+
+class _Cholmod:
+    def __init__(self, family: Symmetric, factor: Any, generation: int) -> None:
+        self._family, self._factor, self._generation = family, factor, generation
+
+    def solve(self, right: Reals) -> Reals:
+        if self._generation != self._family._generation:
+            raise RuntimeError("this factor was replaced by a later factorisation of the same family")
+        vector = right.ndim == 1
+        solution = matrix(np.ascontiguousarray(right[:, None] if vector else right))
+        cholmod.solve(self._factor, solution)
+        result = np.array(solution)
+        return result[:, 0] if vector else result
+
+
+class _SuperLU:
+    def __init__(self, full: sp.csc_array, *, definite: bool = True) -> None:
+        options = {"SymmetricMode": True}
+        try:
+            self._lu = splu(full, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        except RuntimeError as error:  # "Factor is exactly singular"
+            raise NotPositiveDefinite(str(error)) from error
+        pivots = self._lu.U.diagonal()
+        self.negative = int((pivots < 0.0).sum())
+        if definite and not (pivots > 0.0).all():
+            raise NotPositiveDefinite("the matrix is not positive definite")
+
+    def solve(self, right: Reals) -> Reals:
+        return np.asarray(self._lu.solve(right))

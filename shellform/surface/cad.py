@@ -1,0 +1,257 @@
+"""Surfaces built or imported in gmsh; the door to gmsh.
+
+A builder script is a Python file with one function `build(gmsh, *, name=default, ...)`, whose keyword arguments are the shell's
+named dimensions, m, and which makes the geometry in the current model. Where it has a second function
+`form(points, triangles, edge, *, ...)` with the same dimensions, the mesh of what was built is a plan, and `form` returns where
+its `points` (v, 3) go; `edge` (v,) tells which lie on its boundary. So a form-found shell is meshed before it is found.
+
+CAD files (STEP, IGES, BREP) come through gmsh's OpenCASCADE, which converts their unit to metres; a BREP file has none.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import importlib.util
+import inspect
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.errors import InputError
+from shellform.surface.target import Surface, make_surface
+from shellform.surface.units import turned_up, unit_factor
+
+try:
+    import gmsh
+except OSError as error:  # a shared library that gmsh's wheel needs isn't there
+    raise InputError(
+        f"gmsh can't be loaded: {error}",
+        remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
+    ) from error
+
+FORMATS = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
+_DEFAULT_TRIANGLES = 60.0  # along the longer plan extent
+_MOST_TRIANGLES = 2_000_000
+
+
+def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Surface:
+    """The surface that a builder script makes with the named `dimensions`, m, meshed at about `size`, m.
+
+    Raises InputError for a script that can't be read or fails, and for dimensions it doesn't have.
+    """
+    path = Path(script)
+    module = _load(path)
+    build = _function(module, "build", path)
+    named = _dimensions(build, dimensions, path)
+    form = getattr(module, "form", None)
+    with _session(), _gmsh_errors(path):
+        build(gmsh, **named)
+        gmsh.model.occ.synchronize()
+        points, triangles, normals = _mesh(size, path)
+        if form is not None:
+            edge = _on_edge(triangles, len(points))
+            return make_surface(form(points, triangles, edge, **named), triangles, source=str(path))
+    return make_surface(points, triangles, normals=normals, source=str(path))
+
+
+def dimensions_of(script: str | Path) -> dict[str, float]:
+    """The named dimensions, m, of a builder script and their defaults."""
+    path = Path(script)
+    return _dimensions(_function(_load(path), "build", path), {}, path)
+
+
+def import_surface(path: str | Path, *, unit: str | None = None, size: float | None = None, up: str = "z") -> Surface:
+    """The surface of a STEP, IGES or BREP file, meshed at about `size`, m (a sixtieth of its plan if left out).
+
+    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis, "z" or "y".
+    Raises InputError for unreadable files and solids.
+    """
+    file = Path(path)
+    if not file.is_file():
+        raise InputError("there is no such file", where=str(file))
+    has_unit = file.suffix.lower() not in (".brep", ".brp")
+    if has_unit and unit is not None:
+        raise InputError(
+            f"{file.suffix} files carry their own unit", where="surface.unit", value=unit, remedy="Leave the unit out."
+        )
+    factor = 1.0 if has_unit else unit_factor(unit or "m")
+    with _session(), _gmsh_errors(file):
+        gmsh.option.setString("Geometry.OCCTargetUnit", "M" if has_unit else "")
+        gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
+        gmsh.model.occ.importShapes(str(file), highestDimOnly=True)
+        if factor != 1.0:
+            gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
+        gmsh.model.occ.synchronize()
+        if gmsh.model.getEntities(3):
+            raise InputError("holds a solid", where=str(file), remedy="Export the upper face alone, as a surface.")
+        if not gmsh.model.getEntities(2):
+            raise InputError("holds no surface, only points or curves", where=str(file), remedy="Export the surface.")
+        low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+        extent = float((high - low).max())
+        points, triangles, normals = _mesh(extent / _DEFAULT_TRIANGLES if size is None else size, file)
+    return make_surface(
+        turned_up(points, up), triangles, normals=None if normals is None else turned_up(normals, up), source=str(file)
+    )
+
+
+def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None:
+    """Writes a builder script's geometry as STEP, IGES or BREP, whichever the path's ending says."""
+    source = Path(script)
+    module = _load(source)
+    build = _function(module, "build", source)
+    named = _dimensions(build, dimensions, source)
+    with _session(), _gmsh_errors(source):
+        build(gmsh, **named)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+
+
+@contextlib.contextmanager
+def _session() -> Iterator[None]:
+    """Gmsh's one global session, quiet, without its signal handlers, and repeatable."""
+    if gmsh.isInitialized():
+        raise InputError("gmsh is already in use in this process", remedy="Call gmsh.finalize() first.")
+    gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
+    try:
+        for name, value in [
+            ("General.Terminal", 0),
+            ("General.NumThreads", 1),
+            ("Mesh.RandomSeed", 1),
+            ("Mesh.Algorithm", 6),
+            ("Mesh.MeshSizeExtendFromBoundary", 0),
+            ("Mesh.MeshSizeFromPoints", 0),
+        ]:
+            gmsh.option.setNumber(name, value)
+        gmsh.model.add("surface")
+        yield
+    finally:
+        gmsh.finalize()
+
+
+@contextlib.contextmanager
+def _gmsh_errors(path: Path) -> Iterator[None]:
+    """Gmsh reports errors as plain exceptions; the user gets its last message."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # gmsh raises Exception itself
+        said = gmsh.logger.getLastError() if gmsh.isInitialized() else ""
+        raise InputError(
+            f"gmsh can't use it: {said or error}", where=str(path), remedy="Open it in a CAD program and export it anew."
+        ) from error
+
+
+def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
+    """Points (v, 3), triangles (t, 3) and, where all faces have them, CAD normals (v, 3) of the model's faces."""
+    if not (size > 0.0 and math.isfinite(size)):
+        raise InputError("must be a positive length", where="surface.size", value=size)
+    low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+    spans = np.sort(high - low)
+    if 2.5 * spans[2] * spans[1] / size**2 > _MOST_TRIANGLES:
+        raise InputError(
+            f"would give more than {_MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × {spans[1]:.3g} m",
+            where="surface.size",
+            value=size,
+            remedy="Choose a larger mesh size, or check the surface's unit.",
+        )
+    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.model.mesh.generate(2)
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    if not len(tags):
+        raise InputError("gmsh made no mesh of it", where=str(where), remedy="Check the surface.")
+    number = np.full(int(tags.max()) + 1, -1)
+    number[tags] = np.arange(len(tags))
+    points = coordinates.reshape(-1, 3)
+    triangles, normals = [], np.zeros_like(points)
+    for _, face in gmsh.model.getEntities(2):
+        _, nodes = gmsh.model.mesh.getElementsByType(2, face)
+        mine = number[nodes.reshape(-1, 3)]
+        triangles.append(mine)
+        _add_normals(normals, points, mine, face, number)
+    if not triangles or not sum(len(each) for each in triangles):
+        raise InputError("gmsh made no triangles of it", where=str(where), remedy="Check the surface.")
+    faces = np.vstack(triangles)
+    length = np.linalg.norm(normals, axis=1)
+    used = np.zeros(len(points), dtype=bool)
+    used[faces.ravel()] = True
+    known = bool((length[used] > 0.5).all())
+    points, faces = points[used], (np.cumsum(used) - 1)[faces]
+    return points, faces, normals[used] if known else None
+
+
+def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, number: Indices) -> None:
+    """Adds the CAD normals at the face's nodes, turned to the side of its triangles; at a pole there may be none."""
+    tags, _, parameters = gmsh.model.mesh.getNodes(2, face, includeBoundary=True, returnParametricCoord=True)
+    if not len(triangles) or len(parameters) != 2 * len(tags):
+        return
+    exact = np.reshape(gmsh.model.getNormal(face, parameters), (-1, 3))
+    corner = points[triangles]
+    rough = np.zeros_like(points)
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    for k in range(3):
+        np.add.at(rough, triangles[:, k], across)
+    rows = number[tags]
+    seen = rough[rows]
+    seen /= np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-300)
+    agreement = np.sum(exact * seen, axis=1)
+    # A seam's node has two parameter values and a pole many: what disagrees with the triangles is left to the estimate.
+    good = np.isfinite(exact).all(axis=1) & (np.abs(agreement) > 0.8)
+    signed = np.where(good[:, None], exact * np.sign(agreement)[:, None], seen)
+    rest, first = np.unique(rows, return_index=True)
+    normals[rest] += signed[first]
+
+
+def _on_edge(triangles: Indices, count: int) -> Flags:
+    edges = np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
+    pairs, uses = np.unique(edges, axis=0, return_counts=True)
+    result = np.zeros(count, dtype=bool)
+    result[pairs[uses == 1].ravel()] = True
+    return result
+
+
+def _load(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise InputError("there is no such file", where=str(path))
+    spec = importlib.util.spec_from_file_location(f"surface_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError("isn't a Python script", where=str(path), remedy="Builder scripts end in .py.")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever somebody's script raises
+        raise InputError(f"the script fails: {type(error).__name__}: {error}", where=str(path)) from error
+    return module
+
+
+def _function(module: ModuleType, name: str, path: Path) -> Callable[..., Any]:
+    found = getattr(module, name, None)
+    if not callable(found):
+        raise InputError(f"has no function {name}(gmsh, *, ...)", where=str(path), remedy="See surfaces/dome.py.")
+    return found  # type: ignore[no-any-return]
+
+
+def _dimensions(build: Callable[..., Any], given: dict[str, float], path: Path) -> dict[str, float]:
+    parameters = inspect.signature(build).parameters.values()
+    known = {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
+    for name, value in given.items():
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"Did you mean {near[0]!r}? " if near else ""
+            raise InputError(
+                f"{path.name} has no dimension {name!r}",
+                where="surface.dimensions",
+                remedy=f"{hint}Known: {', '.join(known)}.",
+            )
+        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0.0):
+            raise InputError("must be a positive number", where=f"surface.dimensions.{name}", value=value)
+    return {**known, **{name: float(value) for name, value in given.items()}}
+
+
