@@ -23,13 +23,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.design.gridshell import Design
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, taut, without_slack
 from shellform.design.tensions import TensionModel, tension_model
 from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Term
 from shellform.errors import InputError, NotConverged
 from shellform.structure.loading import Loaded, apply_load
+from shellform.structure.stability import lowest_mode
 from shellform.structure.state import State
 
 try:
@@ -45,6 +46,9 @@ _SETTLED = 1e-3  # relative improvement predicted for the largest window that en
 _SMALLEST = 1e-3  # window, in mean tensions, at which no better design is to be found
 _MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
 _PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
+_THINNING = 1.25  # of the objective that cables with little use may cost
+_REPAIRS = 2  # steps after each batch
+_BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
 FEASIBLE = 1e-3
 
 
@@ -91,13 +95,22 @@ Watch = Callable[[Step], None]
 
 
 def optimize(
-    problem: Problem, start: Design, *, evaluations: int = 80, window: float = WINDOW, progress: Watch | None = None
+    problem: Problem,
+    start: Design,
+    *,
+    evaluations: int = 100,
+    window: float = WINDOW,
+    thin: bool = True,
+    progress: Watch | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
+    `window`: half-width of the first step, in mean cable tensions; `thin`: whether cables that do little are taken away at the end;
+    `progress(step)` is called at each trial.
+
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
-    return _Search(problem, start, window, progress).run(evaluations)
+    return _Search(problem, start, window, progress).run(evaluations, thin=thin)
 
 
 class _Search:
@@ -117,12 +130,24 @@ class _Search:
         self.point = self.evaluator.seed(start, self._staged(start, states[self.base], self.stage), self.stage)
         self.tension = float(np.mean(self._tensions(self.point)))
         self.window = window * self.tension
+        self.braces = np.zeros(int(start.present.sum()), dtype=bool)
         self.objective_start = self.point.objective
         self.accepted = [self.point]
         self.history = [self._record(self.point, True)]
         self.status = "the number of evaluations was reached"
 
-    def run(self, evaluations: int) -> Optimum:
+    def run(self, evaluations: int, *, thin: bool) -> Optimum:
+        """First the objective alone, then thinning."""
+        self._descend(evaluations)
+        while self.accepted and not self._sound(self.accepted[-1]):
+            self.accepted.pop()
+        if self.accepted:
+            self.point = self.accepted[-1]
+            if thin:
+                self._thin(evaluations)
+        return self._finish()
+
+    def _descend(self, evaluations: int) -> None:
         """Rounds of model, trial and judgement."""
         model = self._model()
         while self.evaluator.evaluations < evaluations:
@@ -130,10 +155,10 @@ class _Search:
             if self.stage == 1.0 and self._violation(self.point) <= 0.0:
                 if -predicted < _SETTLED * self.point.objective and self.window >= self.tension:
                     self.status = f"the model predicts less than {_SETTLED:.1%} improvement"
-                    break
+                    return
                 if self.window < _SMALLEST * self.tension:
-                    self.status = "no better design within the smallest window: the stable branch ends beside it"
-                    break
+                    self.status = "the objective has no better design within the smallest window"
+                    return
             trial = self._try(model, y)
             if trial is None or self._merit(trial) >= self._merit(self.point):
                 self.window *= _SHRINK
@@ -141,12 +166,87 @@ class _Search:
                 continue
             ratio = (trial.objective - self.point.objective) / min(predicted, -1e-300)
             self.window *= _GROW if ratio > _GOOD else (_SHRINK if ratio < _POOR else 1.0)
-            self.point = trial
-            self._raise()
-            self.accepted.append(self.point)
-            self.history.append(self._record(self.point, True))
+            self._accept(trial)
             model = self._model()
-        return self._finish()
+
+    def _thin(self, evaluations: int) -> None:
+        """Takes away cables that do little for stability, in batches, and lets the others make up for them.
+
+        The L1 term empties the cables with the least tension, until the shell with those left is about to buckle under the
+        additional load; but tension says little about what a cable does against buckling. What it does is its part of the stiffness
+        in the softest mode of the tangent there: cables with the least of it are taken away, the others are kept taut, their
+        tensions optimised again. A batch that the shell doesn't bear, or that costs too much of the objective, is halved.
+        """
+        budget = _THINNING * self.point.objective
+        batch = max(1, self._taut(self.point) // 10)
+        self.window = max(self.window, 0.1 * self.tension)
+        while batch >= 1 and self.evaluator.evaluations < evaluations:
+            model = self._model()
+            y = model.origin.copy()
+            order = self._least_bracing(model)
+            if len(order) <= batch:
+                return
+            y[order[:batch]] = 0.0
+            self.braces = y[: len(self.braces)] > 0.0
+            trial = self._try(model, y)
+            good = trial is not None and self._merit(trial) < 2.0 * budget and self._sound(trial)
+            if good and trial is not None:
+                trial = self._repair(trial, budget)
+                good = trial.objective < budget and self._violation(trial) <= 0.0 and self._sound(trial)
+            if good and trial is not None:
+                self._accept(trial)
+                batch = int(1.3 * batch) + 1 if batch > 2 else batch
+            else:
+                self.history.append(self._record(trial or self.point, False))
+                batch //= 2
+        self.status += ", and no further cable can be taken away" if batch < 1 else ""
+
+    def _repair(self, point: Point, budget: float) -> Point:
+        """A few steps with the cables that are left, none of which may go slack."""
+        before, self.point = self.point, point
+        for _ in range(_REPAIRS):
+            model = self._model()
+            y, _ = self._propose(model)
+            trial = self._try(model, y)
+            if trial is None or self._merit(trial) >= self._merit(self.point):
+                self.window *= _SHRINK
+            else:
+                self.window *= _GROW
+                self.point = trial
+        self.window = float(np.clip(self.window, 0.05 * self.tension, self.tension))
+        best, self.point = self.point, before
+        return best
+
+    def _least_bracing(self, model: TensionModel) -> Indices:
+        """The taut cables, numbered among those present, from the one that does least in the softest mode."""
+        name = self.evaluator.used()[-1]
+        mode = lowest_mode(model.assembly, self.point.states[name])
+        cables = self.problem.shell.cables(self.point.design)
+        place = self.point.states[name].positions[cables.ends]
+        chord = place[:, 1] - place[:, 0]
+        stretch = np.sum(chord * (mode[cables.ends[:, 1], :3] - mode[cables.ends[:, 0], :3]), axis=1)
+        resists = stretch**2 / np.sum(chord**2, axis=1) / cables.rest_length
+        pull = model.origin[: len(resists)]
+        score = resists / resists.sum() + pull / pull.sum()
+        taut = np.flatnonzero(pull > 0.0)
+        return taut[np.argsort(score[taut], kind="stable")]
+
+    def _accept(self, trial: Point) -> None:
+        self.point = trial
+        self._raise()
+        self.accepted.append(self.point)
+        self.history.append(self._record(self.point, True))
+
+    def _sound(self, point: Point | None = None) -> bool:
+        """Whether the design bears all loads on the documented path, without its slack cables."""
+        point = point or self.point
+        design = without_slack(self.problem.shell, point.design, point.states[self.base])
+        loaded = follow(self.problem.shell, design, self.problem.loads, stay=True)
+        self.evaluator.factorisations += sum(each.factorisations for each in loaded.values())
+        return all(each.on_branch for each in loaded.values())
+
+    def _taut(self, point: Point) -> int:
+        return int((self._tensions(point) > 0.0).sum())
 
     def _is_bound(self, term: Term) -> bool:
         return isinstance(term, CableForces) and term.load == self.base and term.chosen is None
@@ -170,7 +270,7 @@ class _Search:
         width = np.full(len(model.origin), self.window)
         if self.problem.frees_radius:
             width[-1] = 0.1 * model.origin[-1] * min(self.window / self.tension, 1.0)
-        lower = np.maximum(lower, model.origin - width)
+        lower = np.minimum(np.maximum(lower, model.origin - width), model.origin + width)
         upper = np.maximum(np.minimum(upper, model.origin + width), lower)
         slope = self.point.objective_by_variables @ model.variables_by_y
         curvature = sum(
@@ -231,7 +331,7 @@ class _Search:
         upper = stiffness * (model.length / shortest - 1.0)
         for part in self.bounded:
             upper = np.minimum(upper, part.limit)
-        lower = np.zeros(len(upper))
+        lower = np.where(self.braces, _BRACE * self.tension, 0.0)
         if self.problem.frees_radius:
             low, high = self.evaluator.bounds()
             scale = self.evaluator.start.radius
@@ -325,20 +425,16 @@ class _Search:
         """The last accepted design that bears all loads on the documented path."""
         shell, problem = self.problem.shell, self.problem
         none = np.zeros((len(shell.net.grid.flat), 6))
-        for back, point in enumerate(reversed(self.accepted)):
-            design = without_slack(shell, point.design, point.states[self.base])
-            loaded = follow(shell, design, {"none": none, **problem.loads})
-            if all(each.on_branch for each in loaded.values()):
-                break
-        else:
+        if not self.accepted:
             raise NotConverged(
                 "No design was found that carries all loads",
                 state=self.point.design,
                 iterations=self.evaluator.factorisations,
                 remedy="Choose a denser grid, thicker rods, stiffer cables, or more evaluations.",
             )
-        if back:
-            self.status += f"; the last {back} designs didn't bear all loads and were dropped"
+        point = self.accepted[-1]
+        design = without_slack(shell, point.design, point.states[self.base])
+        loaded = follow(shell, design, {"none": none, **problem.loads})
         final = self._judge(design, loaded)
         return Optimum(
             problem,

@@ -267,25 +267,23 @@ def _on_free(by_position: sp.csr_array, assembly: Assembly) -> Reals:
     return result
 
 
-def follow(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:
-    """The documented path of a design: unloaded from the target shape by relaxation, then the loads one after the other.
+def follow(
+    shell: Gridshell, design: Design, loads: Mapping[str, Reals], *, stay: bool = False
+) -> dict[str, Loaded]:
+    """The documented path of a design: unloaded from the target shape by relaxation, then each load case on its own from there,
+    step by step (loading.py). `shellform analyse` goes the same way.
 
-    Each load case is followed step by step from the one before it; where one snaps through, the next starts from the last
-    stable state. Raises NotConverged where not even the unloaded shell finds an equilibrium.
+    With `stay` snap-through isn't followed. Raises NotConverged where no equilibrium is found.
     """
     assembly = assemble(shell.network(design))
     none = np.zeros((len(shell.net.grid.flat), 6))
     unloaded = find_equilibrium(assembly, shell.target, none)
     result: dict[str, Loaded] = {}
-    state, before = unloaded.state, none
     for name, load in loads.items():
-        if not load.any():
+        if load.any():
+            result[name] = apply_load(assembly, unloaded.state, none, load, stay=stay)
+        else:
             result[name] = Loaded(unloaded, 1.0, unloaded.factorisations)
-            continue
-        loaded = apply_load(assembly, state, before, load)
-        result[name] = loaded
-        if loaded.on_branch:
-            state, before = loaded.equilibrium.state, load
     return result
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import numpy as np
 
@@ -11,7 +12,16 @@ from shellform.errors import InputError
 from shellform.net.compass import Finder, covering_lattice
 from shellform.net.grid import Grid, lattice_grid
 from shellform.net.net import Net, Quality, cells, crossing_points, neighbours
-from shellform.net.pull import SHEAR_STIFFNESS, SPRING_DENSITY, Progress, Pulled, pull
+from shellform.net.pull import (
+    FROM_COMPASS,
+    FROM_FLAT,
+    SHEAR_STIFFNESS,
+    Progress,
+    Pulled,
+    compass_start,
+    flat_start,
+    pull,
+)
 from shellform.net.trim import Trimmed, Uncovered, trim
 from shellform.surface.locate import Locator
 from shellform.surface.target import Surface
@@ -30,7 +40,8 @@ def pull_net(
     angle: float = 0.0,
     offset: tuple[float, float] = (0.0, 0.0),
     elements: int = ELEMENTS,
-    spring_density: Sequence[float] = SPRING_DENSITY,
+    start: Literal["compass", "flat"] = "compass",
+    spring_density: Sequence[float] | None = None,
     shear_stiffness: float = SHEAR_STIFFNESS,
     merge: float = MERGE,
     progress: Progress | None = None,
@@ -38,7 +49,8 @@ def pull_net(
     """The Chebyshev net of rods `spacing` m apart, the two layers `gap` m apart, on the surface.
 
     `angle`, rad: of the u rods against the x axis in plan, where the net's origin lies; `offset`: of the origin from the middle of
-    the plan, in spacings along u and v; `elements` of a segment; `spring_density` (EI/s³, rising) and `shear_stiffness` (EI/s a
+    the plan, in spacings along u and v; `elements` of a segment; `start`: whether the pull begins at the compass
+    net or at the flat grid; `spring_density` (EI/s³, rising) and `shear_stiffness` (EI/s a
     radian) of the pulling (net/pull.py); joints nearer to the edge than `merge` spacings are left out.
     Raises InputError for settings that can't work on this surface, NotConverged where the pull fails.
     """
@@ -46,14 +58,16 @@ def pull_net(
     finder = Locator(surface, reach=_REACH * spacing)
     origin, frame = _origin(surface, finder, spacing, angle, offset)
     for margin in _MARGINS:
-        lattice, _ = covering_lattice(finder, origin, frame[:, 0], spacing, margin=margin * spacing)
-        grid = lattice_grid(lattice, spacing=spacing, gap=gap, elements=elements)
+        places, points = covering_lattice(finder, origin, frame[:, 0], spacing, margin=margin * spacing)
+        grid = lattice_grid(places, spacing=spacing, gap=gap, elements=elements)
+        compass = start == "compass"
         pulled = pull(
             grid,
             finder,
+            compass_start(grid, finder, places, points) if compass else flat_start(grid, origin, frame),
             origin,
             frame,
-            spring_density=spring_density,
+            spring_density=spring_density or (FROM_COMPASS if compass else FROM_FLAT),
             shear_stiffness=shear_stiffness,
             progress=progress,
         )

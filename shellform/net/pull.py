@@ -16,7 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from scipy.interpolate import CubicSpline
+
+from shellform.arrays import Indices, Reals
 from shellform.errors import NotConverged
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, grid_beams
@@ -27,14 +29,15 @@ from shellform.structure.equilibrium import find_equilibrium
 from shellform.structure.spring import Distance, SlidingSprings
 from shellform.structure.state import State
 
-SPRING_DENSITY = (0.05, 0.5, 5.0)  # EI/s³; directly at 5 the grid folds (findings: 1e3 N/m at EI/s³ = 189 N/m)
-SHEAR_STIFFNESS = 0.01  # of a connector against turning in the grid's plane, EI/s a radian
-REACH=1.0
+FROM_FLAT = (0.05, 0.5, 5.0)  # EI/s³; directly at 5 a flat grid folds (findings: 1e3 N/m at EI/s³ = 189 N/m)
+FROM_COMPASS = (5.0,)  # the compass net lies on the surface already
+SHEAR_STIFFNESS = 0.1  # of a connector against turning in the grid's plane, EI/s a radian; at 0.01 nets slide for ever
+_REACH = 1.0  # spacing a step
 _SLENDERNESS = 50.0  # s/r
 _TORSION = 1.0 / 1.3  # GJ/EI of a round rod with Poisson's ratio 0.3
 _CONNECTOR = 10.0  # bending stiffness of a connector, EI/s a radian: stiff beside the rods
 _TETHER = 5.0  # of the springs that hold the net's place and direction, EI/s³
-_TOLERANCE = 1e-6  # residual of the last density; the others only lead there
+_TOLERANCE = 1e-4  # residual; a node is then within 1e-5 spacings of where it would end
 _LEADING = 1e-3
 
 Progress = Callable[[str, float], None]
@@ -51,26 +54,56 @@ class Pulled:
     factorisations: int
 
 
+def flat_start(grid: Grid, origin: Reals, frame: Reals) -> State:
+    """The flat grid in the tangent plane at `origin` (3,), its axes turned by `frame` (3, 3)."""
+    turned = rotation.from_matrices(frame[None])
+    return State(origin + grid.flat @ frame.T, np.repeat(turned, len(grid.flat), axis=0))
+
+
+def compass_start(grid: Grid, finder: Finder, places: Indices, points: Reals) -> State:
+    """The grid laid along the compass net, `points` (c, 3) at lattice `places` (c, 2): each rod a cubic spline through its
+    crossings, its nodes on their layers and turned with the surface."""
+    known = {(int(i), int(j)): point for (i, j), point in zip(places, points, strict=True)}
+    through = np.array([known[(int(i), int(j))] for i, j in grid.lattice])
+    place, tangent = np.empty((2, *grid.flat.shape))
+    across = np.empty(len(grid.flat), dtype=bool)
+    for rod in grid.rods:
+        curve = CubicSpline(rod.marks, through[rod.crossings]) if len(rod.crossings) > 2 else None
+        if curve is None:
+            ends = through[rod.crossings]
+            share = (rod.arc / rod.length)[:, None]
+            place[rod.nodes], tangent[rod.nodes] = (1.0 - share) * ends[0] + share * ends[-1], ends[-1] - ends[0]
+        else:
+            place[rod.nodes], tangent[rod.nodes] = curve(rod.arc), curve(rod.arc, 1)
+        across[rod.nodes] = rod.direction == "v"
+    foot = finder.foot(place)
+    normal = foot.normal
+    along = tangent - np.sum(tangent * normal, axis=1, keepdims=True) * normal
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    side = np.cross(normal, along)
+    axes = np.where(across[:, None, None], np.stack([-side, along, normal], axis=2), np.stack([along, side, normal], axis=2))
+    return State(foot.point + grid.layer[:, None] * normal, rotation.from_matrices(axes))
+
+
 def pull(
     grid: Grid,
     finder: Finder,
+    start: State,
     origin: Reals,
     frame: Reals,
     *,
-    spring_density: Sequence[float] = SPRING_DENSITY,
+    spring_density: Sequence[float] = FROM_COMPASS,
     shear_stiffness: float = SHEAR_STIFFNESS,
     progress: Progress | None = None,
-    limit: int = 1500,
+    limit: int = 400,
 ) -> Pulled:
-    """The state of the grid pulled from flat onto the surface of `finder`.
+    """The state of the grid pulled onto the surface of `finder` from the state `start`.
 
-    The flat grid starts in the tangent plane at `origin` (3,), its axes turned by `frame` (3, 3). Raises NotConverged.
+    `origin` (3,) and `frame` (3, 3) of u, v and normal are where the lattice's origin is to stay. Raises NotConverged.
     """
     beams = fictitious_beams(grid, shear_stiffness)
-    turned = rotation.from_matrices(np.broadcast_to(frame, (1, 3, 3)))
-    state = State(origin + grid.flat @ frame.T, np.repeat(turned, len(grid.flat), axis=0))
+    state = start
     none = np.zeros((len(grid.flat), 6))
-    unit = grid.spacing**2 / grid.spacing**3
     spent = 0
     loose = np.zeros((len(grid.flat), 6), dtype=bool)
     tethers = _tethers(grid, origin, frame)
@@ -86,7 +119,7 @@ def pull(
                 none,
                 tolerance=_TOLERANCE if last else _LEADING,
                 limit=limit,
-                reach=REACH*grid.spacing,
+                reach=_REACH * grid.spacing,
                 progress=None if progress is None else lambda _, residual, q=density: progress(f"springs {q:g}", residual),
             )
         except NotConverged as error:
@@ -99,7 +132,7 @@ def pull(
             ) from error
         state, spent = found.state, spent + found.factorisations
     assert springs is not None
-    return Pulled(state, _curvature(grid, beams, state), np.abs(springs.stretch(state)) * density * unit / 1.0, spent)
+    return Pulled(state, _curvature(grid, beams, state), density / grid.spacing * np.abs(springs.stretch(state)), spent)
 
 
 def fictitious_beams(grid: Grid, shear_stiffness: float) -> Beams:

@@ -8,6 +8,7 @@ rotations.
 from __future__ import annotations
 
 import copy
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,7 +38,8 @@ class Balance:
 
 
 class Assembly:
-    """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in order."""
+    """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in order;
+    `clock` adds up the seconds spent on assembly, factorisation and solve."""
 
     def __init__(self, count: int, parts: Sequence[Part], fixed: Flags) -> None:
         self.count = count
@@ -50,6 +52,7 @@ class Assembly:
         self.free: Indices = np.flatnonzero(active)
         number = np.full(6 * count, -1, dtype=np.int64)
         number[self.free] = np.arange(len(self.free))
+        self.clock: dict[str, float] = {"assembly": 0.0, "factorisation": 0.0, "solve": 0.0}
         self._freedoms = freedoms
         self._translational = [(each[0] % 6 < 3) if len(each) else np.zeros(0, dtype=bool) for each in freedoms]
         self.matrix, self._slots = _pattern(number, freedoms)
@@ -72,6 +75,7 @@ class Assembly:
 
     def evaluate(self, state: State, *, tangent: bool = True) -> Balance:
         """Energy, internal forces and, if asked for, the tangent at the state."""
+        began = time.perf_counter()
         energy, largest = 0.0, 0.0
         force = np.zeros(6 * self.count)
         values = np.zeros(len(self.matrix.indices) + 1)  # the last collects what belongs to held freedoms
@@ -86,6 +90,7 @@ class Assembly:
             _scatter(freedoms, result.force, force)
             if result.tangent is not None:
                 _scatter(slots, result.tangent, values)
+        self.clock["assembly"] += time.perf_counter() - began
         return Balance(energy, force.reshape(-1, 6), values[:-1] if tangent else None, largest)
 
     def factor(self, state: State) -> Factor:

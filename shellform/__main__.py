@@ -1,0 +1,5 @@
+"""`python -m shellform`."""
+
+from shellform.cli import main
+
+main()

@@ -1,0 +1,98 @@
+"""Saving a net: net.json for others (contracts/run-folder.md), net.npz for shellform itself."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shellform.errors import InputError
+from shellform.net.grid import Grid, GridRod
+from shellform.net.net import Net, Quality
+from shellform.structure.state import State
+
+
+def net_document(net: Net) -> dict[str, Any]:
+    """The content of net.json."""
+    grid, place = net.grid, net.target.positions
+    flat = grid.flat[grid.crossing_nodes].mean(axis=1)
+    return {
+        "spacing": net.spacing,
+        "crossings": [
+            {"lattice": lattice, "flat": flat_place, "target": target}
+            for lattice, flat_place, target in zip(
+                grid.lattice.tolist(), flat[:, :2].tolist(), net.crossings.tolist(), strict=True
+            )
+        ],
+        "rods": [
+            {
+                "direction": rod.direction,
+                "index": rod.index,
+                "length": rod.length,
+                "marks": rod.marks.tolist(),
+                "crossings": rod.crossings.tolist(),
+                "ends": place[rod.nodes[[0, -1]]].tolist(),
+            }
+            for rod in grid.rods
+        ],
+        "supports": place[net.supports].tolist(),
+    }
+
+
+def save_net(path: Path, net: Net) -> None:
+    """Writes the net so that `load_net` gives the same."""
+    grid = net.grid
+    arrays: dict[str, Any] = {
+        "flat": grid.flat,
+        "lattice": grid.lattice,
+        "crossing_nodes": grid.crossing_nodes,
+        "positions": net.target.positions,
+        "quaternions": net.target.quaternions,
+        "supports": net.supports,
+        "curvature": net.curvature,
+        "directions": np.array([rod.direction for rod in grid.rods]),
+        "meta": np.array(
+            json.dumps(
+                {
+                    "spacing": grid.spacing,
+                    "gap": grid.gap,
+                    "quality": asdict(net.quality),
+                    "notes": net.notes,
+                    "indices": [rod.index for rod in grid.rods],
+                }
+            )
+        ),
+    }
+    for name in ("nodes", "arc", "crossings", "at"):
+        pieces = [getattr(rod, name) for rod in grid.rods]
+        arrays[f"rod_{name}"] = np.concatenate(pieces)
+        arrays[f"rod_{name}_ends"] = np.cumsum([len(piece) for piece in pieces])
+    partial = path.with_name(f"{path.name}.part.npz")
+    np.savez_compressed(partial, **arrays)
+    os.replace(partial, path)
+
+
+def load_net(path: Path) -> Net:
+    """The net written by `save_net`. Raises InputError where the file is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            meta = json.loads(str(data["meta"]))
+            pieces = {
+                name: np.split(data[f"rod_{name}"], data[f"rod_{name}_ends"][:-1])
+                for name in ("nodes", "arc", "crossings", "at")
+            }
+            rods = tuple(
+                GridRod(str(direction), index, *(pieces[name][k] for name in ("nodes", "arc", "crossings", "at")))
+                for k, (direction, index) in enumerate(zip(data["directions"], meta["indices"], strict=True))
+            )
+            grid = Grid(data["flat"], rods, data["lattice"], data["crossing_nodes"], meta["spacing"], meta["gap"])
+            target = State(data["positions"], data["quaternions"])
+            return Net(
+                grid, target, data["supports"], data["curvature"], Quality(**meta["quality"]), tuple(meta["notes"])
+            )
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise InputError(f"is damaged: {error}", where=str(path), remedy="Run again with --fresh.") from error

@@ -1,0 +1,211 @@
+"""The case file: TOML, checked entry by entry, every default filled in."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import tomli_w
+from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError, model_validator
+
+import shellform
+from shellform.errors import InputError
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SurfaceEntry(_Section):
+    """What is to be built."""
+
+    file: str = Field(description="surface file, or a builder script, relative to the case file")
+    unit: Literal["m", "cm", "mm", "in", "ft"] | None = Field(None, description="unit of files that carry none")
+    up: Literal["y", "z"] = Field("z", description="vertical axis of the file")
+    size: PositiveFloat | None = Field(None, description="mesh size, m")
+    dimensions: dict[str, PositiveFloat] = Field({}, description="named dimensions of a builder script, m")
+
+
+class NetEntry(_Section):
+    """The Chebyshev net."""
+
+    spacing: PositiveFloat = Field(description="between rods, m")
+    angle: float = Field(0.0, description="of the u rods against the x axis in plan, degrees")
+    offset: tuple[float, float] = Field((0.0, 0.0), description="of the net's origin from the middle, in spacings")
+    elements: PositiveInt = Field(4, description="beam elements a segment")
+    start: Literal["compass", "flat"] = Field("compass", description="from where the grid is pulled")
+    spring_density: list[PositiveFloat] | None = Field(None, description="fictitious springs, rising, EI/s³")
+    shear_stiffness: PositiveFloat = Field(0.1, description="fictitious, of a joint in the grid's plane, EI/s a radian")
+    merge: float = Field(0.2, gt=0.0, lt=0.5, description="joints nearer to the edge, in spacings, are left out")
+
+
+class RodEntry(_Section):
+    """Round rods."""
+
+    young: PositiveFloat = Field(description="Young's modulus, Pa")
+    poisson: float = Field(0.3, ge=0.0, lt=0.5, description="Poisson's ratio, for the shear modulus")
+    strength: PositiveFloat = Field(description="flexural strength, Pa")
+    radius: PositiveFloat | None = Field(None, description="m; left out: the largest that the net allows")
+
+
+class JointEntry(_Section):
+    """The connection of two crossing rods, a short beam."""
+
+    axial: PositiveFloat = Field(description="EA, N")
+    torsion: PositiveFloat = Field(description="GJ, N·m²")
+    bending: PositiveFloat = Field(description="EI, N·m²")
+    gap: PositiveFloat = Field(description="between the rods' axes, m")
+
+
+class CableEntry(_Section):
+    """Bracing cables."""
+
+    stiffness: PositiveFloat = Field(description="EA, N")
+    rest_ratio: float = Field(0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target")
+    force_max: PositiveFloat = Field(description="largest allowed tension, N (constraint 5)")
+
+
+class LoadEntry(_Section):
+    """Wet concrete as point loads."""
+
+    force: PositiveFloat = Field(description="on each loaded crossing, N")
+    every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
+    additional: float = Field(1.2, ge=1.0, description="factor of the additional load case")
+    openings: list[list[tuple[float, float]]] = Field([], description="plan polygons without load, m")
+
+
+class OptimiseEntry(_Section):
+    """Objective (2), bounds (3, 4) and constraint (6)."""
+
+    misfit: float = Field(0.7, ge=0.0, le=1.0, description="share of the misfit in the start value of the objective")
+    cable_force: float = Field(0.3, ge=0.0, le=1.0, description="share of the sum of cable forces")
+    rod_radius: float = Field(0.0, ge=0.0, le=1.0, description="share of the rod radius; above 0 it is a variable")
+    rest_length_min: PositiveFloat = Field(0.01, description="bound (3), m")
+    rest_length_max: float = Field(1.1, gt=1.0, description="bound (3), times the initial rest length")
+    radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
+    misfit_rms_additional: PositiveFloat = Field(description="constraint (6) as root mean square distance a node, m")
+    evaluations: PositiveInt = Field(100, description="design evaluations at the most")
+
+    @model_validator(mode="after")
+    def _whole(self) -> OptimiseEntry:
+        total = self.misfit + self.cable_force + self.rod_radius
+        if abs(total - 1.0) > 1e-9:
+            raise ValueError(f"the shares misfit, cable_force and rod_radius must add up to 1, not {total:g}")
+        return self
+
+
+class FiguresEntry(_Section):
+    """Pictures."""
+
+    limit: PositiveFloat = Field(0.010, description="end of the colour scale, m")
+
+
+class Case(_Section):
+    """One design job."""
+
+    title: str = ""
+    surface: SurfaceEntry
+    net: NetEntry
+    rod: RodEntry
+    joint: JointEntry
+    cable: CableEntry
+    load: LoadEntry
+    optimise: OptimiseEntry
+    figures: FiguresEntry = FiguresEntry()
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Case:
+        if self.joint.gap >= 0.5 * self.net.spacing:
+            raise ValueError(f"joint.gap ({self.joint.gap:g} m) must be well below net.spacing ({self.net.spacing:g} m)")
+        return self
+
+
+def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
+    """The case in a TOML file, with `settings` like "net.spacing=0.06" in place of its entries.
+
+    Its surface's path is made absolute. Raises InputError naming every entry that is wrong.
+    """
+    file = Path(path)
+    try:
+        data = tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"can't be read: {error}", where=str(file)) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"isn't valid TOML: {error}", where=str(file)) from error
+    for setting in settings:
+        _set(data, setting)
+    try:
+        case = Case.model_validate(data)
+    except ValidationError as error:
+        raise InputError("; ".join(_told(each) for each in error.errors()), where=str(file)) from error
+    place = (file.parent / case.surface.file).resolve()
+    return case.model_copy(update={"surface": case.surface.model_copy(update={"file": str(place)})})
+
+
+def dump_case(case: Case) -> str:
+    """The case as TOML, every default filled in."""
+    return tomli_w.dumps(case.model_dump(mode="json", exclude_none=True))
+
+
+def shipped_surfaces() -> Path:
+    """The folder of the builder scripts that come with shellform."""
+    package = Path(shellform.__file__).resolve().parent
+    inside = package / "_surfaces"
+    return inside if inside.is_dir() else package.parent / "surfaces"
+
+
+def check_script(path: Path, *, allow_scripts: bool) -> None:
+    """Raises InputError for a builder script from elsewhere, which would run its code, unless that is allowed."""
+    if path.suffix == ".py" and not allow_scripts and shipped_surfaces() not in path.resolve().parents:
+        raise InputError(
+            "is a Python script from outside the shipped surfaces and isn't run unasked",
+            where=str(path),
+            remedy="Read it, and if you trust it, add --allow-scripts.",
+        )
+
+
+def _set(data: dict[str, Any], setting: str) -> None:
+    key, equals, text = setting.partition("=")
+    if not equals or not key.strip():
+        raise InputError("must be KEY=VALUE", where="--set", value=setting, remedy="For example net.spacing=0.06.")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text  # a bare word stands for itself
+    *sections, last = key.strip().split(".")
+    for section in sections:
+        data = data.setdefault(section, {})
+        if not isinstance(data, dict):
+            raise InputError("names an entry inside a value", where="--set", value=setting)
+    data[last] = value
+
+
+def _told(error: Any) -> str:
+    """One validation error in words: the entry, what is wrong, the value, and the nearest known name."""
+    place = [str(part) for part in error["loc"]]
+    entry = ".".join(place) or "case"
+    kind = error["type"]
+    if kind == "extra_forbidden":
+        model: Any = Case
+        for part in place[:-1]:
+            model = model.model_fields[part].annotation
+        near = difflib.get_close_matches(place[-1], model.model_fields, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(model.model_fields)}"
+        return f"{entry} is no known entry; {hint}"
+    if kind == "missing":
+        return f"{entry} is missing"
+    message = str(error["msg"]).removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    value = "" if kind == "value_error" else f" (found {error['input']!r})"
+    return f"{entry}: {message}{value}"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Writes a file whole or not at all."""
+    partial = path.with_name(f"{path.name}.part")
+    partial.write_text(text, encoding="utf-8")
+    os.replace(partial, path)
