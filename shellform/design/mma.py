@@ -43,10 +43,11 @@ _MARGIN = 0.15  # of the whole additional load that is left between a stage and 
 _GROW, _SHRINK = 1.6, 0.4
 _GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
 _SETTLED = 1e-3  # relative improvement predicted for the largest window that ends the optimisation
-_SMALLEST = 1e-3  # window, in mean tensions, at which no better design is to be found
+_SMALLEST = 0.03  # window, in mean tensions, at which no better design is to be found
 _MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
 _PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
-_THINNING = 1.25  # of the objective that cables with little use may cost
+_FAILURES = 8  # single cables in a row that can't be taken away, after which thinning ends
+_THINNING = 1.5  # of the objective that cables with little use may cost
 _REPAIRS = 2  # steps after each batch
 _BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
 FEASIBLE = 1e-3
@@ -179,27 +180,32 @@ class _Search:
         """
         budget = _THINNING * self.point.objective
         batch = max(1, self._taut(self.point) // 10)
+        needed = np.zeros(len(self.braces), dtype=bool)
         self.window = max(self.window, 0.1 * self.tension)
-        while batch >= 1 and self.evaluator.evaluations < evaluations:
+        failures = 0
+        while failures < _FAILURES and self.evaluator.evaluations < evaluations:
             model = self._model()
-            y = model.origin.copy()
             order = self._least_bracing(model)
-            if len(order) <= batch:
-                return
-            y[order[:batch]] = 0.0
+            order = order[~needed[order]]
+            if not len(order):
+                break
+            leaving = order[:batch]
+            y = model.origin.copy()
+            y[leaving] = 0.0
             self.braces = y[: len(self.braces)] > 0.0
             trial = self._try(model, y)
-            good = trial is not None and self._merit(trial) < 2.0 * budget and self._sound(trial)
-            if good and trial is not None:
+            if trial is not None and self._merit(trial) < 2.0 * budget:
                 trial = self._repair(trial, budget)
-                good = trial.objective < budget and self._violation(trial) <= 0.0 and self._sound(trial)
-            if good and trial is not None:
-                self._accept(trial)
-                batch = int(1.3 * batch) + 1 if batch > 2 else batch
-            else:
+            if trial is None or self._merit(trial) > budget or self._violation(trial) > 0.0 or not self._sound(trial):
                 self.history.append(self._record(trial or self.point, False))
-                batch //= 2
-        self.status += ", and no further cable can be taken away" if batch < 1 else ""
+                needed[leaving] = batch == 1
+                failures += batch == 1
+                batch = max(1, batch // 3)
+                continue
+            self._accept(trial)
+            failures = 0
+            batch = int(1.3 * batch) + 1
+        self.status += ", and no further cable can be taken away" if failures else ""
 
     def _repair(self, point: Point, budget: float) -> Point:
         """A few steps with the cables that are left, none of which may go slack."""
