@@ -42,7 +42,8 @@ def main() -> None:
         code = getattr(error, "exit_code", None)
         if code is None:
             raise
-        _leave(f"refused: {getattr(error, 'format_message', lambda: str(error))()}", 2)
+        said = getattr(error, "format_message", None)
+        _leave(f"refused: {said() if said else error}", 2)
 
 
 def _leave(message: str, status: int) -> None:

@@ -153,8 +153,8 @@ class Gridshell:
         beams = self.beams(radius)
         rate = replace(self.rod, radius=radius).stiffness_by_radius
         rods = beams.kind == 0
-        names = ("axial", "torsion", "bending_y", "bending_z")
-        return replace(beams, **{name: np.where(rods, value, 0.0) for name, value in zip(names, rate, strict=True)})
+        axial, torsion, bending_y, bending_z = (np.where(rods, value, 0.0) for value in rate)
+        return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
 
     def cables(self, design: Design) -> Cables:
         """The cables that exist in the design."""

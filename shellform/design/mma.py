@@ -25,7 +25,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.design.gridshell import Design
-from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, taut, without_slack
+from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
 from shellform.design.tensions import TensionModel, tension_model
 from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Term
 from shellform.errors import InputError, NotConverged

@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from shellform.arrays import Flags, Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.sensitivity import gradients, respond
-from shellform.design.terms import AtMost, Misfit, RodRadius, Share
+from shellform.design.terms import AtMost, Misfit, RodRadius, Share, Term
 from shellform.errors import InputError, NotConverged
 from shellform.structure.assembly import Assembly
 from shellform.structure.equilibrium import find_equilibrium
@@ -54,7 +54,7 @@ class Problem:
     radius_bounds: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
-        used = {part.term.load for part in (*self.minimize, *self.limits)} - {""}
+        used = {term.load for term in self.terms} - {""}
         for name in sorted(used - set(self.loads)):
             raise InputError(
                 f"there is no load case {name!r}", where="problem", remedy=f"Known: {', '.join(self.loads)}."
@@ -62,6 +62,11 @@ class Problem:
         total = sum(part.share for part in self.minimize)
         if abs(total - 1.0) > 1e-9:
             raise InputError("the shares of the objective must add up to 1", where="problem.minimize", value=total)
+
+    @property
+    def terms(self) -> list[Term]:
+        """The terms of the objective, then those of the limits."""
+        return [part.term for part in self.minimize] + [part.term for part in self.limits]
 
     @property
     def frees_radius(self) -> bool:
@@ -171,14 +176,14 @@ class Evaluator:
     def assembly(self, design: Design) -> Assembly:
         """The assembly of a design; its pattern is kept while the same cables are present."""
         parts = (self.shell.beams(design.radius), self.shell.cables(design))
-        if self._assembly is None or not np.array_equal(self._present, design.present):
+        if self._assembly is None or self._present is None or not np.array_equal(self._present, design.present):
             self._assembly, self._present = assemble(self.shell.network(design)), design.present
             return self._assembly
         return self._assembly.with_parts(parts)
 
     def used(self) -> list[str]:
         """The load cases that objective or constraints need."""
-        names = {part.term.load for part in (*self.problem.minimize, *self.problem.limits)}
+        names = {term.load for term in self.problem.terms}
         return [name for name in self.problem.loads if name in names]
 
     def _settle(self, assembly: Assembly, start: State, load: Reals) -> State:
@@ -219,9 +224,9 @@ def linearise(
     objective = np.zeros(len(problem.minimize))
     objective_rows = np.zeros((len(problem.minimize), size))
     any_state = next(iter(states.values()))
-    for name in {part.term.load for part in (*problem.minimize, *problem.limits)}:
+    for name in dict.fromkeys(term.load for term in problem.terms):
         state = states.get(name, any_state)
-        wanted = [part.term for part in (*problem.minimize, *problem.limits) if part.term.load == name]
+        wanted = [term for term in problem.terms if term.load == name]
         measures = [term.measure(shell, design, state) for term in wanted]
         partial = sp.hstack(
             [

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals
+from shellform.arrays import Flags, Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.problem import Point
 from shellform.structure.assembly import Assembly
@@ -62,7 +62,7 @@ class TensionModel:
         length = self.length + self.length_by_y @ (y - self.origin)
         return np.where(tension > _DEAD * stiffness, stiffness * length / (stiffness + tension), self.longest)
 
-    def design(self, y: Reals, present: Reals) -> Design:
+    def design(self, y: Reals, present: Flags) -> Design:
         """The design of y."""
         rest = self.point.design.rest_length.copy()
         rest[present] = np.minimum(self.rest_lengths(y), self.longest)
@@ -71,9 +71,9 @@ class TensionModel:
 
     def predicted(self, y: Reals) -> State:
         """Where the change to y takes the base load's equilibrium, to first order."""
-        step = np.zeros(6 * self.assembly.count)
-        step[self.assembly.free] = self.state_by_y @ (y - self.origin)
-        step = step.reshape(-1, 6)
+        whole = np.zeros(6 * self.assembly.count)
+        whole[self.assembly.free] = self.state_by_y @ (y - self.origin)
+        step = whole.reshape(-1, 6)
         return moved(self.state, self.assembly.chords.corrected(self.state, step))
 
 

@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-
 from scipy.interpolate import CubicSpline
 
 from shellform.arrays import Indices, Reals
@@ -120,7 +119,7 @@ def pull(
                 tolerance=_TOLERANCE if last else _LEADING,
                 limit=limit,
                 reach=_REACH * grid.spacing,
-                progress=None if progress is None else lambda _, residual, q=density: progress(f"springs {q:g}", residual),
+                progress=_named(progress, density),
             )
         except NotConverged as error:
             raise NotConverged(
@@ -133,6 +132,12 @@ def pull(
         state, spent = found.state, spent + found.factorisations
     assert springs is not None
     return Pulled(state, _curvature(grid, beams, state), density / grid.spacing * np.abs(springs.stretch(state)), spent)
+
+
+def _named(progress: Progress | None, density: float) -> Callable[[int, float], None] | None:
+    if progress is None:
+        return None
+    return lambda _, residual: progress(f"springs of {density:g} EI/s³", residual)
 
 
 def fictitious_beams(grid: Grid, shear_stiffness: float) -> Beams:

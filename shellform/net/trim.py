@@ -8,6 +8,7 @@ a rod on which fewer than two joints remain is left out too, with its joints.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -87,8 +88,8 @@ def _pieces(rod: GridRod, overshoot: Reals) -> list[_Piece]:
         return float(rod.arc[within] + share * (rod.arc[beyond] - rod.arc[within]))
 
     return [
-        _Piece(rod, int(first), int(last), cut(first, first - 1), cut(last, last + 1))
-        for first, last in zip(starts, stops, strict=True)
+        _Piece(rod, first, last, cut(first, first - 1), cut(last, last + 1))
+        for first, last in zip(starts.tolist(), stops.tolist(), strict=True)
     ]
 
 
@@ -142,7 +143,7 @@ def _largest(pieces: list[_Piece], joints: list[dict[int, float]], remaining: se
     links = []
     for each in joints:
         along = [numbers[c] for c in each if c in remaining]
-        links += list(zip(along[:-1], along[1:], strict=True))
+        links += list(pairwise(along))
     parts, label = connected(len(numbers), np.array(links).reshape(-1, 2))
     if parts == 1:
         return remaining

@@ -33,7 +33,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Flags, Indices, Reals, indices, reals
 from shellform.errors import InputError
 from shellform.structure.parts import Evaluation
 from shellform.structure.rotation import matrix
@@ -157,10 +157,10 @@ def make_beams(
 def _frames(x_axis: Reals, z_axis: Reals) -> Reals:
     default = np.isnan(z_axis).any(axis=1)
     upright = np.linalg.norm(x_axis[:, :2], axis=1) < _PARALLEL_TO_Z
-    z = np.where(default[:, None], np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), z_axis)
+    z: Reals = np.where(default[:, None], np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), z_axis)
     y_axis = np.cross(z, x_axis)
     size = np.linalg.norm(y_axis, axis=1)
-    along = size <= 1e-9 * np.linalg.norm(z, axis=1)
+    along: Flags = size <= 1e-9 * np.linalg.norm(z, axis=1)
     if along.any():
         beam = int(np.argmax(along))
         remedy = "Give any vector that is not along the beam."

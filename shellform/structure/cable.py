@@ -21,6 +21,7 @@ from shellform.structure.parts import Evaluation
 from shellform.structure.state import State
 
 _LOWER = np.tril_indices(6)
+_NO_LENGTH = 1e-300  # a cable whose ends meet is slack and pulls nowhere
 
 
 @dataclass(frozen=True)
@@ -79,13 +80,13 @@ class Cables:
         length = np.linalg.norm(chord, axis=1)
         stretch = np.maximum(length - self.rest_length, 0.0)
         pull = self.stiffness * stretch / self.rest_length
-        unit = chord / length[:, None]
+        unit = chord / np.maximum(length, _NO_LENGTH)[:, None]
         along = pull[:, None] * unit
         force = np.hstack([-along, along])
         if not tangent:
             return Evaluation(0.5 * pull * stretch, force, None)
         taut = np.where(stretch > 0.0, self.stiffness / self.rest_length, 0.0)
-        lateral = pull / length
+        lateral = pull / np.maximum(length, _NO_LENGTH)
         outer = unit[:, :, None] * unit[:, None, :]
         block = (taut - lateral)[:, None, None] * outer + lateral[:, None, None] * np.eye(3)
         full = np.block([[block, -block], [-block, block]])

@@ -207,9 +207,9 @@ class _Walk:
         return True
 
     def _advance(self, direction: Reals, downhill: float) -> bool:
-        step = np.zeros(6 * self.assembly.count)
-        step[self.assembly.free] = direction
-        step = step.reshape(-1, 6)
+        whole = np.zeros(6 * self.assembly.count)
+        whole[self.assembly.free] = direction
+        step = whole.reshape(-1, 6)
         spin, shift = float(np.abs(step[:, 3:]).max()), float(np.abs(step[:, :3]).max())
         share = min(1.0, TURN / max(spin, TURN), self.reach / max(shift, 1e-300))
         if share < _SHORTEST:

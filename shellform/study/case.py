@@ -10,7 +10,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 import tomli_w
-from pydantic import BaseModel, ConfigDict, Field, PositiveFloat, PositiveInt, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveFloat,
+    PositiveInt,
+    ValidationError,
+    model_validator,
+)
 
 import shellform
 from shellform.errors import InputError
@@ -115,7 +123,7 @@ class Case(_Section):
     cable: CableEntry
     load: LoadEntry
     optimise: OptimiseEntry
-    figures: FiguresEntry = FiguresEntry()
+    figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=0.010))
 
     @model_validator(mode="after")
     def _fitting(self) -> Case:

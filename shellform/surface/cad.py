@@ -5,7 +5,10 @@ named dimensions, m, and which makes the geometry in the current model. Where it
 `form(points, triangles, edge, *, ...)` with the same dimensions, the mesh of what was built is a plan, and `form` returns where
 its `points` (v, 3) go; `edge` (v,) tells which lie on its boundary. So a form-found shell is meshed before it is found.
 
-CAD files (STEP, IGES, BREP) come through gmsh's OpenCASCADE, which converts their unit to metres; a BREP file has none.
+CAD files (STEP, IGES, BREP) come through gmsh's OpenCASCADE, which converts the unit that STEP and IGES files state to metres; a BREP
+file has none. OpenCASCADE remembers the last unit asked for beyond gmsh's session, so that every session asks for metres anew.
+
+Vertex normals are the CAD surface's own, summed over the faces that meet at a vertex; across a fold they are its bisector.
 """
 
 from __future__ import annotations
@@ -15,6 +18,8 @@ import difflib
 import importlib.util
 import inspect
 import math
+import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import ModuleType
@@ -23,21 +28,23 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, ShellformError
 from shellform.surface.target import Surface, make_surface
 from shellform.surface.units import turned_up, unit_factor
 
 try:
     import gmsh
-except OSError as error:  # a shared library that gmsh's wheel needs isn't there
+except (ImportError, OSError) as error:  # a shared library that gmsh's wheel needs isn't there
     raise InputError(
         f"gmsh can't be loaded: {error}",
         remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
     ) from error
 
 FORMATS = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
-_DEFAULT_TRIANGLES = 60.0  # along the longer plan extent
+_DEFAULT_EDGES = 60.0  # along the longer plan extent
 _MOST_TRIANGLES = 2_000_000
+_SEWN = 1e-6  # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
+_IGES_UNITS = 1000.0  # gmsh states millimetres in IGES files and leaves the numbers as they are
 
 
 def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Surface:
@@ -50,13 +57,12 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
     build = _function(module, "build", path)
     named = _dimensions(build, dimensions, path)
     form = getattr(module, "form", None)
-    with _session(), _gmsh_errors(path):
+    with _session(), _errors(path, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
         gmsh.model.occ.synchronize()
         points, triangles, normals = _mesh(size, path)
         if form is not None:
-            edge = _on_edge(triangles, len(points))
-            return make_surface(form(points, triangles, edge, **named), triangles, source=str(path))
+            points, normals = form(points, triangles, _on_edge(triangles, len(points)), **named), None
     return make_surface(points, triangles, normals=normals, source=str(path))
 
 
@@ -75,41 +81,74 @@ def import_surface(path: str | Path, *, unit: str | None = None, size: float | N
     file = Path(path)
     if not file.is_file():
         raise InputError("there is no such file", where=str(file))
+    if file.suffix.lower() not in FORMATS:
+        raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
     has_unit = file.suffix.lower() not in (".brep", ".brp")
     if has_unit and unit is not None:
         raise InputError(
             f"{file.suffix} files carry their own unit", where="surface.unit", value=unit, remedy="Leave the unit out."
         )
     factor = 1.0 if has_unit else unit_factor(unit or "m")
-    with _session(), _gmsh_errors(file):
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M" if has_unit else "")
-        gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
-        gmsh.model.occ.importShapes(str(file), highestDimOnly=True)
+    turned_up(np.zeros((0, 3)), up)  # refuses an unknown axis before the work
+    with _session(), _errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
+        with _silence():
+            gmsh.model.occ.importShapes(str(file), highestDimOnly=True)
+        gmsh.model.occ.synchronize()
+        _refuse_all_but_faces(file)
         if factor != 1.0:
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
+        if len(gmsh.model.getEntities(2)) > 1:
+            gmsh.model.occ.synchronize()
+            with _silence():
+                gmsh.model.occ.healShapes(
+                    gmsh.model.occ.getEntities(2),
+                    tolerance=_SEWN * float(_extent().max()),
+                    fixDegenerated=False,
+                    fixSmallEdges=False,
+                    fixSmallFaces=False,
+                    makeSolids=False,
+                )
         gmsh.model.occ.synchronize()
-        if gmsh.model.getEntities(3):
-            raise InputError("holds a solid", where=str(file), remedy="Export the upper face alone, as a surface.")
-        if not gmsh.model.getEntities(2):
-            raise InputError("holds no surface, only points or curves", where=str(file), remedy="Export the surface.")
-        low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
-        extent = float((high - low).max())
-        points, triangles, normals = _mesh(extent / _DEFAULT_TRIANGLES if size is None else size, file)
+        plan = np.delete(_extent(), 1 if up == "y" else 2)
+        points, triangles, normals = _mesh(float(plan.max()) / _DEFAULT_EDGES if size is None else size, file)
     return make_surface(
         turned_up(points, up), triangles, normals=None if normals is None else turned_up(normals, up), source=str(file)
     )
 
 
 def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None:
-    """Writes a builder script's geometry as STEP, IGES or BREP, whichever the path's ending says."""
-    source = Path(script)
+    """Writes a builder script's geometry as STEP or IGES, in millimetres, or BREP, in metres, whichever the path's ending says.
+
+    Raises InputError for other endings, and for a script with a `form`, whose shell has no CAD geometry.
+    """
+    file, source = Path(path), Path(script)
+    if file.suffix.lower() not in FORMATS:
+        raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
     module = _load(source)
+    if hasattr(module, "form"):
+        raise InputError("is form-found on a mesh, of which there is no CAD file", where=str(source))
     build = _function(module, "build", source)
     named = _dimensions(build, dimensions, source)
-    with _session(), _gmsh_errors(source):
+    with _session(), _errors(source, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
+        if file.suffix.lower() in (".iges", ".igs"):
+            gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
         gmsh.model.occ.synchronize()
-        gmsh.write(str(path))
+        with _silence():
+            gmsh.write(str(file))
+
+
+def _refuse_all_but_faces(file: Path) -> None:
+    if gmsh.model.getEntities(3):
+        raise InputError("holds a solid", where=str(file), remedy="Export the upper face alone, as a surface.")
+    if not gmsh.model.getEntities():
+        raise InputError(
+            f"holds nothing that can be read as {file.suffix.lstrip('.').upper()}",
+            where=str(file),
+            remedy="Open it in a CAD program and export it anew.",
+        )
+    if not gmsh.model.getEntities(2):
+        raise InputError("holds no surface, only points or curves", where=str(file), remedy="Export the surface.")
 
 
 @contextlib.contextmanager
@@ -126,8 +165,10 @@ def _session() -> Iterator[None]:
             ("Mesh.Algorithm", 6),
             ("Mesh.MeshSizeExtendFromBoundary", 0),
             ("Mesh.MeshSizeFromPoints", 0),
+            ("Geometry.OCCBoundsUseStl", 1),  # else the box of a curved face's control points
         ]:
             gmsh.option.setNumber(name, value)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
         gmsh.model.add("surface")
         yield
     finally:
@@ -135,25 +176,42 @@ def _session() -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _gmsh_errors(path: Path) -> Iterator[None]:
-    """Gmsh reports errors as plain exceptions; the user gets its last message."""
+def _errors(path: Path, what: str, remedy: str) -> Iterator[None]:
+    """Gmsh raises plain exceptions with its last message; scripts raise anything. The user gets a sentence."""
     try:
         yield
-    except InputError:
+    except ShellformError:
         raise
-    except Exception as error:  # gmsh raises Exception itself
-        said = gmsh.logger.getLastError() if gmsh.isInitialized() else ""
-        raise InputError(
-            f"gmsh can't use it: {said or error}", where=str(path), remedy="Open it in a CAD program and export it anew."
-        ) from error
+    except Exception as error:
+        said = str(error) if type(error) is Exception else f"{type(error).__name__}: {error}"
+        raise InputError(f"{what}: {said.rstrip('.')}", where=str(path), remedy=remedy) from error
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[None]:
+    """Nothing on standard output: OpenCASCADE writes there past Python and past gmsh's own setting."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def _extent() -> Reals:
+    """The model's extents (3,), m, along x, y and z."""
+    low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
+    return np.asarray(high - low)
 
 
 def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
     """Points (v, 3), triangles (t, 3) and, where all faces have them, CAD normals (v, 3) of the model's faces."""
     if not (size > 0.0 and math.isfinite(size)):
         raise InputError("must be a positive length", where="surface.size", value=size)
-    low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
-    spans = np.sort(high - low)
+    spans = np.sort(_extent())
     if 2.5 * spans[2] * spans[1] / size**2 > _MOST_TRIANGLES:
         raise InputError(
             f"would give more than {_MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × {spans[1]:.3g} m",
@@ -161,12 +219,12 @@ def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
             value=size,
             remedy="Choose a larger mesh size, or check the surface's unit.",
         )
+    if not gmsh.model.getEntities(2):
+        raise InputError("makes no surface", where=str(where), remedy="See surfaces/dome.py.")
     gmsh.option.setNumber("Mesh.MeshSizeMin", size)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.model.mesh.generate(2)
     tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    if not len(tags):
-        raise InputError("gmsh made no mesh of it", where=str(where), remedy="Check the surface.")
     number = np.full(int(tags.max()) + 1, -1)
     number[tags] = np.arange(len(tags))
     points = coordinates.reshape(-1, 3)
@@ -174,10 +232,10 @@ def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
     for _, face in gmsh.model.getEntities(2):
         _, nodes = gmsh.model.mesh.getElementsByType(2, face)
         mine = number[nodes.reshape(-1, 3)]
+        if not len(mine):
+            raise InputError(f"gmsh made no triangles of its face {face}", where=str(where), remedy="Check the surface.")
         triangles.append(mine)
         _add_normals(normals, points, mine, face, number)
-    if not triangles or not sum(len(each) for each in triangles):
-        raise InputError("gmsh made no triangles of it", where=str(where), remedy="Check the surface.")
     faces = np.vstack(triangles)
     length = np.linalg.norm(normals, axis=1)
     used = np.zeros(len(points), dtype=bool)
@@ -188,7 +246,7 @@ def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
 
 
 def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, number: Indices) -> None:
-    """Adds the CAD normals at the face's nodes, turned to the side of its triangles; at a pole there may be none."""
+    """Adds the CAD normals at the face's nodes, turned to the side of its triangles or, where another face came first, to its."""
     tags, _, parameters = gmsh.model.mesh.getNodes(2, face, includeBoundary=True, returnParametricCoord=True)
     if not len(triangles) or len(parameters) != 2 * len(tags):
         return
@@ -206,7 +264,9 @@ def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, n
     good = np.isfinite(exact).all(axis=1) & (np.abs(agreement) > 0.8)
     signed = np.where(good[:, None], exact * np.sign(agreement)[:, None], seen)
     rest, first = np.unique(rows, return_index=True)
-    normals[rest] += signed[first]
+    mine = signed[first]
+    # Two faces of a script need not turn the same way; make_surface turns all upwards, so only the sum has to agree.
+    normals[rest] += np.where(np.sum(normals[rest] * mine, axis=1, keepdims=True) < 0.0, -mine, mine)
 
 
 def _on_edge(triangles: Indices, count: int) -> Flags:
@@ -226,7 +286,7 @@ def _load(path: Path) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # whatever somebody's script raises
+    except (Exception, SystemExit) as error:  # whatever somebody's script raises
         raise InputError(f"the script fails: {type(error).__name__}: {error}", where=str(path)) from error
     return module
 
@@ -241,6 +301,11 @@ def _function(module: ModuleType, name: str, path: Path) -> Callable[..., Any]:
 def _dimensions(build: Callable[..., Any], given: dict[str, float], path: Path) -> dict[str, float]:
     parameters = inspect.signature(build).parameters.values()
     known = {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
+    for name, value in known.items():
+        if not _is_length(value):
+            raise InputError(
+                f"its dimension {name!r} has no positive default", where=str(path), remedy=f"Write {name}=0.90, say, m."
+            )
     for name, value in given.items():
         if name not in known:
             near = difflib.get_close_matches(name, known, n=1)
@@ -250,8 +315,10 @@ def _dimensions(build: Callable[..., Any], given: dict[str, float], path: Path) 
                 where="surface.dimensions",
                 remedy=f"{hint}Known: {', '.join(known)}.",
             )
-        if not (isinstance(value, int | float) and math.isfinite(value) and value > 0.0):
+        if not _is_length(value):
             raise InputError("must be a positive number", where=f"surface.dimensions.{name}", value=value)
-    return {**known, **{name: float(value) for name, value in given.items()}}
+    return {name: float(value) for name, value in {**known, **given}.items()}
 
 
+def _is_length(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0.0

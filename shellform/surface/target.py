@@ -188,9 +188,7 @@ def _cleaned(
         rank = np.empty_like(order)
         rank[order] = np.arange(len(order))
         if len(first) < len(points):
-            used = len(np.unique(faces))
             mended.append(f"{len(points) - len(first)} vertices lay on others and were merged")
-            del used
         points, faces = points[first[order]], rank[same][faces]
         normals = None if normals is None else normals[first[order]]
     area = np.linalg.norm(_area_vectors(points, faces), axis=1)
@@ -216,7 +214,7 @@ def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
     edges = np.sort(_directed_edges(faces), axis=1)
     pairs, counts = np.unique(edges, axis=0, return_counts=True)
     if (counts > 2).any():
-        a, b = pairs[np.argmax(counts > 2)]
+        a = pairs[np.argmax(counts > 2), 0]
         raise InputError(
             f"{int((counts > 2).sum())} edges belong to more than two triangles, the first at {points[a].round(4).tolist()}",
             where=where,

@@ -1,0 +1,87 @@
+"""The Chebyshev net of the paper-scale vault, and the compass method's closed forms."""
+
+import json
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.net.compass import _corner
+from shellform.net.files import load_net, net_document, save_net
+from shellform.net.net import neighbours
+
+
+class Sphere:
+    """The exact unit sphere as a finder."""
+
+    def foot(self, points):
+        normal = points / np.linalg.norm(points, axis=1, keepdims=True)
+        return type("Foot", (), {"point": normal, "normal": normal})()
+
+    def past_edge(self, foot):
+        return np.full(len(foot.point), -1.0)
+
+
+def test_the_compass_net_of_a_sphere_agrees_with_the_published_nodes():
+    chord, count = 0.1, 5
+    turn = 2 * np.arcsin(chord / 2)
+    net = {(0, 0): np.array([0.0, 0.0, 1.0])}
+    for k in range(1, count + 1):
+        net[k, 0] = np.array([np.sin(k * turn), 0.0, np.cos(k * turn)])
+        net[0, k] = np.array([0.0, np.sin(k * turn), np.cos(k * turn)])
+    for i in range(1, count + 1):
+        for j in range(1, count + 1):
+            a, b, c = (net[place][None] for place in ((i - 1, j), (i, j - 1), (i - 1, j - 1)))
+            point, _, good = _corner(Sphere(), a, b, c, chord)
+            assert good[0]
+            net[i, j] = point[0]
+    np.testing.assert_allclose(net[1, 1], [0.09987367, 0.09987367, 0.98997500], atol=1e-7)
+    np.testing.assert_allclose(net[5, 5], [0.47459259, 0.47459259, 0.74129870], atol=1e-7)
+
+
+def test_the_net_lies_within_a_millimetre_with_segments_within_a_percent(net):
+    assert net.quality.distance_max < 0.001
+    assert net.quality.spacing_error_max < 0.01
+    pairs = neighbours(net.grid)
+    chord = np.linalg.norm(net.crossings[pairs[:, 1]] - net.crossings[pairs[:, 0]], axis=1)
+    assert np.abs(chord / 0.055 - 1).max() == pytest.approx(net.quality.spacing_error_max)
+
+
+def test_rods_keep_their_length_when_bent(net):
+    place = net.target.positions
+    for rod in net.grid.rods:
+        bent = np.linalg.norm(np.diff(place[rod.nodes], axis=0), axis=1).sum()
+        assert bent == pytest.approx(rod.length, rel=3e-3)  # chords of a curve, and the springs' own strain
+        assert (np.diff(rod.marks) > 0).all()
+
+
+def test_equation_1_gives_the_largest_radius(net):
+    radius = net.max_radius(young=40e9, strength=255e6)
+    assert radius == pytest.approx(255e6 / (40e9 * net.quality.curvature_max))
+
+
+def test_a_net_is_the_same_after_saving(tmp_path, net):
+    save_net(tmp_path / "net.npz", net)
+    again = load_net(tmp_path / "net.npz")
+    np.testing.assert_array_equal(again.target.positions, net.target.positions)
+    assert json.dumps(net_document(again)) == json.dumps(net_document(net))
+    (tmp_path / "bad.npz").write_bytes(b"junk")
+    with pytest.raises(InputError, match="damaged"):
+        load_net(tmp_path / "bad.npz")
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        ({"spacing": 0.5, "gap": 0.002}, "too large"),
+        ({"spacing": 1e-5, "gap": 1e-6}, "too small"),
+        ({"spacing": -1.0, "gap": 0.002}, "positive"),
+        ({"spacing": 0.055, "gap": 0.05}, "below the spacing"),
+        ({"spacing": 0.055, "gap": 0.002, "elements": 0}, "at least 1"),
+        ({"spacing": 0.055, "gap": 0.002, "merge": 0.9}, "between 0 and 0.5"),
+    ],
+)
+def test_settings_that_cannot_work_are_refused(vault, settings, said):
+    with pytest.raises(InputError, match=said):
+        sf.pull_net(vault, **settings)

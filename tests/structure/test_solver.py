@@ -1,0 +1,125 @@
+"""Rotations, factorisation, equilibrium and loading."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given
+from hypothesis import strategies as st
+
+from shellform.errors import InputError, NotConverged
+from shellform.structure import rotation, sparse
+from shellform.structure.beam import make_beams
+from shellform.structure.cable import make_cables
+from shellform.structure.equilibrium import LostBranch, find_equilibrium
+from shellform.structure.loading import apply_load, limit_factor
+from shellform.structure.network import Network, assemble
+from shellform.structure.state import at_rest
+from shellform.structure.verification import chain
+
+small = st.floats(-3.0, 3.0)
+
+
+@given(st.tuples(small, small, small).filter(lambda v: 1e-9 < np.linalg.norm(v) < 3.1))
+def test_rotation_vectors_come_back_from_quaternions_and_matrices(vector):
+    quaternion = rotation.from_vectors(np.array([vector]))
+    np.testing.assert_allclose(rotation.to_vectors(quaternion)[0], vector, atol=1e-12)
+    matrix = rotation.matrices(quaternion)
+    np.testing.assert_allclose(matrix[0] @ matrix[0].T, np.eye(3), atol=1e-14)
+    np.testing.assert_allclose(rotation.to_vectors(rotation.from_matrices(matrix))[0], vector, atol=1e-7)
+
+
+def test_no_rotation_is_exactly_none_and_tiny_ones_lose_no_digit():
+    assert (rotation.to_vectors(rotation.from_vectors(np.zeros((1, 3)))) == 0.0).all()
+    tiny = np.array([[1e-200, 3e-12, -2e-30]])
+    np.testing.assert_allclose(rotation.to_vectors(rotation.from_vectors(tiny)), tiny, rtol=1e-15)
+
+
+def family(matrix):
+    lower = sp.csc_array(sp.tril(sp.csc_array(matrix)))
+    lower.sort_indices()
+    return sparse.Symmetric(lower.indptr.astype(np.int64), lower.indices.astype(np.int64)), lower.data
+
+
+def random_matrix(shift):
+    a = np.random.default_rng(0).normal(size=(30, 30))
+    return a + a.T + shift * np.eye(30)
+
+
+@pytest.mark.parametrize("backend", ["cholmod", "superlu"])
+def test_both_backends_solve_and_count_negative_eigenvalues(backend, monkeypatch):
+    if backend == "superlu":
+        monkeypatch.setattr(sparse, "cholmod", None)
+    definite, indefinite = random_matrix(30.0), random_matrix(0.0)
+    symmetric, values = family(definite)
+    right = np.arange(60.0).reshape(30, 2)
+    np.testing.assert_allclose(symmetric.factor(values).solve(right), np.linalg.solve(definite, right), atol=1e-10)
+    symmetric, values = family(indefinite)
+    with pytest.raises(sparse.NotPositiveDefinite):
+        symmetric.factor(values)
+    assert symmetric.negative_eigenvalues(values) == (np.linalg.eigvalsh(indefinite) < 0).sum()
+
+
+def shallow_toggle():
+    points = np.vstack([np.linspace([-1, 0, 0], [0, 0, 0.1], 9), np.linspace([0, 0, 0.1], [1, 0, 0], 9)[1:]])
+    pin = [True, True, True, True, False, True]
+    network = chain(points, (1e4, 1.0, 0.2, 0.2), {0: pin, 16: pin})
+    load = np.zeros((17, 6))
+    load[8, 2] = -1.0
+    return assemble(network), at_rest(points), load
+
+
+def test_relaxation_follows_a_snap_through_to_a_stable_state():
+    assembly, start, load = shallow_toggle()
+    borne = limit_factor(assembly, start, load, most=2.0)
+    assert 0.1 < borne < 2.0
+    beyond = apply_load(assembly, start, 0 * load, 1.5 * borne * load)
+    assert not beyond.on_branch
+    assert beyond.equilibrium.stable
+    assert beyond.equilibrium.residual < 1e-7
+    assert beyond.equilibrium.state.positions[8, 2] < -0.05
+
+
+def test_a_start_on_the_branch_is_given_up_when_definiteness_is_lost():
+    assembly, start, load = shallow_toggle()
+    with pytest.raises(LostBranch, match="smaller step"):
+        find_equilibrium(assembly, start, 100.0 * load, on_branch=True)
+
+
+def test_running_out_of_factorisations_keeps_the_last_state():
+    assembly, start, load = shallow_toggle()
+    with pytest.raises(NotConverged, match="increments") as caught:
+        find_equilibrium(assembly, start, 5.0 * load, limit=3)
+    assert caught.value.state.positions.shape == (17, 3)
+
+
+def test_a_loose_straight_rope_under_load_is_solved():
+    points = np.column_stack([np.linspace(0, 1, 5), np.zeros((5, 2))])
+    beams = make_beams(points, np.zeros((0, 2), dtype=int), axial=1, torsion=1, bending_y=1, bending_z=1)
+    cables = make_cables([[k, k + 1] for k in range(4)], rest_length=0.26, stiffness=100.0)
+    fixed = np.zeros((5, 6), dtype=bool)
+    fixed[[0, 4], :3] = True
+    load = np.zeros((5, 6))
+    load[1:4, 2] = -1.0
+    found = find_equilibrium(assemble(Network(points, beams, cables, fixed, np.zeros((5, 6)))), at_rest(points), load)
+    assert found.residual < 1e-8
+    assert found.state.positions[2, 2] < -0.05
+
+
+def test_a_pinned_rod_may_spin_about_its_axis_and_still_counts_as_stable():
+    points = np.column_stack([np.linspace(0, 1, 5), np.zeros((5, 2))])
+    pin = [True, True, True, False, False, False]
+    found = find_equilibrium(
+        assemble(chain(points, (1e3, 1.0, 1.0, 1.0), {0: pin, 4: pin})), at_rest(points), np.zeros((5, 6))
+    )
+    assert found.stable
+
+
+def test_what_nothing_restrains_is_refused_by_name():
+    points = np.column_stack([np.linspace(0, 1, 3), np.zeros((3, 2))])
+    with pytest.raises(InputError, match="nothing restrains.*along x"):
+        assemble(chain(points, (1, 1, 1, 1), {}))
+    lonely = np.vstack([points, [[5.0, 0.0, 0.0]]])
+    network = chain(points, (1, 1, 1, 1), {0: [True] * 6})
+    fixed = np.vstack([network.fixed, np.zeros((1, 6), dtype=bool)])
+    with pytest.raises(InputError, match=r"nodes\[3\].*no element"):
+        assemble(Network(lonely, network.beams, network.cables, fixed, np.zeros((4, 6))))
