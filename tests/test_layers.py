@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent.parent / "shellform"
-FLOORS = {"errors": 0, "arrays": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "study": 5, "cli": 6}
+FLOORS = {"errors": -1, "arrays": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "study": 5, "cli": 6}
 DOORS = {
     "gmsh": {"surface/cad.py"},
     "meshio": {"surface/meshes.py"},

@@ -43,6 +43,7 @@ except (ImportError, OSError) as error:  # a shared library that gmsh's wheel ne
 FORMATS = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
 _MOST_TRIANGLES = 2_000_000
+_SAMPLES = 33  # points on a curve that tell its extent
 _SEWN = 1e-6  # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
 _IGES_UNITS = 1000.0  # gmsh states millimetres in IGES files and leaves the numbers as they are
 
@@ -91,9 +92,7 @@ def import_surface(path: str | Path, *, unit: str | None = None, size: float | N
     factor = 1.0 if has_unit else unit_factor(unit or "m")
     turned_up(np.zeros((0, 3)), up)  # refuses an unknown axis before the work
     with _session(), _errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
-        with _silence():
-            gmsh.model.occ.importShapes(str(file), highestDimOnly=True)
-        gmsh.model.occ.synchronize()
+        _read_shapes(file)
         _refuse_all_but_faces(file)
         if factor != 1.0:
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
@@ -138,6 +137,20 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
             gmsh.write(str(file))
 
 
+def _read_shapes(file: Path) -> None:
+    """The file's shapes into the current model, m."""
+    with _silence():
+        if file.suffix.lower() in (".iges", ".igs"):
+            # OpenCASCADE has a target unit for IGES only once it has read one: the first reading is thrown away.
+            gmsh.option.setString("Geometry.OCCTargetUnit", "")
+            gmsh.model.occ.importShapes(str(file))
+            gmsh.model.remove()
+            gmsh.model.add("surface")
+            gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+        gmsh.model.occ.importShapes(str(file), highestDimOnly=True)
+    gmsh.model.occ.synchronize()
+
+
 def _refuse_all_but_faces(file: Path) -> None:
     if gmsh.model.getEntities(3):
         raise InputError("holds a solid", where=str(file), remedy="Export the upper face alone, as a surface.")
@@ -165,7 +178,6 @@ def _session() -> Iterator[None]:
             ("Mesh.Algorithm", 6),
             ("Mesh.MeshSizeExtendFromBoundary", 0),
             ("Mesh.MeshSizeFromPoints", 0),
-            ("Geometry.OCCBoundsUseStl", 1),  # else the box of a curved face's control points
         ]:
             gmsh.option.setNumber(name, value)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
@@ -202,9 +214,14 @@ def _silence() -> Iterator[None]:
 
 
 def _extent() -> Reals:
-    """The model's extents (3,), m, along x, y and z."""
-    low, high = np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3))
-    return np.asarray(high - low)
+    """The extents (3,), m, of the model's curves along x, y and z: gmsh's own boxes are those of the control points."""
+    ends = [np.reshape(gmsh.model.getValue(0, point, []), (-1, 3)) for _, point in gmsh.model.getEntities(0)]
+    for _, curve in gmsh.model.getEntities(1):
+        low, high = (float(bound[0]) for bound in gmsh.model.getParametrizationBounds(1, curve))
+        ends.append(np.reshape(gmsh.model.getValue(1, curve, np.linspace(low, high, _SAMPLES)), (-1, 3)))
+    if not ends:  # a discrete surface of nothing but triangles
+        return np.asarray(np.ptp(np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3)), axis=0))
+    return np.asarray(np.ptp(np.vstack(ends), axis=0))
 
 
 def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:

@@ -81,8 +81,10 @@ def test_relaxation_follows_a_snap_through_to_a_stable_state():
 
 def test_a_start_on_the_branch_is_given_up_when_definiteness_is_lost():
     assembly, start, load = shallow_toggle()
+    borne = limit_factor(assembly, start, load, most=2.0)
+    near = apply_load(assembly, start, 0 * load, 0.97 * borne * load).equilibrium.state
     with pytest.raises(LostBranch, match="smaller step"):
-        find_equilibrium(assembly, start, 100.0 * load, on_branch=True)
+        find_equilibrium(assembly, near, 1.1 * borne * load, on_branch=True)
 
 
 def test_running_out_of_factorisations_keeps_the_last_state():
