@@ -25,6 +25,8 @@ except ImportError as error:  # VTK's libraries need libGL even to import
         remedy="On Debian and Ubuntu: apt-get install libgl1 libegl1 libxrender1",
     ) from error
 
+pv.vtk_verbosity("off")  # "bad X server connection" is said on every machine without a display, where VTK then goes on
+
 Image = NDArray[np.uint8]
 
 LIMIT = 0.010  # m, end of the colour scale in figures 12 to 14

@@ -96,17 +96,6 @@ def import_surface(path: str | Path, *, unit: str | None = None, size: float | N
         _refuse_all_but_faces(file)
         if factor != 1.0:
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
-        if len(gmsh.model.getEntities(2)) > 1:
-            gmsh.model.occ.synchronize()
-            with _silence():
-                gmsh.model.occ.healShapes(
-                    gmsh.model.occ.getEntities(2),
-                    tolerance=_SEWN * float(_extent().max()),
-                    fixDegenerated=False,
-                    fixSmallEdges=False,
-                    fixSmallFaces=False,
-                    makeSolids=False,
-                )
         gmsh.model.occ.synchronize()
         plan = np.delete(_extent(), 1 if up == "y" else 2)
         points, triangles, normals = _mesh(float(plan.max()) / _DEFAULT_EDGES if size is None else size, file)
@@ -138,15 +127,24 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
 
 
 def _read_shapes(file: Path) -> None:
-    """The file's shapes into the current model, m."""
+    """The file's shapes into the current model, STEP and IGES in m, faces that touch sewn together."""
+    if file.suffix.lower() in (".iges", ".igs"):
+        # OpenCASCADE takes a target unit for IGES only once it has read one: this reading is thrown away.
+        gmsh.option.setString("Geometry.OCCTargetUnit", "")
+        _import(file)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+    _import(file)
+    if len(gmsh.model.getEntities(2)) > 1 and not gmsh.model.getEntities(3):
+        # The sewing tolerance is a share of the size, which is known only now: read again.
+        gmsh.option.setNumber("Geometry.Tolerance", _SEWN * float(_extent().max()))
+        gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
+        _import(file)
+
+
+def _import(file: Path) -> None:
+    gmsh.model.remove()
+    gmsh.model.add("surface")
     with _silence():
-        if file.suffix.lower() in (".iges", ".igs"):
-            # OpenCASCADE has a target unit for IGES only once it has read one: the first reading is thrown away.
-            gmsh.option.setString("Geometry.OCCTargetUnit", "")
-            gmsh.model.occ.importShapes(str(file))
-            gmsh.model.remove()
-            gmsh.model.add("surface")
-            gmsh.option.setString("Geometry.OCCTargetUnit", "M")
         gmsh.model.occ.importShapes(str(file), highestDimOnly=True)
     gmsh.model.occ.synchronize()
 
