@@ -155,9 +155,10 @@ def make_beams(
 
 
 def _frames(x_axis: Reals, z_axis: Reals) -> Reals:
-    default = np.isnan(z_axis).any(axis=1)
-    upright = np.linalg.norm(x_axis[:, :2], axis=1) < _PARALLEL_TO_Z
-    z: Reals = np.where(default[:, None], np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]), z_axis)
+    default: Flags = np.asarray(np.isnan(z_axis).any(axis=1))
+    upright: Flags = np.linalg.norm(x_axis[:, :2], axis=1) < _PARALLEL_TO_Z
+    ordinary = np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    z: Reals = np.where(default[:, None], ordinary, z_axis)
     y_axis = np.cross(z, x_axis)
     size = np.linalg.norm(y_axis, axis=1)
     along: Flags = size <= 1e-9 * np.linalg.norm(z, axis=1)

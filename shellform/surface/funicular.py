@@ -91,7 +91,7 @@ def thrust_heights(
         state=shape,
         residual=change / rise,
         iterations=_ROUNDS,
-        remedy="Choose a smaller rise: steep shells bear their weight by thrust in no shape.",
+        remedy="Choose a smaller rise, or mesh the plan more evenly.",
     )
 
 

@@ -118,7 +118,7 @@ def test_a_pinned_rod_may_spin_about_its_axis_and_still_counts_as_stable():
 
 def test_what_nothing_restrains_is_refused_by_name():
     points = np.column_stack([np.linspace(0, 1, 3), np.zeros((3, 2))])
-    with pytest.raises(InputError, match="nothing restrains.*along x"):
+    with pytest.raises(InputError, match=r"nothing restrains.*along x"):
         assemble(chain(points, (1, 1, 1, 1), {}))
     lonely = np.vstack([points, [[5.0, 0.0, 0.0]]])
     network = chain(points, (1, 1, 1, 1), {0: [True] * 6})
