@@ -24,11 +24,13 @@ from shellform.net.pull import (
 )
 from shellform.net.trim import Trimmed, Uncovered, trim
 from shellform.surface.locate import Locator
-from shellform.surface.target import Surface
+from shellform.surface.target import Surface, largest_curvature
 
 MERGE = 0.2  # of the spacing
 ELEMENTS = 4  # a segment, as in section 4.1
 _REACH = 6.0  # spacings that the surface goes on past its edge
+_SHARPEST = 1.0  # largest curvature times spacing
+_FAR = 0.1  # of the spacing: a net farther from the surface is refused
 _MARGINS = (1.5, 2.5, 4.0)  # spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
 
 
@@ -108,6 +110,14 @@ def _check(surface: Surface, spacing: float, gap: float, elements: int, merge: f
         raise InputError(
             "must be positive and well below the spacing", where="joint.gap", value=gap, remedy="Give metres."
         )
+    bent = largest_curvature(surface)
+    if bent * spacing > _SHARPEST:
+        raise InputError(
+            f"is too large for a surface that bends to a radius of {1.0 / bent:.3g} m",
+            where="net.spacing",
+            value=spacing,
+            remedy=f"Choose a spacing below {_SHARPEST / bent:.3g} m, or a smoother surface.",
+        )
     if elements < 1:
         raise InputError("must be at least 1", where="net.elements", value=elements)
     if not 0.0 < merge < 0.5:
@@ -152,9 +162,17 @@ def _net(finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> N
             remedy="Choose a smaller spacing, another angle, or a flatter surface.",
         )
     curvature = _curvature(oversized, pulled, trimmed)
-    return Net(
-        grid, state, trimmed.supports, curvature, _quality(finder, grid, trimmed, curvature, pulled), trimmed.notes
-    )
+    quality = _quality(finder, grid, trimmed, curvature, pulled)
+    if quality.distance_max > _FAR * grid.spacing:
+        worst = int(np.argmax(np.abs(finder.foot(crossing_points(grid, state)).distance)))
+        raise InputError(
+            f"the net stays {quality.distance_max:.3g} m off the surface at {crossing_points(grid, state)[worst].round(3).tolist()}: "
+            "it is curved more there than a grid of straight rods can follow",
+            where="net.spacing",
+            value=grid.spacing,
+            remedy="Choose a smaller spacing, another angle, or a smoother surface.",
+        )
+    return Net(grid, state, trimmed.supports, curvature, quality, trimmed.notes)
 
 
 def _curvature(oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Reals:

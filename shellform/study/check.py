@@ -13,7 +13,7 @@ from shellform.net.chebyshev import pull_net
 from shellform.net.files import net_document, save_net
 from shellform.study.case import load_case, write_text
 from shellform.study.run import Report, net_summary, read_surface
-from shellform.surface.target import Surface, curvature
+from shellform.surface.target import largest_curvature
 
 _GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
 
@@ -54,11 +54,6 @@ def check_file(file: Path, *, unit: str | None, allow_scripts: bool) -> dict[str
     else:
         told["largest rod radius"] = f"{6.4e-3 / bent:.3g} m in GFRP (strength/E = 255 MPa/40 GPa)" if bent > 0.0 else "any"
     return told
-
-
-def largest_curvature(surface: Surface) -> float:
-    """The largest principal curvature, 1/m, but for the hundredth of the vertices where it is largest: mesh noise at edges."""
-    return float(np.percentile(np.abs(curvature(surface)).max(axis=1), 99.0))
 
 
 def net_alone(

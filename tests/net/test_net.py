@@ -71,6 +71,14 @@ def test_a_net_is_the_same_after_saving(tmp_path, net):
         load_net(tmp_path / "bad.npz")
 
 
+def test_a_surface_sharper_than_the_spacing_is_refused(vault):
+    peak = vault.vertices.copy()
+    away = np.linalg.norm(peak[:, :2], axis=1)
+    peak[:, 2] += 0.3 * np.exp(-((away / 0.05) ** 2))
+    with pytest.raises(InputError, match="radius of"):
+        sf.pull_net(sf.make_surface(peak, vault.triangles), spacing=0.055, gap=0.002)
+
+
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
