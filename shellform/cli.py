@@ -180,21 +180,23 @@ def verify() -> None:
 
 
 class _Progress:
-    """One line that is written over on a terminal, stage ends elsewhere."""
+    """A spinner with the present step on a terminal; what is finished stays as a line, there and elsewhere."""
 
     def __init__(self) -> None:
-        self.live = sys.stderr.isatty()
+        from rich.console import Console
+
+        self.console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+        self.status = self.console.status("starting")
+        self.status.start()
 
     def __call__(self, stage: str, text: str) -> None:
-        if self.live:
-            print(f"\r\x1b[K{stage}: {text}", end="", file=sys.stderr, flush=True)
-        elif text.startswith(("done", "kept", "loading", "no pictures")):
-            print(f"{stage}: {text}", file=sys.stderr, flush=True)
+        if text.startswith(("done", "kept", "loading", "no pictures")):
+            self.console.print(f"{stage}: {text}")
+        self.status.update(f"{stage}: {text}")
 
     def close(self) -> None:
-        """Ends the line."""
-        if self.live:
-            print(file=sys.stderr)
+        """Ends the spinner."""
+        self.status.stop()
 
 
 def _tell(summary: dict[str, Any]) -> None:

@@ -136,9 +136,11 @@ class _Search:
         self.accepted = [self.point]
         self.history = [self._record(self.point, True)]
         self.status = "the number of evaluations was reached"
+        self.most = 0
 
     def run(self, evaluations: int, *, thin: bool) -> Optimum:
         """First the objective alone, then thinning."""
+        self.most = evaluations
         self._descend(evaluations)
         while self.accepted and not self._sound(self.accepted[-1]):
             self.accepted.pop()
@@ -210,7 +212,7 @@ class _Search:
     def _repair(self, point: Point, budget: float) -> Point:
         """A few steps with the cables that are left, none of which may go slack."""
         before, self.point = self.point, point
-        for _ in range(_REPAIRS):
+        for _ in range(min(_REPAIRS, self.most - self.evaluator.evaluations)):
             model = self._model()
             y, _ = self._propose(model)
             trial = self._try(model, y)

@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from shellform.arrays import Flags, Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.sensitivity import gradients, respond
-from shellform.design.terms import AtMost, Misfit, RodRadius, Share, Term
+from shellform.design.terms import AtMost, RodRadius, Share, Term
 from shellform.errors import InputError, NotConverged
 from shellform.structure.assembly import Assembly
 from shellform.structure.equilibrium import find_equilibrium
@@ -309,8 +309,3 @@ def without_slack(shell: Gridshell, design: Design, state: State) -> Design:
 def deviations(shell: Gridshell, state: State) -> Reals:
     """Distance (n,), m, of every node from its place in the target (7)."""
     return np.linalg.norm(state.positions - shell.target.positions, axis=1)
-
-
-def misfit_only(load: str) -> list[Share]:
-    """The objective that asks for the shape alone."""
-    return [Share(1.0, Misfit(load))]

@@ -108,12 +108,6 @@ class Symmetric:
             cholmod.options["supernodal"] = 2
         return symbolic, 1.0 / np.array(inverse)[:, 0]
 
-    def product(self, values: Reals, vector: Reals) -> Reals:
-        """Matrix times `vector` (n,)."""
-        lower = sp.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
-        result: Reals = lower @ vector + lower.T @ vector - values[self.diagonal] * vector
-        return result
-
     def _full(self, values: Reals) -> sp.csc_array:
         lower = sp.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
         return sp.csc_array(lower + sp.tril(lower, -1).T)

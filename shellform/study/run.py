@@ -373,7 +373,6 @@ def draw_run(
     if not (folder / "case.toml").is_file():
         raise InputError("is no run folder", where=str(folder), remedy="Make one with shellform design.")
     case = load_case(folder / "case.toml")
-    summary = _read_json(folder / "summary.json")
     ready = [name for name in DESIGNS if (folder / f"designs/{name}.npz").is_file()]
     if not ready:
         raise InputError("the run has no designs yet", where=str(folder), remedy="Run shellform design on it first.")
@@ -405,7 +404,6 @@ def draw_run(
         file = folder / "figures/deviations.png"
         render.sheet(file, rows, limit=scale)
         files.append(file)
-    del summary
     return files
 
 

@@ -26,6 +26,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, ShellformError
@@ -43,6 +44,7 @@ except (ImportError, OSError) as error:  # a shared library that gmsh's wheel ne
 FORMATS = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
 _MOST_TRIANGLES = 2_000_000
+_AGREES = 0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
 _SAMPLES = 33  # points on a curve that tell its extent
 _SEWN = 1e-6  # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
 _IGES_UNITS = 1000.0  # gmsh states millimetres in IGES files and leaves the numbers as they are
@@ -134,11 +136,21 @@ def _read_shapes(file: Path) -> None:
         _import(file)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
     _import(file)
-    if len(gmsh.model.getEntities(2)) > 1 and not gmsh.model.getEntities(3):
+    if not gmsh.model.getEntities(3) and not _faces_connected():
         # The sewing tolerance is a share of the size, which is known only now: read again.
         gmsh.option.setNumber("Geometry.Tolerance", _SEWN * float(_extent().max()))
         gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
         _import(file)
+
+
+def _faces_connected() -> bool:
+    """Whether all faces hang together by curves that they share; sewing faces with a pole breaks them, so only the others are sewn."""
+    groups: list[set[int]] = []
+    for _, face in gmsh.model.getEntities(2):
+        curves = set(gmsh.model.getAdjacencies(2, face)[1].tolist())
+        touching = [group for group in groups if group & curves]
+        groups = [group for group in groups if not group & curves] + [curves.union(*touching)]
+    return len(groups) < 2
 
 
 def _import(file: Path) -> None:
@@ -223,9 +235,11 @@ def _extent() -> Reals:
 
 
 def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
-    """Points (v, 3), triangles (t, 3) and, where all faces have them, CAD normals (v, 3) of the model's faces."""
+    """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's faces."""
     if not (size > 0.0 and math.isfinite(size)):
         raise InputError("must be a positive length", where="surface.size", value=size)
+    if not gmsh.model.getEntities(2):
+        raise InputError("makes no surface", where=str(where), remedy="See surfaces/dome.py.")
     spans = np.sort(_extent())
     if 2.5 * spans[2] * spans[1] / size**2 > _MOST_TRIANGLES:
         raise InputError(
@@ -234,8 +248,6 @@ def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
             value=size,
             remedy="Choose a larger mesh size, or check the surface's unit.",
         )
-    if not gmsh.model.getEntities(2):
-        raise InputError("makes no surface", where=str(where), remedy="See surfaces/dome.py.")
     gmsh.option.setNumber("Mesh.MeshSizeMin", size)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.model.mesh.generate(2)
@@ -252,12 +264,17 @@ def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
         triangles.append(mine)
         _add_normals(normals, points, mine, face, number)
     faces = np.vstack(triangles)
-    length = np.linalg.norm(normals, axis=1)
+    length = np.linalg.norm(normals, axis=1)  # zero where no face knows it
     used = np.zeros(len(points), dtype=bool)
     used[faces.ravel()] = True
-    known = bool((length[used] > 0.5).all())
     points, faces = points[used], (np.cumsum(used) - 1)[faces]
-    return points, faces, normals[used] if known else None
+    normals, known = normals[used], length[used] > 0.5
+    if not known.any():
+        return points, faces, None
+    if not known.all():
+        estimated = make_surface(points, faces, source=str(where))
+        normals[~known] = estimated.normals[cKDTree(estimated.vertices).query(points[~known])[1]]
+    return points, faces, normals
 
 
 def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, number: Indices) -> None:
@@ -275,9 +292,9 @@ def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, n
     seen = rough[rows]
     seen /= np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-300)
     agreement = np.sum(exact * seen, axis=1)
-    # A seam's node has two parameter values and a pole many: what disagrees with the triangles is left to the estimate.
-    good = np.isfinite(exact).all(axis=1) & (np.abs(agreement) > 0.8)
-    signed = np.where(good[:, None], exact * np.sign(agreement)[:, None], seen)
+    # At a pole the CAD normal means nothing: it stays zero here, unless another face knows it.
+    good = np.isfinite(exact).all(axis=1) & (np.abs(agreement) > _AGREES)
+    signed = np.where(good[:, None], exact * np.sign(agreement)[:, None], 0.0)
     rest, first = np.unique(rows, return_index=True)
     mine = signed[first]
     # Two faces of a script need not turn the same way; make_surface turns all upwards, so only the sum has to agree.

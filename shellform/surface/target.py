@@ -105,11 +105,6 @@ def make_surface(
     return Surface(points, faces, unit, source, tuple(mended))
 
 
-def scaled(surface: Surface, factor: float) -> Surface:
-    """The surface with all lengths times `factor`."""
-    return Surface(factor * surface.vertices, surface.triangles, surface.normals, surface.source, surface.mended)
-
-
 def curvature(surface: Surface) -> Reals:
     """Principal curvatures (v, 2), 1/m, positive where the surface bends away from its upper side."""
     return jets(surface.vertices, surface.triangles, surface.normals)[1]

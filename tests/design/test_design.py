@@ -118,6 +118,21 @@ def test_svanberg_s_two_bar_truss_is_solved_to_its_published_optimum():
     assert evaluate(best)[0] == pytest.approx(1.5086525, abs=1e-5)
 
 
+def test_svanberg_s_cantilever_is_solved_to_its_published_optimum():
+    # Svanberg 1987: minimise 0.0624 sum(x) with sum(c / x³) <= 1; f = 1.3399564.
+    share = np.array([61.0, 37.0, 19.0, 7.0, 1.0])
+
+    def evaluate(x):
+        limit = np.array([(share / x**3).sum() - 1.0])
+        return 0.0624 * x.sum(), np.full(5, 0.0624), limit, (-3.0 * share / x**4)[None]
+
+    best, _ = mma.minimise(
+        evaluate, np.full(5, 5.0), np.full(5, 1.0), np.full(5, 10.0), constraints=1, evaluations=500, tolerance=1e-12
+    )
+    np.testing.assert_allclose(best, [6.0160, 5.3092, 4.4943, 3.5015, 2.1527], atol=2e-3)
+    assert evaluate(best)[0] == pytest.approx(1.3399564, abs=2e-6)
+
+
 def test_a_start_outside_the_bounds_is_refused():
     with pytest.raises(InputError, match="outside the bounds"):
         mma.minimise(lambda x: (0.0, x, x, x), np.zeros(1), np.ones(1), 2 * np.ones(1), constraints=0, evaluations=1)

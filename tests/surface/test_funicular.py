@@ -1,0 +1,153 @@
+"""Force densities against closed forms (verification.md, E), and shells that bear a uniform weight by thrust alone."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.spatial import Delaunay
+
+from shellform.errors import InputError, NotConverged
+from shellform.surface import funicular
+from shellform.surface.funicular import force_density, thrust_heights
+
+
+def line(count, load):
+    """Nodes on the x axis, 1 m apart, loaded along z and fixed at both ends."""
+    nodes = np.zeros((count + 1, 3))
+    nodes[:, 0] = np.arange(count + 1)
+    edges = np.column_stack([np.arange(count), np.arange(1, count + 1)])
+    loads = np.zeros((count + 1, 3))
+    loads[:, 2] = load
+    fixed = np.zeros(count + 1, dtype=bool)
+    fixed[[0, -1]] = True
+    return nodes, edges, loads, fixed
+
+
+def disc(rings, radius=1.0):
+    """A plan of a circle: points, triangles, and which lie on its edge."""
+    points = [(0.0, 0.0)]
+    for k in range(1, rings + 1):
+        turn = np.arange(6 * k) * np.pi / (3 * k)
+        points += list(radius * k / rings * np.column_stack([np.cos(turn), np.sin(turn)]))
+    plan = np.array(points)
+    return plan, Delaunay(plan).simplices, np.hypot(*plan.T) > radius * (1 - 1e-9)
+
+
+def test_a_line_of_equal_branches_is_a_parabola():
+    # verification.md E: z_i = p i (n - i) / (2 q), exact at the nodes.
+    count, density, load = 10, 3.0, 2.0
+    nodes, edges, loads, fixed = line(count, load)
+    i = np.arange(count + 1)
+    result = force_density(nodes, edges, np.full(count, density), loads, fixed)
+    np.testing.assert_allclose(result[:, 2], load * i * (count - i) / (2 * density), atol=1e-13)
+    np.testing.assert_allclose(result[:, 0], i, atol=1e-13)
+
+
+def test_all_branches_in_compression_stand_up_to_loads_pointing_down():
+    nodes, edges, loads, fixed = line(10, 2.0)
+    hanging = force_density(nodes, edges, np.full(10, 3.0), loads, fixed)
+    standing = force_density(nodes, edges, np.full(10, -3.0), -loads, fixed)
+    np.testing.assert_allclose(standing, hanging, atol=1e-13)
+
+
+def test_every_free_node_of_an_uneven_network_is_in_equilibrium():
+    rng = np.random.default_rng(1)
+    plan, triangles, fixed = disc(6)
+    nodes = np.column_stack([plan, rng.normal(size=len(plan))])
+    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    densities, loads = rng.uniform(0.1, 10.0, len(edges)), rng.normal(size=nodes.shape)
+    found = force_density(nodes, edges, densities, loads, fixed)
+    pull = densities[:, None] * (found[edges[:, 1]] - found[edges[:, 0]])
+    balance = loads.copy()
+    np.add.at(balance, edges[:, 0], pull)
+    np.add.at(balance, edges[:, 1], -pull)
+    assert np.abs(balance[~fixed]).max() < 1e-12
+    np.testing.assert_array_equal(found[fixed], nodes[fixed])
+
+
+def test_fixed_nodes_alone_stay_where_they_are():
+    nodes, edges, loads, _ = line(3, 1.0)
+    np.testing.assert_array_equal(force_density(nodes, edges, np.ones(3), loads, np.ones(4, dtype=bool)), nodes)
+
+
+def test_networks_that_have_no_shape_are_refused():
+    nodes, edges, loads, fixed = line(10, 1.0)
+    with pytest.raises(InputError, match="no node is fixed"):
+        force_density(nodes, edges, np.ones(10), loads, np.zeros(11, dtype=bool))
+    with pytest.raises(InputError, match="hang on nothing"):
+        force_density(nodes, edges[:5], np.ones(5), loads, fixed)
+    loose = np.ones(10)
+    loose[[2, 5]] = 0.0
+    with pytest.raises(InputError, match="hang on nothing"):
+        force_density(nodes, edges, loose, loads, fixed)
+    mixed = np.ones(10)
+    mixed[4] = -0.3
+    with pytest.raises(InputError, match="no definite shape"):
+        force_density(nodes, edges, mixed, loads, fixed)
+    with pytest.raises(InputError, match="densities"):
+        force_density(nodes, edges, np.full(10, np.nan), loads, fixed)
+    with pytest.raises(InputError, match="out of range"):
+        force_density(nodes, edges + 1, np.ones(10), loads, fixed)
+
+
+def test_a_weight_of_the_plan_over_a_circle_gives_a_paraboloid_of_second_order():
+    errors = []
+    for rings in (10, 20, 40):
+        plan, triangles, fixed = disc(rings)
+        heights = thrust_heights(plan, triangles, fixed, rise=0.3, load="plan")
+        errors.append(np.abs(heights - 0.3 * (1 - (plan**2).sum(axis=1))).max())
+    assert errors[-1] < 2e-5
+    assert np.log2(errors[0] / errors[2]) / 2 > 1.6  # h² up to the logarithm of linear elements
+
+
+def test_a_weight_of_the_surface_over_a_circle_follows_its_differential_equation():
+    # (r z')' = -c r sqrt(1 + z'²), z(1) = 0: the rise fixes c. Equal thrust in all plan directions.
+    rise = 0.6
+
+    def profile(c, radii):
+        def slope(r, y):
+            return [y[1], -c * np.sqrt(1 + y[1] ** 2) - (y[1] / r if r > 0 else -0.5 * c)]
+
+        return solve_ivp(slope, (0.0, 1.0), [0.0, 0.0], t_eval=radii, rtol=1e-10, atol=1e-12).y[0]
+
+    low, high = 0.1, 10.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if -profile(middle, [1.0])[0] < rise else (low, middle)
+    radii = np.linspace(0.0, 1.0, 31)
+    plan, triangles, fixed = disc(30)
+    heights = thrust_heights(plan, triangles, fixed, rise=rise)
+    expected = np.interp(np.hypot(*plan.T), radii, rise + profile(low, radii))
+    assert np.abs(heights - expected).max() < 5e-4 * rise
+
+
+def test_heights_grow_with_the_plan_and_reach_the_rise():
+    plan, triangles, fixed = disc(8)
+    small = thrust_heights(plan, triangles, fixed, rise=0.2)
+    large = thrust_heights(20 * plan, triangles, fixed, rise=4.0)
+    np.testing.assert_allclose(large, 20 * small, rtol=1e-12, atol=1e-12)
+    assert small.max() == pytest.approx(0.2, rel=1e-14)
+    assert (small[fixed] == 0.0).all()
+    assert (small[~fixed] > 0.0).all()
+
+
+def test_plans_that_carry_no_shell_are_refused():
+    plan, triangles, fixed = disc(3)
+    for rise in (0.0, -1.0, float("nan")):
+        with pytest.raises(InputError, match="rise"):
+            thrust_heights(plan, triangles, fixed, rise=rise)
+    with pytest.raises(InputError, match="load"):
+        thrust_heights(plan, triangles, fixed, rise=0.1, load="snow")
+    with pytest.raises(InputError, match="no vertex is fixed"):
+        thrust_heights(plan, triangles, np.zeros_like(fixed), rise=0.1)
+    with pytest.raises(InputError, match="every vertex is fixed"):
+        thrust_heights(plan, triangles, np.ones_like(fixed), rise=0.1)
+    with pytest.raises(InputError, match="hang on nothing"):
+        thrust_heights(np.vstack([plan, [[9, 9]]]), triangles, np.append(fixed, False), rise=0.1)
+
+
+def test_a_shell_that_still_changes_is_not_given_out(monkeypatch):
+    monkeypatch.setattr(funicular, "_ROUNDS", 2)
+    with pytest.raises(NotConverged, match="still changes") as stopped:
+        thrust_heights(*disc(6), rise=1.0)
+    assert stopped.value.iterations == 2
+    assert stopped.value.state.shape[1] == 3
