@@ -20,6 +20,8 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 
+_STOPPED = 130
+
 Scripts = Annotated[bool, typer.Option("--allow-scripts", help="Run builder scripts from outside the shipped surfaces.")]
 Unit = Annotated[str | None, typer.Option(help="Unit of files that carry none: m, cm, mm, in, ft.")]
 
@@ -27,13 +29,16 @@ Unit = Annotated[str | None, typer.Option(help="Unit of files that carry none: m
 def main() -> None:
     """Runs the command line: status 0 done, 2 input refused, 3 no result, 130 stopped."""
     try:
-        app(standalone_mode=False)
+        status = app(standalone_mode=False)  # typer turns Ctrl-C into a returned status
+        if status == _STOPPED:
+            raise KeyboardInterrupt
+        sys.exit(status if isinstance(status, int) else 0)
     except InputError as error:
         _leave(f"refused: {error}", 2)
     except NotConverged as error:
         _leave(f"no result: {error}", 3)
     except (KeyboardInterrupt, typer.Abort):
-        _leave("stopped; what was computed is kept, and the same command goes on from there", 130)
+        _leave("stopped; what was computed is kept, and the same command goes on from there", _STOPPED)
     except MemoryError:
         _leave("no result: the memory is full. Choose a larger spacing or fewer elements.", 3)
     except typer.Exit as stop:

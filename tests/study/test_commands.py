@@ -1,6 +1,7 @@
 """The commands, as a user calls them: results, exit status, and messages without traceback."""
 
 import json
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -113,6 +114,22 @@ def test_net_alone_writes_the_contract_s_file_for_a_mesh(tmp_path):
     net = json.loads((tmp_path / "net.json").read_text(encoding="utf-8"))
     assert len(net["crossings"]) > 50
     assert {"direction", "index", "length", "marks", "crossings", "ends"} == set(net["rods"][0])
+
+
+def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
+    arguments = [sys.executable, "-m", "shellform", "design", "scripts/scale_model.toml", "--output", str(tmp_path)]
+    job = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert job.stderr is not None
+    for line in job.stderr:
+        if line.startswith("net: done"):
+            job.send_signal(signal.SIGINT)
+            break
+    said = job.stderr.read()
+    assert job.wait(60) == 130
+    assert "stopped" in said
+    assert "Traceback" not in said
+    again = shellform("design", "scripts/scale_model.toml", "--output", tmp_path, "--until", "net")
+    assert again.stderr.count("kept") == 2
 
 
 def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
