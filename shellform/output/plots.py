@@ -1,51 +1,193 @@
-"""Convergence plots (figures 10, 11, 15 and 16 of the paper); the door to matplotlib."""
+"""Convergence plots (figures 10, 11, 15 and 16 of the paper); the door to matplotlib.
+
+Figures are made as objects with their own canvas, so that nothing global is touched and any thread may draw.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
 from pathlib import Path
 
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9")  # Okabe and Ito's
+from shellform.arrays import Reals
+from shellform.errors import InputError
 
-
-def objective_history(path: str | Path, evaluation: Sequence[int], terms: Mapping[str, Sequence[float]]) -> None:
-    """Figure 10: the objective and its weighted terms at each accepted design; the ending of `path` chooses the format."""
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    axes = figure.add_subplot()
-    total = [sum(values) for values in zip(*terms.values(), strict=True)]
-    axes.plot(evaluation, total, color="black", linewidth=2.0, label="objective")
-    for (name, values), colour in zip(terms.items(), _COLOURS, strict=False):
-        axes.plot(evaluation, values, color=colour, marker=".", label=name.replace("_", " "))
-    axes.set(xlabel="design evaluations", ylabel="objective and its terms", ylim=(0.0, None))
-    _finish(figure, path)
+_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
+_DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
+_FORMATS = (".png", ".svg", ".pdf")
+_WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
 
 
-def constraint_history(path: str | Path, evaluation: Sequence[int], constraints: Mapping[str, Sequence[float]]) -> None:
-    """Figure 11: value over limit, minus 1, of each constraint at each accepted design; feasible at and below zero."""
-    figure = Figure(figsize=(7.0, 4.2), layout="constrained")
-    axes = figure.add_subplot()
-    for (name, values), colour in zip(constraints.items(), _COLOURS, strict=False):
-        axes.plot(evaluation, values, color=colour, marker=".", label=name.replace("_", " "))
-    highest = max((max(values) for values in constraints.values()), default=0.0)
-    if highest > 3.0:
-        axes.set_yscale("symlog", linthresh=1.0)
-    axes.axhspan(0.0, max(1.1 * highest, 0.1), color="#f3d9d6", zorder=0, label="infeasible")
-    axes.axhline(0.0, color="black", linewidth=0.8)
-    axes.set(xlabel="design evaluations", ylabel="value / limit - 1")
-    _finish(figure, path)
+@dataclass(frozen=True)
+class History:
+    """What the plots take: one entry an accepted design."""
+
+    evaluation: list[float]
+    terms: dict[str, list[float]]
+    constraints: dict[str, list[float]]
+    cables: list[float] | None
 
 
-def _finish(figure: Figure, path: str | Path) -> None:
-    axes = figure.axes[0]
-    axes.grid(color="#e0e0e0", linewidth=0.6)
-    axes.spines[["top", "right"]].set_visible(False)
-    figure.legend(loc="outside right upper", frameon=False)
+def read_history(table: Mapping[str, Sequence[object]] | Iterable[Mapping[str, object]]) -> History:
+    """The columns of an optimiser's history, from rows (as of csv.DictReader on history.csv) or from named columns.
+
+    Wanted: `evaluation` (or `iteration`), `term.NAME` and `constraint.NAME` for each; `cables` and `accepted` if there.
+    Rows with `accepted` 0 are left out. Raises InputError for missing columns, ragged ones and what is no number.
+    """
+    columns = dict(table) if isinstance(table, Mapping) else _turned(list(table))
+    step = next((name for name in ("evaluation", "iteration") if name in columns), None)
+    if step is None or not len(columns[step]):
+        raise InputError("has no rows with a column evaluation or iteration", where="history", value=sorted(columns))
+    wanted = [step, *(name for name in columns if name.startswith(("term.", "constraint.")) or name in ("cables", "accepted"))]
+    numbers: dict[str, list[float]] = {}
+    for name in wanted:
+        try:
+            numbers[name] = [float(value) for value in columns[name]]  # type: ignore[arg-type]
+        except (TypeError, ValueError) as error:
+            raise InputError(f"column {name} must be numbers: {error}", where="history") from error
+        if len(numbers[name]) != len(columns[step]):
+            raise InputError(f"column {name} and {step} differ in length", where="history", value=len(numbers[name]))
+    keep = [bool(flag) for flag in numbers.pop("accepted", [1.0] * len(columns[step]))]
+    kept = {name: [v for v, good in zip(values, keep, strict=True) if good] for name, values in numbers.items()}
+
+    def group(prefix: str) -> dict[str, list[float]]:
+        return {name.removeprefix(prefix): values for name, values in kept.items() if name.startswith(prefix)}
+
+    return History(kept[step], group("term."), group("constraint."), kept.get("cables"))
+
+
+def objective_history(
+    path: str | Path,
+    evaluation: Sequence[float],
+    terms: Mapping[str, Sequence[float]],
+    *,
+    cables: Sequence[float] | None = None,
+) -> None:
+    """Figure 10: the objective and its weighted terms at each accepted design, and `cables` in tension if given.
+
+    The ending of `path` chooses the format: png, svg or pdf. Raises InputError for other endings and uneven columns.
+    """
+    at, lines = _columns(evaluation, terms)
+    figure, axes = _figure()
+    axes.plot(at, np.sum(list(lines.values()), axis=0), color="black", linewidth=2.0, label="objective")
+    _curves(axes, at, lines)
+    axes.set(xlabel="design evaluations", ylabel="objective and its terms")
+    if np.nanmin(list(lines.values()), initial=0.0) >= 0.0:
+        axes.set_ylim(bottom=0.0)
+    if cables is not None:
+        beside = axes.twinx()
+        (count,) = _columns(evaluation, {"cables": cables})[1].values()
+        beside.step(at, count, where="post", color="#9a9a9a", linewidth=1.2, linestyle="--", label="cables (right)")
+        beside.set_ylabel("cables", color="#6a6a6a")
+        beside.set_ylim(bottom=0.0, top=1.1 * float(np.nanmax(count, initial=1.0)))
+        beside.yaxis.set_major_locator(MaxNLocator(integer=True))
+        beside.tick_params(axis="y", colors="#6a6a6a")
+        beside.spines[["top", "left"]].set_visible(False)
+        beside.spines["right"].set_color("#b0b0b0")
+    _save(figure, path)
+
+
+def constraint_history(
+    path: str | Path, evaluation: Sequence[float], constraints: Mapping[str, Sequence[float]]
+) -> None:
+    """Figure 11: value over limit, minus 1, of each constraint at each accepted design; feasible at and below zero.
+
+    Linear, or, where a value exceeds 3, linear between -1 and 1 and logarithmic beyond. `path` as in `objective_history`.
+    """
+    at, lines = _columns(evaluation, constraints)
+    figure, axes = _figure()
+    _curves(axes, at, lines)
+    values = np.concatenate(list(lines.values()))
+    highest, lowest = float(np.nanmax(values, initial=0.0)), float(np.nanmin(values, initial=0.0))
+    if highest > _WIDE:
+        axes.set_yscale("symlog", linthresh=1.0, linscale=1.0)
+        decades = [k * 10.0**n for n in range(int(np.log10(highest)) + 1) for k in (1, 2, 5)]
+        axes.yaxis.set_major_locator(FixedLocator([-5.0, -2.0, -1.0, -0.5, 0.0, 0.5, *decades]))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        top = 1.5 * highest
+    else:
+        top = max(1.15 * highest, 0.15)
+    bottom = min(1.1 * lowest, -0.15)
+    axes.set_ylim(bottom, top)
+    axes.axhspan(0.0, top, color="#f8ddd3", linewidth=0.0, zorder=0)
+    axes.axhspan(bottom, 0.0, color="#e4eff6", linewidth=0.0, zorder=0)
+    axes.axhline(0.0, color="black", linewidth=0.9, zorder=1.5)
+    for word, offset, foot in [("infeasible", 4, "bottom"), ("feasible", -4, "top")]:
+        axes.annotate(
+            word, (1.0, 0.0), (-6, offset), xycoords=("axes fraction", "data"), textcoords="offset points",
+            ha="right", va=foot, color="#5a5a5a", style="italic",
+        )  # fmt: skip
+    axes.set(xlabel="design evaluations", ylabel="value / limit − 1")
+    _save(figure, path)
+
+
+def _turned(rows: Sequence[Mapping[str, object]]) -> dict[str, Sequence[object]]:
+    names = list(rows[0]) if rows else []
+    for number, row in enumerate(rows):
+        if list(row) != names:
+            raise InputError(f"row {number} has other columns than the first", where="history", value=sorted(row))
+    return {name: [row[name] for row in rows] for name in names}
+
+
+def _columns(evaluation: Sequence[float], named: Mapping[str, Sequence[float]]) -> tuple[Reals, dict[str, Reals]]:
+    """Arrays of one length; what is not finite (a design without an equilibrium) leaves a gap."""
+    at = np.asarray(evaluation, dtype=np.float64)
+    if at.ndim != 1 or not len(at) or not named:
+        raise InputError("has nothing to draw", where="history", remedy="Give at least one row and one column.")
+    lines = {}
+    for name, values in named.items():
+        line = np.asarray(values, dtype=np.float64)
+        if line.shape != at.shape:
+            raise InputError(f"column {name} and evaluation differ in length", where="history", value=line.shape)
+        lines[name] = np.where(np.isfinite(line), line, np.nan)
+    return at, lines
+
+
+def _figure() -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
     FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.grid(color="#e0e0e0", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.margins(x=0.02)
+    return figure, axes
+
+
+def _curves(axes: Axes, at: Reals, lines: Mapping[str, Reals]) -> None:
+    styles = cycle([(colour, dash) for dash in _DASHES for colour in _COLOURS])
+    for (name, values), (colour, dash) in zip(lines.items(), styles, strict=False):
+        label = name.replace(".", ", ").replace("_", " ")
+        axes.plot(at, values, color=colour, linestyle=dash, linewidth=1.4, marker=".", markersize=5, label=label)
+
+
+def _save(figure: Figure, path: str | Path) -> None:
+    """Writes all of the file or nothing; the same history gives the same bytes."""
     target = Path(path)
+    ending = target.suffix.lower()
+    if ending not in _FORMATS:
+        raise InputError("has another ending", where=str(target), value=ending, remedy=f"Use {', '.join(_FORMATS)}.")
+    if not target.parent.is_dir():
+        raise InputError("the folder doesn't exist", where=str(target.parent), remedy="Make it first.")
+    figure.legend(loc="outside right upper", frameon=False)
+    undated: dict[str, None] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(ending, {})
     partial = target.with_name(f"{target.stem}.part{target.suffix}")
-    figure.savefig(partial, dpi=160)
-    os.replace(partial, target)
+    try:
+        with rc_context({"svg.hashsalt": "shellform"}):
+            figure.savefig(partial, dpi=160, metadata=undated)
+        os.replace(partial, target)
+    except OSError as error:
+        raise InputError(f"can't be written: {error.strerror}", where=str(target)) from error
+    finally:
+        partial.unlink(missing_ok=True)

@@ -344,7 +344,10 @@ def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
         return
     from shellform.output import plots
 
-    draw_run(job.folder, limit=job.case.figures.limit, report=job.report)
+    try:
+        draw_run(job.folder, limit=job.case.figures.limit, report=job.report)
+    except InputError as error:  # no OpenGL: everything but the pictures is still made
+        job.report("figures", f"no pictures: {error}")
     with job.path("history.csv").open(encoding="utf-8", newline="") as file:
         rows = [row for row in csv.DictReader(file) if row["accepted"] == "1"]
     at = [int(row["evaluation"]) for row in rows]

@@ -1,0 +1,287 @@
+"""Deviation maps of a synthetic dome: what the pictures show, what is refused, what is left on the disc."""
+
+import functools
+import itertools
+import os
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista as pv
+
+from shellform.errors import InputError
+from shellform.output import render
+
+SIZE = (400, 300)
+SMALL = {"size": SIZE}
+
+
+def dome(side=9, pieces=4):
+    """A square grid of rods on a dome 1 m wide and 0.3 m high, of `pieces` elements a segment, diagonals as cables."""
+    line = np.linspace(-0.5, 0.5, (side - 1) * pieces + 1)
+    nodes, number, beams = [], {}, []
+
+    def node(x, y):
+        key = (round(x, 9), round(y, 9))
+        if key not in number:
+            number[key] = len(nodes)
+            nodes.append([x, y, 0.3 - 0.6 * (x * x + y * y)])
+        return number[key]
+
+    for across in line[::pieces]:
+        along = [node(x, across) for x in line], [node(across, y) for y in line]
+        for rod in along:
+            beams += itertools.pairwise(rod)
+    knots = [[node(x, y) for x in line[::pieces]] for y in line[::pieces]]
+    cables = [(knots[i][j], knots[i + 1][j + 1]) for i in range(side - 1) for j in range(side - 1)]
+    edge = sorted({*knots[0], *knots[-1], *(row[0] for row in knots), *(row[-1] for row in knots)})
+    inner = [each for row in knots[1:-1:2] for each in row[1:-1:2]]
+    return np.array(nodes), np.array(beams), np.array(cables), np.array(edge), np.array(inner)
+
+
+@functools.cache
+def panel():
+    nodes, beams, cables, supports, loads = dome()
+    deviation = np.abs(np.random.default_rng(1).normal(scale=0.004, size=len(nodes)))
+    forces = np.linspace(0.5, 12.0, len(cables))
+    return render.Panel("A dome", nodes, beams, deviation, cables, forces, supports, loads, 0.001)
+
+
+def bare(**changes):
+    """The dome's rods alone, for counting pixels."""
+    none = np.empty((0, 2), int)
+    alone = {"cables": none, "cable_forces": np.empty(0), "supports": [], "load_points": []}
+    return replace(panel(), **{**alone, **changes})
+
+
+def above(picture):
+    """The part of a picture between title and colour bar."""
+    return picture[45 : SIZE[1] - render._bar_height(SIZE)].astype(int)
+
+
+def ink(picture, axis=None):
+    """Pixels that are not white."""
+    return (picture.min(axis=2) < 250).sum() if axis is None else (picture.min(axis=2) < 250).any(axis=axis)
+
+
+def test_the_same_panel_gives_the_same_picture():
+    first = render.image(panel(), **SMALL)
+    second = render.image(panel(), **SMALL)
+    assert first.shape == (300, 400, 3)
+    assert first.dtype == np.uint8
+    assert np.abs(first.astype(int) - second).max() <= 1
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0, 30.0])
+def test_rods_have_the_colour_of_the_bar_at_their_deviation(share):
+    count = len(panel().positions)
+    picture = above(render.image(bare(deviation=np.full(count, share * 0.010)), **SMALL))
+    wanted = render._colours(np.array([share]))[0].astype(float)
+    seen = picture[picture.min(axis=2) < 200].astype(float)
+    # shading dims a colour, but does not turn it
+    turned = (seen @ wanted) / (np.linalg.norm(seen, axis=1) * np.linalg.norm(wanted) + 1e-9)
+    assert np.median(turned) > 0.97
+
+
+def test_colours_are_those_of_viridis_and_stay_at_its_ends():
+    ends = render._colours(np.array([0.0, 0.5, 1.0, 7.0]))
+    np.testing.assert_array_equal(ends, [[68, 1, 84], [33, 145, 140], [253, 231, 37], [253, 231, 37]])
+
+
+def test_slack_cables_are_fainter_than_taut_ones():
+    only = {"beams": np.empty((0, 2), int), "supports": [], "load_points": []}
+    taut = above(render.image(replace(panel(), **only, cable_forces=np.full(64, 5.0)), **SMALL))
+    slack = above(render.image(replace(panel(), **only, cable_forces=np.zeros(64)), **SMALL))
+    assert (255 - slack).sum() < 0.5 * (255 - taut).sum()
+    assert (255 - slack).sum() > 0
+
+
+def test_a_cable_is_as_thick_as_its_force():
+    only = {"beams": np.empty((0, 2), int), "supports": [], "load_points": []}
+    half = np.arange(64) < 32
+    uneven = above(render.image(replace(panel(), **only, cable_forces=np.where(half, 12.0, 0.1)), **SMALL))
+    even = above(render.image(replace(panel(), **only, cable_forces=np.full(64, 12.0)), **SMALL))
+    assert (255 - uneven).sum() < 0.85 * (255 - even).sum()
+
+
+def test_a_gridshell_without_cables_loads_or_supports_is_drawn():
+    assert ink(above(render.image(bare(), **SMALL))) > 500
+
+
+def test_supports_and_loads_are_marked():
+    plain = above(render.image(bare(), frame=panel().positions, **SMALL))
+    supported = above(render.image(bare(supports=panel().supports), frame=panel().positions, **SMALL))
+    loaded = above(render.image(bare(load_points=panel().load_points), **SMALL))
+    assert (np.abs(plain - supported).max(axis=2) > 60).sum() > 50
+    red = loaded[..., 0] > np.maximum(loaded[..., 1], loaded[..., 2]) + 40
+    assert red.sum() > 50
+
+
+@pytest.mark.parametrize("view", ["iso", "top", "front", "side"])
+def test_the_whole_shell_lies_in_the_frame_also_when_it_has_snapped_through(view):
+    inverted = replace(panel(), positions=panel().positions * [1.0, 1.0, -1.4])
+    for each in (panel(), inverted):
+        picture = above(render.image(each, view=view, **SMALL))
+        across, down = ink(picture, axis=0), ink(picture, axis=1)
+        assert not across[[0, -1]].any()
+        assert not down[-1]
+        assert across.mean() > 0.4 or down.mean() > 0.5
+
+
+def test_pictures_with_one_frame_share_their_camera():
+    inverted = bare(positions=panel().positions * [1.0, 1.0, -1.0])
+    both = np.vstack([panel().positions, inverted.positions])
+    first = above(render.image(bare(), frame=both, view="front", **SMALL))
+    second = above(render.image(inverted, frame=both, view="front", **SMALL))
+    np.testing.assert_allclose(np.flatnonzero(ink(first, 0))[[0, -1]], np.flatnonzero(ink(second, 0))[[0, -1]], atol=1)
+    assert np.flatnonzero(ink(first, 1))[0] < np.flatnonzero(ink(second, 1))[0]
+
+
+def test_a_target_surface_shows_through():
+    corners = np.array([[-0.5, -0.5, 0.0], [0.5, -0.5, 0.0], [0.5, 0.5, 0.0], [-0.5, 0.5, 0.0]])
+    plain = above(render.image(bare(), view="top", frame=corners, **SMALL))
+    covered = above(render.image(bare(), view="top", surface=(corners, [[0, 1, 2], [0, 2, 3]]), **SMALL))
+    assert (np.abs(plain - covered).max(axis=2) > 5).mean() > 0.2
+    dark = plain.max(axis=2) < 120  # rods stand above it
+    assert np.abs(plain - covered)[dark].mean() < 30
+
+
+def test_elements_without_length_do_not_make_their_rods_vanish():
+    positions = np.array(panel().positions)
+    first, second = panel().beams[5]
+    positions[second] = positions[first]
+    whole, pinched = ink(above(render.image(bare(), **SMALL))), ink(above(render.image(bare(positions=positions), **SMALL)))
+    assert pinched > 0.95 * whole
+
+
+def test_a_sheet_has_the_size_of_its_panels_and_one_scale_and_camera(tmp_path):
+    good, bad = bare(deviation=np.zeros(len(panel().positions))), bare(deviation=np.full(len(panel().positions), 0.5))
+    render.sheet(tmp_path / "sheet.png", [[good, bad], [good]], size=SIZE)
+    page = np.flipud(pv.read(tmp_path / "sheet.png").point_data.active_scalars.reshape(-1, 800, 3))
+    assert page.shape == (600 + render._bar_height(SIZE), 800, 3)
+    upper, lower = page[45:300, :400].astype(int), page[345:600, :400].astype(int)
+    assert np.abs(upper - lower).max() <= 1
+    np.testing.assert_array_equal(ink(page[45:300, :400], 0), ink(page[45:300, 400:], 0))  # yellow at the same pixels
+    assert ink(page[300:600, 400:]) == 0  # the short row's end stays white
+    assert [path.name for path in tmp_path.iterdir()] == ["sheet.png"]
+
+
+def test_a_picture_on_the_disc_is_the_image(tmp_path):
+    render.picture(tmp_path / "a.png", panel(), **SMALL)
+    read = np.flipud(pv.read(tmp_path / "a.png").point_data.active_scalars.reshape(300, 400, 3))
+    assert np.abs(read.astype(int) - render.image(panel(), **SMALL)).max() <= 1
+
+
+def test_a_state_file_holds_rods_then_cables_with_their_values(tmp_path):
+    given = panel()
+    render.write_vtp(tmp_path / "state.vtp", given, {"N": np.arange(len(given.beams))})
+    mesh = pv.read(tmp_path / "state.vtp")
+    np.testing.assert_allclose(mesh.points, given.positions)
+    np.testing.assert_array_equal(mesh.lines.reshape(-1, 3)[:, 1:], np.vstack([given.beams, given.cables]))
+    np.testing.assert_allclose(mesh.point_data["deviation"], given.deviation)
+    rods = len(given.beams)
+    assert np.isnan(mesh.cell_data["cable_force"][:rods]).all()
+    np.testing.assert_allclose(mesh.cell_data["cable_force"][rods:], given.cable_forces)
+    np.testing.assert_allclose(mesh.cell_data["N"][:rods], np.arange(rods))
+    assert np.isnan(mesh.cell_data["N"][rods:]).all()
+    np.testing.assert_array_equal(mesh.cell_data["cable"], [0] * rods + [1] * len(given.cables))
+
+
+def test_lines_without_cables_and_with_vectors_are_written(tmp_path):
+    nodes = np.eye(3)
+    render.write_lines(tmp_path / "a.vtp", nodes, [[0, 1], [1, 2]], [], {"spin": nodes}, {"N": [1.0, 2.0]})
+    mesh = pv.read(tmp_path / "a.vtp")
+    np.testing.assert_allclose(mesh.point_data["spin"], nodes)
+    np.testing.assert_allclose(mesh.cell_data["N"], [1.0, 2.0])
+
+
+def test_values_of_the_wrong_length_are_refused_before_anything_is_written(tmp_path):
+    with pytest.raises(InputError, match=r"cell_data\['N'\] has the wrong shape.*Give 3 or 2 rows"):
+        render.write_lines(tmp_path / "a.vtp", np.eye(3), [[0, 1], [1, 2]], [[0, 2]], {}, {"N": [1.0]})
+    with pytest.raises(InputError, match=r"point_data\['d'\]"):
+        render.write_lines(tmp_path / "a.vtp", np.eye(3), [[0, 1]], [], {"d": [1.0]}, {})
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("positions", np.empty((0, 3)), "no nodes"),
+        ("positions", np.full((3, 3), np.nan), "not finite"),
+        ("beams", [[0, 10**6]], "out of range"),
+        ("beams", [0, 1], "wrong shape"),
+        ("deviation", np.zeros(3), "deviation has the wrong shape"),
+        ("deviation", None, "can't be negative"),
+        ("cable_forces", np.zeros(3), "cable_forces has the wrong shape"),
+        ("supports", [[0, 1]], "wrong shape"),
+        ("load_points", [-1], "out of range"),
+        ("rod_radius", 0.0, "above zero"),
+    ],
+)
+def test_panels_of_wrong_arrays_are_refused(name, value, message):
+    if value is None:
+        value = np.full(len(panel().positions), -1.0)
+    with pytest.raises(InputError, match=message):
+        replace(panel(), **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"view": "inside"}, "Known: iso, top, front, side"),
+        ({"limit": 0.0}, "must be positive"),
+        ({"limit": np.nan}, "must be positive"),
+        ({"size": (20, 20)}, "too small"),
+        ({"surface": (np.eye(3), [[0, 1, 7]])}, "surface triangles"),
+        ({"frame": [1.0, 2.0]}, "frame has the wrong shape"),
+    ],
+)
+def test_arguments_that_cannot_be_drawn_are_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        render.image(panel(), **{**SMALL, **given})
+
+
+def test_empty_sheets_other_endings_and_missing_folders_are_refused(tmp_path):
+    with pytest.raises(InputError, match="no panels"):
+        render.sheet(tmp_path / "a.png", [[]])
+    with pytest.raises(InputError, match=r"Use \.png"):
+        render.picture(tmp_path / "a.jpg", panel())
+    with pytest.raises(InputError, match=r"Use \.vtp"):
+        render.write_vtp(tmp_path / "a.vtk", panel())
+    with pytest.raises(InputError, match="folder doesn't exist"):
+        render.picture(tmp_path / "none/a.png", panel())
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_that_cannot_be_written_is_refused_and_leaves_nothing(tmp_path):
+    (tmp_path / "a.vtp").mkdir()
+    with pytest.raises(InputError, match="can't be written"):
+        render.write_vtp(tmp_path / "a.vtp", panel())
+    assert [path.name for path in tmp_path.iterdir()] == ["a.vtp"]
+
+
+def test_nothing_is_drawn_without_a_context_and_the_packages_are_named(monkeypatch):
+    monkeypatch.setattr(render, "_window_works", lambda: False)
+    with pytest.raises(InputError, match="apt-get install libegl1"):
+        render.image(panel(), **SMALL)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="VTK chooses its window at run time on Linux")
+def test_a_window_without_a_context_is_found_out_before_vtk_crashes():
+    # OSMesa is asked for where it isn't installed, which leaves VTK with what it has on a machine without GL libraries
+    code = (
+        "import ctypes.util, sys; from shellform.output import render\n"
+        "sys.exit(0 if render._window_works() is bool(ctypes.util.find_library('OSMesa')) else 1)"
+    )
+    asked = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
+    done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_drawing_without_a_display_says_nothing_on_standard_error():
+    code = "from shellform.output import render; assert render._window_works()"
+    shell = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    done = subprocess.run([sys.executable, "-c", code], env=shell, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
