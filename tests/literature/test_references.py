@@ -1,0 +1,103 @@
+"""The literal references of `shellform verify`, recomputed as exact rods (rods.py): to the last digit that is quoted."""
+
+import numpy as np
+import pytest
+
+from shellform.structure.verification import beams, limits
+from tests.literature.rods import Piece, about_y, extremum, integrate, solve
+
+
+def agree(found, quoted, digits):
+    np.testing.assert_allclose(found, quoted, rtol=0.0, atol=0.51 * 10.0**-digits)
+
+
+@pytest.mark.parametrize(("torsion", "load"), beams.BENDS)
+def test_the_45_degree_bend_is_a_kirchhoff_rod(torsion, load):
+    stiffness = (1e7, torsion, 8.333e5, 8.333e5)
+    triad = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # bent about -z, towards y
+    arc = [Piece(25.0 * np.pi, bend=-0.01)]
+    moment = np.zeros(3)
+    for part in np.linspace(0.2, 1.0, 5):
+
+        def free(m, force=part * load):
+            return integrate(arc, stiffness, triad, (0.0, 0.0, force), m)[-1].moment
+
+        moment = solve(free, moment, [8e3] * 3)
+    tip = integrate(arc, stiffness, triad, (0.0, 0.0, load), moment)[-1].position
+    agree(tip, beams.BENDS[torsion, load], 5)
+
+
+class Lee:
+    """Lee's frame: unknown slope at the first pin and force there; the far end has to be at the other pin, without moment."""
+
+    pieces = (Piece(120.0), Piece(24.0, turn=0.5 * np.pi))
+    scale = (1.0, 0.1, 0.1, 1.0)
+
+    def ends(self, slope, along, up, load):
+        pieces = [*self.pieces, Piece(96.0, force=(0.0, 0.0, -load))]
+        stiffness = (4320.0, 1440.0, 1440.0, 1440.0)
+        return integrate(pieces, stiffness, about_y(slope - 0.5 * np.pi), (along, 0.0, up), (0.0, 0.0, 0.0))
+
+    def misses(self, unknown):
+        end = self.ends(*unknown)[-1]
+        return [end.position[0] - 120.0, end.position[2] - 120.0, end.moment[1]]
+
+    def place(self, unknown):
+        """Displacements down and along under the load."""
+        here = self.ends(*unknown)[1].position
+        return np.array([120.0 - here[2], here[0] - 24.0])
+
+    def under(self, load, start):
+        return np.append(solve(lambda x: self.misses([*x, load]), start[:3], self.scale[:3]), load)
+
+    def at(self, which, value, start):
+        return solve(lambda x: [*self.misses(x), self.place(x)[which] - value], start, self.scale)
+
+
+@pytest.fixture(scope="module")
+def lee_path():
+    """States of Lee's frame from rest to its last branch: by load to 1.5, by the displacement along up to 90."""
+    frame, x = Lee(), np.zeros(4)
+    path = {}
+    for load in np.arange(0.25, 1.51, 0.25):
+        path[load] = x = frame.under(load, x)
+    for along in np.arange(10.0, 90.1, 2.0):
+        path[along] = x = frame.at(1, along, x)
+    return path
+
+
+def test_lee_s_frame_is_an_extensible_elastica(lee_path):
+    for load, quoted in beams.LEE.items():
+        agree(Lee().place(lee_path[load]), quoted, 4)
+
+
+def test_the_limits_of_lee_s_frame_are_those_of_the_elastica(lee_path):
+    frame = Lee()
+    found = {}
+    for start, low, high in [(26.0, 26.0, 28.0), (90.0, 89.0, 91.0)]:
+        along = extremum(lambda u, x=lee_path[start]: frame.at(1, u, x)[3], low, high, 0.02)
+        state = frame.at(1, along, lee_path[start])
+        found[frame.place(state)[0]] = state[3]
+    agree(list(found), list(limits.LEE_LIMITS), 3)
+    agree(list(found.values()), list(limits.LEE_LIMITS.values()), 5)
+
+
+def test_williams_toggle_is_an_extensible_elastica():
+    stiffness = (1.885e6, 9.274e3, 9.274e3, 9.274e3)
+    slope = np.arctan2(0.386, 12.943)
+    member = [Piece(np.hypot(12.943, 0.386))]
+
+    def load(drop):
+        def misses(x):
+            end = integrate(member, stiffness, about_y(-slope), (x[0], 0.0, x[1]), (0.0, x[2], 0.0))[-1]
+            tangent = end.triad[:, 0]
+            # The crown stays level with the rigid joint: the tangent keeps its slope there.
+            return [end.position[0] - 12.943, end.position[2] - (0.386 - drop), tangent[2] - np.tan(slope) * tangent[0]]
+
+        # Half the crown's load goes down each member.
+        return -2.0 * solve(misses, [-300.0 * (drop > 0.0), -10.0, 0.0], [100.0, 10.0, 100.0])[1]
+
+    first = extremum(load, 0.18, 0.28, 1e-3)
+    second = extremum(load, 0.36, 0.43, 1e-3)
+    agree([first, second], [limits.TOGGLE[0][0], limits.TOGGLE[1][0]], 5)
+    agree([load(first), load(second)], [limits.TOGGLE[0][1], limits.TOGGLE[1][1]], 4)
