@@ -13,11 +13,13 @@ from shellform.structure.verification.beams import (
     bends,
     cantilever_order,
     cantilevers,
+    diamonds,
     lee_frames,
     quarter_ring,
     roll_ups,
     twisted_rod,
 )
+from shellform.structure.verification.bent import bows, rings, strips
 from shellform.structure.verification.buckling import columns
 from shellform.structure.verification.cables import slack, slack_pair
 from shellform.structure.verification.case import Row
@@ -30,6 +32,7 @@ __all__ = ["CASES", "Row", "chain", "slack_pair", "turned_forces", "verify"]
 CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     cantilevers,
     cantilever_order,
+    diamonds,
     roll_ups,
     bends,
     bend_order,
@@ -40,6 +43,9 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     toggles,
     mises_truss,
     columns,
+    strips,
+    bows,
+    rings,
     slack,
     turns,
 )

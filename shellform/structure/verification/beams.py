@@ -141,6 +141,35 @@ def lee_frames() -> Iterator[Row]:
 
 
 
+def diamond(load: float) -> tuple[float, float]:
+    """Where the loaded hinge and the rigid corner of a square diamond frame end up, from its centre, sides 1.
+
+    A quarter of it: `load` on the hinge at the top (compression positive), EI = 1, EA = 1e7, 60 elements. By symmetry the hinge
+    stays on the vertical axis, and the rigid corner on the horizontal one without turning.
+    """
+    points = polyline([[np.sqrt(0.5), 0.0, 0.0], [0.0, 0.0, np.sqrt(0.5)]], 60)
+    corner, hinge = [False, True, True, True, True, True], [True, True, False, True, False, True]
+    network = in_plane(chain(points, (1e7, 1.0, 1.0, 1.0), {0: corner, 60: hinge}))
+    place = solved(network, load_at(network, 60, [0.0, 0.0, -load])).positions
+    return float(place[-1, 2]), float(place[0, 0])
+
+
+def diamonds() -> Iterator[Row]:
+    """Mattiasson, Int. J. Num. Meth. Eng. 17 (1981) 145: square frame, hinged where it is loaded, rigid at the other corners.
+
+    Pulled and pushed, against elliptic integrals (evaluated here); at PL²/EI = 4 the pushed hinge has passed the other one.
+    60 elements a side leave O(h²) = 5e-5 of a side.
+    """
+    for load in (1.0, 2.0, 4.0):
+        pushed = exact.inclined(load, 0.25 * np.pi)
+        pulled = exact.inclined(load, 0.75 * np.pi)
+        source = "Mattiasson 1981, elliptic integrals"
+        names = ("hinge z/L", "corner x/L")
+        yield from rows(f"diamond pushed, PL²/EI = {load:g}", source, 2e-4, zip(names, diamond(load), pushed, strict=True))
+        wanted = (-pulled[0], pulled[1])
+        yield from rows(f"diamond pulled, PL²/EI = {load:g}", source, 2e-4, zip(names, diamond(-load), wanted, strict=True))
+
+
 def quarter_ring() -> Iterator[Row]:
     """A quarter ring clamped at one end and loaded across its plane at the other, so little that it stays linear.
 

@@ -12,21 +12,29 @@ from scipy.optimize import brentq, root
 from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, jv
 
 
-def cantilever(load: float) -> tuple[float, float]:
-    """Tip displacements u (along) and w (across), over L, of a cantilever under a dead transverse tip load, PL²/EI = `load`."""
+def inclined(load: float, angle: float) -> tuple[float, float]:
+    """Tip of a cantilever of length 1 under a dead tip force, PL²/EI = `load`, as its distances from the clamp against the
+    force and across it; `angle`, rad, is the clamped tangent's from the direction against the force.
+
+    A pendulum that swings from `angle` to its amplitude alpha within the length.
+    """
     size = np.sqrt(load)
 
-    def amplitude(k: float) -> float:
-        return float(np.arcsin(1.0 / (k * np.sqrt(2.0))))
+    def phase(k: float) -> float:
+        return float(np.arcsin(min(np.sin(0.5 * angle) / k, 1.0)))
 
     def gap(k: float) -> float:
-        return float(ellipk(k * k) - ellipkinc(amplitude(k), k * k) - size)
+        return float(ellipk(k * k) - ellipkinc(phase(k), k * k) - size)
 
-    # k² from 1/2 (no load) to 1 (the tip hangs along the load).
-    k = brentq(gap, np.sqrt(0.5) * (1.0 + 1e-14), 1.0 - 1e-12, xtol=1e-15)
-    w = 1.0 - 2.0 / size * (ellipe(k * k) - ellipeinc(amplitude(k), k * k))
-    u = 1.0 - np.sqrt(2.0 * (2.0 * k * k - 1.0)) / size
-    return float(u), float(w)
+    k = brentq(gap, np.sin(0.5 * angle) * (1.0 + 1e-15), 1.0 - 1e-12, xtol=1e-15)
+    bent = ellipe(k * k) - ellipeinc(phase(k), k * k)
+    return float(2.0 * bent / size - 1.0), float(2.0 * k * np.cos(phase(k)) / size)
+
+
+def cantilever(load: float) -> tuple[float, float]:
+    """Tip displacements u (along) and w (across), over L, of a cantilever under a dead transverse tip load, PL²/EI = `load`."""
+    against, across = inclined(load, 0.5 * np.pi)
+    return 1.0 - across, -against
 
 
 def buckled(alpha: float) -> tuple[float, float, float]:
@@ -34,6 +42,13 @@ def buckled(alpha: float) -> tuple[float, float, float]:
     k = np.sin(0.5 * alpha)
     whole = ellipk(k * k)
     return float(4.0 * whole**2), float(2.0 * ellipe(k * k) / whole - 1.0), float(k / whole)
+
+
+def buckled_clamped(alpha: float) -> tuple[float, float, float]:
+    """The like of `buckled` with clamped ends, `alpha` the slope at its inflections: four quarters of a pinned strip's half."""
+    thrust, chord, _ = buckled(alpha)
+    k = np.sin(0.5 * alpha)
+    return 4.0 * thrust, chord, float(k / ellipk(k * k))
 
 
 def bow(cable: float, stiffness: float) -> tuple[float, float, float]:
@@ -76,6 +91,16 @@ def catenary(
     h, v = scale * found.x
     _, _, x, down = both(h, v)
     return float(h), float(v), x, -down
+
+
+def two_links(half: float, axial: float, pretension: float, load: float) -> float:
+    """Sag of the middle of two straight cables of length `half` each, stretched to `pretension`, under a load across them."""
+    rest = half / (1.0 + pretension / axial)
+
+    def gap(sag: float) -> float:
+        return 2.0 * axial * (1.0 / rest - 1.0 / np.hypot(half, sag)) * sag - load
+
+    return float(brentq(gap, 0.0, half, xtol=1e-15))
 
 
 def bessel_zero(kind: float, low: float, high: float) -> float:
