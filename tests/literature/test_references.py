@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
-from shellform.structure.verification import beams, limits
+from shellform.structure.verification import beams, buckling, limits
 from tests.literature.rods import Piece, about_y, extremum, integrate, solve
 
 
@@ -101,3 +102,45 @@ def test_williams_toggle_is_an_extensible_elastica():
     second = extremum(load, 0.36, 0.43, 1e-3)
     agree([first, second], [limits.TOGGLE[0][0], limits.TOGGLE[1][0]], 5)
     agree([load(first), load(second)], [limits.TOGGLE[0][1], limits.TOGGLE[1][1]], 4)
+
+
+def test_the_arch_of_215_degrees_is_an_extensible_elastica():
+    stiffness, half = (1e8, 1e6, 1e6, 1e6), np.radians(107.5)
+    top, span = 100.0 * (1.0 - np.cos(half)), 200.0 * np.sin(half)
+
+    def ends(x):
+        sides = [Piece(100.0 * half, bend=0.01), Piece(100.0 * half, bend=0.01, force=(0.0, 0.0, -x[3]))]
+        return integrate(sides, stiffness, about_y(-half), (x[0], 0.0, x[1]), (0.0, x[2], 0.0))
+
+    def at(drop, start):
+        def misses(x):
+            crown, hinge = ends(x)
+            fallen = top - crown.position[2]
+            return [hinge.position[0] - span, hinge.position[2], 0.01 * hinge.moment[1], fallen - drop]
+
+        return solve(misses, start, [100.0, 100.0, 1e4, 100.0])
+
+    x = np.zeros(4)
+    for drop in np.arange(3.0, 114.1, 3.0):
+        x = at(drop, x)
+    drop = extremum(lambda v: at(v, x)[3], 112.0, 116.0, 0.02)
+    agree([drop, at(drop, x)[3]], limits.ARCH, 3)
+
+
+def test_the_right_angle_frame_s_tip_load_makes_the_linearised_rod_singular():
+    legs = [Piece(240.0), Piece(240.0, turn=0.5 * np.pi)]
+
+    def tip_moment(load, moment):
+        return integrate(legs, buckling.FRAME, np.eye(3), (load, 0.0, 0.0), moment)[-1].moment
+
+    def singular(load):
+        plane = [0.0]
+        for part in (0.25, 0.5, 0.75, 1.0):
+            plane = solve(lambda m, p=part * load: [tip_moment(p, [0.0, m[0], 0.0])[1]], plane, [100.0])
+        h = 0.1
+        sides = [h * np.eye(3)[k] for k in (0, 2)]
+        start = np.array([0.0, plane[0], 0.0])
+        slopes = [(tip_moment(load, start + d) - tip_moment(load, start - d))[[0, 2]] / (2.0 * h) for d in sides]
+        return np.linalg.det(np.array(slopes))
+
+    agree([brentq(singular, 0.9, 1.2), brentq(singular, -0.75, -0.6)], buckling.FRAME_TIP, 5)

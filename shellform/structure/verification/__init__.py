@@ -20,11 +20,18 @@ from shellform.structure.verification.beams import (
     twisted_rod,
 )
 from shellform.structure.verification.bent import bows, rings, strips
-from shellform.structure.verification.buckling import columns
+from shellform.structure.verification.buckling import (
+    columns,
+    greenhill,
+    lateral,
+    michell,
+    right_angle,
+    ring_pressure,
+)
 from shellform.structure.verification.cables import slack, slack_pair
 from shellform.structure.verification.case import Row
 from shellform.structure.verification.checks import turned_forces, turns
-from shellform.structure.verification.limits import lee_limits, mises_truss, toggles
+from shellform.structure.verification.limits import arches, lee_limits, mises_truss, toggles
 from shellform.structure.verification.models import chain
 
 __all__ = ["CASES", "Row", "chain", "slack_pair", "turned_forces", "verify"]
@@ -42,7 +49,13 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     lee_limits,
     toggles,
     mises_truss,
+    arches,
     columns,
+    lateral,
+    right_angle,
+    ring_pressure,
+    greenhill,
+    michell,
     strips,
     bows,
     rings,

@@ -10,7 +10,7 @@ from shellform.structure.state import at_rest
 from shellform.structure.verification import exact
 from shellform.structure.verification.beams import lee_frame
 from shellform.structure.verification.case import Row, rows
-from shellform.structure.verification.models import CLAMP, PIN, chain, in_plane, polyline, pushed
+from shellform.structure.verification.models import CLAMP, PIN, chain, in_plane, order, polyline, pushed
 
 
 def mises_truss() -> Iterator[Row]:
@@ -72,3 +72,27 @@ def lee_limits() -> Iterator[Row]:
     stays, snaps = (float(np.isfinite(lee_frame(20, load)[0])) for load in (1.84, 1.88))
     borne = [("borne at 1.84", stays, 1.0), ("borne at 1.88", snaps, 0.0)]
     yield from rows("Lee's frame, dead load", "its limit is 1.8557", 0.0, borne)
+
+
+ARCH = (113.731, 897.295)
+"""Crown's displacement and load at the limit of the arch (tests/literature/test_references.py)."""
+
+
+def arch(elements: int) -> float:
+    """Crown load of the clamped-hinged arch at its limit's displacement."""
+    angle = np.linspace(-1.0, 1.0, 2 * elements + 1) * np.radians(107.5)
+    points = 100.0 * np.column_stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)])
+    network = in_plane(chain(points, (1e8, 1e6, 1e6, 1e6), {0: CLAMP, 2 * elements: PIN}))
+    drops = np.append(np.arange(4.0, ARCH[0], 4.0), ARCH[0])
+    return -pushed(network, at_rest(points), (elements, 2), 100.0 - drops)[-1][1]
+
+
+def arches() -> Iterator[Row]:
+    """DaDeppo and Schmidt, J. Appl. Mech. 42 (1975) 894: arch of 215°, clamped left, hinged right, dead crown load: 897.
+
+    R = 100, EI = 1e6, EA = 1e8 as in Simo and Vu-Quoc 1986 (inextensible: 897.309). 60 chords a side: O(h²), and the order.
+    """
+    loads = [arch(n) for n in (30, 60)]
+    source = "extensible elastica, recomputed; DaDeppo and Schmidt 1975"
+    yield Row("clamped-hinged arch of 215°", "limit load", loads[1], ARCH[1], 3e-3, source)
+    yield Row("clamped-hinged arch of 215°", "order of the limit load", order(np.array(loads) - ARCH[1]), 2.0, 0.1, "O(h²)")

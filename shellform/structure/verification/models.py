@@ -108,7 +108,10 @@ def critical(assembly: Assembly, start: State, load: Reals, low: float, high: fl
 
     By bisection on the inertia of the tangent at converged states, 24 halvings of the interval.
     """
-    state = find_equilibrium(assembly, start, low * load, on_branch=True).state
+    first = find_equilibrium(assembly, start, low * load, on_branch=True)
+    if not first.stable:
+        return float("nan")  # not bracketed: fails whatever the reference
+    state = first.state
     for _ in range(_BISECTIONS):
         middle = 0.5 * (low + high)
         try:
