@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize, root
 
-from shellform.structure.verification import beams, buckling, limits
+from shellform.structure.verification import beams, buckling, cables, limits
 from tests.literature.rods import Piece, about_y, extremum, integrate, solve
 
 
@@ -144,3 +144,30 @@ def test_the_right_angle_frame_s_tip_load_makes_the_linearised_rod_singular():
         return np.linalg.det(np.array(slopes))
 
     agree([brentq(singular, 0.9, 1.2), brentq(singular, -0.75, -0.6)], buckling.FRAME_TIP, 5)
+
+
+def test_the_loaded_saddle_net_is_the_minimum_of_its_energy():
+    network, shape = cables.hypar()
+    (a, b), rest, axial = network.cables.ends.T, network.cables.rest_length, network.cables.stiffness
+    load, free = cables.hypar_load(shape)[:, :3], ~network.fixed[:, :3]
+
+    def parts(x):
+        place = shape.copy()
+        place[free] = x
+        chord = place[b] - place[a]
+        length = np.linalg.norm(chord, axis=1)
+        tension = axial * np.maximum(length / rest - 1.0, 0.0)
+        pull = (tension / length)[:, None] * chord
+        unbalanced = -load
+        np.add.at(unbalanced, b, pull)
+        np.subtract.at(unbalanced, a, pull)
+        energy = 0.5 * (tension * (length - rest)).sum() - (load * place).sum()
+        return energy, unbalanced[free], tension, place
+
+    x = minimize(lambda x: parts(x)[:2], shape[free], jac=True, method="BFGS", options={"maxiter": 5000}).x
+    x = root(lambda x: parts(x)[1], x, tol=1e-14).x
+    _, unbalanced, tension, place = parts(x)
+    assert np.abs(unbalanced).max() < 1e-8
+    agree((place - shape)[list(cables.HYPAR_NODES), 2], cables.HYPAR[:2], 8)
+    agree(tension.max(), cables.HYPAR[2], 5)
+    assert (tension == 0.0).sum() == cables.HYPAR[3]

@@ -28,7 +28,15 @@ from shellform.structure.verification.buckling import (
     right_angle,
     ring_pressure,
 )
-from shellform.structure.verification.cables import slack, slack_pair
+from shellform.structure.verification.cables import (
+    catenaries,
+    force_densities,
+    nets,
+    slack,
+    slack_pair,
+    tripod,
+    two_links,
+)
 from shellform.structure.verification.case import Row
 from shellform.structure.verification.checks import turned_forces, turns
 from shellform.structure.verification.limits import arches, lee_limits, mises_truss, toggles
@@ -60,6 +68,11 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     bows,
     rings,
     slack,
+    tripod,
+    two_links,
+    catenaries,
+    force_densities,
+    nets,
     turns,
 )
 

@@ -83,12 +83,13 @@ def catenary(
         return first[0] + second[0], first[1] + second[1], *first
 
     def gap(unknown: np.ndarray) -> np.ndarray:
-        x, down, _, _ = both(*(scale * unknown))
+        x, down, _, _ = both(total * np.exp(unknown[0]), total * unknown[1])
         return np.array([x - span, down - drop]) / span
 
-    scale = weight * length + force
-    found = root(gap, [1.0, 0.5], tol=1e-13)
-    h, v = scale * found.x
+    total = weight * length + force
+    # The logarithm keeps the horizontal tension positive.
+    found = root(gap, [-1.0, 0.5], tol=1e-13)
+    h, v = total * np.exp(found.x[0]), total * found.x[1]
     _, _, x, down = both(h, v)
     return float(h), float(v), x, -down
 
