@@ -174,14 +174,19 @@ def verify() -> None:
     """Run the published cases and gradient checks."""
     from shellform.structure.verification import verify as rows
 
-    failed = 0
-    print(f"{'case':42} {'value':>14} {'reference':>14} {'difference':>11}       source")
+    failed, cases, number = 0, set(), 0
+    head = f"{'case':40} {'quantity':38} {'value':>12} {'reference':>12} {'difference':>10} {'allowed':>8}"
+    print(f"{head}       source")
     for row in rows():
         failed += not row.passed
+        cases.add(row.case)
+        number += 1
+        numbers = f"{row.value:12.7g} {row.reference:12.7g} {row.difference:10.1e} {row.tolerance:8.0e}"
         mark = "pass" if row.passed else "FAIL"
-        print(f"{row.name:42} {row.value:14.7g} {row.reference:14.7g} {row.difference:11.1e} {mark}  {row.source}", flush=True)
+        print(f"{row.case:40} {row.quantity:38} {numbers} {mark}  {row.source}", flush=True)
     if failed:
-        raise NotConverged(f"{failed} cases do not hold")
+        raise NotConverged(f"{failed} of {number} numbers do not hold")
+    print(f"all {number} numbers of {len(cases)} cases hold")
 
 
 class _Progress:

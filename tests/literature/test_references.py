@@ -1,0 +1,173 @@
+"""The literal references of `shellform verify`, recomputed as exact rods (rods.py): to the last digit that is quoted."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq, minimize, root
+
+from shellform.structure.verification import beams, buckling, cables, limits
+from tests.literature.rods import Piece, about_y, extremum, integrate, solve
+
+
+def agree(found, quoted, digits):
+    np.testing.assert_allclose(found, quoted, rtol=0.0, atol=0.51 * 10.0**-digits)
+
+
+@pytest.mark.parametrize(("torsion", "load"), beams.BENDS)
+def test_the_45_degree_bend_is_a_kirchhoff_rod(torsion, load):
+    stiffness = (1e7, torsion, 8.333e5, 8.333e5)
+    triad = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # bent about -z, towards y
+    arc = [Piece(25.0 * np.pi, bend=-0.01)]
+    moment = np.zeros(3)
+    for part in np.linspace(0.2, 1.0, 5):
+
+        def free(m, force=part * load):
+            return integrate(arc, stiffness, triad, (0.0, 0.0, force), m)[-1].moment
+
+        moment = solve(free, moment, [8e3] * 3)
+    tip = integrate(arc, stiffness, triad, (0.0, 0.0, load), moment)[-1].position
+    agree(tip, beams.BENDS[torsion, load], 5)
+
+
+class Lee:
+    """Lee's frame: unknown slope at the first pin and force there; the far end has to be at the other pin, without moment."""
+
+    pieces = (Piece(120.0), Piece(24.0, turn=0.5 * np.pi))
+    scale = (1.0, 0.1, 0.1, 1.0)
+
+    def ends(self, slope, along, up, load):
+        pieces = [*self.pieces, Piece(96.0, force=(0.0, 0.0, -load))]
+        stiffness = (4320.0, 1440.0, 1440.0, 1440.0)
+        return integrate(pieces, stiffness, about_y(slope - 0.5 * np.pi), (along, 0.0, up), (0.0, 0.0, 0.0))
+
+    def misses(self, unknown):
+        end = self.ends(*unknown)[-1]
+        return [end.position[0] - 120.0, end.position[2] - 120.0, end.moment[1]]
+
+    def place(self, unknown):
+        """Displacements down and along under the load."""
+        here = self.ends(*unknown)[1].position
+        return np.array([120.0 - here[2], here[0] - 24.0])
+
+    def under(self, load, start):
+        return np.append(solve(lambda x: self.misses([*x, load]), start[:3], self.scale[:3]), load)
+
+    def at(self, which, value, start):
+        return solve(lambda x: [*self.misses(x), self.place(x)[which] - value], start, self.scale)
+
+
+@pytest.fixture(scope="module")
+def lee_path():
+    """States of Lee's frame from rest to its last branch: by load to 1.5, by the displacement along up to 90."""
+    frame, x = Lee(), np.zeros(4)
+    path = {}
+    for load in np.arange(0.25, 1.51, 0.25):
+        path[load] = x = frame.under(load, x)
+    for along in np.arange(10.0, 90.1, 2.0):
+        path[along] = x = frame.at(1, along, x)
+    return path
+
+
+def test_lee_s_frame_is_an_extensible_elastica(lee_path):
+    for load, quoted in beams.LEE.items():
+        agree(Lee().place(lee_path[load]), quoted, 4)
+
+
+def test_the_limits_of_lee_s_frame_are_those_of_the_elastica(lee_path):
+    frame = Lee()
+    found = {}
+    for start, low, high in [(26.0, 26.0, 28.0), (90.0, 89.0, 91.0)]:
+        along = extremum(lambda u, x=lee_path[start]: frame.at(1, u, x)[3], low, high, 0.02)
+        state = frame.at(1, along, lee_path[start])
+        found[frame.place(state)[0]] = state[3]
+    agree(list(found), list(limits.LEE_LIMITS), 3)
+    agree(list(found.values()), list(limits.LEE_LIMITS.values()), 5)
+
+
+def test_williams_toggle_is_an_extensible_elastica():
+    stiffness = (1.885e6, 9.274e3, 9.274e3, 9.274e3)
+    slope = np.arctan2(0.386, 12.943)
+    member = [Piece(np.hypot(12.943, 0.386))]
+
+    def load(drop):
+        def misses(x):
+            end = integrate(member, stiffness, about_y(-slope), (x[0], 0.0, x[1]), (0.0, x[2], 0.0))[-1]
+            tangent = end.triad[:, 0]
+            # The crown stays level with the rigid joint: the tangent keeps its slope there.
+            return [end.position[0] - 12.943, end.position[2] - (0.386 - drop), tangent[2] - np.tan(slope) * tangent[0]]
+
+        # Half the crown's load goes down each member.
+        return -2.0 * solve(misses, [-300.0 * (drop > 0.0), -10.0, 0.0], [100.0, 10.0, 100.0])[1]
+
+    first = extremum(load, 0.18, 0.28, 1e-3)
+    second = extremum(load, 0.36, 0.43, 1e-3)
+    agree([first, second], [limits.TOGGLE[0][0], limits.TOGGLE[1][0]], 5)
+    agree([load(first), load(second)], [limits.TOGGLE[0][1], limits.TOGGLE[1][1]], 4)
+
+
+def test_the_arch_of_215_degrees_is_an_extensible_elastica():
+    stiffness, half = (1e8, 1e6, 1e6, 1e6), np.radians(107.5)
+    top, span = 100.0 * (1.0 - np.cos(half)), 200.0 * np.sin(half)
+
+    def ends(x):
+        sides = [Piece(100.0 * half, bend=0.01), Piece(100.0 * half, bend=0.01, force=(0.0, 0.0, -x[3]))]
+        return integrate(sides, stiffness, about_y(-half), (x[0], 0.0, x[1]), (0.0, x[2], 0.0))
+
+    def at(drop, start):
+        def misses(x):
+            crown, hinge = ends(x)
+            fallen = top - crown.position[2]
+            return [hinge.position[0] - span, hinge.position[2], 0.01 * hinge.moment[1], fallen - drop]
+
+        return solve(misses, start, [100.0, 100.0, 1e4, 100.0])
+
+    x = np.zeros(4)
+    for drop in np.arange(3.0, 114.1, 3.0):
+        x = at(drop, x)
+    drop = extremum(lambda v: at(v, x)[3], 112.0, 116.0, 0.02)
+    agree([drop, at(drop, x)[3]], limits.ARCH, 3)
+
+
+def test_the_right_angle_frame_s_tip_load_makes_the_linearised_rod_singular():
+    legs = [Piece(240.0), Piece(240.0, turn=0.5 * np.pi)]
+
+    def tip_moment(load, moment):
+        return integrate(legs, buckling.FRAME, np.eye(3), (load, 0.0, 0.0), moment)[-1].moment
+
+    def singular(load):
+        plane = [0.0]
+        for part in (0.25, 0.5, 0.75, 1.0):
+            plane = solve(lambda m, p=part * load: [tip_moment(p, [0.0, m[0], 0.0])[1]], plane, [100.0])
+        h = 0.1
+        sides = [h * np.eye(3)[k] for k in (0, 2)]
+        start = np.array([0.0, plane[0], 0.0])
+        slopes = [(tip_moment(load, start + d) - tip_moment(load, start - d))[[0, 2]] / (2.0 * h) for d in sides]
+        return np.linalg.det(np.array(slopes))
+
+    agree([brentq(singular, 0.9, 1.2), brentq(singular, -0.75, -0.6)], buckling.FRAME_TIP, 5)
+
+
+def test_the_loaded_saddle_net_is_the_minimum_of_its_energy():
+    network, shape = cables.hypar()
+    (a, b), rest, axial = network.cables.ends.T, network.cables.rest_length, network.cables.stiffness
+    load, free = cables.hypar_load(shape)[:, :3], ~network.fixed[:, :3]
+
+    def parts(x):
+        place = shape.copy()
+        place[free] = x
+        chord = place[b] - place[a]
+        length = np.linalg.norm(chord, axis=1)
+        tension = axial * np.maximum(length / rest - 1.0, 0.0)
+        pull = (tension / length)[:, None] * chord
+        unbalanced = -load
+        np.add.at(unbalanced, b, pull)
+        np.subtract.at(unbalanced, a, pull)
+        energy = 0.5 * (tension * (length - rest)).sum() - (load * place).sum()
+        return energy, unbalanced[free], tension, place
+
+    x = minimize(lambda x: parts(x)[:2], shape[free], jac=True, method="BFGS", options={"maxiter": 5000}).x
+    x = root(lambda x: parts(x)[1], x, tol=1e-14).x
+    _, unbalanced, tension, place = parts(x)
+    assert np.abs(unbalanced).max() < 1e-8
+    agree((place - shape)[list(cables.HYPAR_NODES), 2], cables.HYPAR[:2], 8)
+    agree(tension.max(), cables.HYPAR[2], 5)
+    assert (tension == 0.0).sum() == cables.HYPAR[3]
