@@ -74,6 +74,11 @@ class Assembly:
         return [part for part in self.parts if isinstance(part, Beams)]
 
     @cached_property
+    def turns(self) -> Indices:
+        """Places of the free rotations' diagonal entries among the tangent's values."""
+        return self.matrix.diagonal[self.free % 6 >= 3]
+
+    @cached_property
     def chords(self) -> ChordKeeper:
         """The second-order correction of steps; `with_parts` keeps it, its weights needn't be up to date."""
         return ChordKeeper(self.count, self.beams, self.free)

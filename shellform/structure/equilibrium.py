@@ -86,7 +86,7 @@ def find_equilibrium(
     at every step. Raises NotConverged with the last state, LostBranch where `on_branch` is set and definiteness is lost.
     """
     walk = _Walk(assembly, start, load, reach)
-    while walk.residual > max(tolerance, walk.rounding()):
+    while walk.residual > tolerance and walk.residual > walk.rounding():
         if progress is not None:
             progress(walk.factorisations, walk.residual)
         if walk.factorisations >= limit:
@@ -266,8 +266,8 @@ class _Walk:
                 self.mass = 0.0
 
     def rounding(self) -> float:
-        """The residual that rounding of the coordinates alone leaves."""
-        return self.measure.rounding(self.now, self.state, self.load)
+        """The residual that rounding of the coordinates alone leaves; 0 while that is far away."""
+        return 0.0 if self.residual > _CLOSE else self.measure.rounding(self.now, self.state, self.load)
 
 
 def _minimum(rise: float, downhill: float, share: float) -> float:

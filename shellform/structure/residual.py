@@ -44,7 +44,7 @@ class Measure:
     def rounding(self, balance: Balance, state: State, load: Reals) -> float:
         """The residual that rounding of the coordinates alone leaves: stiff short elements answer to the last bit."""
         assert balance.tangent is not None
-        stiffest = float(np.abs(balance.tangent).max(initial=0.0))
+        stiffest = float(balance.tangent.max(initial=0.0))  # on the diagonal
         last_bit = 4.0 * np.finfo(float).eps * float(np.abs(state.positions).max(initial=0.0))
         scale = self.scale(balance, load)
         return stiffest * last_bit / scale if scale > 0.0 else 0.0
@@ -58,8 +58,7 @@ def held(assembly: Assembly, balance: Balance) -> Reals:
     """
     assert balance.tangent is not None
     values = balance.tangent.copy()
-    turns = assembly.matrix.diagonal[assembly.free % 6 >= 3]
-    values[turns] += _SPIN * np.abs(values[turns])
+    values[assembly.turns] += _SPIN * np.abs(values[assembly.turns])
     return values
 
 
