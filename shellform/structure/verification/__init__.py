@@ -14,6 +14,7 @@ from shellform.structure.verification.beams import (
     cantilever_order,
     cantilevers,
     diamonds,
+    helices,
     lee_frames,
     quarter_ring,
     roll_ups,
@@ -38,8 +39,16 @@ from shellform.structure.verification.cables import (
     two_links,
 )
 from shellform.structure.verification.case import Row
-from shellform.structure.verification.checks import turned_forces, turns
-from shellform.structure.verification.limits import arches, lee_limits, mises_truss, toggles
+from shellform.structure.verification.checks import (
+    betti,
+    gradients,
+    invariances,
+    statics,
+    turned_forces,
+    turns,
+    work,
+)
+from shellform.structure.verification.limits import arches, domes, lee_limits, mises_truss, toggles
 from shellform.structure.verification.models import chain
 
 __all__ = ["CASES", "Row", "chain", "slack_pair", "turned_forces", "verify"]
@@ -51,6 +60,7 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     roll_ups,
     bends,
     bend_order,
+    helices,
     quarter_ring,
     twisted_rod,
     lee_frames,
@@ -58,6 +68,7 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     toggles,
     mises_truss,
     arches,
+    domes,
     columns,
     lateral,
     right_angle,
@@ -74,6 +85,11 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     force_densities,
     nets,
     turns,
+    invariances,
+    statics,
+    work,
+    betti,
+    gradients,
 )
 
 

@@ -170,6 +170,27 @@ def diamonds() -> Iterator[Row]:
         yield from rows(f"diamond pulled, PL²/EI = {load:g}", source, 2e-4, zip(names, diamond(-load), wanted, strict=True))
 
 
+HELIX = (7.41252, 5.06259, 2.65499)
+"""Tip of the roll-up with a force across its plane (tests/literature/test_references.py)."""
+
+
+def helix(elements: int, share: float) -> Reals:
+    """Tip (3,) of a cantilever (L = 10, EI = GJ = 100, EA = 1e4) under `share` of an end moment 200π and a force of 50 across."""
+    network = chain(line(elements, 10.0), (1e4, 100.0, 100.0, 100.0), {0: CLAMP})
+    load = load_at(network, elements, np.array([0.0, 0.0, 50.0, 0.0, 0.0, 200.0 * np.pi]) * share)
+    return np.asarray(solved(network, load).positions[-1])
+
+
+def helices() -> Iterator[Row]:
+    """Ibrahimbegovic, Comp. Meth. Appl. Mech. Eng. 149 (1997) 49: roll-up by an end moment with a force out of its plane.
+
+    He draws ten turns of it, shear-flexible (GA = EA); here 2 % of his load, 0.2 turns, as a rod without shear: recomputed. The
+    moment keeps its axis in space, so that it has no potential. 50 elements leave O(h²) = 1e-4.
+    """
+    source = "Kirchhoff rod, recomputed; after Ibrahimbegovic 1997"
+    yield from rows("roll-up out of its plane, 2 %", source, 2e-4, zip("xyz", helix(50, 0.02), HELIX, strict=True))
+
+
 def quarter_ring() -> Iterator[Row]:
     """A quarter ring clamped at one end and loaded across its plane at the other, so little that it stays linear.
 

@@ -6,11 +6,23 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from shellform.arrays import Indices, Reals
+from shellform.structure.beam import make_beams
+from shellform.structure.network import Network
 from shellform.structure.state import at_rest
 from shellform.structure.verification import exact
 from shellform.structure.verification.beams import lee_frame
 from shellform.structure.verification.case import Row, rows
-from shellform.structure.verification.models import CLAMP, PIN, chain, in_plane, order, polyline, pushed
+from shellform.structure.verification.models import (
+    CLAMP,
+    PIN,
+    chain,
+    in_plane,
+    no_cables,
+    order,
+    polyline,
+    pushed,
+)
 
 
 def mises_truss() -> Iterator[Row]:
@@ -96,3 +108,41 @@ def arches() -> Iterator[Row]:
     source = "extensible elastica, recomputed; DaDeppo and Schmidt 1975"
     yield Row("clamped-hinged arch of 215°", "limit load", loads[1], ARCH[1], 3e-3, source)
     yield Row("clamped-hinged arch of 215°", "order of the limit load", order(np.array(loads) - ARCH[1]), 2.0, 0.1, "O(h²)")
+
+
+DOME = ((0.768, 303.189), (3.028, -265.101))
+"""Apex displacement and load at the star dome's limit and in its valley (tests/literature/test_references.py)."""
+
+
+def star_dome() -> tuple[Reals, Indices]:
+    """Nodes and bars of a dome of 24 bars like Hangai and Kawamata's (1972): apex 0, ring 1-6 at 25 cm, supports 7-12 at 50 cm."""
+    ring, outer = np.radians(60.0 * np.arange(6)), np.radians(60.0 * np.arange(6) + 30.0)
+    points = np.vstack(
+        [
+            [[0.0, 0.0, 8.216]],
+            np.column_stack([25.0 * np.cos(ring), 25.0 * np.sin(ring), np.full(6, 6.216)]),
+            np.column_stack([50.0 * np.cos(outer), 50.0 * np.sin(outer), np.zeros(6)]),
+        ]
+    )
+    i = np.arange(6)
+    after = (i + 1) % 6
+    spokes, rim = np.column_stack([0 * i, 1 + i]), np.column_stack([1 + i, 1 + after])
+    legs = np.vstack([np.column_stack([1 + i, 7 + i]), np.column_stack([1 + after, 7 + i])])
+    return points, np.vstack([spokes, rim, legs])
+
+
+def domes() -> Iterator[Row]:
+    """Star dome of 24 hinged bars, EA = 3.03e5 · 3.17 N, loaded at its apex: limit load and valley by displacement control.
+
+    One element a bar; hinges by a bending stiffness of 1e-6 of what would matter (EI = 0.1 N cm²). cm, N. The reference is a truss of
+    Hooke's bars, its symmetric path solved by SciPy.
+    """
+    points, ends = star_dome()
+    beams = make_beams(points, ends, axial=3.03e5 * 3.17, torsion=0.1, bending_y=0.1, bending_z=0.1)
+    fixed = np.zeros((13, 6), dtype=bool)
+    fixed[7:, :3] = True
+    network = Network(points, beams, no_cables(), fixed, np.zeros((13, 6)))
+    drops = np.array([0.4, DOME[0][0], 1.2, 1.6, 2.0, 2.4, 2.8, DOME[1][0]])
+    loads = [-force for _, force in pushed(network, at_rest(points), (0, 2), 8.216 - drops)]
+    numbers = [("limit load, N", loads[1], DOME[0][1]), ("valley, N", loads[-1], DOME[1][1])]
+    yield from rows("star dome of 24 bars", "Hooke's bars, recomputed; after Hangai and Kawamata 1972", 1e-5, numbers)
