@@ -22,6 +22,7 @@ from shellform.structure.chords import ChordKeeper
 from shellform.structure.parts import Part
 from shellform.structure.sparse import Factor, Symmetric
 from shellform.structure.state import State
+from shellform.structure.threads import share
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,16 @@ class Assembly:
         self.clock: dict[str, float] = {"assembly": 0.0, "factorisation": 0.0, "solve": 0.0}
         self._freedoms = freedoms
         self._translational = [(each[0] % 6 < 3) if len(each) else np.zeros(0, dtype=bool) for each in freedoms]
-        self.matrix, self._slots = _pattern(number, freedoms)
+        self.matrix, self._starts, self._sources = _pattern(number, freedoms)
+        ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
+        self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+        self._entries = np.empty(int(ends[-1]))
 
     def with_parts(self, parts: Sequence[Part]) -> Assembly:
         """The same assembly, its pattern shared, with parts of the same elements and other properties."""
         other = copy.copy(self)
         other.parts = tuple(parts)
+        other._entries = np.empty_like(self._entries)
         return other
 
     @property
@@ -78,20 +83,21 @@ class Assembly:
         began = time.perf_counter()
         energy, largest = 0.0, 0.0
         force = np.zeros(6 * self.count)
-        values = np.zeros(len(self.matrix.indices) + 1)  # the last collects what belongs to held freedoms
-        for part, freedoms, slots, moved in zip(
-            self.parts, self._freedoms, self._slots, self._translational, strict=True
+        for part, freedoms, translation, (first, last) in zip(
+            self.parts, self._freedoms, self._translational, self._shares, strict=True
         ):
             if not len(freedoms):
                 continue
-            result = part.evaluate(state, tangent=tangent)
+            block = self._entries[first:last].reshape(len(freedoms), -1) if tangent else None
+            result = part.evaluate(state, tangent=tangent, into=block)
             energy += float(result.energy.sum())
-            largest = max(largest, float(np.abs(result.force[:, moved]).max()))
-            _scatter(freedoms, result.force, force)
-            if result.tangent is not None:
-                _scatter(slots, result.tangent, values)
+            largest = max(largest, _add_forces(freedoms, translation, result.force, force))
+        values = None
+        if tangent:
+            values = np.empty(len(self.matrix.indices))
+            share(_gather, len(values), self._starts, self._sources, self._entries, values)
         self.clock["assembly"] += time.perf_counter() - began
-        return Balance(energy, force.reshape(-1, 6), values[:-1] if tangent else None, largest)
+        return Balance(energy, force.reshape(-1, 6), values, largest)
 
     def factor(self, state: State) -> Factor:
         """Cholesky factor of the tangent at the state, good until the next factorisation here.
@@ -103,25 +109,59 @@ class Assembly:
         return self.matrix.factor(values)
 
 
-def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, list[Indices]]:
-    """The common lower pattern, and for each part the slot (m, k (k + 1) / 2) of each packed entry (nnz: nowhere)."""
+def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, Indices, Indices]:
+    """The common lower pattern, and which packed entries of all elements, one after the other, add up to each of its values:
+    `sources[starts[v] : starts[v + 1]]` for value v."""
     size = int(number.max(initial=-1)) + 1
-    keys = [np.arange(size) * (size + 1)]  # every diagonal entry is stored, whatever touches it
+    rows, columns = [], []
     for each in freedoms:
         row, column = np.tril_indices(each.shape[1])
-        mapped = number[each]
-        upper, lower = np.minimum(mapped[:, row], mapped[:, column]), np.maximum(mapped[:, row], mapped[:, column])
-        keys.append(np.where(upper < 0, -1, upper * size + lower))
-    entries = np.unique(np.concatenate([key.ravel() for key in keys]))
-    entries = entries[entries >= 0]
-    slots = [np.where(key < 0, len(entries), np.searchsorted(entries, key)) for key in keys[1:]]
-    columns, rows = np.divmod(entries, size) if size else (entries, entries)
-    indptr = np.searchsorted(columns, np.arange(size + 1))
-    return Symmetric(indptr, rows), slots
+        mapped = number[each].astype(np.int32)
+        lower, upper = np.maximum(mapped[:, row], mapped[:, column]), np.minimum(mapped[:, row], mapped[:, column])
+        rows.append(lower.ravel())
+        columns.append(upper.ravel())
+    row, column = (np.concatenate([*each, np.zeros(0, dtype=np.int32)]) for each in (rows, columns))
+    order = _counted(column, _counted(row, np.arange(len(row)), size), size)
+    order = order[column[order] >= 0]
+    row, column = row[order], column[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (row[1:] != row[:-1]) | (column[1:] != column[:-1])
+    starts = np.append(np.flatnonzero(new), len(order))
+    indptr = np.searchsorted(column[new], np.arange(size + 1))
+    return Symmetric(indptr, row[new].astype(np.int64)), starts, order
 
 
 @njit(cache=True)
-def _scatter(slots, values, total):  # type: ignore[no-untyped-def]
-    for e in range(slots.shape[0]):
-        for k in range(slots.shape[1]):
-            total[slots[e, k]] += values[e, k]
+def _counted(keys, order, size):  # type: ignore[no-untyped-def]
+    """`order` sorted by keys[order], which run from -1 to size - 1; equal ones stay in order (counting sort)."""
+    place = np.zeros(size + 2, dtype=np.int64)
+    for k in order:
+        place[keys[k] + 2] += 1
+    for k in range(1, size + 2):
+        place[k] += place[k - 1]
+    result = np.empty_like(order)
+    for k in order:
+        result[place[keys[k] + 1]] = k
+        place[keys[k] + 1] += 1
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _gather(start, stop, starts, sources, entries, values):  # type: ignore[no-untyped-def]
+    for v in range(start, stop):
+        total = 0.0
+        for k in range(starts[v], starts[v + 1]):
+            total += entries[sources[k]]
+        values[v] = total
+
+
+@njit(cache=True)
+def _add_forces(freedoms, translation, element, total):  # type: ignore[no-untyped-def]
+    """Adds the elements' end forces to the nodes' and returns the largest component that is a force."""
+    largest = 0.0
+    for e in range(freedoms.shape[0]):
+        for k in range(freedoms.shape[1]):
+            total[freedoms[e, k]] += element[e, k]
+            if translation[k]:
+                largest = max(largest, abs(element[e, k]))
+    return largest

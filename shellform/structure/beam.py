@@ -38,7 +38,9 @@ from shellform.errors import InputError
 from shellform.structure.parts import Evaluation
 from shellform.structure.rotation import matrix
 from shellform.structure.state import State
+from shellform.structure.threads import share
 
+_NOTHING = np.empty((0, 78))
 _PARALLEL_TO_Z = 1e-6  # rad; nearer to global z than this, the default z axis is global x (model-file.md)
 
 
@@ -74,12 +76,12 @@ class Beams:
         """Freedoms (m, 12) of each element in the order of x^e below equation (20)."""
         return (6 * self.ends[:, :, None] + np.arange(6)).reshape(-1, 12)
 
-    def evaluate(self, state: State, *, tangent: bool) -> Evaluation:
-        """Energy (m,) J, end forces (m, 12) N and N·m, packed lower tangents (m, 78) if asked for (19, 21)."""
+    def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
+        """Energy (m,) J, end forces (m, 12) N and N·m, packed lower tangents (m, 78) if asked for (19, 21), filled `into`."""
         count = len(self.ends)
         energy, force = np.empty(count), np.empty((count, 12))
-        blocks = np.empty((count if tangent else 0, 78))
-        _evaluate(*self._kernel_input(state), energy, force, blocks, np.empty((0, 7)), np.empty((0, 7)))
+        blocks = _NOTHING if not tangent else np.empty((count, 78)) if into is None else into
+        share(_evaluate, count, *self._kernel_input(state), energy, force, blocks, _NOTHING, _NOTHING)
         return Evaluation(energy, force, blocks if tangent else None)
 
     def local_forces(self, state: State) -> Reals:
@@ -94,7 +96,9 @@ class Beams:
         count = len(self.ends)
         forces, deformations = np.empty((count, 7)), np.empty((count, 7))
         inputs = self._kernel_input(state)
-        _evaluate(*inputs, np.empty(count), np.empty((count, 12)), np.empty((0, 78)), forces, deformations)
+        share(
+            _evaluate, count, *inputs, np.empty(count), np.empty((count, 12)), _NOTHING, forces, deformations
+        )
         return forces, deformations
 
     def _kernel_input(self, state: State) -> tuple[Reals | Indices, ...]:
@@ -138,7 +142,12 @@ def make_beams(
     frames = _frames(chord / length[:, None], asked)
     rest = np.full(count, np.nan) if rest_length is None else np.asarray(rest_length, dtype=float)
     numbers = {
-        name: reals(f"beams.{name}", np.broadcast_to(np.asarray(value, dtype=float), (count,)), (count,), positive=True)
+        name: reals(
+            f"beams.{name}",
+            np.broadcast_to(np.asarray(value, dtype=float), (count,)),
+            (count,),
+            positive=True,
+        )
         for name, value in [("EA", axial), ("GJ", torsion), ("EIy", bending_y), ("EIz", bending_z)]
     }
     return Beams(
@@ -165,34 +174,53 @@ def _frames(x_axis: Reals, z_axis: Reals) -> Reals:
     if along.any():
         beam = int(np.argmax(along))
         remedy = "Give any vector that is not along the beam."
-        raise InputError("z_axis is zero or along the beam", where=f"beams[{beam}]", value=z[beam].tolist(), remedy=remedy)
+        raise InputError(
+            "z_axis is zero or along the beam", where=f"beams[{beam}]", value=z[beam].tolist(), remedy=remedy
+        )
     y_axis /= size[:, None]
     return np.stack([x_axis, y_axis, np.cross(x_axis, y_axis)], axis=2)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", nogil=True)
 def _evaluate(  # type: ignore[no-untyped-def]
-    positions, quaternions, ends, frames, rest_length, stiffness, energy, force, blocks, local_force, local_deformation
+    start,
+    stop,
+    positions,
+    quaternions,
+    ends,
+    frames,
+    rest_length,
+    stiffness,
+    energy,
+    force,
+    blocks,
+    local_force,
+    local_deformation,
 ):
-    """One pass over the beams; `blocks`, `local_force`, `local_deformation` are filled where they have rows."""
+    """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled where they have rows."""
     E = np.empty((3, 3))
-    R = np.empty((3, 3))
     A = np.empty((3, 3))
     B = np.empty((3, 3))
-    P = np.empty((3, 3))
+    Q = np.empty((3, 3))  # of a node, then of a quaternion's matrix
     h = np.empty((6, 3))  # gradients of s_k by the spin of their end, E fixed
     c = np.empty(6)
     theta = np.empty(6)
-    cosine = np.empty(6)
+    sine, cosine = np.empty(6), np.empty(6)
     moment = np.empty(6)
     g = np.empty((2, 3))
     Ma = np.empty((3, 3))
     Mb = np.empty((3, 3))
-    G = np.zeros((3, 9))
-    dg = np.empty((2, 3, 9))
+    near_a, near_b, far = (
+        np.empty(3),
+        np.empty(3),
+        np.empty(3),
+    )  # derivatives of moments by rotations: same end, other end
+    P = np.empty((6, 6))
+    R = np.empty((3, 6))
+    S = np.empty((3, 3))
+    alpha = np.zeros(6)
     K = np.empty((9, 9))
-    W = np.empty((6, 6))
-    for e in range(ends.shape[0]):
+    for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
         l0 = rest_length[e]
         EA, GJ, EIy, EIz = stiffness[e, 0], stiffness[e, 1], stiffness[e, 2], stiffness[e, 3]
@@ -203,14 +231,14 @@ def _evaluate(  # type: ignore[no-untyped-def]
         E[0, 0], E[1, 0], E[2, 0] = dx / l, dy / l, dz / l
 
         # Nodal triads in global axes, kept in A and B until E is known.
-        matrix(quaternions[a], R)
+        matrix(quaternions[a], Q)
         for i in range(3):
             for j in range(3):
-                A[i, j] = R[i, 0] * frames[e, 0, j] + R[i, 1] * frames[e, 1, j] + R[i, 2] * frames[e, 2, j]
-        matrix(quaternions[b], R)
+                A[i, j] = Q[i, 0] * frames[e, 0, j] + Q[i, 1] * frames[e, 1, j] + Q[i, 2] * frames[e, 2, j]
+        matrix(quaternions[b], Q)
         for i in range(3):
             for j in range(3):
-                B[i, j] = R[i, 0] * frames[e, 0, j] + R[i, 1] * frames[e, 1, j] + R[i, 2] * frames[e, 2, j]
+                B[i, j] = Q[i, 0] * frames[e, 0, j] + Q[i, 1] * frames[e, 1, j] + Q[i, 2] * frames[e, 2, j]
         vx, vy, vz = A[0, 1] + B[0, 1], A[1, 1] + B[1, 1], A[2, 1] + B[2, 1]
         zx = E[1, 0] * vz - E[2, 0] * vy
         zy = E[2, 0] * vx - E[0, 0] * vz
@@ -231,11 +259,20 @@ def _evaluate(  # type: ignore[no-untyped-def]
             B[2, j] = E[0, 2] * p + E[1, 2] * q + E[2, 2] * r
 
         # Local rotations (12) and moments (15, 18); order xa, ya, za, xb, yb, zb.
-        theta[0], theta[1], theta[2] = 0.5 * (A[2, 1] - A[1, 2]), 0.5 * (A[2, 0] - A[0, 2]), 0.5 * (A[1, 0] - A[0, 1])
-        theta[3], theta[4], theta[5] = 0.5 * (B[2, 1] - B[1, 2]), 0.5 * (B[2, 0] - B[0, 2]), 0.5 * (B[1, 0] - B[0, 1])
+        theta[0], theta[1], theta[2] = (
+            0.5 * (A[2, 1] - A[1, 2]),
+            0.5 * (A[2, 0] - A[0, 2]),
+            0.5 * (A[1, 0] - A[0, 1]),
+        )
+        theta[3], theta[4], theta[5] = (
+            0.5 * (B[2, 1] - B[1, 2]),
+            0.5 * (B[2, 0] - B[0, 2]),
+            0.5 * (B[1, 0] - B[0, 1]),
+        )
         for k in range(6):
-            cosine[k] = np.sqrt(1.0 - theta[k] * theta[k])
-            theta[k] = np.arcsin(theta[k])
+            sine[k] = theta[k]
+            cosine[k] = np.sqrt(1.0 - sine[k] * sine[k])
+            theta[k] = np.arcsin(sine[k])
         N = EA * (l - l0) / l0
         moment[0] = GJ * (theta[0] - theta[3]) / l0
         moment[1] = EIy * (4.0 * theta[1] + 2.0 * theta[4]) / l0
@@ -253,20 +290,20 @@ def _evaluate(  # type: ignore[no-untyped-def]
             for k in range(6):
                 local_force[e, 1 + k], local_deformation[e, 1 + k] = moment[k], theta[k]
 
-        # g = sum c_k h_k on each end is the axial vector of P = sum +-c_k (triad vector)(element axis)'; M = P - tr(P) I.
+        # g = sum c_k h_k on each end is the axial vector of Q = sum +-c_k (triad vector)(element axis)'; M = Q - tr(Q) I.
         for end in range(2):
             T = A if end == 0 else B
             M = Ma if end == 0 else Mb
             cx, cy, cz = c[3 * end], c[3 * end + 1], c[3 * end + 2]
             for i in range(3):
-                P[i, 0] = -cy * T[i, 2] - cz * T[i, 1]
-                P[i, 1] = cz * T[i, 0] - cx * T[i, 2]
-                P[i, 2] = cx * T[i, 1] + cy * T[i, 0]
-            g[end, 0], g[end, 1], g[end, 2] = P[1, 2] - P[2, 1], P[2, 0] - P[0, 2], P[0, 1] - P[1, 0]
-            trace = P[0, 0] + P[1, 1] + P[2, 2]
+                Q[i, 0] = -cy * T[i, 2] - cz * T[i, 1]
+                Q[i, 1] = cz * T[i, 0] - cx * T[i, 2]
+                Q[i, 2] = cx * T[i, 1] + cy * T[i, 0]
+            g[end, 0], g[end, 1], g[end, 2] = Q[1, 2] - Q[2, 1], Q[2, 0] - Q[0, 2], Q[0, 1] - Q[1, 0]
+            trace = Q[0, 0] + Q[1, 1] + Q[2, 2]
             for i in range(3):
                 for j in range(3):
-                    M[i, j] = P[i, j]
+                    M[i, j] = Q[i, j]
                 M[i, i] -= trace
         gx, gy, gz = g[0, 0] + g[1, 0], g[0, 1] + g[1, 1], g[0, 2] + g[1, 2]
 
@@ -274,15 +311,14 @@ def _evaluate(  # type: ignore[no-untyped-def]
         v0, v1 = A[0, 1] + B[0, 1], A[1, 1] + B[1, 1]
         nu = 1.0 / v1
         eta = v0 * nu
-        G[0, 2], G[1, 2], G[2, 1] = -eta / l, -1.0 / l, 1.0 / l
-        G[0, 3], G[0, 4] = nu * A[1, 1], -nu * A[0, 1]
-        G[0, 6], G[0, 7] = nu * B[1, 1], -nu * B[0, 1]
+        # G's first row is (0, 0, -eta / l, alpha), its others turn d2 and d1 over l.
+        alpha[0], alpha[1], alpha[3], alpha[4] = nu * A[1, 1], -nu * A[0, 1], nu * B[1, 1], -nu * B[0, 1]
 
         # End forces in element axes: on d, then on the two ends' spins.
         fd1 = -(gz / l)
         fd2 = (gy + eta * gx) / l
-        ma0, ma1, ma2 = g[0, 0] - G[0, 3] * gx, g[0, 1] - G[0, 4] * gx, g[0, 2]
-        mb0, mb1, mb2 = g[1, 0] - G[0, 6] * gx, g[1, 1] - G[0, 7] * gx, g[1, 2]
+        ma0, ma1, ma2 = g[0, 0] - alpha[0] * gx, g[0, 1] - alpha[1] * gx, g[0, 2]
+        mb0, mb1, mb2 = g[1, 0] - alpha[3] * gx, g[1, 1] - alpha[4] * gx, g[1, 2]
         for i in range(3):
             along = E[i, 0] * N + E[i, 1] * fd1 + E[i, 2] * fd2
             force[e, i] = -along
@@ -302,109 +338,138 @@ def _evaluate(  # type: ignore[no-untyped-def]
             h[k + 1, 0], h[k + 1, 1], h[k + 1, 2] = s * T[1, 0], s * (-T[0, 0] - T[2, 2]), s * T[1, 2]
             s = 0.5 / cosine[k + 2]
             h[k + 2, 0], h[k + 2, 1], h[k + 2, 2] = -s * T[2, 0], -s * T[2, 1], s * (T[0, 0] + T[1, 1])
-        # Derivatives of the moments by the local rotations, with the arcsine's own curvature on the diagonal.
-        W[:] = 0.0
-        W[0, 0] = W[3, 3] = GJ / l0
-        W[0, 3] = W[3, 0] = -GJ / l0
-        W[1, 1] = W[4, 4] = 4.0 * EIy / l0
-        W[1, 4] = W[4, 1] = 2.0 * EIy / l0
-        W[2, 2] = W[5, 5] = 4.0 * EIz / l0
-        W[2, 5] = W[5, 2] = 2.0 * EIz / l0
-        for k in range(6):
-            W[k, k] += moment[k] * np.sin(theta[k]) / cosine[k]
 
-        # Derivative of g on each end by (dd, w_a, w_b): Q (w - phi) + M w - M' phi.
-        for end in range(2):
-            M = Ma if end == 0 else Mb
+        near_a[0], near_a[1], near_a[2] = GJ / l0, 4.0 * EIy / l0, 4.0 * EIz / l0
+        far[0], far[1], far[2] = -GJ / l0, 2.0 * EIy / l0, 2.0 * EIz / l0
+        for k in range(3):
+            near_b[k] = near_a[k] + moment[k + 3] * sine[k + 3] / cosine[k + 3]
+            near_a[k] += moment[k] * sine[k] / cosine[k]
+
+        # P: the quadratic form of the two ends' spins with the element triad at rest, from the derivatives of the moments by
+        # the local rotations, the arcsine's own curvature with them, and from the triads' moments' own turning M.
+        for i in range(3):
+            for j in range(3):
+                aa = bb = ab = 0.0
+                for k in range(3):
+                    aa += near_a[k] * h[k, i] * h[k, j]
+                    bb += near_b[k] * h[k + 3, i] * h[k + 3, j]
+                    ab += far[k] * h[k, i] * h[k + 3, j]
+                P[i, j] = aa
+                P[3 + i, 3 + j] = bb
+                P[i, 3 + j] = ab
+                P[3 + j, i] = ab
+        # R, S: how spins of the element triad (phi, the same at both ends) couple with the ends' spins and with themselves.
+        for r in range(3):
             for i in range(3):
-                qa0 = qa1 = qa2 = qb0 = qb1 = qb2 = 0.0
-                for k in range(3 * end, 3 * end + 3):
-                    kk = k - 3 * end  # the same axis at the ends a and b
-                    wa, wb = h[k, i] * W[k, kk], h[k, i] * W[k, kk + 3]
-                    qa0 += wa * h[kk, 0]
-                    qa1 += wa * h[kk, 1]
-                    qa2 += wa * h[kk, 2]
-                    qb0 += wb * h[kk + 3, 0]
-                    qb1 += wb * h[kk + 3, 1]
-                    qb2 += wb * h[kk + 3, 2]
-                t0, t1, t2 = qa0 + qb0 + M[0, i], qa1 + qb1 + M[1, i], qa2 + qb2 + M[2, i]
-                for j in range(9):
-                    dg[end, i, j] = -(t0 * G[0, j] + t1 * G[1, j] + t2 * G[2, j])
-                dg[end, i, 3] += qa0
-                dg[end, i, 4] += qa1
-                dg[end, i, 5] += qa2
-                dg[end, i, 6] += qb0
-                dg[end, i, 7] += qb1
-                dg[end, i, 8] += qb2
-                for j in range(3):
-                    dg[end, i, 3 + 3 * end + j] += M[i, j]
+                R[r, i] = P[i, r] + P[i, 3 + r] + Ma[r, i]
+                R[r, 3 + i] = P[r, 3 + i] + P[3 + i, 3 + r] + Mb[r, i]
+        for r in range(3):
+            for i in range(3):
+                S[r, i] = (
+                    P[r, i] + P[r, 3 + i] + P[i, 3 + r] + P[3 + r, 3 + i]
+                    + 0.5 * (Ma[r, i] + Ma[i, r] + Mb[r, i] + Mb[i, r])
+                )  # fmt: skip
+        for i in range(3):
+            for j in range(3):
+                P[i, j] += 0.5 * (Ma[i, j] + Ma[j, i])
+                P[3 + i, 3 + j] += 0.5 * (Mb[i, j] + Mb[j, i])
 
-        # K = d(force)/d(d, w_a, w_b): axial part, then the triads' moments, then -G' dg, then -(dG)' g column by column.
-        for i in range(9):
-            for j in range(9):
-                total = 0.0
-                if i >= 3:
-                    total = dg[(i - 3) // 3, (i - 3) % 3, j]
-                for r in range(3):
-                    total -= G[r, i] * (dg[0, r, j] + dg[1, r, j])
-                K[i, j] = total
-        K[0, 0] += EA / l0
-        K[1, 1] += N / l
-        K[2, 2] += N / l
-        gd1, gd2 = gz / l, -(gy + eta * gx) / l  # G' g on d
-        for j in range(9):
-            p0, p1, p2 = G[0, j], G[1, j], G[2, j]  # phi of a unit in column j
-            w0, w1, w2 = 1.0 if j == 3 else 0.0, 1.0 if j == 4 else 0.0, 1.0 if j == 5 else 0.0
-            u0, u1, u2 = 1.0 if j == 6 else 0.0, 1.0 if j == 7 else 0.0, 1.0 if j == 8 else 0.0
-            dv0 = w1 * A[2, 1] - w2 * A[1, 1] + u1 * B[2, 1] - u2 * B[1, 1]
-            dv1 = w2 * A[0, 1] - w0 * A[2, 1] + u2 * B[0, 1] - u0 * B[2, 1]
-            d_ev0 = v1 * p2 + dv0
-            d_ev1 = -v0 * p2 + dv1
-            d_eta = nu * (d_ev0 - eta * d_ev1)
-            d_nu = -nu * nu * d_ev1
-            d_gx = gy * p2 - gz * p1
-            d_gy = gz * p0 - gx * p2
-            d_gz = gx * p1 - gy * p0
-            stretch = 1.0 / l if j == 0 else 0.0
-            s = gy + eta * gx
-            ds = d_gy + d_eta * gx + eta * d_gx
-            K[0, j] -= (-s * p1 - gz * p2) / l
-            K[1, j] -= (s * p0 + d_gz) / l - gd1 * stretch
-            K[2, j] -= (-ds + gz * p0) / l - gd2 * stretch
-            k = d_nu * gx + nu * d_gx
-            n = nu * gx
-            dot = A[0, 1] * p0 + A[1, 1] * p1 + A[2, 1] * p2
-            K[3, j] -= k * A[1, 1] + n * (A[0, 1] * w2 - w0 * A[2, 1] + p0 * A[2, 1])
-            K[4, j] -= -k * A[0, 1] + n * (A[1, 1] * w2 - w1 * A[2, 1] + p1 * A[2, 1])
-            K[5, j] -= n * (A[2, 1] * w2 - w2 * A[2, 1] + p2 * A[2, 1] - dot)
-            dot = B[0, 1] * p0 + B[1, 1] * p1 + B[2, 1] * p2
-            K[6, j] -= k * B[1, 1] + n * (B[0, 1] * u2 - u0 * B[2, 1] + p0 * B[2, 1])
-            K[7, j] -= -k * B[0, 1] + n * (B[1, 1] * u2 - u1 * B[2, 1] + p1 * B[2, 1])
-            K[8, j] -= n * (B[2, 1] * u2 - u2 * B[2, 1] + p2 * B[2, 1] - dot)
+        # With phi = G (dd, w_a, w_b) the form is P w·w - 2 R w·phi + S phi·phi.
+        il = 1.0 / l
+        d2 = -eta * il
+        along_1, along_2 = S[0, 2] * il, S[0, 0] * d2 - S[0, 1] * il
+        for i in range(6):
+            for j in range(i + 1):
+                K[3 + i, 3 + j] = (
+                    P[i, j] - alpha[i] * R[0, j] - R[0, i] * alpha[j] + S[0, 0] * alpha[i] * alpha[j]
+                )
+            K[3 + i, 0] = 0.0
+            K[3 + i, 1] = alpha[i] * along_1 - R[2, i] * il
+            K[3 + i, 2] = alpha[i] * along_2 - R[0, i] * d2 + R[1, i] * il
+        K[0, 0] = EA / l0
+        K[1, 1] = N * il + S[2, 2] * il * il
+        K[2, 2] = N * il + S[0, 0] * d2 * d2 - 2.0 * S[0, 1] * d2 * il + S[1, 1] * il * il
+        K[2, 1] = (S[0, 2] * d2 - S[1, 2] * il) * il
+
+        # Minus the symmetric part of (dG)' g: the lever arms of the ends' moments change with the chord and with v.
+        s = gy + eta * gx
+        n = nu * gx
+        K[1, 0] = gz * il * il
+        K[2, 0] = -s * il * il
+        K[2, 1] += 0.5 * (eta * s + gx * (1.0 + eta * eta)) * il * il
+        K[2, 2] += eta * gz * il * il
+        for end in range(2):
+            T = A if end == 0 else B
+            a0, a1, a2 = T[0, 1], T[1, 1], T[2, 1]  # the end's y axis
+            o = 3 + 3 * end
+            m0, m1 = alpha[o - 3], alpha[o - 2]
+            # d1 and d2 against this end's spins; each term and its transpose have a half.
+            K[o, 1] -= 0.5 * (a1 * nu * s + eta * gx * m0) * il
+            K[o + 1, 1] -= 0.5 * (-a0 * nu * s + eta * gx * m1) * il
+            K[o, 2] -= 0.5 * (a1 * nu * gz - n * eta * a2 - eta * nu * gx * a2) * il
+            K[o + 1, 2] -= 0.5 * (-a0 * nu * gz - n * a2 - nu * gx * a2) * il
+            K[o + 2, 2] -= 0.5 * (n * (a0 * eta + a1) + nu * gx * (a1 + eta * a0)) * il
+            # This end's spins against themselves.
+            nn = nu * n
+            K[o, o] -= nn * a2 * a1 + n * a2 * (m0 - 1.0)
+            K[o + 1, o] -= 0.5 * (-nn * a2 * a0 + n * m1 * a2)
+            K[o + 2, o] -= 0.5 * (n * a0 - nn * a0 * a1 - n * a0 * m0)
+            K[o + 1, o + 1] += n * a2
+            K[o + 2, o + 1] -= 0.5 * (n * a1 + nn * a0 * a0 - n * a0 * m1)
+        # The two ends' spins against each other.
+        a0, a1, a2, b0, b1, b2 = A[0, 1], A[1, 1], A[2, 1], B[0, 1], B[1, 1], B[2, 1]
+        nn = nu * n
+        K[6, 3] -= 0.5 * (nn * a2 * b1 + n * alpha[0] * b2 + nn * b2 * a1 + n * alpha[3] * a2)
+        K[7, 3] -= 0.5 * (-nn * a2 * b0 + n * alpha[4] * a2)
+        K[8, 3] -= 0.5 * (-n * b0 * alpha[0] - nn * b0 * a1)
+        K[6, 4] -= 0.5 * (n * alpha[1] * b2 - nn * b2 * a0)
+        K[8, 4] -= 0.5 * (-n * b0 * alpha[1] + nn * b0 * a0)
+        K[6, 5] -= 0.5 * (-nn * a0 * b1 - n * a0 * alpha[3])
+        K[7, 5] -= 0.5 * (nn * a0 * b0 - n * a0 * alpha[4])
         _pack(E, K, blocks[e])
 
 
-@njit(cache=True)
+@njit(cache=True, error_model="numpy", inline="always")
 def _pack(E, K, out):  # type: ignore[no-untyped-def]
-    """The symmetric part of K (9, 9), element axes, as the packed lower triangle (78,) over 12 freedoms, global axes."""
-    S = np.empty((9, 9))
-    T = np.empty((9, 9))
-    for i in range(9):
-        for j in range(9):
-            S[i, j] = 0.5 * (K[i, j] + K[j, i])
-    for i in range(9):  # S times E' from the right
-        for q in range(3):
-            for j in range(3):
-                T[i, 3 * q + j] = S[i, 3 * q] * E[j, 0] + S[i, 3 * q + 1] * E[j, 1] + S[i, 3 * q + 2] * E[j, 2]
-    for p in range(3):  # E from the left
-        for j in range(9):
+    """The symmetric matrix with lower triangle K (9, 9), element axes, as packed lower triangle (78,) of 12 freedoms, global axes."""
+    X = np.empty((3, 3))
+    Y = np.empty((3, 3))
+    for p in range(3):
+        for q in range(p + 1):
             for i in range(3):
-                S[3 * p + i, j] = E[i, 0] * T[3 * p, j] + E[i, 1] * T[3 * p + 1, j] + E[i, 2] * T[3 * p + 2, j]
-    at = 0
-    for r in range(12):
-        # Rows and columns of x_a are minus those of d, those of x_b are d itself.
-        p, sp = (r, -1.0) if r < 3 else ((r, 1.0) if r < 6 else ((r - 6, 1.0) if r < 9 else (r - 3, 1.0)))
-        for s in range(r + 1):
-            q, sq = (s, -1.0) if s < 3 else ((s, 1.0) if s < 6 else ((s - 6, 1.0) if s < 9 else (s - 3, 1.0)))
-            out[at] = sp * sq * S[p, q]
-            at += 1
+                for j in range(3):
+                    X[i, j] = K[3 * p + i, 3 * q + j] if p > q or i >= j else K[3 * p + j, 3 * q + i]
+            for i in range(3):
+                for j in range(3):
+                    Y[i, j] = X[i, 0] * E[j, 0] + X[i, 1] * E[j, 1] + X[i, 2] * E[j, 2]
+            for i in range(3):
+                for j in range(3):
+                    X[i, j] = E[i, 0] * Y[0, j] + E[i, 1] * Y[1, j] + E[i, 2] * Y[2, j]
+            # Rows and columns of x_a are minus those of d, those of x_b are d itself.
+            if p == 0:
+                for i in range(3):
+                    for j in range(i + 1):
+                        out[_row(i) + j] = X[i, j]
+                        out[_row(6 + i) + 6 + j] = X[i, j]
+                    for j in range(3):
+                        out[_row(6 + i) + j] = -X[i, j]
+            elif q == 0:
+                own = 3 if p == 1 else 9
+                for i in range(3):
+                    for j in range(3):
+                        out[_row(own + i) + j] = -X[i, j]
+                        if p == 1:
+                            out[_row(6 + j) + own + i] = X[i, j]
+                        else:
+                            out[_row(own + i) + 6 + j] = X[i, j]
+            else:
+                r, c = (3 if p == 1 else 9), (3 if q == 1 else 9)
+                for i in range(3):
+                    for j in range(3 if p > q else i + 1):
+                        out[_row(r + i) + c + j] = X[i, j]
+
+
+@njit(cache=True, inline="always")
+def _row(r):  # type: ignore[no-untyped-def]
+    """Where row r of a packed lower triangle begins."""
+    return r * (r + 1) // 2

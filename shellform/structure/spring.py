@@ -49,8 +49,8 @@ class SlidingSprings:
         """How far (k,), m, each node lies above its level; the spring's force is `density` times that."""
         return self.distance(state.positions[self.nodes])[0] - self.level
 
-    def evaluate(self, state: State, *, tangent: bool) -> Evaluation:
-        """Energy (k,) J, forces (k, 3) N, packed lower tangents (k, 6) N/m."""
+    def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
+        """Energy (k,) J, forces (k, 3) N, packed lower tangents (k, 6) N/m, filled `into`."""
         distance, normal = self.distance(state.positions[self.nodes])
         stretch = distance - self.level
         force = (self.density * stretch)[:, None] * normal
@@ -58,4 +58,6 @@ class SlidingSprings:
         if not tangent:
             return Evaluation(energy, force, None)
         block = self.density[:, None, None] * normal[:, :, None] * normal[:, None, :]
-        return Evaluation(energy, force, block[:, _LOWER[0], _LOWER[1]])
+        packed = np.empty((len(energy), 6)) if into is None else into
+        packed[:] = block[:, _LOWER[0], _LOWER[1]]
+        return Evaluation(energy, force, packed)
