@@ -90,7 +90,7 @@ def right_angle() -> Iterator[Row]:
 
     Hinged frame under equal end moments that open or close it: each leg twists and bends as in pure bending, so that
     M = ± π √(EI GJ)/L = 622.2 N mm. The same legs clamped at one end, with a load at the tip along the clamped leg: 1.088 there,
-    1.08752 when it pulls and 0.68043 when it pushes recomputed (linearised about the exact plane state). 40 elements a leg: O(h²).
+    1.08752 when it pulls and 0.68043 when it pushes recomputed, linearised about the exact plane state. 40 elements a leg: O(h²).
     """
     half = 240.0 * np.sqrt(0.5)
     points = polyline([[-half, 0.0, 0.0], [0.0, 0.0, half], [half, 0.0, 0.0]], 40)

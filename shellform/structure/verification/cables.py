@@ -64,7 +64,8 @@ def two_links() -> Iterator[Row]:
         network = ropes(line(2, 2.0), make_cables([[0, 1], [1, 2]], rest_length=rest, stiffness=1e4), [0, 2])
         sag = -solved(network, load_at(network, 1, [0.0, 0.0, -load])).positions[1, 2]
         wanted = exact.two_links(1.0, 1e4, pretension, load)
-        yield Row("two links", f"sag, prestress {pretension:g}, load {load:g}", float(sag), wanted, 1e-7, "closed form; Kwan 1998")
+        quantity = f"sag, prestress {pretension:g}, load {load:g}"
+        yield Row("two links", quantity, float(sag), wanted, 1e-7, "closed form; Kwan 1998")
 
 
 def hanging(elements: int, force: float) -> tuple[float, float, float]:
@@ -89,7 +90,7 @@ def hanging(elements: int, force: float) -> tuple[float, float, float]:
 def catenaries() -> Iterator[Row]:
     """The elastic catenary (Irvine 1981, section 1.3), alone and with a load at 3/5 as in Jayaraman and Knudsen 1981.
 
-    Span 1, stress-free length 1.2, weight 1 a length, EA = 60; 80 cables with their weight lumped at the nodes: O(h²), and the order.
+    Span 1, stress-free length 1.2, weight 1 a length, EA = 60; 80 cables, weight lumped at the nodes: O(h²), and the order.
     """
     for force in (0.0, 2.0):
         tension, _, x, z = exact.catenary(1.0, 0.0, 1.2, 1.0, 60.0, 0.72, force)
@@ -114,7 +115,8 @@ def force_densities() -> Iterator[Row]:
     load = np.zeros((n + 1, 6))
     load[:, 2] = -p
     found = solved(network, load).positions
-    yield Row("line of equal force density", "largest miss of z", float(np.abs(found[:, 2] + depth).max()), 0.0, 1e-7, "Schek 1974")
+    miss = float(np.abs(found[:, 2] + depth).max())
+    yield Row("line of equal force density", "largest miss of z", miss, 0.0, 1e-7, "Schek 1974, closed form")
 
 
 SIDE = 6
@@ -140,7 +142,7 @@ def hypar() -> tuple[Network, Reals]:
 
 
 def nets() -> Iterator[Row]:
-    """A prestressed saddle net: found back from half as deep again, then loaded with 200 N at each node of one half: some go slack.
+    """A prestressed saddle net: found back from half as deep again, then loaded with 200 N a node on one half; four cables go slack.
 
     The shape is exact (force densities, Schek 1974), to the residual; the loaded net is recomputed by minimising its energy with
     SciPy, to the digits quoted.

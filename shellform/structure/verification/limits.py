@@ -115,7 +115,7 @@ DOME = ((0.768, 303.189), (3.028, -265.101))
 
 
 def star_dome() -> tuple[Reals, Indices]:
-    """Nodes and bars of a dome of 24 bars like Hangai and Kawamata's (1972): apex 0, ring 1-6 at 25 cm, supports 7-12 at 50 cm."""
+    """Nodes and bars of a dome of 24 bars like Hangai and Kawamata's (1972), cm: apex 0, ring 1-6, supports 7-12."""
     ring, outer = np.radians(60.0 * np.arange(6)), np.radians(60.0 * np.arange(6) + 30.0)
     points = np.vstack(
         [
@@ -134,8 +134,8 @@ def star_dome() -> tuple[Reals, Indices]:
 def domes() -> Iterator[Row]:
     """Star dome of 24 hinged bars, EA = 3.03e5 · 3.17 N, loaded at its apex: limit load and valley by displacement control.
 
-    One element a bar; hinges by a bending stiffness of 1e-6 of what would matter (EI = 0.1 N cm²). cm, N. The reference is a truss of
-    Hooke's bars, its symmetric path solved by SciPy.
+    cm, N; one element a bar, hinged by a bending stiffness that adds 3e-6 (EI = 0.1 N cm²). The reference is a truss of Hooke's bars
+    followed by Newton's method; apart from the apex' height its tangent stays positive definite.
     """
     points, ends = star_dome()
     beams = make_beams(points, ends, axial=3.03e5 * 3.17, torsion=0.1, bending_y=0.1, bending_z=0.1)
