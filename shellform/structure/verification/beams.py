@@ -14,6 +14,7 @@ from shellform.structure.verification import exact
 from shellform.structure.verification.case import Row, rows
 from shellform.structure.verification.models import (
     CLAMP,
+    PIN,
     chain,
     in_plane,
     line,
@@ -216,3 +217,42 @@ def twisted_rod() -> Iterator[Row]:
     w, x = state.quaternions[:, 0], state.quaternions[:, 1]
     twist = np.unwrap(2.0 * np.arctan2(x, w), period=2.0 * np.pi)[-1]
     yield Row("rod twisted by 2.7 turns", "twist, rad", float(twist), 17.0, 1e-8, "closed form")
+
+
+def beam_columns() -> Iterator[Row]:
+    """A pinned beam with a small load in the middle and a large axial force, in compression and in tension.
+
+    Timoshenko and Gere 1961, art. 1.3 and 1.11: the deflection PL³/48EI times 3 (tan u - u)/u³, or 3 (u - tanh u)/u³, with
+    u = L/2 √(S/EI). S = ± 5 EI/L² (half of Euler's load), so little P that it stays linear; 40 elements: O(h²), of the
+    margin to Euler's load too.
+    """
+    u = 0.5 * np.sqrt(5.0)
+    wanted = {-5.0: 3.0 * (np.tan(u) - u) / u**3, 5.0: 3.0 * (u - np.tanh(u)) / u**3}
+    for force, reference in wanted.items():
+        # EA = 1e8: the axial force shortens the beam by 5e-8.
+        network = in_plane(chain(line(40), (1e8, 1.0, 1.0, 1.0), {0: PIN, 40: [False, True, True, False, False, False]}))
+        load = load_at(network, 40, [force, 0.0, 0.0]) + load_at(network, 20, [0.0, 0.0, -0.01])
+        found = -48.0 * solved(network, load).positions[20, 2] / 0.01
+        kind = "tension" if force > 0.0 else "compression"
+        yield Row(f"beam in {kind}, S L²/EI = 5", "deflection over PL³/48EI", float(found), reference, 1e-3, "Timoshenko and Gere 1961")
+
+
+def helical_spring() -> Iterator[Row]:
+    """A helical spring of three open coils pulled along its axis: extension P R² L (cos² a/GJ + sin² a/EI) (Love 1927, art. 271).
+
+    Clamped at one end; at the other the axial force, with its moment about the rod's end, pulling and pushing by 2e-4 EI/R², so
+    that terms of second order cancel. R = 1, pitch angle a = 20°, EI = 1, GJ = 0.8, EA = 1e5; 240 chords: O(h²) of 4.5° a chord.
+    """
+    angle, count = np.radians(20.0), 240
+    turn = np.linspace(0.0, 6.0 * np.pi, count + 1)
+    points = np.column_stack([np.cos(turn), np.sin(turn), np.tan(angle) * turn])
+    network = chain(points, (1e5, 0.8, 1.0, 1.0), {0: CLAMP})
+    # On the axis the force would pass through (0, 0): seen from the rod's end at (1, 0), its moment is (-1, 0, 0) x force.
+    heights = []
+    for size in (2e-4, -2e-4):
+        state = solved(network, load_at(network, count, [0.0, 0.0, size, *np.cross([-1.0, 0.0, 0.0], [0.0, 0.0, size])]))
+        heights.append(float((state.positions[-1] + np.cross(state.rotations[-1], [-1.0, 0.0, 0.0]))[2]))
+    found = (heights[0] - heights[1]) / 4e-4
+    length = 6.0 * np.pi / np.cos(angle)
+    wanted = length * (np.cos(angle) ** 2 / 0.8 + np.sin(angle) ** 2)
+    yield Row("helical spring, 3 coils at 20°", "extension EI/(P R³)", float(found), wanted, 2e-3, "Love 1927")

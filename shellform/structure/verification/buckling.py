@@ -9,6 +9,8 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.structure import rotation
+from shellform.structure.beam import make_beams
+from shellform.structure.cable import make_cables
 from shellform.structure.equilibrium import LostBranch, find_equilibrium
 from shellform.structure.network import Network, assemble
 from shellform.structure.state import State, at_rest, moved
@@ -51,6 +53,27 @@ def columns() -> Iterator[Row]:
     yield from rows("Euler column, PL²/EI", "Euler 1744; Timoshenko and Gere 1961", 2e-3, numbers)
     errors = [column("clamped-clamped", n) - 4.0 * np.pi**2 for n in (12, 24)]
     yield Row("clamped column, 12, 24 elements", "order of the buckling load", order(errors), 2.0, 0.05, "O(h²)")
+
+
+def braced() -> Iterator[Row]:
+    """A pinned column held at its middle by two prestressed cables across it: rods and cables together.
+
+    L = EI = 1, EA = 1e6, 48 elements (O(h²) late). Cables of length 1 and EA = 25: as long as both are taut they are a spring of
+    50 EI/L³. Slack ones (rest length 1.05) hold nothing at first: Euler's load.
+    """
+    points = np.vstack([line(48), [[0.5, 0.0, 1.0], [0.5, 0.0, -1.0]]])
+    fixed = np.zeros((51, 6), dtype=bool)
+    fixed[:, [1, 3, 5]] = True
+    fixed[0, :3] = fixed[48, 2] = fixed[49:, :3] = True
+    ends = np.column_stack([np.arange(48), np.arange(1, 49)])
+    beams = make_beams(points, ends, axial=1e6, torsion=1.0, bending_y=1.0, bending_z=1.0)
+    source = "Timoshenko and Gere 1961, art. 2.6"
+    for name, ratio, spring in [("taut", 0.95, 50.0 / 0.95), ("slack", 1.05, 0.0)]:
+        cables = make_cables([[24, 49], [24, 50]], rest_length=ratio, stiffness=25.0)
+        network = Network(points, beams, cables, fixed, np.zeros((51, 6)))
+        reference = exact.braced_column(spring) if spring else np.pi**2
+        found = strip_load(network, load_at(network, 48, [-1.0, 0.0, 0.0]), reference)
+        yield Row("column braced by two cables", f"{name}, PL²/EI", found, reference, 2e-3, source)
 
 
 def strip_load(network: Network, load: Reals, reference: float) -> float:
