@@ -48,6 +48,7 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     cables.tripod,
     cables.two_links,
     cables.catenaries,
+    cables.opensees,
     cables.force_densities,
     cables.nets,
     checks.turns,

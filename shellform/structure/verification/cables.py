@@ -13,7 +13,7 @@ from shellform.structure.network import Network
 from shellform.structure.state import at_rest
 from shellform.structure.verification import exact
 from shellform.structure.verification.case import Row, rows
-from shellform.structure.verification.models import line, load_at, order, ropes, solved
+from shellform.structure.verification.models import line, load_at, order, polyline, ropes, solved
 
 
 def slack_pair() -> tuple[float, float]:
@@ -174,3 +174,32 @@ def hypar_load(shape: Reals) -> Reals:
     load = np.zeros((len(shape), 6))
     load[shape[:, 0] < 0.0, 2] = -200.0
     return load
+
+
+def two_catenaries(elements: int) -> tuple[float, float]:
+    """x and z of a node that slides in a plane between two heavy cables, `elements` in each."""
+    ends = np.array([[0.0, 0.0, 90.0], [15.0, 0.0, 40.0], [30.0, 60.0, 30.0]])
+    points = polyline(ends, elements)
+    count = 2 * elements
+    # 50 long each, warmed by 100 at 6.5e-6 a degree.
+    length = 50.0 * (1.0 + 6.5e-4) / elements
+    pairs = np.column_stack([np.arange(count), np.arange(1, count + 1)])
+    network = ropes(points, make_cables(pairs, rest_length=length, stiffness=3e7), [0, count])
+    fixed = network.fixed.copy()
+    fixed[elements, 1] = True
+    load = np.zeros((count + 1, 6))
+    load[:, 2] = -length
+    place = solved(replace(network, fixed=fixed), load).positions[elements]
+    return float(place[0]), float(place[2])
+
+
+def opensees() -> Iterator[Row]:
+    """Two catenary cables with a node that slides in the plane y = 0 between them: the example of OpenSees' CatenaryCable.
+
+    Its manual (Ibañez and Abell, after Salehi Ahmad Abad et al., Finite Elem. Anal. Des. 73 (2013) 11) prints displacements of
+    8.58693 and 2.82578 from (15, 40), all of whose digits are met. Cables of 50 and EA = 3e7, weight 1 a length, 20 straight ones
+    for each; they are stretched by 5 %, so that their sag hardly counts.
+    """
+    x, z = two_catenaries(20)
+    numbers = [("x of the sliding node", x, 15.0 + 8.58693), ("z of the sliding node", z, 40.0 + 2.82578)]
+    yield from rows("two catenaries", "OpenSees manual, CatenaryCable", 1e-6, numbers)
