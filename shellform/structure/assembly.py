@@ -99,6 +99,16 @@ class Assembly:
         self.clock["assembly"] += time.perf_counter() - began
         return Balance(energy, force.reshape(-1, 6), values, largest)
 
+    def force_along(self, state: State, motion: Reals) -> Reals:
+        """How the internal forces (n, 6) begin to change, N and N·m, as the nodes move by `motion` (n, 6), held freedoms too."""
+        change = np.zeros(6 * self.count)
+        for part, freedoms in zip(self.parts, self._freedoms, strict=True):
+            if len(freedoms):
+                tangent = part.evaluate(state, tangent=True).tangent
+                assert tangent is not None
+                _multiply(freedoms, tangent, motion.ravel(), change)
+        return change.reshape(-1, 6)
+
     def factor(self, state: State) -> Factor:
         """Cholesky factor of the tangent at the state, good until the next factorisation here.
 
@@ -165,3 +175,16 @@ def _add_forces(freedoms, translation, element, total):  # type: ignore[no-untyp
             if translation[k]:
                 largest = max(largest, abs(element[e, k]))
     return largest
+
+
+@njit(cache=True)
+def _multiply(freedoms, tangent, motion, total):  # type: ignore[no-untyped-def]
+    """Adds each element's packed symmetric tangent times its motion."""
+    for e in range(freedoms.shape[0]):
+        at = 0
+        for i in range(freedoms.shape[1]):
+            for j in range(i + 1):
+                total[freedoms[e, i]] += tangent[e, at] * motion[freedoms[e, j]]
+                if j < i:
+                    total[freedoms[e, j]] += tangent[e, at] * motion[freedoms[e, i]]
+                at += 1

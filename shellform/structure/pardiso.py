@@ -27,6 +27,10 @@ _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
 _NOT_DEFINITE, _FULL = -4, -2
 _DISSECTION_FROM = 300_000  # freedoms
 _TWO_THREADS_FROM = 200_000  # freedoms
+_MANY = 16  # right-hand sides, which are solved side by side without waiting; each comes out the same on one thread
+
+
+_Integers = np.ndarray[Any, np.dtype[Any]]
 
 
 class NotDefinite(ArithmeticError):
@@ -126,12 +130,12 @@ class Factoriser:
 def _pardiso(
     phase: int,
     kind: int,
-    handle: Indices,
-    settings: Indices,
+    handle: _Integers,
+    settings: _Integers,
     size: int,
     values: Reals,
-    rows: Indices,
-    columns: Indices,
+    rows: _Integers,
+    columns: _Integers,
     count: int,
     right: Reals,
     solution: Reals,
@@ -140,7 +144,8 @@ def _pardiso(
     step, order, sides, error = ctypes.c_int(phase), ctypes.c_int(size), ctypes.c_int(count), ctypes.c_int(0)
     ref, unused = ctypes.byref, ctypes.c_int(0)
     mkl = library()
-    before = mkl.MKL_Set_Num_Threads_Local(min(2, cores()) if size > _TWO_THREADS_FROM else 1)
+    many = size > _TWO_THREADS_FROM or (phase == _SOLVE and count >= _MANY)
+    before = mkl.MKL_Set_Num_Threads_Local(min(2, cores()) if many else 1)
     mkl.PARDISO(
         _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values), _at(rows), _at(columns), ref(unused),
         ref(sides), _at(settings), ref(quiet), _at(right), _at(solution), ref(error),
@@ -153,7 +158,7 @@ def _at(array: Any) -> ctypes.c_void_p:
     return ctypes.c_void_p(array.ctypes.data)
 
 
-def _release(kind: int, handle: Indices, settings: Indices, size: int) -> None:
+def _release(kind: int, handle: _Integers, settings: _Integers, size: int) -> None:
     if handle.any():
         none = np.zeros(1)
         empty = np.zeros(1, dtype=np.int32)

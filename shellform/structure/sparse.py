@@ -93,7 +93,7 @@ class Symmetric:
         if self._backend == "mkl":
             return self._factor_with_pardiso(values)
         if self._backend == "superlu":
-            return _SuperLU(self._full(values))
+            return _SuperLU(self.full(values))
         if self._symbolic is None:
             self._matrix = spmatrix(
                 matrix(values), matrix(self.indices.astype(np.int64)), matrix(self.columns), (self.size, self.size)
@@ -125,8 +125,11 @@ class Symmetric:
             whole.factor(values)
             return whole
         if self._backend == "superlu":
-            return _SuperLU(self._full(values), definite=False)
-        symbolic, pivots = self._indefinite(values)
+            return _SuperLU(self.full(values), definite=False)
+        try:
+            symbolic, pivots = self._indefinite(values)
+        except ArithmeticError:  # a pivot is exactly zero; SuperLU exchanges rows
+            return _SuperLU(self.full(values), definite=False)
         return _Indefinite(symbolic, int((pivots < 0.0).sum()))
 
     def negative_eigenvalues(self, values: Reals) -> int:
@@ -137,9 +140,12 @@ class Symmetric:
         """The solution for `right` (n,) with a matrix that needn't be definite, and whether `right` leaves its negative part
         untouched: whether below 1e-9 of y'|D|y, L D L' = A and L D y = right, comes from negative pivots."""
         if cholmod is None:
-            plain = _SuperLU(self._full(values), definite=False)
+            plain = _SuperLU(self.full(values), definite=False)
             return plain.solve(right), plain.negative == 0
-        symbolic, pivots = self._indefinite(values)
+        try:
+            symbolic, pivots = self._indefinite(values)
+        except ArithmeticError:  # a pivot is exactly zero: no Newton step is to be had
+            return np.zeros_like(right), False
         lower = matrix(right)
         cholmod.solve(symbolic, lower, sys=7)
         cholmod.solve(symbolic, lower, sys=4)
@@ -168,7 +174,8 @@ class Symmetric:
         if generation != self._generation:
             raise RuntimeError("this factor was replaced by a later factorisation of the same family")
 
-    def _full(self, values: Reals) -> sp.csc_array:
+    def full(self, values: Reals) -> sp.csc_array:
+        """The whole matrix (n, n) with lower `values` (nnz,)."""
         lower = sp.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
         return sp.csc_array(lower + sp.tril(lower, -1).T)
 
