@@ -44,6 +44,8 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     bent.strips,
     bent.bows,
     bent.rings,
+    bent.laths,
+    bent.torsion_constants,
     cables.slack,
     cables.tripod,
     cables.two_links,
@@ -58,6 +60,7 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     checks.betti,
     checks.gradients,
     checks.assembled,
+    checks.sensitivities,
 )
 
 

@@ -195,7 +195,7 @@ def helices() -> Iterator[Row]:
 def quarter_ring() -> Iterator[Row]:
     """A quarter ring clamped at one end and loaded across its plane at the other, so little that it stays linear.
 
-    Closed form (Castigliano; Timoshenko, Strength of Materials II): w = P R³ (π/4 / EI + (3π/4 - 2) / GJ). R = EI = 1, GJ = 0.7,
+    Closed form by Castigliano's theorem: w = P R³ (π/4 / EI + (3π/4 - 2) / GJ). R = EI = 1, GJ = 0.7,
     P = 1e-6; 32 elements leave h² = 2e-4 a turn.
     """
     angle = np.linspace(0.0, 0.5 * np.pi, 33)
@@ -222,7 +222,7 @@ def twisted_rod() -> Iterator[Row]:
 def beam_columns() -> Iterator[Row]:
     """A pinned beam with a small load in the middle and a large axial force, in compression and in tension.
 
-    Timoshenko and Gere 1961, art. 1.3 and 1.11: the deflection PL³/48EI times 3 (tan u - u)/u³, or 3 (u - tanh u)/u³, with
+    Timoshenko and Gere 1961, chapter 1: the deflection PL³/48EI times 3 (tan u - u)/u³, or 3 (u - tanh u)/u³, with
     u = L/2 √(S/EI). S = ± 5 EI/L² (half of Euler's load), so little P that it stays linear; 40 elements: O(h²), of the
     margin to Euler's load too.
     """
@@ -238,7 +238,7 @@ def beam_columns() -> Iterator[Row]:
 
 
 def helical_spring() -> Iterator[Row]:
-    """A helical spring of three open coils pulled along its axis: extension P R² L (cos² a/GJ + sin² a/EI) (Love 1927, art. 271).
+    """A helical spring of three open coils pulled along its axis: extension P R² L (cos² a/GJ + sin² a/EI) (Love 1927, spiral springs).
 
     Clamped at one end; at the other the axial force, with its moment about the rod's end, pulling and pushing by 2e-4 EI/R², so
     that terms of second order cancel. R = 1, pitch angle a = 20°, EI = 1, GJ = 0.8, EA = 1e5; 240 chords: O(h²) of 4.5° a chord.

@@ -13,6 +13,7 @@ from shellform.arrays import Reals
 from shellform.structure.cable import make_cables
 from shellform.structure.equilibrium import find_equilibrium
 from shellform.structure.network import Network, assemble
+from shellform.structure.sections import Rectangle, isotropic, stiffness, stress
 from shellform.structure.state import State, from_vectors
 from shellform.structure.verification import exact
 from shellform.structure.verification.case import Row, rows
@@ -82,10 +83,10 @@ def bows() -> Iterator[Row]:
 
     Closed form: the elastica whose thrust is the cable's tension at its chord; 80 elements, O(h²) as for the strips.
     """
-    for stiffness in (1e4, 50.0):
+    for axial in (1e4, 50.0):
         names = ("tension TL²/EI", "chord/L", "height/L")
-        numbers = zip(names, bow(0.8, stiffness), exact.bow(0.8, stiffness), strict=True)
-        yield from rows(f"bow, EA L²/EI of its string {stiffness:g}", "elastica and Hooke, closed form", 5e-4, numbers)
+        numbers = zip(names, bow(0.8, axial), exact.bow(0.8, axial), strict=True)
+        yield from rows(f"bow, EA L²/EI of its string {axial:g}", "elastica and Hooke, closed form", 5e-4, numbers)
 
 
 def ring_state(elements: int, twist: float) -> tuple[Network, State]:
@@ -131,3 +132,34 @@ def rings() -> Iterator[Row]:
         ("energy UL/EI", found.energy, 2.0 * np.pi**2),
     ]
     yield from rows("straight strip closed to a ring", "closed form", 1e-6, numbers)
+
+
+def torsion_constants() -> Iterator[Row]:
+    """St Venant's torsion constant of rectangles, J/(a b³), against the table of Timoshenko and Goodier, Theory of Elasticity.
+
+    Four digits are printed there, so 5e-4.
+    """
+    table = {1.0: 0.1406, 1.5: 0.1958, 2.0: 0.2287, 3.0: 0.2633, 5.0: 0.2913, 10.0: 0.3123}
+    material = isotropic(young=1.0)
+    for ratio, reference in table.items():
+        found = Rectangle(ratio, 1.0, material).constants[1] / ratio
+        yield Row("torsion of a rectangle", f"J/(ab³), a/b = {ratio:g}", found, reference, 5e-4, "Timoshenko and Goodier")
+
+
+def laths() -> Iterator[Row]:
+    """A lath of 3 x 20 mm, 3 m long, E = 10 GPa, sprung to a ring: stress E t/(2 R) of 31.4 MPa in every fibre that is furthest out.
+
+    The ring of `rings` with a real section, 40 elements: turns alone decide, the axial stretch adds nothing.
+    """
+    lath = Rectangle(0.003, 0.020, isotropic(young=10e9, poisson=0.3))
+    axial, torsion, bending_y, bending_z = stiffness(lath)
+    _, circle = ring_state(40, 0.0)
+    network = chain(line(40, 3.0), (axial, torsion, bending_y, bending_z), {0: CLAMP, 40: CLAMP})
+    found = find_equilibrium(
+        assemble(network), State(3.0 * circle.positions * [1.2, 0.85, 1.0], circle.quaternions), np.zeros((41, 6))
+    )
+    forces = network.beams.local_forces(found.state)
+    stresses = stress(lath, forces[:, 0], forces[:, 2], forces[:, 3])
+    wanted = 10e9 * 0.0015 * 2.0 * np.pi / 3.0
+    numbers = [("largest stress, Pa", float(stresses.max()), wanted), ("smallest stress, Pa", float(stresses.min()), wanted)]
+    yield from rows("lath sprung to a ring", "closed form", 1e-6, numbers)

@@ -54,7 +54,7 @@ def tripod() -> Iterator[Row]:
 
 
 def two_links() -> Iterator[Row]:
-    """Two links in a line, prestressed, loaded across: Kwan, Computers and Structures 67 (1998) 41 explains nets by it.
+    """Two links in a line, prestressed, loaded across: Kwan, Computers and Structures 67 (1998) explains nets by it.
 
     Half span 1, EA = 1e4, loads of 0.01 to 100 % of EA; with and without prestress, where the line has no stiffness at first.
     The exact law P = 2 EA (1/l0 - 1/l) w is solved here to rounding.
