@@ -79,6 +79,7 @@ class Symmetric:
         self.diagonal = indptr[:-1]  # the first stored entry of each column of a lower triangle
         self._backend = "cholmod" if often_solved and cholmod is not None else backend()
         self._pardiso: pardiso.Factoriser | None = None
+        self._bunch_kaufman: pardiso.Factoriser | None = None
         self._symbolic: Any = None
         self._matrix: Any = None
         self._generation = 0
@@ -119,11 +120,16 @@ class Symmetric:
         return _Pardiso(self, self._pardiso, self._generation)
 
     def factor_indefinite(self, values: Reals) -> Indefinite:
-        """L D L' of a matrix that needn't be positive definite, with its number of negative eigenvalues (Sylvester's law)."""
+        """L D L' of a matrix that needn't be positive definite, with its number of negative eigenvalues (Sylvester's law).
+
+        It serves until the next factorisation of either kind.
+        """
         if self._backend == "mkl":
-            whole = pardiso.Factoriser(self.indptr, self.indices, definite=False)
-            whole.factor(values)
-            return whole
+            if self._bunch_kaufman is None:
+                self._bunch_kaufman = pardiso.Factoriser(self.indptr, self.indices, definite=False)
+            self._generation += 1
+            self._bunch_kaufman.factor(values)
+            return _Pardiso(self, self._bunch_kaufman, self._generation)
         if self._backend == "superlu":
             return _SuperLU(self.full(values), definite=False)
         try:
@@ -183,6 +189,7 @@ class Symmetric:
 class _Pardiso:
     def __init__(self, family: Symmetric, factor: pardiso.Factoriser, generation: int) -> None:
         self._family, self._factor, self._generation = family, factor, generation
+        self.negative = factor.negative
 
     def solve(self, right: Reals) -> Reals:
         self._family._check(self._generation)

@@ -42,7 +42,7 @@ def column(elements=20, length=1.0):
 
 
 def test_arc_length_passes_both_limit_points_of_lee_s_frame():
-    assembly, start, load, node = lee()
+    assembly, start, load, _ = lee()
     points = list(follow(assembly, start, forces(load), goal=2.5))
     limits = [p for p in points if p.event == "limit point"]
     # Recomputed by shooting (tests/literature/rods.py): 1.85567; O(h²) with 20 elements a leg.
@@ -116,7 +116,7 @@ def test_a_critical_load_needs_a_stable_start():
 
 
 def test_modes_are_the_eigenvectors_of_the_dense_tangent():
-    assembly, start, load = column(12)
+    assembly, start, _ = column(12)
     found = modes(assembly, start, 4)
     tangent = assembly.matrix.full(assembly.evaluate(start).tangent).toarray()
     arm = np.where(assembly.free % 6 < 3, 1.0, 1.0 / 12.0)
