@@ -43,6 +43,7 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
     buckling.michell,
     bent.strips,
     bent.bows,
+    bent.bow_in_space,
     bent.rings,
     bent.laths,
     bent.torsion_constants,

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import jv
 
 from shellform.arrays import Reals
+from shellform.structure import rotation
 from shellform.structure.cable import make_cables
 from shellform.structure.equilibrium import find_equilibrium
 from shellform.structure.network import Network, assemble
@@ -87,6 +88,35 @@ def bows() -> Iterator[Row]:
         names = ("tension TL²/EI", "chord/L", "height/L")
         numbers = zip(names, bow(0.8, axial), exact.bow(0.8, axial), strict=True)
         yield from rows(f"bow, EA L²/EI of its string {axial:g}", "elastica and Hooke, closed form", 5e-4, numbers)
+
+
+def bow_in_space() -> Iterator[Row]:
+    """The stiff-stringed bow free in space, of a strip twice as stiff the other way, let go bent about its stiff axis.
+
+    The rod is free to spin about its chord: it turns over until it bends about its weak axis (EI = 1), with the plane bow's numbers.
+    """
+    tie = make_cables([[0, _ELEMENTS]], rest_length=0.8, stiffness=1e4)
+    ends = {0: PIN, _ELEMENTS: [False, True, True, False, False, False]}
+    network = replace(chain(line(_ELEMENTS), (1e7, 0.8, 2.0, 1.0), ends), cables=tie)
+    flat = _arched(0.8, 1)
+    # Tilted by half a radian, without which it would balance on its edge.
+    tilt = rotation.from_vectors(np.array([[0.5, 0.0, 0.0]]))
+    turn, back = np.repeat(tilt, _ELEMENTS + 1, axis=0), np.repeat(tilt * [1.0, -1.0, -1.0, -1.0], _ELEMENTS + 1, axis=0)
+    start = State(
+        flat.positions @ rotation.matrices(tilt)[0].T, rotation.product(turn, rotation.product(flat.quaternions, back))
+    )
+    found = find_equilibrium(assemble(network), start, np.zeros((_ELEMENTS + 1, 6)))
+    height = float(np.hypot(*found.state.positions[:, 1:].T).max())
+    thrust, chord, wanted = exact.bow(0.8, 1e4)
+    moments = np.abs(network.beams.local_forces(found.state)).max(axis=0)
+    numbers = [
+        ("tension TL²/EI", float(tie.tension(found.state)[0]), thrust),
+        ("chord/L", float(tie.lengths(found.state)[0]), chord),
+        ("height/L", height, wanted),
+        ("moment about the weak axis ML/EI", float(moments[3]), thrust * wanted),
+        ("stable", float(found.stable), 1.0),
+    ]
+    yield from rows("bow in space", "elastica and Hooke, closed form", 5e-4, numbers)
 
 
 def ring_state(elements: int, twist: float) -> tuple[Network, State]:
