@@ -28,6 +28,30 @@ def test_the_45_degree_bend_is_a_kirchhoff_rod(torsion, load):
     agree(tip, beams.BENDS[torsion, load], 5)
 
 
+def exact_helix(share):
+    """Tip of the roll-up with a force across its plane, followed up to a share of its load."""
+    rod, stiffness = [Piece(10.0)], (1e4, 100.0, 100.0, 100.0)
+
+    def miss(m, part):
+        return integrate(rod, stiffness, np.eye(3), (0.0, 0.0, 50.0 * part), m)[-1].moment - [0.0, 0.0, 200.0 * np.pi * part]
+
+    start, before = np.zeros(3), 0.0
+    for part in np.linspace(0.0, share, max(2, round(share / 0.005) + 1))[1:]:
+        guess = start + np.array([0.0, 0.0, 200.0 * np.pi * (part - before)])
+        start, before = solve(lambda m, p=part: miss(m, p), guess, [50.0] * 3), part
+    return integrate(rod, stiffness, np.eye(3), (0.0, 0.0, 50.0 * share), start)[-1].position
+
+
+def test_the_roll_up_out_of_its_plane_is_a_kirchhoff_rod():
+    agree(exact_helix(0.02), beams.HELIX, 5)
+
+
+@pytest.mark.xfail(reason="a moment about a fixed axis has no potential: relaxation by energy doesn't converge", strict=True)
+@pytest.mark.parametrize("share", [0.03, 0.1])
+def test_the_roll_up_out_of_its_plane_is_followed_to_whole_turns(share):
+    np.testing.assert_allclose(beams.helix(50, share), exact_helix(share), atol=0.02)
+
+
 class Lee:
     """Lee's frame: unknown slope at the first pin and force there; the far end has to be at the other pin, without moment."""
 
@@ -73,14 +97,14 @@ def test_lee_s_frame_is_an_extensible_elastica(lee_path):
 
 
 def test_the_limits_of_lee_s_frame_are_those_of_the_elastica(lee_path):
-    frame = Lee()
-    found = {}
+    frame, found = Lee(), []
     for start, low, high in [(26.0, 26.0, 28.0), (90.0, 89.0, 91.0)]:
         along = extremum(lambda u, x=lee_path[start]: frame.at(1, u, x)[3], low, high, 0.02)
         state = frame.at(1, along, lee_path[start])
-        found[frame.place(state)[0]] = state[3]
-    agree(list(found), list(limits.LEE_LIMITS), 3)
-    agree(list(found.values()), list(limits.LEE_LIMITS.values()), 5)
+        found.append((state[3], frame.place(state)[0]))
+    for (load, drop), (quoted_load, quoted_drop) in zip(found, limits.LEE_LIMITS, strict=True):
+        agree(load, quoted_load, 5)
+        agree(drop, quoted_drop, 3)
 
 
 def test_williams_toggle_is_an_extensible_elastica():
@@ -100,8 +124,9 @@ def test_williams_toggle_is_an_extensible_elastica():
 
     first = extremum(load, 0.18, 0.28, 1e-3)
     second = extremum(load, 0.36, 0.43, 1e-3)
-    agree([first, second], [limits.TOGGLE[0][0], limits.TOGGLE[1][0]], 5)
-    agree([load(first), load(second)], [limits.TOGGLE[0][1], limits.TOGGLE[1][1]], 4)
+    for drop, (quoted_load, quoted_drop) in zip((first, second), limits.TOGGLE, strict=True):
+        agree(load(drop), quoted_load, 4)
+        agree(drop, quoted_drop, 5)
 
 
 def test_the_arch_of_215_degrees_is_an_extensible_elastica():
@@ -124,7 +149,7 @@ def test_the_arch_of_215_degrees_is_an_extensible_elastica():
     for drop in np.arange(3.0, 114.1, 3.0):
         x = at(drop, x)
     drop = extremum(lambda v: at(v, x)[3], 112.0, 116.0, 0.02)
-    agree([drop, at(drop, x)[3]], limits.ARCH, 3)
+    agree([at(drop, x)[3], drop], limits.ARCH, 3)
 
 
 def test_the_right_angle_frame_s_tip_load_makes_the_linearised_rod_singular():
@@ -171,3 +196,43 @@ def test_the_loaded_saddle_net_is_the_minimum_of_its_energy():
     agree((place - shape)[list(cables.HYPAR_NODES), 2], cables.HYPAR[:2], 8)
     agree(tension.max(), cables.HYPAR[2], 5)
     assert (tension == 0.0).sum() == cables.HYPAR[3]
+
+
+def test_the_star_dome_s_limits_are_those_of_hooke_s_bars():
+    points, ends = limits.star_dome()
+    (a, b), axial = ends.T, 3.03e5 * 3.17
+    rest = np.linalg.norm(points[b] - points[a], axis=1)
+    free = np.delete(np.arange(21), 2)  # all but the apex' height and the supports
+
+    def balance(place):
+        """Forces (39,) that hold the nodes, and their derivative."""
+        force, slope = np.zeros(39), np.zeros((39, 39))
+        for i, j, l0 in zip(a, b, rest, strict=True):
+            chord = place[j] - place[i]
+            length = np.linalg.norm(chord)
+            e, pull = chord / length, axial * (length / l0 - 1.0)
+            block = axial / l0 * np.outer(e, e) + pull / length * (np.eye(3) - np.outer(e, e))
+            both = np.r_[3 * i : 3 * i + 3, 3 * j : 3 * j + 3]
+            force[both] += pull * np.concatenate([-e, e])
+            slope[np.ix_(both, both)] += np.block([[block, -block], [-block, block]])
+        return force, slope
+
+    def at(drop, start):
+        place = start.copy()
+        place[0, 2] = 8.216 - drop
+        for _ in range(12):
+            force, slope = balance(place)
+            place.reshape(-1)[free] -= np.linalg.solve(slope[np.ix_(free, free)], force[free])
+        return place, -balance(place)[0][2]
+
+    place, found = points, []
+    for drop in np.arange(0.1, 3.01, 0.1):
+        place, _ = at(drop, place)
+        if abs(drop - 0.7) < 1e-9 or abs(drop - 3.0) < 1e-9:
+            limit = extremum(lambda w, start=place: at(w, start)[1], drop - 0.1, drop + 0.15, 1e-3)
+            found.append([at(limit, place)[1], limit])
+            # All that the apex' height doesn't hold is stable: the symmetric path is the one a load follows.
+            slope = balance(place)[1][np.ix_(free, free)]
+            assert np.linalg.eigvalsh(slope)[0] > 0.0
+    agree(np.array(found)[:, 0], [load for load, _ in limits.DOME], 3)
+    agree(np.array(found)[:, 1], [drop for _, drop in limits.DOME], 5)

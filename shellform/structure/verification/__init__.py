@@ -8,72 +8,60 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from shellform.structure.verification.beams import (
-    bend_order,
-    bends,
-    cantilever_order,
-    cantilevers,
-    diamonds,
-    lee_frames,
-    quarter_ring,
-    roll_ups,
-    twisted_rod,
-)
-from shellform.structure.verification.bent import bows, rings, strips
-from shellform.structure.verification.buckling import (
-    columns,
-    greenhill,
-    lateral,
-    michell,
-    right_angle,
-    ring_pressure,
-)
-from shellform.structure.verification.cables import (
-    catenaries,
-    force_densities,
-    nets,
-    slack,
-    slack_pair,
-    tripod,
-    two_links,
-)
+from shellform.structure.verification import beams, bent, buckling, cables, checks, limits
+from shellform.structure.verification.cables import slack_pair
 from shellform.structure.verification.case import Row
-from shellform.structure.verification.checks import turned_forces, turns
-from shellform.structure.verification.limits import arches, lee_limits, mises_truss, toggles
+from shellform.structure.verification.checks import turned_forces
 from shellform.structure.verification.models import chain
 
 __all__ = ["CASES", "Row", "chain", "slack_pair", "turned_forces", "verify"]
 
 CASES: tuple[Callable[[], Iterator[Row]], ...] = (
-    cantilevers,
-    cantilever_order,
-    diamonds,
-    roll_ups,
-    bends,
-    bend_order,
-    quarter_ring,
-    twisted_rod,
-    lee_frames,
-    lee_limits,
-    toggles,
-    mises_truss,
-    arches,
-    columns,
-    lateral,
-    right_angle,
-    ring_pressure,
-    greenhill,
-    michell,
-    strips,
-    bows,
-    rings,
-    slack,
-    tripod,
-    two_links,
-    catenaries,
-    force_densities,
-    nets,
-    turns,
+    beams.cantilevers,
+    beams.cantilever_order,
+    beams.diamonds,
+    beams.roll_ups,
+    beams.bends,
+    beams.bend_order,
+    beams.helices,
+    beams.quarter_ring,
+    beams.helical_spring,
+    beams.twisted_rod,
+    beams.beam_columns,
+    beams.lee_frames,
+    limits.lee_limits,
+    limits.toggles,
+    limits.mises_truss,
+    limits.arches,
+    limits.domes,
+    buckling.columns,
+    buckling.braced,
+    buckling.lateral,
+    buckling.right_angle,
+    buckling.ring_pressure,
+    buckling.greenhill,
+    buckling.michell,
+    bent.strips,
+    bent.bows,
+    bent.bow_in_space,
+    bent.rings,
+    bent.laths,
+    bent.torsion_constants,
+    cables.slack,
+    cables.tripod,
+    cables.two_links,
+    cables.catenaries,
+    cables.opensees,
+    cables.force_densities,
+    cables.nets,
+    checks.turns,
+    checks.invariances,
+    checks.statics,
+    checks.work,
+    checks.betti,
+    checks.gradients,
+    checks.assembled,
+    checks.sensitivities,
 )
 
 

@@ -14,6 +14,7 @@ from shellform.structure.verification import exact
 from shellform.structure.verification.case import Row, rows
 from shellform.structure.verification.models import (
     CLAMP,
+    PIN,
     chain,
     in_plane,
     line,
@@ -170,10 +171,31 @@ def diamonds() -> Iterator[Row]:
         yield from rows(f"diamond pulled, PL²/EI = {load:g}", source, 2e-4, zip(names, diamond(-load), wanted, strict=True))
 
 
+HELIX = (7.41252, 5.06259, 2.65499)
+"""Tip of the roll-up with a force across its plane (tests/literature/test_references.py)."""
+
+
+def helix(elements: int, share: float) -> Reals:
+    """Tip (3,) of a cantilever (L = 10, EI = GJ = 100, EA = 1e4) under `share` of an end moment 200π and a force of 50 across."""
+    network = chain(line(elements, 10.0), (1e4, 100.0, 100.0, 100.0), {0: CLAMP})
+    load = load_at(network, elements, np.array([0.0, 0.0, 50.0, 0.0, 0.0, 200.0 * np.pi]) * share)
+    return np.asarray(solved(network, load).positions[-1])
+
+
+def helices() -> Iterator[Row]:
+    """Ibrahimbegovic, Comp. Meth. Appl. Mech. Eng. 149 (1997) 49: roll-up by an end moment with a force out of its plane.
+
+    He draws ten turns of it, shear-flexible (GA = EA); here 2 % of his load, 0.2 turns, as a rod without shear: recomputed. The
+    moment keeps its axis in space, so that it has no potential. 50 elements leave O(h²) = 1e-4.
+    """
+    source = "Kirchhoff rod, recomputed; after Ibrahimbegovic 1997"
+    yield from rows("roll-up out of its plane, 2 %", source, 2e-4, zip("xyz", helix(50, 0.02), HELIX, strict=True))
+
+
 def quarter_ring() -> Iterator[Row]:
     """A quarter ring clamped at one end and loaded across its plane at the other, so little that it stays linear.
 
-    Closed form (Castigliano; Timoshenko, Strength of Materials II): w = P R³ (π/4 / EI + (3π/4 - 2) / GJ). R = EI = 1, GJ = 0.7,
+    Closed form by Castigliano's theorem: w = P R³ (π/4 / EI + (3π/4 - 2) / GJ). R = EI = 1, GJ = 0.7,
     P = 1e-6; 32 elements leave h² = 2e-4 a turn.
     """
     angle = np.linspace(0.0, 0.5 * np.pi, 33)
@@ -195,3 +217,42 @@ def twisted_rod() -> Iterator[Row]:
     w, x = state.quaternions[:, 0], state.quaternions[:, 1]
     twist = np.unwrap(2.0 * np.arctan2(x, w), period=2.0 * np.pi)[-1]
     yield Row("rod twisted by 2.7 turns", "twist, rad", float(twist), 17.0, 1e-8, "closed form")
+
+
+def beam_columns() -> Iterator[Row]:
+    """A pinned beam with a small load in the middle and a large axial force, in compression and in tension.
+
+    Timoshenko and Gere 1961, chapter 1: the deflection PL³/48EI times 3 (tan u - u)/u³, or 3 (u - tanh u)/u³, with
+    u = L/2 √(S/EI). S = ± 5 EI/L² (half of Euler's load), so little P that it stays linear; 40 elements: O(h²), of the
+    margin to Euler's load too.
+    """
+    u = 0.5 * np.sqrt(5.0)
+    wanted = {-5.0: 3.0 * (np.tan(u) - u) / u**3, 5.0: 3.0 * (u - np.tanh(u)) / u**3}
+    for force, reference in wanted.items():
+        # EA = 1e8: the axial force shortens the beam by 5e-8.
+        network = in_plane(chain(line(40), (1e8, 1.0, 1.0, 1.0), {0: PIN, 40: [False, True, True, False, False, False]}))
+        load = load_at(network, 40, [force, 0.0, 0.0]) + load_at(network, 20, [0.0, 0.0, -0.01])
+        found = -48.0 * solved(network, load).positions[20, 2] / 0.01
+        kind = "tension" if force > 0.0 else "compression"
+        yield Row(f"beam in {kind}, S L²/EI = 5", "deflection over PL³/48EI", float(found), reference, 1e-3, "Timoshenko and Gere 1961")
+
+
+def helical_spring() -> Iterator[Row]:
+    """A helical spring of three open coils pulled along its axis: extension P R² L (cos² a/GJ + sin² a/EI) (Love 1927, spiral springs).
+
+    Clamped at one end; at the other the axial force, with its moment about the rod's end, pulling and pushing by 2e-4 EI/R², so
+    that terms of second order cancel. R = 1, pitch angle a = 20°, EI = 1, GJ = 0.8, EA = 1e5; 240 chords: O(h²) of 4.5° a chord.
+    """
+    angle, count = np.radians(20.0), 240
+    turn = np.linspace(0.0, 6.0 * np.pi, count + 1)
+    points = np.column_stack([np.cos(turn), np.sin(turn), np.tan(angle) * turn])
+    network = chain(points, (1e5, 0.8, 1.0, 1.0), {0: CLAMP})
+    # On the axis the force would pass through (0, 0): seen from the rod's end at (1, 0), its moment is (-1, 0, 0) x force.
+    heights = []
+    for size in (2e-4, -2e-4):
+        state = solved(network, load_at(network, count, [0.0, 0.0, size, *np.cross([-1.0, 0.0, 0.0], [0.0, 0.0, size])]))
+        heights.append(float((state.positions[-1] + np.cross(state.rotations[-1], [-1.0, 0.0, 0.0]))[2]))
+    found = (heights[0] - heights[1]) / 4e-4
+    length = 6.0 * np.pi / np.cos(angle)
+    wanted = length * (np.cos(angle) ** 2 / 0.8 + np.sin(angle) ** 2)
+    yield Row("helical spring, 3 coils at 20°", "extension EI/(P R³)", float(found), wanted, 2e-3, "Love 1927")

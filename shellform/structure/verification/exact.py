@@ -114,6 +114,16 @@ def clamped_column() -> float:
     return _tangent() ** 2
 
 
+def braced_column(spring: float) -> float:
+    """PL²/EI of a pinned column with a spring of `spring` EI/L³ at its middle, softer than 16 π² (Timoshenko and Gere 1961)."""
+
+    def gap(u: float) -> float:
+        # The symmetric mode, u = L/2 √(P/EI): spring = 4 P/(L (1 - tan u/u)).
+        return 16.0 * u**2 * (u * np.cos(u)) - spring * (u * np.cos(u) - np.sin(u))
+
+    return 4.0 * float(brentq(gap, 0.5 * np.pi, np.pi, xtol=1e-14)) ** 2
+
+
 def clamped_twist() -> float:
     """ML/EI at which a straight rod with clamped ends buckles under torsion: tan(x/2) = x/2, 8.987 (Greenhill 1883 is the
     like for pinned ends, 2π)."""

@@ -1,4 +1,4 @@
-"""Models that several cases share, and the three ways in which they are solved: under loads, at a held freedom, at a limit."""
+"""Models that several cases share, and the ways in which they are solved: under loads, at a held freedom, at critical points."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Reals
-from shellform.structure.assembly import Assembly
 from shellform.structure.beam import make_beams
 from shellform.structure.cable import Cables, make_cables
-from shellform.structure.equilibrium import LostBranch, find_equilibrium
+from shellform.structure.equilibrium import find_equilibrium
+from shellform.structure.loading import forces
 from shellform.structure.network import Network, assemble
+from shellform.structure.path import follow
+from shellform.structure.stability import critical_load
 from shellform.structure.state import State, at_rest
 
 Stiffness = tuple[float, float, float, float]
@@ -23,7 +25,6 @@ CLAMP = [True] * 6
 PIN = [True, True, True, False, False, False]
 FORK = [True, True, True, True, False, False]
 """Held in place and against spin about x; free to turn about y and z."""
-_BISECTIONS = 24
 
 
 def no_cables() -> Cables:
@@ -103,27 +104,17 @@ def pushed(network: Network, start: State, freedom: tuple[int, int], places: Arr
     return found
 
 
-def critical(assembly: Assembly, start: State, load: Reals, low: float, high: float) -> float:
-    """The factor of the load between `low` (borne) and `high` (not borne) at which the stable branch from `start` ends.
+def critical(network: Network, load: Reals, goal: float) -> float:
+    """The factor of the load, up to `goal`, at which the unloaded shape's branch loses stability; NaN where it doesn't."""
+    found = critical_load(assemble(network), at_rest(network.nodes), forces(load), goal=goal)
+    return found.factor if found is not None else float("nan")
 
-    By bisection on the inertia of the tangent at converged states, 24 halvings of the interval.
-    """
-    first = find_equilibrium(assembly, start, low * load, on_branch=True)
-    if not first.stable:
-        return float("nan")  # not bracketed: fails whatever the reference
-    state = first.state
-    for _ in range(_BISECTIONS):
-        middle = 0.5 * (low + high)
-        try:
-            found = find_equilibrium(assembly, state, middle * load, on_branch=True)
-        except LostBranch:
-            high = middle
-            continue
-        if found.stable:
-            low, state = middle, found.state
-        else:
-            high = middle
-    return 0.5 * (low + high)
+
+def turning_points(network: Network, load: Reals, node: int, goal: float) -> list[tuple[float, float]]:
+    """Load factor and drop of a node at the limit points and bifurcations of the path from no load to `goal` (arc length)."""
+    path = follow(assemble(network), at_rest(network.nodes), forces(load), goal=goal)
+    height = float(network.nodes[node, 2])
+    return [(p.factor, height - float(p.equilibrium.state.positions[node, 2])) for p in path if p.event]
 
 
 def order(errors: ArrayLike) -> float:
