@@ -29,7 +29,7 @@ from shellform.structure.threads import share
 class Balance:
     """All elements at one state: strain `energy` J, nodal internal `force` (n, 6), lower `tangent` values (or None).
 
-    `largest` is the largest component of any element's end force, N: the scale for residuals.
+    `largest` is the largest component of any element's end force, moments over the node's arm, N: the scale for residuals.
     """
 
     energy: float
@@ -40,6 +40,7 @@ class Balance:
 
 class Assembly:
     """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in order;
+    `arms` (count,), m: the mean rest length of each node's beams;
     `clock` adds up the seconds spent on assembly, factorisation and solve."""
 
     def __init__(self, count: int, parts: Sequence[Part], fixed: Flags) -> None:
@@ -55,7 +56,11 @@ class Assembly:
         number[self.free] = np.arange(len(self.free))
         self.clock: dict[str, float] = {"assembly": 0.0, "factorisation": 0.0, "solve": 0.0}
         self._freedoms = freedoms
-        self._translational = [(each[0] % 6 < 3) if len(each) else np.zeros(0, dtype=bool) for each in freedoms]
+        self.arms = _arms(count, self.beams)
+        # What turns a force or a moment into a force: 1 for translations, 1 over the node's arm for rotations.
+        self.reach: Reals = np.repeat(1.0 / self.arms[:, None], 6, axis=1)
+        self.reach[:, :3] = 1.0
+        self.reach = self.reach.ravel()
         self.matrix, self._starts, self._sources = _pattern(number, freedoms)
         ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
         self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
@@ -88,15 +93,13 @@ class Assembly:
         began = time.perf_counter()
         energy, largest = 0.0, 0.0
         force = np.zeros(6 * self.count)
-        for part, freedoms, translation, (first, last) in zip(
-            self.parts, self._freedoms, self._translational, self._shares, strict=True
-        ):
+        for part, freedoms, (first, last) in zip(self.parts, self._freedoms, self._shares, strict=True):
             if not len(freedoms):
                 continue
             block = self._entries[first:last].reshape(len(freedoms), -1) if tangent else None
             result = part.evaluate(state, tangent=tangent, into=block)
             energy += float(result.energy.sum())
-            largest = max(largest, _add_forces(freedoms, translation, result.force, force))
+            largest = max(largest, _add_forces(freedoms, self.reach, result.force, force))
         values = None
         if tangent:
             values = np.empty(len(self.matrix.indices))
@@ -122,6 +125,16 @@ class Assembly:
         values = self.evaluate(state).tangent
         assert values is not None
         return self.matrix.factor(values)
+
+
+def _arms(count: int, beams: Sequence[Beams]) -> Reals:
+    """A length (count,) for each node, m: the mean rest length of the beams that meet there (1 where there are none)."""
+    total, number = np.zeros(count), np.zeros(count)
+    for part in beams:
+        for end in part.ends.T:
+            np.add.at(total, end, part.rest_length)
+            np.add.at(number, end, 1.0)
+    return np.where(number > 0.0, total / np.maximum(number, 1.0), 1.0)
 
 
 def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, Indices, Indices]:
@@ -171,14 +184,14 @@ def _gather(start, stop, starts, sources, entries, values):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _add_forces(freedoms, translation, element, total):  # type: ignore[no-untyped-def]
-    """Adds the elements' end forces to the nodes' and returns the largest component that is a force."""
+def _add_forces(freedoms, reach, element, total):  # type: ignore[no-untyped-def]
+    """Adds the elements' end forces to the nodes' and returns the largest component, moments over the node's arm."""
     largest = 0.0
     for e in range(freedoms.shape[0]):
         for k in range(freedoms.shape[1]):
-            total[freedoms[e, k]] += element[e, k]
-            if translation[k]:
-                largest = max(largest, abs(element[e, k]))
+            freedom = freedoms[e, k]
+            total[freedom] += element[e, k]
+            largest = max(largest, abs(element[e, k]) * reach[freedom])
     return largest
 
 

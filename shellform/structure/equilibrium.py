@@ -29,7 +29,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.structure.assembly import Assembly, Balance
-from shellform.structure.residual import Measure, held
+from shellform.structure.residual import Measure, Turning, held
 from shellform.structure.sparse import Factor, NotPositiveDefinite
 from shellform.structure.state import State, moved
 
@@ -41,6 +41,7 @@ _CLOSE, _CONTRACTION = 1e-2, 0.9  # a residual near the goal that falls this muc
 # sliding springs on a surface known to a finite order have no exact potential
 _SHORTEST = 0.1  # share of a step to which it is cut before the mass is raised instead
 _PATIENCE = 3  # steps with mass between two looks for a symmetric path
+_STAGNANT = 0.1  # ratio of two residuals one after the other: a step that brings less than this may be down to rounding
 _FAR = 1e6  # m or rad, a step of Newton's iteration that leads nowhere
 _HALVINGS = 4  # of one step before the mass is raised instead
 
@@ -110,8 +111,8 @@ def newton(
     It may end on an unstable equilibrium, which implicit dynamic relaxation never does. Raises NotConverged with the state of the
     smallest residual after `limit` factorisations, or where a step isn't finite.
     """
-    measure = Measure(assembly)
-    state, best, least = start, start, np.inf
+    measure, turning = Measure(assembly), Turning(assembly, load)
+    state, best, least, before = start, start, np.inf, np.inf
     for spent in range(limit + 1):
         now = assembly.evaluate(state)
         residual = measure.residual(now, load)
@@ -119,14 +120,16 @@ def newton(
             progress(spent, residual)
         if residual < least:
             best, least = state, residual
-        if residual <= max(tolerance, measure.rounding(now, state, load)):
+        noise = measure.rounding(now, state, load) if residual > _STAGNANT * before else 0.0
+        before = residual
+        if residual <= max(tolerance, noise):
             stable, negative = stability(assembly, now)
             return Equilibrium(state, now.energy, residual, spent, stable, negative)
         if not np.isfinite(residual):
             break
         step = np.zeros(6 * assembly.count)
         unbalanced = (load - now.force).ravel()[assembly.free]
-        step[assembly.free] = assembly.matrix.factor_indefinite(held(assembly, now)).solve(unbalanced)
+        step[assembly.free] = turning.solve(assembly.matrix.factor_indefinite(held(assembly, now)), now, unbalanced)
         if not np.isfinite(step).all() or np.abs(step).max() > _FAR:
             break
         state = moved(state, step.reshape(-1, 6))
@@ -160,6 +163,8 @@ class _Walk:
         self.mass = 0.0
         self.factorisations = 0
         self.patience = _PATIENCE
+        self.turning = Turning(assembly, load)
+        self.before = np.inf
         self.residual = self.measure.residual(self.now, load)
 
     def step(self, on_branch: bool) -> None:
@@ -173,7 +178,7 @@ class _Walk:
             began = time.perf_counter()
             factor = self._factor(values, on_branch)
             then = time.perf_counter()
-            direction = factor.solve(unbalanced)
+            direction = self.turning.solve(factor, self.now, unbalanced)
             clock["factorisation"] += then - began
             clock["solve"] += time.perf_counter() - then
             if self._advance(direction, float(unbalanced @ direction)):
@@ -241,16 +246,18 @@ class _Walk:
             return False
         full = share == 1.0
         for halving in range(_HALVINGS + 1):
-            trial = moved(self.state, self.assembly.chords.corrected(self.state, share * step))
+            whole_step = self.assembly.chords.corrected(self.state, share * step)
+            trial = moved(self.state, whole_step)
             then = self.assembly.evaluate(trial)
-            rise = then.energy - self.now.energy - share * float((self.load * step).sum())
+            rise = then.energy - self.now.energy - float((self.load * whole_step).sum())
             rounding = 1e-12 * (abs(then.energy) + abs(self.now.energy))
             residual = self.measure.residual(then, self.load)
             lower = rise <= -_SUFFICIENT * share * downhill
             # Next to the goal the change of the potential drowns in rounding: there the residual decides.
-            settling = share * downhill <= rounding and residual < max(2.0 * self.residual, self.rounding())
-            closing = self.residual < _CLOSE and residual < _CONTRACTION * self.residual
+            settling = share * downhill <= rounding and residual < max(2.0 * self.residual, self._noise())
+            closing = (self.residual < _CLOSE or self.turns) and residual < _CONTRACTION * self.residual
             if lower or settling or closing:
+                self.before = self.residual
                 self.state, self.now, self.residual = trial, then, residual
                 if halving == 0 and full:
                     self._lower_mass()
@@ -265,9 +272,17 @@ class _Walk:
             if self.mass < 1e-10 * float(diagonal.mean()):
                 self.mass = 0.0
 
+    @property
+    def turns(self) -> bool:
+        """Whether moments turn nodes in space: the potential is a guide then, not a measure."""
+        return len(self.turning.nodes) > 0
+
     def rounding(self) -> float:
-        """The residual that rounding of the coordinates alone leaves; 0 while that is far away."""
-        return 0.0 if self.residual > _CLOSE else self.measure.rounding(self.now, self.state, self.load)
+        """The residual that rounding leaves, once steps have stopped to bring more than that; 0 before."""
+        return self._noise() if self.residual > _STAGNANT * self.before else 0.0
+
+    def _noise(self) -> float:
+        return self.measure.rounding(self.now, self.state, self.load)
 
 
 def _minimum(rise: float, downhill: float, share: float) -> float:

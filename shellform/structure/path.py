@@ -31,7 +31,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.structure.assembly import Assembly, Balance
 from shellform.structure.equilibrium import TOLERANCE, TURN, Equilibrium
 from shellform.structure.loading import Drive
-from shellform.structure.residual import Measure, held
+from shellform.structure.residual import Measure, Turning, held
 from shellform.structure.sparse import Indefinite
 from shellform.structure.state import State, moved
 
@@ -147,6 +147,7 @@ class _Path:
     def __init__(self, assembly: Assembly, start: State, drive: Drive, tolerance: float) -> None:
         self.assembly, self.drive, self.tolerance, self.start = assembly, drive, tolerance, start
         self.measure = Measure(assembly)
+        self.turning = Turning(assembly, drive.load + drive.base)
         self.moving = assembly.free % 6 < 3
         self.spent = 0
 
@@ -167,7 +168,7 @@ class _Path:
     def point(self, state: State, factor: float, iterations: int) -> _Here:
         balance = self.assembly.evaluate(state)
         matrix = self._factor(balance)
-        tangent = matrix.solve(self._drive(state))
+        tangent = self.turning.solve(matrix, balance, self._drive(state))
         residual = self.measure.residual(balance, self.drive.at(factor))
         found = Equilibrium(state, balance.energy, residual, self.spent, matrix.negative == 0, matrix.negative)
         speed = float(np.linalg.norm(tangent[self.moving]))
@@ -200,7 +201,8 @@ class _Path:
             if not residual < 1e12:
                 raise _Missed
             matrix = self._factor(balance)
-            by_forces, by_factor = matrix.solve(np.column_stack([unbalanced, self._drive(state)])).T
+            by_forces = self.turning.solve(matrix, balance, unbalanced)
+            by_factor = self.turning.solve(matrix, balance, self._drive(state))
             if led is not None:
                 slope, rest = by_factor[led], gap - by_forces[led]
             else:
@@ -219,11 +221,11 @@ class _Path:
             balance = self.assembly.evaluate(state)
             residual = self.measure.residual(balance, self.drive.at(goal))
             if residual <= max(self.tolerance, self.measure.rounding(balance, state, self.drive.at(goal))):
-                return self._settled(near, state, goal, iteration)
+                return self._settled(here, state, goal, iteration)
             if not residual < 1e12:
                 break
             unbalanced = (self.drive.at(goal) - balance.force).ravel()[self.assembly.free]
-            state = self._moved(state, self._factor(balance).solve(unbalanced), 0.0)
+            state = self._moved(state, self.turning.solve(self._factor(balance), balance, unbalanced), 0.0)
         return there  # the factor is close to a turning point: the path goes on and comes by again
 
     def located(

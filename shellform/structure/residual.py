@@ -1,11 +1,13 @@
-"""How far a state is from equilibrium, and what holds a rod that is free to spin."""
+"""How far a state is from equilibrium, what holds a rod that is free to spin, and Newton's step under dead moments."""
 
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
 
 from shellform.arrays import Reals
 from shellform.structure.assembly import Assembly, Balance
+from shellform.structure.sparse import Factor
 from shellform.structure.state import State
 
 _SPIN = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
@@ -14,13 +16,13 @@ _SPIN = 1e-10  # share of a rotation's own stiffness that holds a rod free to sp
 class Measure:
     """Measures unbalanced forces, moments divided by a length, against the largest applied or internal force.
 
-    `arms` (n,), m: that length for each node, the mean rest length of its beams; `mass_shape` (f,): 1 for free translations
+    `arms` (n,), m: that length for each node; `mass_shape` (f,): 1 for free translations
     and the arm's square for free rotations, so that both weigh alike.
     """
 
     def __init__(self, assembly: Assembly) -> None:
         self.free = assembly.free
-        self.arms = _arms(assembly)
+        self.arms = assembly.arms
         self._turns = self.free % 6 >= 3
         self._arms_of_turns = self.arms[self.free[self._turns] // 6]
         self.mass_shape = np.ones(len(self.free))
@@ -62,11 +64,36 @@ def held(assembly: Assembly, balance: Balance) -> Reals:
     return values
 
 
-def _arms(assembly: Assembly) -> Reals:
-    """A length (n,) for each node, m: the mean rest length of the beams that meet there (1 where there are none)."""
-    total, number = np.zeros(assembly.count), np.zeros(assembly.count)
-    for part in assembly.beams:
-        for end in part.ends.T:
-            np.add.at(total, end, part.rest_length)
-            np.add.at(number, end, 1.0)
-    return np.where(number > 0.0, total / np.maximum(number, 1.0), 1.0)
+class Turning:
+    """Newton's step where dead moments turn about fixed axes in space.
+
+    Rotations don't commute, so the exact tangent of a node in equilibrium with an applied moment m has -S(m)/2 besides its symmetric part. With
+    K + E C E' for the tangent, C holding those blocks, the step (I + K⁻¹ E C E') x = K⁻¹ r is found by GMRES, exactly after as many
+    solves as there are such blocks' ranks.
+    """
+
+    def __init__(self, assembly: Assembly, load: Reals) -> None:
+        number = np.full(6 * assembly.count, -1)
+        number[assembly.free] = np.arange(len(assembly.free))
+        rotations = number.reshape(-1, 6)[:, 3:]
+        # With one free rotation there is nothing that it could fail to commute with.
+        self.nodes = np.flatnonzero(load[:, 3:].any(axis=1) & ((rotations >= 0).sum(axis=1) > 1))
+        self.rows = rotations[self.nodes]
+
+    def solve(self, factor: Factor, balance: Balance, right: Reals) -> Reals:
+        """The step (f,) for the unbalanced forces `right` (f,)."""
+        plain = factor.solve(right)
+        if not len(self.nodes):
+            return plain
+        moments = balance.force[self.nodes, 3:]
+
+        def turned(step: Reals) -> Reals:
+            spins = np.where(self.rows >= 0, step[self.rows], 0.0)
+            change = np.zeros_like(step)
+            kept = self.rows >= 0
+            change[self.rows[kept]] = (-0.5 * np.cross(moments, spins))[kept]
+            return step + factor.solve(change)
+
+        size = len(right)
+        found, failed = gmres(LinearOperator((size, size), matvec=turned, dtype=float), plain, rtol=1e-10, restart=50, maxiter=4)
+        return plain if failed else np.asarray(found)

@@ -56,8 +56,8 @@ def test_every_solver_solves_and_counts_negative_eigenvalues(backend, monkeypatc
     with pytest.raises(sparse.NotPositiveDefinite):
         symmetric.factor(values)
     factor = symmetric.factor_indefinite(values)
-    assert factor.negative == symmetric.negative_eigenvalues(values) == (np.linalg.eigvalsh(indefinite) < 0).sum()
     np.testing.assert_allclose(factor.solve(right), np.linalg.solve(indefinite, right), atol=1e-9)
+    assert factor.negative == symmetric.negative_eigenvalues(values) == (np.linalg.eigvalsh(indefinite) < 0).sum()
 
 
 def test_a_factor_that_was_replaced_refuses_to_solve():

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.structure.loading import apply_load
+from shellform.structure.loading import apply_load, forces
 from shellform.structure.network import assemble
+from shellform.structure.path import follow
 from shellform.structure.state import at_rest
 from shellform.structure.verification import exact
 from shellform.structure.verification.case import Row, rows
@@ -172,24 +173,29 @@ def diamonds() -> Iterator[Row]:
 
 
 HELIX = (7.41252, 5.06259, 2.65499)
-"""Tip of the roll-up with a force across its plane (tests/literature/test_references.py)."""
+"""Tip of the roll-up with a force across its plane at 2 % of the load (tests/literature/test_references.py)."""
+ONE_TURN = (0.41042, 0.05383, -1.09651)
+"""The same at 10 %."""
 
 
 def helix(elements: int, share: float) -> Reals:
     """Tip (3,) of a cantilever (L = 10, EI = GJ = 100, EA = 1e4) under `share` of an end moment 200π and a force of 50 across."""
     network = chain(line(elements, 10.0), (1e4, 100.0, 100.0, 100.0), {0: CLAMP})
-    load = load_at(network, elements, np.array([0.0, 0.0, 50.0, 0.0, 0.0, 200.0 * np.pi]) * share)
-    return np.asarray(solved(network, load).positions[-1])
+    load = load_at(network, elements, np.array([0.0, 0.0, 50.0, 0.0, 0.0, 200.0 * np.pi]))
+    path = follow(assemble(network), at_rest(network.nodes), forces(load), goal=share, first=0.01 / share, events=False)
+    *_, last = path
+    return np.asarray(last.equilibrium.state.positions[-1])
 
 
 def helices() -> Iterator[Row]:
     """Ibrahimbegovic, Comp. Meth. Appl. Mech. Eng. 149 (1997) 49: roll-up by an end moment with a force out of its plane.
 
-    He draws ten turns of it, shear-flexible (GA = EA); here 2 % of his load, 0.2 turns, as a rod without shear: recomputed. The
-    moment keeps its axis in space, so that it has no potential. 50 elements leave O(h²) = 1e-4.
+    He draws ten turns of it, shear-flexible (GA = EA); here 2 % and 10 % of his load, one whole turn, as a rod without shear: recomputed.
+    The moment keeps its axis in space, so that it has no potential; the path is followed. 50 and 100 elements leave O(h²), 2e-3 m of 10 m.
     """
     source = "Kirchhoff rod, recomputed; after Ibrahimbegovic 1997"
     yield from rows("roll-up out of its plane, 2 %", source, 2e-4, zip("xyz", helix(50, 0.02), HELIX, strict=True))
+    yield from rows("roll-up out of its plane, one turn", source, 3e-2, zip("xyz", helix(100, 0.1), ONE_TURN, strict=True))
 
 
 def quarter_ring() -> Iterator[Row]:
