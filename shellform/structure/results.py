@@ -13,7 +13,16 @@ from shellform.errors import InputError
 from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables
 from shellform.structure.network import Network
-from shellform.structure.sections import Material, Rectangle, Round, Section, Tube, isotropic, stress
+from shellform.structure.sections import (
+    Material,
+    Rectangle,
+    Round,
+    Section,
+    Tube,
+    isotropic,
+    stress,
+    stress_by_force,
+)
 from shellform.structure.state import State
 
 _SHAPES = {"round": (Round, ("radius",)), "tube": (Tube, ("radius", "thickness")), "rectangle": (Rectangle, ("width", "height"))}
@@ -29,6 +38,19 @@ def end_stress(beams: Beams, forces: Reals, sections: Mapping[str, Section]) -> 
             for end in range(2):
                 axial, about_y, about_z = forces[own, 0], forces[own, 2 + 3 * end], forces[own, 3 + 3 * end]
                 result[own, end] = stress(sections[kind], axial, about_y, about_z)
+    return result
+
+
+def end_stress_by_force(beams: Beams, forces: Reals, sections: Mapping[str, Section]) -> Reals:
+    """Derivatives (m, 2, 7) of `end_stress` by the section forces of each beam, 1/m² and 1/m³; 0 for kinds without a section."""
+    result = np.zeros((len(beams.ends), 2, 7))
+    for index, kind in enumerate(beams.kinds):
+        if kind in sections:
+            own = beams.kind == index
+            for end in range(2):
+                y, z = 2 + 3 * end, 3 + 3 * end
+                rates = stress_by_force(sections[kind], forces[own, 0], forces[own, y], forces[own, z])
+                result[own, end, 0], result[own, end, y], result[own, end, z] = rates
     return result
 
 

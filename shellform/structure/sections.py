@@ -73,6 +73,12 @@ class Section(Protocol):
     def bending(self, about_y: Reals, about_z: Reals) -> Reals:
         """Largest bending stress, Pa, under moments about both axes, N·m."""
 
+    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
+        """Its derivatives, 1/m³, by both moments; 0 where a moment is 0 and the stress has a kink."""
+
+    def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
+        """Its derivatives, Pa/m, by each size at fixed moments."""
+
 
 def stiffness(section: Section) -> tuple[float, float, float, float]:
     """EA, N; GJ, EI_y, EI_z, N·m²."""
@@ -90,6 +96,19 @@ def stiffness_by_size(section: Section) -> Reals:
 def stress(section: Section, axial: Reals, about_y: Reals, about_z: Reals) -> Reals:
     """Largest fibre stress, Pa, under the axial force, N, and the moments, N·m; arrays of one shape."""
     return np.asarray(np.abs(axial) / section.constants[0] + section.bending(about_y, about_z))
+
+
+def stress_by_force(section: Section, axial: Reals, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals, Reals]:
+    """Derivatives of `stress` by the axial force, 1/m², and the moments, 1/m³."""
+    return (np.asarray(np.sign(axial) / section.constants[0]), *section.bending_by_moment(about_y, about_z))
+
+
+def stress_by_size(section: Section, axial: Reals, about_y: Reals, about_z: Reals) -> Reals:
+    """Derivatives (k, ...), Pa/m, of `stress` by each of the k sizes at fixed forces."""
+    area = section.constants[0]
+    by_area = -np.abs(axial) / area**2
+    rates = [rate[0] * by_area for rate in section.constants_by_size]
+    return np.stack([rate + bend for rate, bend in zip(rates, section.bending_by_size(about_y, about_z), strict=True)])
 
 
 def mass_per_length(section: Section) -> float:
@@ -132,6 +151,14 @@ class Round:
     def bending(self, about_y: Reals, about_z: Reals) -> Reals:
         """|M| r / I."""
         return np.hypot(about_y, about_z) * (self.radius / self.constants[2])
+
+    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
+        """Along the moment."""
+        return _along(about_y, about_z, self.radius / self.constants[2])
+
+    def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
+        """4 |M| / πr³ falls with the radius' cube."""
+        return [-3.0 / self.radius * self.bending(about_y, about_z)]
 
 
 @dataclass(frozen=True)
@@ -181,6 +208,16 @@ class Tube:
         """|M| r / I."""
         return np.hypot(about_y, about_z) * (self.radius / self.constants[2])
 
+    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
+        """Along the moment."""
+        return _along(about_y, about_z, self.radius / self.constants[2])
+
+    def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
+        """Of |M| r / I by radius and thickness."""
+        inertia, rates = self.constants[2], self.constants_by_size[:, 2]
+        moment = np.hypot(about_y, about_z)
+        return [moment * (1.0 - self.radius * rates[0] / inertia) / inertia, -moment * self.radius * rates[1] / inertia**2]
+
 
 @dataclass(frozen=True)
 class Rectangle:
@@ -227,6 +264,22 @@ class Rectangle:
         """In a corner: |M_y| h / 2 I_y + |M_z| b / 2 I_z."""
         _, _, inertia_y, inertia_z = self.constants
         return np.asarray(np.abs(about_y) * (0.5 * self.height / inertia_y) + np.abs(about_z) * (0.5 * self.width / inertia_z))
+
+    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
+        """Each moment's own part."""
+        _, _, inertia_y, inertia_z = self.constants
+        return np.asarray(np.sign(about_y) * (0.5 * self.height / inertia_y)), np.asarray(np.sign(about_z) * (0.5 * self.width / inertia_z))
+
+    def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
+        """Of 6 |M_y| / bh² + 6 |M_z| / hb²."""
+        by_y, by_z = 6.0 * np.abs(about_y) / (self.width * self.height**2), 6.0 * np.abs(about_z) / (self.height * self.width**2)
+        return [np.asarray(-(by_y + 2.0 * by_z) / self.width), np.asarray(-(2.0 * by_y + by_z) / self.height)]
+
+
+def _along(about_y: Reals, about_z: Reals, scale: float) -> tuple[Reals, Reals]:
+    moment = np.hypot(about_y, about_z)
+    share = scale / np.where(moment > 0.0, moment, 1.0)
+    return np.asarray(about_y * share), np.asarray(about_z * share)
 
 
 def _torsion(slenderness: float) -> tuple[float, float]:

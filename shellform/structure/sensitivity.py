@@ -13,11 +13,12 @@ counts the solves and takes the cheaper way. The right-hand sides go to the solv
 
 A design variable is a column of df/ds: `by_rest_length` for cables, `by_stiffness` for whatever the beams' stiffness depends on (a rod's
 radius or another size, a connector's EA, GJ or EI), `by_load` for the load factor. A measure is a row of ∂g/∂x: `tension_rows`,
-`end_force_rows`, or rows of its own.
+`end_force_rows`, `stress_rows`, or rows of its own.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -27,6 +28,8 @@ from shellform.arrays import Reals
 from shellform.structure.assembly import Assembly
 from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables
+from shellform.structure.results import end_stress_by_force
+from shellform.structure.sections import Section
 from shellform.structure.sparse import Factor
 from shellform.structure.state import State, moved
 
@@ -88,6 +91,12 @@ def end_force_rows(assembly: Assembly, state: State, beams: Beams) -> sp.csr_arr
     """Derivative (7 m, f) of N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam by the free freedoms at fixed stiffness."""
     rates = beams.local_forces_by_freedom(state)
     return _rows(assembly, beams.freedoms()[:, None, :], rates)
+
+
+def stress_rows(assembly: Assembly, state: State, beams: Beams, sections: Mapping[str, Section]) -> sp.csr_array:
+    """Derivative (2 m, f), Pa/m and Pa/rad, of the largest fibre stresses at both ends of each beam by the free freedoms."""
+    by_force = end_stress_by_force(beams, beams.local_forces(state), sections)
+    return _rows(assembly, beams.freedoms()[:, None, :], by_force @ beams.local_forces_by_freedom(state))
 
 
 def gradients(response: Response, by_state: Reals, by_design: Reals) -> Reals:

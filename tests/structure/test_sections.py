@@ -8,7 +8,7 @@ from shellform.structure.beam import make_beams
 from shellform.structure.cable import make_cables
 from shellform.structure.equilibrium import find_equilibrium
 from shellform.structure.network import Network, assemble
-from shellform.structure.results import end_stress, read_sections, utilisation
+from shellform.structure.results import end_stress, end_stress_by_force, read_sections, utilisation
 from shellform.structure.sections import (
     Material,
     Rectangle,
@@ -19,6 +19,8 @@ from shellform.structure.sections import (
     stiffness,
     stiffness_by_size,
     stress,
+    stress_by_force,
+    stress_by_size,
 )
 from shellform.structure.sensitivity import (
     by_load,
@@ -30,6 +32,7 @@ from shellform.structure.sensitivity import (
     predicted,
     respond,
     stiffness_rate,
+    stress_rows,
     tension_rows,
 )
 from shellform.structure.state import at_rest
@@ -205,6 +208,48 @@ def test_sensitivities_to_rest_length_radius_connector_and_load_match_solved_nei
             found.append(measured(other, solved(other, load), section))
         slope = (found[0] - found[1]) / (2 * step)
         np.testing.assert_allclose(total[:, k], slope, rtol=1e-4, atol=1e-6 * np.abs(slope).max())
+
+
+def test_stresses_answer_to_the_radius_and_the_load_as_solved_neighbours_do():
+    network, load, section = frame()
+    state, assembly = solved(network, load), assemble(network)
+    by_radius = stiffness_rate(network.beams, "rod", tuple(stiffness_by_size(section)[0]))
+    response = respond(assembly, state, by_stiffness(assembly, state, by_radius), by_load(assembly, load))
+    forces = network.beams.local_forces(state)
+    own = end_stress_by_force(network.beams, forces, {"rod": section})
+    partial = np.zeros((16, 2))
+    partial[:, 0] = (own @ by_radius.local_forces(state)[:, :, None]).ravel()
+    for end in range(2):
+        rates = stress_by_size(section, forces[:, 0], forces[:, 2 + 3 * end], forces[:, 3 + 3 * end])[0]
+        partial[end::2, 0] += np.where(network.beams.kind == 0, rates, 0.0)
+    total = gradients(response, stress_rows(assembly, state, network.beams, {"rod": section}).toarray(), partial)
+
+    def stresses(model, shape, under):
+        return end_stress(model.beams, model.beams.local_forces(solved(model, under)), {"rod": shape}).ravel()
+
+    rods = np.repeat(network.beams.kind == 0, 2)
+    step = 1e-4 * 0.012
+    ahead, behind = frame(radius=0.012 + step), frame(radius=0.012 - step)
+    slope = (stresses(ahead[0], ahead[2], load) - stresses(behind[0], behind[2], load)) / (2 * step)
+    np.testing.assert_allclose(total[rods, 0], slope[rods], rtol=1e-4, atol=1e-5 * np.abs(slope[rods]).max())
+    slope = (stresses(network, section, 1.001 * load) - stresses(network, section, 0.999 * load)) / 0.002
+    np.testing.assert_allclose(total[rods, 1], slope[rods], rtol=1e-4, atol=1e-5 * np.abs(slope[rods]).max())
+
+
+@pytest.mark.parametrize("section", [Round(0.01, GFRP), Tube(0.01, 0.002, GFRP), Rectangle(0.02, 0.007, GFRP)], ids=lambda s: type(s).__name__)
+def test_the_derivatives_of_stress_pass_the_taylor_test(section):
+    at = np.array([120.0, -3.0, 2.0])
+    by_force = np.array(stress_by_force(section, *at))
+    by_size = stress_by_size(section, *at)
+    value = stress(section, *at)
+    for k in range(3):
+        move = np.zeros(3)
+        move[k] = 1e-4
+        assert stress(section, *(at + move)) - value == pytest.approx(by_force[k] * 1e-4, rel=1e-3)
+    for k, size in enumerate(section.sizes):
+        sizes = list(section.sizes)
+        sizes[k] = size * (1 + 1e-6)
+        assert stress(type(section)(*sizes, GFRP), *at) - value == pytest.approx(by_size[k] * size * 1e-6, rel=1e-4)
 
 
 def test_the_predicted_state_is_right_to_first_order():
