@@ -42,6 +42,7 @@ _CLOSE, _CONTRACTION = 1e-2, 0.9  # a residual near the goal that falls this muc
 _SHORTEST = 0.1  # share of a step to which it is cut before the mass is raised instead
 _PATIENCE = 3  # steps with mass between two looks for a symmetric path
 _STAGNANT = 0.1  # ratio of two residuals one after the other: a step that brings less than this may be down to rounding
+_HEAVY = 1e6  # times the largest stiffness
 _FAR = 1e6  # m or rad, a step of Newton's iteration that leads nowhere
 _HALVINGS = 4  # of one step before the mass is raised instead
 
@@ -184,14 +185,6 @@ class _Walk:
             if self._advance(direction, float(unbalanced @ direction)):
                 return
             self._raise_mass()
-            if self.mass > 1e6 * float(np.abs(values[self.assembly.matrix.diagonal]).max()):
-                raise NotConverged(
-                    f"The relaxation stalled (residual {self.residual:.1e})",
-                    state=self.state,
-                    residual=self.residual,
-                    iterations=self.factorisations,
-                    remedy="Apply the load in more increments, or loosen the tolerance.",
-                )
 
     def _factor(self, values: Reals, on_branch: bool) -> Factor:
         while True:
@@ -213,10 +206,24 @@ class _Walk:
                     ) from error
                 self._raise_mass()
 
+    def _heaviest(self) -> float:
+        """The mass at which a step leads nowhere; 0 where the tangent isn't finite."""
+        assert self.now.tangent is not None
+        largest = float(np.abs(self.now.tangent[self.assembly.matrix.diagonal]).max(initial=0.0))
+        return _HEAVY * max(largest, 1.0) if np.isfinite(largest) else 0.0
+
     def _raise_mass(self) -> None:
         diagonal = np.abs(self.now.tangent[self.assembly.matrix.diagonal]) if self.now.tangent is not None else np.ones(1)
         least = 1e-7 * float(np.mean(diagonal[self.assembly.free % 6 < 3]))
         self.mass = max(_GROWTH * self.mass, least if least > 0.0 else max(float(np.abs(self.load).max()), 1.0))
+        if not self.mass <= self._heaviest():
+            raise NotConverged(
+                f"The relaxation stalled (residual {self.residual:.1e})",
+                state=self.state,
+                residual=self.residual,
+                iterations=self.factorisations,
+                remedy="Apply the load in more increments, or loosen the tolerance.",
+            )
 
     def _saddle(self, values: Reals, unbalanced: Reals) -> bool:
         """A Newton step where the tangent has negative eigenvalues that the unbalanced forces don't touch.

@@ -24,6 +24,7 @@ from shellform.structure.cable import Cables, make_cables
 from shellform.structure.network import Network
 from shellform.structure.state import State, from_vectors
 
+_HUGE = 1e30  # squares and ratios of such numbers are still finite
 _Three = tuple[float, float, float]
 _Six = tuple[float, float, float, float, float, float]
 
@@ -276,10 +277,10 @@ def _load(entries: list[_Load], where: str, count: int) -> Reals:
 
 def _array(rows: Any, where: str, width: int) -> Reals:
     array = np.array(rows, dtype=float).reshape(-1, width)
-    wrong = ~np.isfinite(array).all(axis=1)
+    wrong = ~(np.abs(array) <= _HUGE).all(axis=1)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InputError("holds a number that is not finite", where=f"{where}[{row}]", value=array[row].tolist())
+        raise InputError(f"holds a number beyond {_HUGE:g}", where=f"{where}[{row}]", value=array[row].tolist())
     return array
 
 
@@ -300,9 +301,11 @@ def _pairs(pairs: list[tuple[int, int]], name: str, count: int) -> np.ndarray:
 def _positive(values: Reals, part: str, name: str) -> Reals:
     """The values, NaN standing for those left out."""
     wrong = (values <= 0.0) | np.isinf(values)
-    if wrong.any():
-        element = int(np.argmax(wrong))
-        raise InputError("must be a positive number", where=f"{part}[{element}].{name}", value=float(values[element]))
+    absurd = (values > _HUGE) | (values < 1.0 / _HUGE)
+    for which, what in ((wrong, "must be a positive number"), (absurd, f"is beyond what can be calculated with ({1 / _HUGE:g} to {_HUGE:g})")):
+        if which.any():
+            element = int(np.argmax(which))
+            raise InputError(what, where=f"{part}[{element}].{name}", value=float(values[element]))
     return values
 
 
