@@ -10,6 +10,8 @@ FLOORS = {"errors": -1, "arrays": 0, "surface": 1, "structure": 1, "net": 2, "de
 DOORS = {
     "gmsh": {"surface/cad.py"},
     "meshio": {"surface/meshes.py"},
+    "rhino3dm": {"surface/rhino.py"},
+    "vtkmodules": {"output/render.py", "surface/vtkfiles.py"},
     "nlopt": {"design/mma.py"},
     "pyvista": {"output/render.py"},
     "vtk": {"output/render.py"},

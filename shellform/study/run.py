@@ -33,7 +33,7 @@ from shellform.structure.equilibrium import Equilibrium
 from shellform.structure.loading import Loaded
 from shellform.structure.model import Model, write_model
 from shellform.structure.state import State
-from shellform.study.case import Case, check_script, dump_case, write_text
+from shellform.study.case import Case, SurfaceEntry, check_script, dump_case, write_text
 from shellform.surface.target import Surface
 
 STAGES = ("surface", "net", "initial", "optimise", "figures")
@@ -44,31 +44,48 @@ Report = Callable[[str, str], None]
 """Called with the stage and a line of progress."""
 
 
-def read_surface(
-    file: Path,
-    *,
-    unit: str | None = None,
-    up: str = "z",
-    size: float | None = None,
-    dimensions: Mapping[str, float] | None = None,
-    allow_scripts: bool = False,
-) -> Surface:
-    """The surface of a builder script, a CAD file or a mesh file, whichever the ending says."""
+def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
+    """The surface of a builder script, or of a file in any format, as its entry says."""
+    file = Path(entry.file)
     check_script(file, allow_scripts=allow_scripts)
-    ending = file.suffix.lower()
-    if ending == ".py":
+    if file.suffix.lower() == ".py":
         from shellform.surface import cad
 
-        return cad.build_surface(file, size=_builder_size(file, size, dimensions), **(dimensions or {}))
-    if dimensions:
-        raise InputError("only builder scripts have dimensions", where="surface.dimensions", value=dict(dimensions))
-    if ending in (".step", ".stp", ".iges", ".igs", ".brep", ".brp"):
-        from shellform.surface import cad
+        return cad.build_surface(file, size=_builder_size(file, entry.size, entry.dimensions), **entry.dimensions)
+    if entry.dimensions:
+        raise InputError("only builder scripts have dimensions", where="surface.dimensions", value=entry.dimensions)
+    from shellform.surface.reading import read_surface
 
-        return cad.import_surface(file, unit=unit, size=size, up=up)
-    from shellform.surface import meshes
+    return read_surface(
+        file,
+        unit=entry.unit,
+        up=entry.up,
+        size=entry.size,
+        layer=entry.layer,
+        name=entry.object,
+        face=entry.face,
+        piece=entry.piece,
+        fill=entry.fill,
+        ground=entry.ground,
+    )
 
-    return meshes.read_mesh(file, unit=unit or "m", up=up)
+
+def surface_summary(surface: Surface, source: str) -> dict[str, Any]:
+    """The `surface` part of summary.json."""
+    return {
+        "source": source,
+        "area": surface.area,
+        "size": surface.size.tolist(),
+        "triangles": len(surface.triangles),
+        "holes": surface.holes,
+        "mended": list(surface.mended),
+    }
+
+
+def told_size(surface: Surface) -> str:
+    """The extents in words, so that a wrong unit is seen."""
+    x, y, z = surface.size
+    return f"{x:.4g} × {y:.4g} × {z:.4g} m (is the unit right?)"
 
 
 def _builder_size(file: Path, size: float | None, dimensions: Mapping[str, float] | None) -> float:
@@ -162,23 +179,10 @@ def _surface(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
         with np.load(store, allow_pickle=False) as data:
             return Surface(data["vertices"], data["triangles"], data["normals"], entry.file)
     job.report("surface", f"reading {entry.file}")
-    surface = read_surface(
-        Path(entry.file),
-        unit=entry.unit,
-        up=entry.up,
-        size=entry.size,
-        dimensions=entry.dimensions,
-        allow_scripts=job.allow_scripts,
-    )
+    surface = surface_of(entry, allow_scripts=job.allow_scripts)
+    job.report("surface", f"size {told_size(surface)}")
     _save_arrays(store, vertices=surface.vertices, triangles=surface.triangles, normals=surface.normals)
-    summary["surface"] = {
-        "source": entry.file,
-        "area": surface.area,
-        "size": surface.size.tolist(),
-        "triangles": len(surface.triangles),
-        "holes": surface.holes,
-        "mended": list(surface.mended),
-    }
+    summary["surface"] = surface_summary(surface, entry.file)
     return surface
 
 

@@ -14,24 +14,24 @@ Vertex normals are the CAD surface's own, summed over the faces that meet at a v
 from __future__ import annotations
 
 import contextlib
-import difflib
-import importlib.util
-import inspect
 import math
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, ShellformError
-from shellform.surface.target import Surface, make_surface
+from shellform.surface.draft import MOST_TRIANGLES, Draft
+from shellform.surface.script import function_of, load_script, named_dimensions
 from shellform.surface.units import turned_up, unit_factor
+
+if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
+    from shellform.surface.rhino import Patch
+    from shellform.surface.target import Surface
 
 try:
     import gmsh
@@ -41,9 +41,8 @@ except (ImportError, OSError) as error:  # a shared library that gmsh's wheel ne
         remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
     ) from error
 
-FORMATS = (".step", ".stp", ".iges", ".igs", ".brep", ".brp")
+FORMATS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep"}
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
-_MOST_TRIANGLES = 2_000_000
 _AGREES = 0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
 _SAMPLES = 33  # points on a curve that tell its extent
 _SEWN = 1e-6  # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
@@ -56,9 +55,9 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
     Raises InputError for a script that can't be read or fails, and for dimensions it doesn't have.
     """
     path = Path(script)
-    module = _load(path)
-    build = _function(module, "build", path)
-    named = _dimensions(build, dimensions, path)
+    module = load_script(path)
+    build = function_of(module, "build", path)
+    named = named_dimensions(build, dimensions, path)
     form = getattr(module, "form", None)
     with _session(), _errors(path, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
@@ -66,44 +65,143 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
         points, triangles, normals = _mesh(size, path)
         if form is not None:
             points, normals = form(points, triangles, _on_edge(triangles, len(points)), **named), None
-    return make_surface(points, triangles, normals=normals, source=str(path))
+    return _make(points, triangles, normals, str(path))
 
 
 def dimensions_of(script: str | Path) -> dict[str, float]:
     """The named dimensions, m, of a builder script and their defaults."""
     path = Path(script)
-    return _dimensions(_function(_load(path), "build", path), {}, path)
+    return named_dimensions(function_of(load_script(path), "build", path), {}, path)
 
 
 def import_surface(path: str | Path, *, unit: str | None = None, size: float | None = None, up: str = "z") -> Surface:
-    """The surface of a STEP, IGES or BREP file, meshed at about `size`, m (a sixtieth of its plan if left out).
-
-    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis, "z" or "y".
-    Raises InputError for unreadable files and solids.
-    """
+    """The surface of a STEP, IGES or BREP file as `read_cad` reads it, in this process, and z up."""
     file = Path(path)
     if not file.is_file():
         raise InputError("there is no such file", where=str(file))
-    if file.suffix.lower() not in FORMATS:
+    kind = FORMATS.get(file.suffix.lower())
+    if kind is None:
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
-    has_unit = file.suffix.lower() not in (".brep", ".brp")
-    if has_unit and unit is not None:
-        raise InputError(
-            f"{file.suffix} files carry their own unit", where="surface.unit", value=unit, remedy="Leave the unit out."
-        )
-    factor = 1.0 if has_unit else unit_factor(unit or "m")
     turned_up(np.zeros((0, 3)), up)  # refuses an unknown axis before the work
+    draft = read_cad(file, kind, unit=unit, size=size, up=up)
+    normals = None if draft.normals is None else turned_up(draft.normals, up)
+    return _make(turned_up(draft.points, up), draft.triangles, normals, str(file))
+
+
+def read_cad(
+    file: Path, kind: str, *, unit: str | None = None, size: float | None = None, up: str = "z", face: str | None = None
+) -> Draft:
+    """The faces of a "step", "iges" or "brep" file, in m, meshed at about `size`, m (a sixtieth of its plan if left out).
+
+    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis, and stays so; of a solid
+    its "upper" or "lower" `face` is taken. Raises InputError for unreadable files, and for solids without a `face`.
+    """
+    if kind != "brep" and unit is not None:
+        raise InputError(
+            f"{kind.upper()} files carry their own unit", where="surface.unit", value=unit, remedy="Leave the unit out."
+        )
+    factor = 1.0 if kind != "brep" else unit_factor(unit or "m")
     with _session(), _errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
-        _read_shapes(file)
-        _refuse_all_but_faces(file)
+        _read_shapes(file, kind)
+        _refuse_all_but_faces(file, kind, face)
         if factor != 1.0:
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
         gmsh.model.occ.synchronize()
-        plan = np.delete(_extent(), 1 if up == "y" else 2)
-        points, triangles, normals = _mesh(float(plan.max()) / _DEFAULT_EDGES if size is None else size, file)
-    return make_surface(
-        turned_up(points, up), triangles, normals=None if normals is None else turned_up(normals, up), source=str(file)
+        return _draft(file, size, up, face)
+
+
+def mesh_patches(patches: Sequence[Patch], *, size: float | None, up: str, face: str | None, where: Path) -> Draft:
+    """NURBS patches, m, trimmed and sewn where they touch, meshed as CAD files are."""
+    with _session(), _errors(where, "gmsh can't build its surfaces", "Export it as STEP, or as a mesh."):
+        for patch in patches:
+            _add_patch(patch)
+        gmsh.model.occ.synchronize()
+        if not _faces_connected():
+            tolerance = _SEWN * float(_extent().max())
+            gmsh.model.occ.healShapes(gmsh.model.occ.getEntities(2), tolerance, False, False, False, True, False)
+            gmsh.model.occ.synchronize()
+        return _draft(where, size, up, face)
+
+
+def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[Reals, Indices]:
+    """Points (k, 2) inside the first of the closed `outlines` (n, 2), m, and outside the others, and triangles (t, 3), counterclockwise.
+
+    The triangles number the outlines' points first, one outline after the other, then these. Edges are about `size`, m, long (left out:
+    as those of the outline nearby). Raises InputError where outlines cross.
+    """
+    with _session(), _errors(Path("plan"), "its outline can't be meshed", "Check that it doesn't cross itself."):
+        geo = gmsh.model.geo
+        loops, tags = [], []
+        for outline in outlines:
+            mine = [geo.addPoint(x, y, 0.0) for x, y in outline]
+            lines = [geo.addLine(a, b) for a, b in zip(mine, mine[1:] + mine[:1], strict=True)]
+            loops.append(geo.addCurveLoop(lines))
+            tags += mine
+            for line in lines:
+                geo.mesh.setTransfiniteCurve(line, 2)
+        geo.addPlaneSurface(loops)
+        geo.synchronize()
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 1)
+        if size is not None:
+            gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        gmsh.model.mesh.generate(2)
+        nodes, coordinates, _ = gmsh.model.mesh.getNodes()
+        kinds, _, corners = gmsh.model.mesh.getElements(2)
+    places = coordinates.reshape(-1, 3)[:, :2]
+    own = [int(np.flatnonzero(nodes == tag)[0]) for tag in tags]  # a mesh's vertex on a point has the point's number
+    if not len(kinds) or not np.array_equal(places[own], np.vstack(outlines)):
+        raise InputError("its outline can't be meshed", remedy="Check that it doesn't cross itself.")
+    inside = np.setdiff1d(np.arange(len(nodes)), own)
+    number = np.zeros(int(nodes.max()) + 1, dtype=np.int64)
+    number[nodes[np.concatenate([own, inside]).astype(int)]] = np.arange(len(nodes))
+    triangles = number[corners[0].reshape(-1, 3)]
+    first, second = (np.concatenate([places[own], places[inside]])[triangles[:, k]] for k in (1, 2))
+    begin = np.concatenate([places[own], places[inside]])[triangles[:, 0]]
+    across = (first - begin)[:, 0] * (second - begin)[:, 1] - (first - begin)[:, 1] * (second - begin)[:, 0]
+    triangles[across < 0.0] = triangles[across < 0.0][:, ::-1]
+    return places[inside], triangles
+
+
+def _add_patch(patch: Patch) -> None:
+    """One trimmed NURBS surface into the model, without the curves and points that it was made with."""
+    occ = gmsh.model.occ
+    before = set(occ.getEntities())
+    rows, columns, _ = patch.control.shape
+    tags = [occ.addPoint(*patch.control[i, j]) for j in range(columns) for i in range(rows)]
+    wires = []
+    for loop in patch.loops:
+        curves = []
+        for curve in loop:
+            ends = [occ.addPoint(*point) for point in curve.control]
+            knots, times = _knots(curve.knots)
+            curves.append(occ.addBSpline(ends, -1, curve.degree, curve.weights, knots, times))
+        wires.append(occ.addWire(curves))
+    (u, times_u), (v, times_v) = _knots(patch.knots[0]), _knots(patch.knots[1])
+    made = occ.addBSplineSurface(
+        tags, rows, -1, *patch.degree, patch.weights.T.ravel(), u, v, times_u, times_v, wires, wire3D=True
     )
+    kept = {(2, made)}
+    waste = [each for each in occ.getEntities() if each not in before and each not in kept]
+    occ.remove([each for each in waste if each[0] < 2])
+
+
+def _knots(knots: Reals) -> tuple[Reals, Indices]:
+    """The different knots and how often each occurs."""
+    values, times = np.unique(knots, return_counts=True)
+    return values, times
+
+
+def _draft(where: Path, size: float | None, up: str, face: str | None) -> Draft:
+    plan = np.delete(_extent(), 1 if up == "y" else 2)
+    points, triangles, normals = _mesh(float(plan.max()) / _DEFAULT_EDGES if size is None else size, where, face, up)
+    notes = () if face is None or not gmsh.model.getEntities(3) else (f"the {face} face of a solid was taken",)
+    return Draft(points, triangles, normals, 1.0, up, notes)
+
+
+def _make(points: Reals, triangles: Indices, normals: Reals | None, source: str) -> Surface:
+    from shellform.surface.target import make_surface
+
+    return make_surface(points, triangles, normals=normals, source=source)
 
 
 def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None:
@@ -114,11 +212,11 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
     file, source = Path(path), Path(script)
     if file.suffix.lower() not in FORMATS:
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
-    module = _load(source)
+    module = load_script(source)
     if hasattr(module, "form"):
         raise InputError("is form-found on a mesh, of which there is no CAD file", where=str(source))
-    build = _function(module, "build", source)
-    named = _dimensions(build, dimensions, source)
+    build = function_of(module, "build", source)
+    named = named_dimensions(build, dimensions, source)
     with _session(), _errors(source, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
         if file.suffix.lower() in (".iges", ".igs"):
@@ -128,19 +226,19 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
             gmsh.write(str(file))
 
 
-def _read_shapes(file: Path) -> None:
+def _read_shapes(file: Path, kind: str) -> None:
     """The file's shapes into the current model, STEP and IGES in m, faces that touch sewn together."""
-    if file.suffix.lower() in (".iges", ".igs"):
+    if kind == "iges":
         # OpenCASCADE takes a target unit for IGES only once it has read one: this reading is thrown away.
         gmsh.option.setString("Geometry.OCCTargetUnit", "")
-        _import(file)
+        _import(file, kind)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-    _import(file)
+    _import(file, kind)
     if not gmsh.model.getEntities(3) and not _faces_connected():
         # The sewing tolerance is a share of the size, which is known only now: read again.
         gmsh.option.setNumber("Geometry.Tolerance", _SEWN * float(_extent().max()))
         gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
-        _import(file)
+        _import(file, kind)
 
 
 def _faces_connected() -> bool:
@@ -153,20 +251,21 @@ def _faces_connected() -> bool:
     return len(groups) < 2
 
 
-def _import(file: Path) -> None:
+def _import(file: Path, kind: str) -> None:
     gmsh.model.remove()
     gmsh.model.add("surface")
     with _silence():
-        gmsh.model.occ.importShapes(str(file), highestDimOnly=True)
+        gmsh.model.occ.importShapes(str(file), highestDimOnly=True, format=kind)
     gmsh.model.occ.synchronize()
 
 
-def _refuse_all_but_faces(file: Path) -> None:
-    if gmsh.model.getEntities(3):
-        raise InputError("holds a solid", where=str(file), remedy="Export the upper face alone, as a surface.")
+def _refuse_all_but_faces(file: Path, kind: str, face: str | None) -> None:
+    if gmsh.model.getEntities(3) and face is None:
+        remedy = "Choose its upper or lower face (surface.face, --face), or export that face alone, as a surface."
+        raise InputError("holds a solid", where=str(file), remedy=remedy)
     if not gmsh.model.getEntities():
         raise InputError(
-            f"holds nothing that can be read as {file.suffix.lstrip('.').upper()}",
+            f"holds nothing that can be read as {kind.upper()}",
             where=str(file),
             remedy="Open it in a CAD program and export it anew.",
         )
@@ -234,16 +333,21 @@ def _extent() -> Reals:
     return np.asarray(np.ptp(np.vstack(ends), axis=0))
 
 
-def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
-    """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's faces."""
+def _mesh(
+    size: float, where: Path, side: str | None = None, up: str = "z"
+) -> tuple[Reals, Indices, Reals | None]:
+    """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's faces.
+
+    Of a solid, only the triangles of its upper or lower `side`.
+    """
     if not (size > 0.0 and math.isfinite(size)):
         raise InputError("must be a positive length", where="surface.size", value=size)
     if not gmsh.model.getEntities(2):
         raise InputError("makes no surface", where=str(where), remedy="See surfaces/dome.py.")
     spans = np.sort(_extent())
-    if 2.5 * spans[2] * spans[1] / size**2 > _MOST_TRIANGLES:
+    if 2.5 * spans[2] * spans[1] / size**2 > MOST_TRIANGLES:
         raise InputError(
-            f"would give more than {_MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × {spans[1]:.3g} m",
+            f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × {spans[1]:.3g} m",
             where="surface.size",
             value=size,
             remedy="Choose a larger mesh size, or check the surface's unit.",
@@ -255,15 +359,17 @@ def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
     number = np.full(int(tags.max()) + 1, -1)
     number[tags] = np.arange(len(tags))
     points = coordinates.reshape(-1, 3)
-    triangles, normals = [], np.zeros_like(points)
+    triangles, normals = {}, np.zeros_like(points)
     for _, face in gmsh.model.getEntities(2):
         _, nodes = gmsh.model.mesh.getElementsByType(2, face)
-        mine = number[nodes.reshape(-1, 3)]
-        if not len(mine):
+        triangles[face] = number[nodes.reshape(-1, 3)]
+        if not len(triangles[face]):
             raise InputError(f"gmsh made no triangles of its face {face}", where=str(where), remedy="Check the surface.")
-        triangles.append(mine)
+    if side is not None and gmsh.model.getEntities(3):
+        triangles = _on_side(points, triangles, side, up, where)
+    for face, mine in triangles.items():
         _add_normals(normals, points, mine, face, number)
-    faces = np.vstack(triangles)
+    faces = np.vstack(list(triangles.values()))
     length = np.linalg.norm(normals, axis=1)  # zero where no face knows it
     used = np.zeros(len(points), dtype=bool)
     used[faces.ravel()] = True
@@ -272,9 +378,23 @@ def _mesh(size: float, where: Path) -> tuple[Reals, Indices, Reals | None]:
     if not known.any():
         return points, faces, None
     if not known.all():
-        estimated = make_surface(points, faces, source=str(where))
+        estimated = _make(points, faces, None, str(where))
+        from scipy.spatial import cKDTree
+
         normals[~known] = estimated.normals[cKDTree(estimated.vertices).query(points[~known])[1]]
     return points, faces, normals
+
+
+def _on_side(points: Reals, triangles: dict[int, Indices], side: str, up: str, where: Path) -> dict[int, Indices]:
+    """The triangles of a solid's skin on one side, by their CAD faces."""
+    from shellform.surface.mend import turned_alike
+    from shellform.surface.sides import side_of
+
+    whole = np.vstack(list(triangles.values()))
+    kept = side_of(turned_up(points, up), turned_alike(whole, str(where)), side, str(where))
+    ends = np.cumsum([len(each) for each in triangles.values()])[:-1]
+    chosen = zip(triangles, np.split(whole, ends), np.split(kept, ends), strict=True)
+    return {face: mine[mask] for face, mine, mask in chosen if mask.any()}
 
 
 def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, number: Indices) -> None:
@@ -307,50 +427,3 @@ def _on_edge(triangles: Indices, count: int) -> Flags:
     result = np.zeros(count, dtype=bool)
     result[pairs[uses == 1].ravel()] = True
     return result
-
-
-def _load(path: Path) -> ModuleType:
-    if not path.is_file():
-        raise InputError("there is no such file", where=str(path))
-    spec = importlib.util.spec_from_file_location(f"surface_{path.stem}", path)
-    if spec is None or spec.loader is None:
-        raise InputError("isn't a Python script", where=str(path), remedy="Builder scripts end in .py.")
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-    except (Exception, SystemExit) as error:  # whatever somebody's script raises
-        raise InputError(f"the script fails: {type(error).__name__}: {error}", where=str(path)) from error
-    return module
-
-
-def _function(module: ModuleType, name: str, path: Path) -> Callable[..., Any]:
-    found = getattr(module, name, None)
-    if not callable(found):
-        raise InputError(f"has no function {name}(gmsh, *, ...)", where=str(path), remedy="See surfaces/dome.py.")
-    return found  # type: ignore[no-any-return]
-
-
-def _dimensions(build: Callable[..., Any], given: dict[str, float], path: Path) -> dict[str, float]:
-    parameters = inspect.signature(build).parameters.values()
-    known = {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
-    for name, value in known.items():
-        if not _is_length(value):
-            raise InputError(
-                f"its dimension {name!r} has no positive default", where=str(path), remedy=f"Write {name}=0.90, say, m."
-            )
-    for name, value in given.items():
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=1)
-            hint = f"Did you mean {near[0]!r}? " if near else ""
-            raise InputError(
-                f"{path.name} has no dimension {name!r}",
-                where="surface.dimensions",
-                remedy=f"{hint}Known: {', '.join(known)}.",
-            )
-        if not _is_length(value):
-            raise InputError("must be a positive number", where=f"surface.dimensions.{name}", value=value)
-    return {name: float(value) for name, value in {**known, **given}.items()}
-
-
-def _is_length(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and value > 0.0
