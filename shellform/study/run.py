@@ -101,7 +101,6 @@ class _Job:
     case: Case
     folder: Path
     report: Report
-    allow_scripts: bool
 
     def path(self, name: str) -> Path:
         return self.folder / name
@@ -126,23 +125,27 @@ def run_case(
     if not file.is_file():
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
+    keys = _keys(case, file)
+    done = {} if fresh else _read_json(folder / "stages.json")
+    results: dict[str, Any] = {}
+    began = time.perf_counter()
+    if done.get("surface") != keys["surface"]:  # before anything is written: most bad input is a bad surface
+        report("surface", f"reading {file}")
+        results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
+        report("surface", f"size {told_size(results['surface'])}")
     try:
         for part in ("designs", "states", "figures"):
             (folder / part).mkdir(parents=True, exist_ok=True)
         write_text(folder / "case.toml", dump_case(case))
     except OSError as error:
         raise InputError(f"can't be written: {error}", where=str(folder), remedy="Choose another --output.") from error
-    job = _Job(case, folder, report, allow_scripts)
-    keys = _keys(case, file)
-    done = {} if fresh else _read_json(folder / "stages.json")
+    job = _Job(case, folder, report)
     summary = _read_json(folder / "summary.json") if done else {}
     summary = {"format": "shellform-summary", "version": 1, **{k: v for k, v in summary.items() if k != "format"}}
     summary.setdefault("seconds", {})
-    results: dict[str, Any] = {}
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
     reusable = True
     for stage in STAGES[: STAGES.index(until) + 1]:
-        began = time.perf_counter()
         reusable = reusable and done.get(stage) == keys[stage]
         results[stage] = steps[stage](job, results, summary, reusable)
         if not reusable:
@@ -152,6 +155,7 @@ def run_case(
         write_text(folder / "summary.json", json.dumps(summary, indent=1))
         write_text(folder / "stages.json", json.dumps(done))
         report(stage, f"{'kept' if reusable else 'done'} in {time.perf_counter() - began:.1f} s")
+        began = time.perf_counter()
     return summary
 
 
@@ -178,9 +182,7 @@ def _surface(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
     if keep:
         with np.load(store, allow_pickle=False) as data:
             return Surface(data["vertices"], data["triangles"], data["normals"], entry.file)
-    job.report("surface", f"reading {entry.file}")
-    surface = surface_of(entry, allow_scripts=job.allow_scripts)
-    job.report("surface", f"size {told_size(surface)}")
+    surface: Surface = results["surface"]
     _save_arrays(store, vertices=surface.vertices, triangles=surface.triangles, normals=surface.normals)
     summary["surface"] = surface_summary(surface, entry.file)
     return surface

@@ -80,6 +80,7 @@ def _merged(draft: Draft, size: float) -> Draft:
     unused = without_unused(draft)[1]
     if unused:
         draft = noted(without_unused(draft)[0], f"{unused} points of no face were dropped")
+    draft = _without_points(draft)
     pairs = cKDTree(draft.points).query_pairs(_SAME * size, output_type="ndarray") if len(draft.points) else np.zeros((0, 2))
     if len(pairs):
         count = len(draft.points)
@@ -87,11 +88,8 @@ def _merged(draft: Draft, size: float) -> Draft:
         groups, label = connected_components(links, directed=False)
         first = np.full(groups, count)
         np.minimum.at(first, label, np.arange(count))
-        before = len(draft.triangles)
-        draft = _without(replace(draft, triangles=first[label][draft.triangles]))
         draft = noted(draft, f"{count - groups} vertices lay on others and were merged")
-        if len(draft.triangles) < before:
-            draft = noted(draft, f"{before - len(draft.triangles)} faces shrank to nothing and were dropped")
+        draft = _without_points(replace(draft, triangles=first[label][draft.triangles]))
     _, once = np.unique(np.sort(draft.triangles, axis=1), axis=0, return_index=True)
     if len(once) < len(draft.triangles):
         note = f"{len(draft.triangles) - len(once)} faces given twice were dropped"
@@ -99,10 +97,13 @@ def _merged(draft: Draft, size: float) -> Draft:
     return without_unused(draft)[0]
 
 
-def _without(draft: Draft) -> Draft:
+def _without_points(draft: Draft) -> Draft:
     """The draft without triangles that have a vertex twice, and without what is then unused."""
     a, b, c = draft.triangles.T
-    return without_unused(replace(draft, triangles=draft.triangles[(a != b) & (b != c) & (c != a)]))[0]
+    whole = (a != b) & (b != c) & (c != a)
+    if not whole.all():
+        draft = noted(replace(draft, triangles=draft.triangles[whole]), f"{int((~whole).sum())} faces without area were dropped")
+    return without_unused(draft)[0]
 
 
 def _refuse_branches(draft: Draft, where: str) -> None:

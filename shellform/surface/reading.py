@@ -153,7 +153,7 @@ def _content(head: bytes, file: Path) -> str | None:
     if text.startswith(b"{"):
         data = file.read_bytes()
         return "gltf" if b'"asset"' in data and b'"bufferViews"' in data else "compas"
-    if len(head) > 80 and re.match(rb"S\s*1\s", head[72:81] + b" "):
+    if re.match(rb"[^\r\n]{72}S[ 0]*1\s", head):
         return "iges"
     facets = int.from_bytes(head[80:84], "little")
     if len(head) >= 84 and file.stat().st_size == 84 + 50 * facets:
