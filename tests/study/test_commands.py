@@ -127,7 +127,8 @@ def test_a_refused_surface_leaves_nothing_behind(tmp_path):
     bad.write_text("solid cut off\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n")
     case = tmp_path / "case.toml"
     text = (ROOT / "scripts/scale_model.toml").read_text(encoding="utf-8").replace("../surfaces/vault.py", "bad.stl")
-    case.write_text("\n".join(line for line in text.splitlines() if not line.startswith("dimensions")), encoding="utf-8")
+    before, _, after = text.partition("[surface.dimensions]")
+    case.write_text(before + after[after.index("[net]") :], encoding="utf-8")
     refused(shellform("net", bad, "--spacing", 0.5, "--output", tmp_path / "net"), "bad.stl")
     refused(shellform("design", case, "--output", tmp_path / "run"), "bad.stl")
     refused(shellform("check", bad), "bad.stl")
