@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, ShellformError
+from shellform.errors import InputError, NotConverged, ShellformError
 from shellform.surface.draft import MOST_TRIANGLES, Draft
 from shellform.surface.script import function_of, load_script, named_dimensions
 from shellform.surface.units import turned_up, unit_factor
@@ -46,6 +46,9 @@ _DEFAULT_EDGES = 60.0  # along the longer plan extent
 _AGREES = 0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
 _SAMPLES = 33  # points on a curve that tell its extent
 _SEWN = 1e-6  # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
+_FITTED = 1000  # about as many vertices a fitted surface passes through
+_SEGMENTS = 100  # of a fitted B-spline along u and v
+_CORNER = np.cos(np.deg2rad(30.0))  # an edge that turns more has a corner there
 _IGES_UNITS = 1000.0  # gmsh states millimetres in IGES files and leaves the numbers as they are
 
 
@@ -224,6 +227,59 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
         gmsh.model.occ.synchronize()
         with _silence():
             gmsh.write(str(file))
+
+
+def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) -> float:
+    """Writes a B-spline surface through a surface's edge and vertices, by the path's ending as `write_cad`, and returns how far it is off, m.
+
+    Raises InputError for other endings and for surfaces with openings, which one B-spline can't have, and NotConverged where the
+    vertices are further off than `within` of the size.
+    """
+    file = Path(path)
+    kind = FORMATS.get(file.suffix.lower())
+    if kind is None:
+        raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
+    loops = surface.boundary
+    if len(loops) > 1:
+        raise InputError(
+            "has openings, which can't be fitted", where=surface.source, remedy="Close them (surface.fill), or write a mesh."
+        )
+    inner = np.setdiff1d(np.arange(len(surface.vertices)), loops[0])
+    # One vertex a cell of a grid in space: evenly spread, whatever the mesh.
+    cell = max(math.sqrt(surface.area / _FITTED), 1e-12 * float(surface.size.max()))
+    chosen = inner[np.unique(np.floor(surface.vertices[inner] / cell), axis=0, return_index=True)[1]]
+    with _session(), _errors(file, "gmsh can't fit a surface", "Write a mesh."):
+        occ = gmsh.model.occ
+        curves = []
+        rim = [occ.addPoint(*point) for point in surface.vertices[loops[0]]]
+        for stretch in _stretches(surface.vertices[loops[0]]):
+            ends = [rim[k % len(rim)] for k in stretch]
+            curves.append(occ.addSpline(ends) if len(ends) > 2 else occ.addLine(*ends))
+        wire = occ.addWire(curves)
+        points = [occ.addPoint(*surface.vertices[k]) for k in chosen]
+        face = occ.addSurfaceFilling(wire, pointTags=points, degree=3, numPointsOnCurves=_SAMPLES, maxSegments=_SEGMENTS)
+        occ.remove([(0, point) for point in points])
+        occ.synchronize()
+        closest = np.reshape(gmsh.model.getClosestPoint(2, face, surface.vertices[inner].ravel())[0], (-1, 3))
+        off = float(np.linalg.norm(closest - surface.vertices[inner], axis=1).max(initial=0.0))
+        if off > within * float(surface.size.max()):
+            raise NotConverged(f"The fitted surface is {off:.2g} m off", residual=off, remedy="Write a mesh instead.")
+        if kind == "iges":
+            occ.dilate(occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
+            occ.synchronize()
+        with _silence():
+            gmsh.write(str(file))
+    return off
+
+
+def _stretches(edge: Reals) -> list[range]:
+    """A closed edge (k, 3) parted at its corners, and where it has fewer than two, into four."""
+    along = np.roll(edge, -1, axis=0) - edge
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    corners = np.flatnonzero(np.sum(along * np.roll(along, 1, axis=0), axis=1) < _CORNER)
+    if len(corners) < 2:
+        corners = np.arange(4) * len(edge) // 4
+    return [range(a, b + 1) for a, b in zip(corners, np.append(corners[1:], corners[0] + len(edge)), strict=True)]
 
 
 def _read_shapes(file: Path, kind: str) -> None:

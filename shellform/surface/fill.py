@@ -43,7 +43,7 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
     level = float(draft.points[outer, 2].min()) if ground is None else ground
     rise = float(draft.points[:, 2].max()) - level
     low = draft.points[:, 2] < level + _ON_GROUND * rise
-    own, closed = len(draft.points), draft
+    own, closed = len(draft.points), replace(draft, normals=normals)
     holes = [loop for loop in loops if loop is not outer and not low[loop].any()]
     standing = len(loops) - 1 - len(holes)
     for loop in holes if what != "edges" else []:
@@ -58,9 +58,9 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
         notes.append(f"{len(arches)} open stretches of the edge were brought down to the ground at {level:.4g} m")
     for note in notes:
         closed = noted(closed, note)
-    if draft.normals is not None and len(closed.points) > own:
+    if draft.normals is None and closed.normals is not None:  # with the fill, the rim knows both its sides
         estimated = make_surface(closed.points, closed.triangles, source=where).normals
-        closed = replace(closed, normals=np.vstack([normals, estimated[own:]]))
+        closed = replace(closed, normals=np.vstack([estimated[:own], closed.normals[own:]]))
     return closed
 
 
@@ -100,10 +100,11 @@ def _arches(outer: Indices, low: Flags, where: str) -> list[Indices]:
     return [closed[a : b + 1] for a, b in zip(feet, ends, strict=True) if b - a > 1]
 
 
-def _capped(points: Reals, normals: Reals, loop: Indices, where: str) -> tuple[Indices, Reals, Indices]:
-    """The rim, new points (k, 3) and triangles, numbered rim first, of a hole's fill."""
+def _capped(points: Reals, normals: Reals, loop: Indices, where: str) -> tuple[Indices, Reals, Reals, Indices]:
+    """The rim, new points (k, 3), their normals, and triangles, numbered rim first, of a hole's fill."""
     up = normals[loop].mean(axis=0)
-    up /= np.linalg.norm(up)
+    upright = float(np.linalg.norm(up))
+    up = up / upright if upright > _UPRIGHT else np.array([0.0, 0.0, 1.0])
     first = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
     first /= np.linalg.norm(first)
     frame = np.array([first, np.cross(up, first), up])
@@ -113,11 +114,12 @@ def _capped(points: Reals, normals: Reals, loop: Indices, where: str) -> tuple[I
     plan = np.vstack([local[:, :2], inside])
     known = np.full(len(plan), np.nan)
     known[: len(rim)] = local[:, 2]
-    heights = _least_bent(plan, triangles, known, np.arange(len(rim)), slope, closed=True)
-    return rim, np.column_stack([inside, heights[len(rim) :]]) @ frame, triangles
+    heights, slopes = _least_bent(plan, triangles, known, np.arange(len(rim)), slope, closed=True)
+    new = slice(len(rim), None)
+    return rim, np.column_stack([inside, heights[new]]) @ frame, _upright(slopes[new]) @ frame, triangles
 
 
-def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: str) -> tuple[Indices, Reals, Indices]:
+def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: str) -> tuple[Indices, Reals, Reals, Indices]:
     """The same of an arch's fill, which reaches the ground."""
     place = points[arch]
     chord = place[-1, :2] - place[0, :2]
@@ -143,9 +145,14 @@ def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: s
     known = np.full(len(plan), np.nan)
     known[: len(rim)] = place[::-1, 2]
     known[len(rim) : len(outline)] = level
-    heights = _least_bent(plan, triangles, known, np.arange(len(rim)), slope[::-1], closed=False)
-    new = np.column_stack([plan, heights])[len(rim) :]
-    return rim, new, triangles
+    heights, slopes = _least_bent(plan, triangles, known, np.arange(len(rim)), slope[::-1], closed=False)
+    return rim, np.column_stack([plan, heights])[len(rim) :], _upright(slopes[len(rim) :]), triangles
+
+
+def _upright(slopes: Reals) -> Reals:
+    """Unit normals (k, 3) of heights with these slopes (k, 2)."""
+    normals = np.column_stack([-slopes, np.ones(len(slopes))])
+    return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def _gradients(normals: Reals, place: Reals, where: str) -> Reals:
@@ -170,7 +177,7 @@ def _meshed(outline: Reals, where: str) -> tuple[Reals, Indices]:
         ) from error
 
 
-def _least_bent(plan: Reals, triangles: Indices, known: Reals, rim: Indices, slope: Reals, *, closed: bool) -> Reals:
+def _least_bent(plan: Reals, triangles: Indices, known: Reals, rim: Indices, slope: Reals, *, closed: bool) -> tuple[Reals, Reals]:
     edges = np.column_stack([rim, np.roll(rim, -1)])
     if not closed:
         edges = edges[:-1]
@@ -187,8 +194,12 @@ def _evenly(line: Reals, step: float) -> Reals:
     return np.column_stack([np.interp(to, at, line[:, k]) for k in range(2)])
 
 
-def _with_fill(draft: Draft, rim: Indices, new: Reals, triangles: Indices) -> Draft:
+def _with_fill(draft: Draft, rim: Indices, new: Reals, normals: Reals, triangles: Indices) -> Draft:
+    assert draft.normals is not None
     number = np.concatenate([rim, len(draft.points) + np.arange(len(new))])
     return replace(
-        draft, points=np.vstack([draft.points, new]), triangles=np.vstack([draft.triangles, number[triangles]])
+        draft,
+        points=np.vstack([draft.points, new]),
+        triangles=np.vstack([draft.triangles, number[triangles]]),
+        normals=np.vstack([draft.normals, normals]),
     )

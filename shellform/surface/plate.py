@@ -18,8 +18,10 @@ from scipy.sparse.linalg import spsolve
 from shellform.arrays import Indices, Reals
 
 
-def bent_heights(plan: Reals, triangles: Indices, heights: Reals, edges: Indices, slopes: Reals) -> Reals:
-    """Heights (v,), m, over the vertices of a `plan` (v, 2), m, triangles (t, 3) turned counterclockwise.
+def bent_heights(
+    plan: Reals, triangles: Indices, heights: Reals, edges: Indices, slopes: Reals
+) -> tuple[Reals, Reals]:
+    """Heights (v,), m, and their slopes (v, 2) over the vertices of a `plan` (v, 2), m, triangles (t, 3) turned counterclockwise.
 
     `heights` (v,) are those given, NaN where free; `slopes` (e,) are those along the right-hand normals of directed `edges` (e, 2)
     of the boundary, which pass it with the plan on their left; elsewhere the boundary may turn.
@@ -56,4 +58,25 @@ def bent_heights(plan: Reals, triangles: Indices, heights: Reals, edges: Indices
     part = bend[:, free]
     result = given
     result[free] = spsolve(sp.csc_array(part.T @ part), right)
-    return np.asarray(result[:count])
+    # The slope at a triangle's middle is the mean of those at its edges' middles, and varies from there with D²w.
+    across = (sense * result[count + number])[:, None] * normal
+    at_edge = across + ((result[directed[:, 1]] - result[directed[:, 0]]) / length)[:, None] * tangent
+    middle = at_edge.reshape(3, -1, 2).mean(axis=0)
+    return np.asarray(result[:count]), _at_vertices(plan, triangles, middle, _curvatures(bend @ result, area))
+
+
+def _curvatures(parts: Reals, area: Reals) -> Reals:
+    """D²w (t, 2, 2) from its weighted entries 11, 22, 12, 21 of each triangle."""
+    entries = parts.reshape(-1, 4) / np.sqrt(area)[:, None]
+    return np.asarray(entries[:, [0, 2, 3, 1]].reshape(-1, 2, 2))
+
+
+def _at_vertices(plan: Reals, triangles: Indices, middle: Reals, curvature: Reals) -> Reals:
+    """Slopes (v, 2) at the vertices, the mean of those of the triangles round each."""
+    total, times = np.zeros((len(plan), 2)), np.zeros(len(plan))
+    centre = plan[triangles].mean(axis=1)
+    for k in range(3):
+        slope = middle + np.einsum("tij,tj->ti", curvature, plan[triangles[:, k]] - centre)
+        np.add.at(total, triangles[:, k], slope)
+        np.add.at(times, triangles[:, k], 1.0)
+    return total / np.maximum(times, 1.0)[:, None]
