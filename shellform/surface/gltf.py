@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.draft import Choice, Draft, Part, joined
+from shellform.surface.draft import Choice, Draft, Part, check_points, joined
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -93,6 +93,7 @@ class _Scene:
         if mode not in (_TRIANGLES, _STRIP, _FAN) or "POSITION" not in primitive["attributes"]:
             return []
         points = np.asarray(self._accessor(primitive["attributes"]["POSITION"]), dtype=float)
+        check_points(points, str(self._file))
         order = (
             np.asarray(self._accessor(primitive["indices"]), dtype=np.int64).ravel()
             if "indices" in primitive

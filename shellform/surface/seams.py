@@ -34,18 +34,18 @@ def sewn(draft: Draft, size: float) -> Draft:
         return draft
     length = np.linalg.norm(draft.points[rim[:, 1]] - draft.points[rim[:, 0]], axis=1)
     reach = min(_GAP * float(length.mean()), _MOST_GAP * size)
-    draft, joined, moved = _vertices_joined(draft, reach)
-    cut = 0
+    draft, joined, gap = _vertices_joined(draft, reach)
+    cut, off = 0, 0.0
     for _ in range(_ROUNDS):
         draft, more, away = _edges_cut(draft, reach)
-        cut, moved = cut + more, max(moved, away)
+        cut, off = cut + more, max(off, away)
         if not more:
             break
     notes = draft.notes
     if joined:
-        notes = (*notes, f"{joined} pairs of vertices across a gap of up to {moved:.2g} m were joined")
+        notes = (*notes, f"{joined} pairs of vertices across a gap of up to {gap:.2g} m were joined")
     if cut:
-        notes = (*notes, f"{cut} vertices on another face's edge (T-junctions, up to {moved:.2g} m off) were taken into it")
+        notes = (*notes, f"{cut} vertices on another face's edge (T-junctions, up to {off:.2g} m off) were taken into it")
     return replace(draft, notes=notes)
 
 
