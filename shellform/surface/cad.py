@@ -1,4 +1,4 @@
-"""Surfaces built or imported in gmsh; the door to gmsh.
+"""Surfaces built or imported in gmsh, through occ.py.
 
 A builder script is a Python file with one function `build(gmsh, *, name=default, ...)`, whose keyword arguments are the shell's
 named dimensions, m, and which makes the geometry in the current model. Where it has a second function
@@ -13,19 +13,17 @@ Vertex normals are the CAD surface's own, summed over the faces that meet at a v
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
-import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, NotConverged, ShellformError
-from shellform.surface.draft import MOST_TRIANGLES, Draft
+from shellform.errors import InputError, NotConverged
+from shellform.surface.draft import Draft
+from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence
 from shellform.surface.script import function_of, load_script, named_dimensions
 from shellform.surface.units import turned_up, unit_factor
 
@@ -33,17 +31,8 @@ if TYPE_CHECKING:  # target.py loads numba, which a reader's process does withou
     from shellform.surface.rhino import Patch
     from shellform.surface.target import Surface
 
-try:
-    import gmsh
-except (ImportError, OSError) as error:  # a shared library that gmsh's wheel needs isn't there
-    raise InputError(
-        f"gmsh can't be loaded: {error}",
-        remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
-    ) from error
-
 FORMATS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep"}
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
-_AGREES = 0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
 _SAMPLES = 33  # points on a curve that tell its extent
 _SEWN = 1e-6  # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
 _FITTED = 1000  # about as many vertices a fitted surface passes through
@@ -62,13 +51,13 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
     build = function_of(module, "build", path)
     named = named_dimensions(build, dimensions, path)
     form = getattr(module, "form", None)
-    with _session(), _errors(path, "the script fails", "Check the script and its dimensions."):
+    with session(), errors(path, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
         gmsh.model.occ.synchronize()
-        points, triangles, normals = _mesh(size, path)
+        points, triangles, normals = mesh_faces(size, path)
         if form is not None:
             points, normals = form(points, triangles, _on_edge(triangles, len(points)), **named), None
-    return _make(points, triangles, normals, str(path))
+    return made(points, triangles, normals, str(path))
 
 
 def dimensions_of(script: str | Path) -> dict[str, float]:
@@ -88,7 +77,7 @@ def import_surface(path: str | Path, *, unit: str | None = None, size: float | N
     turned_up(np.zeros((0, 3)), up)  # refuses an unknown axis before the work
     draft = read_cad(file, kind, unit=unit, size=size, up=up)
     normals = None if draft.normals is None else turned_up(draft.normals, up)
-    return _make(turned_up(draft.points, up), draft.triangles, normals, str(file))
+    return made(turned_up(draft.points, up), draft.triangles, normals, str(file))
 
 
 def read_cad(
@@ -104,7 +93,7 @@ def read_cad(
             f"{kind.upper()} files carry their own unit", where="surface.unit", value=unit, remedy="Leave the unit out."
         )
     factor = 1.0 if kind != "brep" else unit_factor(unit or "m")
-    with _session(), _errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
+    with session(), errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
         _read_shapes(file, kind)
         _refuse_all_but_faces(file, kind, face)
         if factor != 1.0:
@@ -115,12 +104,12 @@ def read_cad(
 
 def mesh_patches(patches: Sequence[Patch], *, size: float | None, up: str, face: str | None, where: Path) -> Draft:
     """NURBS patches, m, trimmed and sewn where they touch, meshed as CAD files are."""
-    with _session(), _errors(where, "gmsh can't build its surfaces", "Export it as STEP, or as a mesh."):
+    with session(), errors(where, "gmsh can't build its surfaces", "Export it as STEP, or as a mesh."):
         for patch in patches:
             _add_patch(patch)
         gmsh.model.occ.synchronize()
         if not _faces_connected():
-            tolerance = _SEWN * float(_extent().max())
+            tolerance = _SEWN * float(extent().max())
             gmsh.model.occ.healShapes(gmsh.model.occ.getEntities(2), tolerance, False, False, False, True, False)
             gmsh.model.occ.synchronize()
         return _draft(where, size, up, face)
@@ -132,7 +121,7 @@ def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[
     The triangles number the outlines' points first, one outline after the other, then these. Edges are about `size`, m, long (left out:
     as those of the outline nearby). Raises InputError where outlines cross.
     """
-    with _session(), _errors(Path("plan"), "its outline can't be meshed", "Check that it doesn't cross itself."):
+    with session(), errors(Path("plan"), "its outline can't be meshed", "Check that it doesn't cross itself."):
         geo = gmsh.model.geo
         loops, tags = [], []
         for outline in outlines:
@@ -195,16 +184,10 @@ def _knots(knots: Reals) -> tuple[Reals, Indices]:
 
 
 def _draft(where: Path, size: float | None, up: str, face: str | None) -> Draft:
-    plan = np.delete(_extent(), 1 if up == "y" else 2)
-    points, triangles, normals = _mesh(float(plan.max()) / _DEFAULT_EDGES if size is None else size, where, face, up)
+    plan = np.delete(extent(), 1 if up == "y" else 2)
+    points, triangles, normals = mesh_faces(float(plan.max()) / _DEFAULT_EDGES if size is None else size, where, face, up)
     notes = () if face is None or not gmsh.model.getEntities(3) else (f"the {face} face of a solid was taken",)
     return Draft(points, triangles, normals, 1.0, up, notes)
-
-
-def _make(points: Reals, triangles: Indices, normals: Reals | None, source: str) -> Surface:
-    from shellform.surface.target import make_surface
-
-    return make_surface(points, triangles, normals=normals, source=source)
 
 
 def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None:
@@ -220,12 +203,12 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
         raise InputError("is form-found on a mesh, of which there is no CAD file", where=str(source))
     build = function_of(module, "build", source)
     named = named_dimensions(build, dimensions, source)
-    with _session(), _errors(source, "the script fails", "Check the script and its dimensions."):
+    with session(), errors(source, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
         if file.suffix.lower() in (".iges", ".igs"):
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
         gmsh.model.occ.synchronize()
-        with _silence():
+        with silence():
             gmsh.write(str(file))
 
 
@@ -248,7 +231,7 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
     # One vertex a cell of a grid in space: evenly spread, whatever the mesh.
     cell = max(math.sqrt(surface.area / _FITTED), 1e-12 * float(surface.size.max()))
     chosen = inner[np.unique(np.floor(surface.vertices[inner] / cell), axis=0, return_index=True)[1]]
-    with _session(), _errors(file, "gmsh can't fit a surface", "Write a mesh."):
+    with session(), errors(file, "gmsh can't fit a surface", "Write a mesh."):
         occ = gmsh.model.occ
         curves = []
         rim = [occ.addPoint(*point) for point in surface.vertices[loops[0]]]
@@ -267,7 +250,7 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
         if kind == "iges":
             occ.dilate(occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
             occ.synchronize()
-        with _silence():
+        with silence():
             gmsh.write(str(file))
     return off
 
@@ -292,7 +275,7 @@ def _read_shapes(file: Path, kind: str) -> None:
     _import(file, kind)
     if not gmsh.model.getEntities(3) and not _faces_connected():
         # The sewing tolerance is a share of the size, which is known only now: read again.
-        gmsh.option.setNumber("Geometry.Tolerance", _SEWN * float(_extent().max()))
+        gmsh.option.setNumber("Geometry.Tolerance", _SEWN * float(extent().max()))
         gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
         _import(file, kind)
 
@@ -310,7 +293,7 @@ def _faces_connected() -> bool:
 def _import(file: Path, kind: str) -> None:
     gmsh.model.remove()
     gmsh.model.add("surface")
-    with _silence():
+    with silence():
         gmsh.model.occ.importShapes(str(file), highestDimOnly=True, format=kind)
     gmsh.model.occ.synchronize()
 
@@ -327,154 +310,6 @@ def _refuse_all_but_faces(file: Path, kind: str, face: str | None) -> None:
         )
     if not gmsh.model.getEntities(2):
         raise InputError("holds no surface, only points or curves", where=str(file), remedy="Export the surface.")
-
-
-@contextlib.contextmanager
-def _session() -> Iterator[None]:
-    """Gmsh's one global session, quiet, without its signal handlers, and repeatable."""
-    if gmsh.isInitialized():
-        raise InputError("gmsh is already in use in this process", remedy="Call gmsh.finalize() first.")
-    gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
-    try:
-        for name, value in [
-            ("General.Terminal", 0),
-            ("General.NumThreads", 1),
-            ("Mesh.RandomSeed", 1),
-            ("Mesh.Algorithm", 6),
-            ("Mesh.MeshSizeExtendFromBoundary", 0),
-            ("Mesh.MeshSizeFromPoints", 0),
-        ]:
-            gmsh.option.setNumber(name, value)
-        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-        gmsh.model.add("surface")
-        yield
-    finally:
-        gmsh.finalize()
-
-
-@contextlib.contextmanager
-def _errors(path: Path, what: str, remedy: str) -> Iterator[None]:
-    """Gmsh raises plain exceptions with its last message; scripts raise anything. The user gets a sentence."""
-    try:
-        yield
-    except ShellformError:
-        raise
-    except Exception as error:
-        said = str(error) if type(error) is Exception else f"{type(error).__name__}: {error}"
-        raise InputError(f"{what}: {said.rstrip('.')}", where=str(path), remedy=remedy) from error
-
-
-@contextlib.contextmanager
-def _silence() -> Iterator[None]:
-    """Nothing on standard output: OpenCASCADE writes there past Python and past gmsh's own setting."""
-    sys.stdout.flush()
-    kept = os.dup(1)
-    try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-        yield
-    finally:
-        os.dup2(kept, 1)
-        os.close(kept)
-
-
-def _extent() -> Reals:
-    """The extents (3,), m, of the model's curves along x, y and z: gmsh's own boxes are those of the control points."""
-    ends = [np.reshape(gmsh.model.getValue(0, point, []), (-1, 3)) for _, point in gmsh.model.getEntities(0)]
-    for _, curve in gmsh.model.getEntities(1):
-        low, high = (float(bound[0]) for bound in gmsh.model.getParametrizationBounds(1, curve))
-        ends.append(np.reshape(gmsh.model.getValue(1, curve, np.linspace(low, high, _SAMPLES)), (-1, 3)))
-    if not ends:  # a discrete surface of nothing but triangles
-        return np.asarray(np.ptp(np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3)), axis=0))
-    return np.asarray(np.ptp(np.vstack(ends), axis=0))
-
-
-def _mesh(
-    size: float, where: Path, side: str | None = None, up: str = "z"
-) -> tuple[Reals, Indices, Reals | None]:
-    """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's faces.
-
-    Of a solid, only the triangles of its upper or lower `side`.
-    """
-    if not (size > 0.0 and math.isfinite(size)):
-        raise InputError("must be a positive length", where="surface.size", value=size)
-    if not gmsh.model.getEntities(2):
-        raise InputError("makes no surface", where=str(where), remedy="See surfaces/dome.py.")
-    spans = np.sort(_extent())
-    if 2.5 * spans[2] * spans[1] / size**2 > MOST_TRIANGLES:
-        raise InputError(
-            f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × {spans[1]:.3g} m",
-            where="surface.size",
-            value=size,
-            remedy="Choose a larger mesh size, or check the surface's unit.",
-        )
-    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
-    gmsh.model.mesh.generate(2)
-    tags, coordinates, _ = gmsh.model.mesh.getNodes()
-    number = np.full(int(tags.max()) + 1, -1)
-    number[tags] = np.arange(len(tags))
-    points = coordinates.reshape(-1, 3)
-    triangles, normals = {}, np.zeros_like(points)
-    for _, face in gmsh.model.getEntities(2):
-        _, nodes = gmsh.model.mesh.getElementsByType(2, face)
-        triangles[face] = number[nodes.reshape(-1, 3)]
-        if not len(triangles[face]):
-            raise InputError(f"gmsh made no triangles of its face {face}", where=str(where), remedy="Check the surface.")
-    if side is not None and gmsh.model.getEntities(3):
-        triangles = _on_side(points, triangles, side, up, where)
-    for face, mine in triangles.items():
-        _add_normals(normals, points, mine, face, number)
-    faces = np.vstack(list(triangles.values()))
-    length = np.linalg.norm(normals, axis=1)  # zero where no face knows it
-    used = np.zeros(len(points), dtype=bool)
-    used[faces.ravel()] = True
-    points, faces = points[used], (np.cumsum(used) - 1)[faces]
-    normals, known = normals[used], length[used] > 0.5
-    if not known.any():
-        return points, faces, None
-    if not known.all():
-        estimated = _make(points, faces, None, str(where))
-        from scipy.spatial import cKDTree
-
-        normals[~known] = estimated.normals[cKDTree(estimated.vertices).query(points[~known])[1]]
-    return points, faces, normals
-
-
-def _on_side(points: Reals, triangles: dict[int, Indices], side: str, up: str, where: Path) -> dict[int, Indices]:
-    """The triangles of a solid's skin on one side, by their CAD faces."""
-    from shellform.surface.mend import turned_alike
-    from shellform.surface.sides import side_of
-
-    whole = np.vstack(list(triangles.values()))
-    kept = side_of(turned_up(points, up), turned_alike(whole, str(where)), side, str(where))
-    ends = np.cumsum([len(each) for each in triangles.values()])[:-1]
-    chosen = zip(triangles, np.split(whole, ends), np.split(kept, ends), strict=True)
-    return {face: mine[mask] for face, mine, mask in chosen if mask.any()}
-
-
-def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, number: Indices) -> None:
-    """Adds the CAD normals at the face's nodes, turned to the side of its triangles or, where another face came first, to its."""
-    tags, _, parameters = gmsh.model.mesh.getNodes(2, face, includeBoundary=True, returnParametricCoord=True)
-    if not len(triangles) or len(parameters) != 2 * len(tags):
-        return
-    exact = np.reshape(gmsh.model.getNormal(face, parameters), (-1, 3))
-    corner = points[triangles]
-    rough = np.zeros_like(points)
-    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    for k in range(3):
-        np.add.at(rough, triangles[:, k], across)
-    rows = number[tags]
-    seen = rough[rows]
-    seen /= np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-300)
-    agreement = np.sum(exact * seen, axis=1)
-    # At a pole the CAD normal means nothing: it stays zero here, unless another face knows it.
-    good = np.isfinite(exact).all(axis=1) & (np.abs(agreement) > _AGREES)
-    signed = np.where(good[:, None], exact * np.sign(agreement)[:, None], 0.0)
-    rest, first = np.unique(rows, return_index=True)
-    mine = signed[first]
-    # Two faces of a script need not turn the same way; make_surface turns all upwards, so only the sum has to agree.
-    normals[rest] += np.where(np.sum(normals[rest] * mine, axis=1, keepdims=True) < 0.0, -mine, mine)
 
 
 def _on_edge(triangles: Indices, count: int) -> Flags:

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from shellform.arrays import Indices
+from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.draft import Draft
 from shellform.surface.seams import sewn, without_slivers
@@ -81,20 +81,33 @@ def _merged(draft: Draft, size: float) -> Draft:
     if unused:
         draft = noted(without_unused(draft)[0], f"{unused} points of no face were dropped")
     draft = _without_points(draft)
-    pairs = cKDTree(draft.points).query_pairs(_SAME * size, output_type="ndarray") if len(draft.points) else np.zeros((0, 2))
-    if len(pairs):
-        count = len(draft.points)
-        links = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(count, count))
-        groups, label = connected_components(links, directed=False)
-        first = np.full(groups, count)
-        np.minimum.at(first, label, np.arange(count))
-        draft = noted(draft, f"{count - groups} vertices lay on others and were merged")
-        draft = _without_points(replace(draft, triangles=first[label][draft.triangles]))
+    same = _same_places(draft.points, _SAME * size)
+    merged = int((same != np.arange(len(same))).sum())
+    if merged:
+        draft = noted(draft, f"{merged} vertices lay on others and were merged")
+        draft = _without_points(replace(draft, triangles=same[draft.triangles]))
     _, once = np.unique(np.sort(draft.triangles, axis=1), axis=0, return_index=True)
     if len(once) < len(draft.triangles):
         note = f"{len(draft.triangles) - len(once)} faces given twice were dropped"
         draft = noted(replace(draft, triangles=draft.triangles[np.sort(once)]), note)
     return without_unused(draft)[0]
+
+
+def _same_places(points: Reals, reach: float) -> Indices:
+    """For each point (v,) the first of those that lie within `reach` m of it, of each other, and so on."""
+    count = len(points)
+    # Equal ones first, in whatever numbers; then what few are nearly equal.
+    order = np.lexsort(points.T)
+    new = np.append(True, (points[order][1:] != points[order][:-1]).any(axis=1)) if count else np.zeros(0, dtype=bool)
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.cumsum(new) - 1
+    apart = points[order[new]]
+    pairs = cKDTree(apart).query_pairs(reach, output_type="ndarray")
+    links = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(len(apart), len(apart)))
+    groups, label = connected_components(links, directed=False)
+    first = np.full(groups, count)
+    np.minimum.at(first, label[place], np.arange(count))
+    return np.asarray(first[label[place]])
 
 
 def _without_points(draft: Draft) -> Draft:

@@ -14,7 +14,7 @@ import rhino3dm
 
 from shellform.surface import cad
 from shellform.surface.funicular import thrust_shell
-from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
+from tests.surface.shells import cap, compas_mesh, write_gltf, write_obj, write_off, write_stl, y_up
 
 ROOT = Path(__file__).parent.parent.parent
 DATA, SURFACES = ROOT / "tests/data", ROOT / "surfaces"
