@@ -24,6 +24,14 @@ _STOPPED = 130
 
 Scripts = Annotated[bool, typer.Option("--allow-scripts", help="Run builder scripts from outside the shipped surfaces.")]
 Unit = Annotated[str | None, typer.Option(help="Unit of files that carry none: m, cm, mm, in, ft.")]
+Up = Annotated[str | None, typer.Option(help="Vertical axis of the file: z or y.")]
+Layer = Annotated[str | None, typer.Option(help="Layer of the surface in the file.")]
+Object = Annotated[str | None, typer.Option("--object", help="Name of the surface in the file.")]
+Face = Annotated[str | None, typer.Option(help="Face of a solid: upper or lower.")]
+Piece = Annotated[int | None, typer.Option(help="Number of a separate piece, 1 the largest.")]
+Fill = Annotated[str | None, typer.Option(help="Openings to close: holes, edges or all.")]
+Ground = Annotated[float | None, typer.Option(help="Height to which open edges are closed, m.")]
+Size = Annotated[float | None, typer.Option(help="Mesh size on CAD surfaces, m.")]
 
 
 def main() -> None:
@@ -77,12 +85,25 @@ def _options(
 
 
 @app.command()
-def check(file: Annotated[Path, typer.Argument(help="A surface or a case file.")], unit: Unit = None, allow_scripts: Scripts = False) -> None:
+def check(
+    file: Annotated[Path, typer.Argument(help="A surface or a case file.")],
+    unit: Unit = None,
+    up: Up = None,
+    size: Size = None,
+    layer: Layer = None,
+    name: Object = None,
+    face: Face = None,
+    piece: Piece = None,
+    fill: Fill = None,
+    ground: Ground = None,
+    allow_scripts: Scripts = False,
+) -> None:
     """Read a surface or case and report what it is."""
     from shellform.study.check import check_file
 
-    for name, value in check_file(file, unit=unit, allow_scripts=allow_scripts).items():
-        print(f"{name:>22}  {value}")
+    options = _given(unit=unit, up=up, size=size, layer=layer, object=name, face=face, piece=piece, fill=fill, ground=ground)
+    for label, value in check_file(file, options, allow_scripts=allow_scripts).items():
+        print(f"{label:>22}  {value}")
 
 
 @app.command()
@@ -91,6 +112,14 @@ def net(
     spacing: Annotated[float, typer.Option(help="Distance between rods, m.")],
     output: Annotated[Path, typer.Option(help="Run folder.")],
     unit: Unit = None,
+    up: Up = None,
+    size: Size = None,
+    layer: Layer = None,
+    name: Object = None,
+    face: Face = None,
+    piece: Piece = None,
+    fill: Fill = None,
+    ground: Ground = None,
     angle: Annotated[float, typer.Option(help="Of the u rods against the x axis, degrees.")] = 0.0,
     gap: Annotated[float | None, typer.Option(help="Between the rods' axes, m (default: spacing / 27.5).")] = None,
     allow_scripts: Scripts = False,
@@ -98,13 +127,19 @@ def net(
     """Draw the Chebyshev net alone."""
     from shellform.study.check import net_alone
 
+    options = _given(unit=unit, up=up, size=size, layer=layer, object=name, face=face, piece=piece, fill=fill, ground=ground)
     report = _Progress()
     summary = net_alone(
-        surface, output, spacing=spacing, unit=unit, angle=angle, gap=gap, allow_scripts=allow_scripts, report=report
+        surface, output, options, spacing=spacing, angle=angle, gap=gap, allow_scripts=allow_scripts, report=report
     )
     report.close()
-    for name, value in summary.items():
-        print(f"{name:>22}  {value}")
+    for label, value in summary.items():
+        print(f"{label:>22}  {value}")
+
+
+def _given(**options: Any) -> dict[str, Any]:
+    """The options that were given."""
+    return {name: value for name, value in options.items() if value is not None}
 
 
 @app.command()
@@ -245,7 +280,7 @@ class _Progress:
         self.status.start()
 
     def __call__(self, stage: str, text: str) -> None:
-        if text.startswith(("done", "kept", "loading", "no pictures")):
+        if text.startswith(("done", "kept", "loading", "no pictures", "size")):
             self.console.print(f"{stage}: {text}")
         self.status.update(f"{stage}: {text}")
 

@@ -8,8 +8,10 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent.parent / "shellform"
 FLOORS = {"errors": -1, "arrays": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "study": 5, "cli": 6}
 DOORS = {
-    "gmsh": {"surface/cad.py"},
+    "gmsh": {"surface/occ.py"},
     "meshio": {"surface/meshes.py"},
+    "rhino3dm": {"surface/rhino.py"},
+    "vtkmodules": {"output/render.py", "surface/vtkfiles.py"},
     "nlopt": {"design/mma.py"},
     "pyvista": {"output/render.py"},
     "vtk": {"output/render.py"},

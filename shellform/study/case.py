@@ -33,8 +33,14 @@ class SurfaceEntry(_Section):
 
     file: str = Field(description="surface file, or a builder script, relative to the case file")
     unit: Literal["m", "cm", "mm", "in", "ft"] | None = Field(None, description="unit of files that carry none")
-    up: Literal["y", "z"] = Field("z", description="vertical axis of the file")
+    up: Literal["y", "z"] | None = Field(None, description="vertical axis of the file; left out: the format's")
     size: PositiveFloat | None = Field(None, description="mesh size, m")
+    layer: str = Field("", description="layer of the surface in the file")
+    object: str = Field("", description="name of the surface in the file")
+    face: Literal["upper", "lower"] | None = Field(None, description="face of a solid")
+    piece: PositiveInt | None = Field(None, description="number of a separate piece, 1 the largest")
+    fill: Literal["holes", "edges", "all"] | None = Field(None, description="openings to close")
+    ground: float | None = Field(None, description="height to which open edges are closed, m; left out: the edge's lowest")
     dimensions: dict[str, PositiveFloat] = Field({}, description="named dimensions of a builder script, m")
 
 

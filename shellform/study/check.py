@@ -3,46 +3,44 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from shellform.errors import InputError
 from shellform.net.chebyshev import pull_net
 from shellform.net.files import net_document, save_net
-from shellform.study.case import load_case, write_text
-from shellform.study.run import Report, net_summary, read_surface
+from shellform.study.case import SurfaceEntry, load_case, write_text
+from shellform.study.run import Report, net_summary, surface_of, surface_summary, told_size
+from shellform.surface.reading import FORMATS, kind_of
 from shellform.surface.target import largest_curvature
 
 _GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
 
 
-def check_file(file: Path, *, unit: str | None, allow_scripts: bool) -> dict[str, str]:
-    """What a surface file or a case's surface is, as labelled lines."""
+def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> dict[str, str]:
+    """What a surface file or a case's surface is, as labelled lines; `options` are the entries of [surface] in a case.
+
+    For a case they take the place of its own.
+    """
     case = load_case(file) if file.suffix.lower() == ".toml" else None
-    entry = case.surface if case else None
-    path = Path(entry.file) if entry else file
-    if not path.is_file():
-        raise InputError("there is no such file", where=str(path))
-    surface = read_surface(
-        path,
-        unit=entry.unit if entry else unit,
-        up=entry.up if entry else "z",
-        size=entry.size if entry else None,
-        dimensions=entry.dimensions if entry else None,
-        allow_scripts=allow_scripts,
-    )
-    x, y, z = surface.size
+    entry = surface_entry(file, options) if case is None else surface_entry(None, {**case.surface.model_dump(), **options})
+    path = Path(entry.file)
+    surface = surface_of(entry, allow_scripts=allow_scripts)
     bent = largest_curvature(surface)
     told = {
         "surface": str(path),
-        "format": path.suffix,
-        "size": f"{x:.4g} × {y:.4g} × {z:.4g} m (is the unit right?)",
+        "format": "builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
+        "unit": _unit(path, entry.unit),
+        "size": told_size(surface),
         "area": f"{surface.area:.4g} m²",
         "triangles": str(len(surface.triangles)),
         "holes": str(surface.holes),
-        "mended": "; ".join(surface.mended) or "nothing",
+        "mended": "nothing" if not surface.mended else surface.mended[0],
+        **{f"mended {k}": text for k, text in enumerate(surface.mended[1:], 2)},
         "largest curvature": f"{bent:.3g} 1/m, radius {1.0 / bent:.3g} m" if bent > 0.0 else "none",
     }
     if case:
@@ -56,21 +54,45 @@ def check_file(file: Path, *, unit: str | None, allow_scripts: bool) -> dict[str
     return told
 
 
+def surface_entry(file: Path | None, options: Mapping[str, Any]) -> SurfaceEntry:
+    """The [surface] entry of a file with options as a case has them. Raises InputError naming the option that is wrong."""
+    given = {**({} if file is None else {"file": str(file)}), **options}
+    try:
+        entry = SurfaceEntry.model_validate(given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(["surface", *(str(part) for part in first["loc"])])
+        raise InputError(str(first["msg"]).lower(), where=where, value=first["input"]) from error
+    if not Path(entry.file).is_file():
+        raise InputError("there is no such file", where=entry.file)
+    return entry
+
+
+def _unit(path: Path, stated: str | None) -> str:
+    if path.suffix == ".py":
+        return "m"
+    if kind_of(path) in ("step", "iges", "3dm"):
+        return "the file's own"
+    return stated or "m, as none is stated (--unit)"
+
+
 def net_alone(
     file: Path,
     folder: Path,
+    options: Mapping[str, Any],
     *,
     spacing: float,
-    unit: str | None,
     angle: float,
     gap: float | None,
     allow_scripts: bool,
     report: Report,
 ) -> dict[str, Any]:
-    """Writes net.json, net.npz and summary.json of the net on a surface file; returns the net's summary."""
-    if not file.is_file():
-        raise InputError("there is no such file", where=str(file))
-    surface = read_surface(file, unit=unit, allow_scripts=allow_scripts)
+    """Writes net.json, net.npz and summary.json of the net on a surface file; returns the surface's size and the net's summary.
+
+    `options` are the entries of [surface] in a case.
+    """
+    surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
+    report("surface", f"size {told_size(surface)}")
     net = pull_net(
         surface,
         spacing=spacing,
@@ -85,7 +107,6 @@ def net_alone(
         raise InputError(f"can't be written: {error}", where=str(folder)) from error
     save_net(folder / "net.npz", net)
     write_text(folder / "net.json", json.dumps(net_document(net)))
-    head = {"source": str(file), "area": surface.area, "size": surface.size.tolist(), "triangles": len(surface.triangles)}
-    document = {"format": "shellform-summary", "version": 1, "surface": head, "net": told}
+    document = {"format": "shellform-summary", "version": 1, "surface": surface_summary(surface, str(file)), "net": told}
     write_text(folder / "summary.json", json.dumps(document, indent=1))
-    return told
+    return {"size": told_size(surface), **told}

@@ -33,7 +33,7 @@ from shellform.structure.equilibrium import Equilibrium
 from shellform.structure.loading import Loaded
 from shellform.structure.model import Model, write_model
 from shellform.structure.state import State
-from shellform.study.case import Case, check_script, dump_case, write_text
+from shellform.study.case import Case, SurfaceEntry, check_script, dump_case, write_text
 from shellform.surface.target import Surface
 
 STAGES = ("surface", "net", "initial", "optimise", "figures")
@@ -44,31 +44,48 @@ Report = Callable[[str, str], None]
 """Called with the stage and a line of progress."""
 
 
-def read_surface(
-    file: Path,
-    *,
-    unit: str | None = None,
-    up: str = "z",
-    size: float | None = None,
-    dimensions: Mapping[str, float] | None = None,
-    allow_scripts: bool = False,
-) -> Surface:
-    """The surface of a builder script, a CAD file or a mesh file, whichever the ending says."""
+def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
+    """The surface of a builder script, or of a file in any format, as its entry says."""
+    file = Path(entry.file)
     check_script(file, allow_scripts=allow_scripts)
-    ending = file.suffix.lower()
-    if ending == ".py":
+    if file.suffix.lower() == ".py":
         from shellform.surface import cad
 
-        return cad.build_surface(file, size=_builder_size(file, size, dimensions), **(dimensions or {}))
-    if dimensions:
-        raise InputError("only builder scripts have dimensions", where="surface.dimensions", value=dict(dimensions))
-    if ending in (".step", ".stp", ".iges", ".igs", ".brep", ".brp"):
-        from shellform.surface import cad
+        return cad.build_surface(file, size=_builder_size(file, entry.size, entry.dimensions), **entry.dimensions)
+    if entry.dimensions:
+        raise InputError("only builder scripts have dimensions", where="surface.dimensions", value=entry.dimensions)
+    from shellform.surface.reading import read_surface
 
-        return cad.import_surface(file, unit=unit, size=size, up=up)
-    from shellform.surface import meshes
+    return read_surface(
+        file,
+        unit=entry.unit,
+        up=entry.up,
+        size=entry.size,
+        layer=entry.layer,
+        name=entry.object,
+        face=entry.face,
+        piece=entry.piece,
+        fill=entry.fill,
+        ground=entry.ground,
+    )
 
-    return meshes.read_mesh(file, unit=unit or "m", up=up)
+
+def surface_summary(surface: Surface, source: str) -> dict[str, Any]:
+    """The `surface` part of summary.json."""
+    return {
+        "source": source,
+        "area": surface.area,
+        "size": surface.size.tolist(),
+        "triangles": len(surface.triangles),
+        "holes": surface.holes,
+        "mended": list(surface.mended),
+    }
+
+
+def told_size(surface: Surface) -> str:
+    """The extents in words, so that a wrong unit is seen."""
+    x, y, z = surface.size
+    return f"{x:.4g} × {y:.4g} × {z:.4g} m (is the unit right?)"
 
 
 def _builder_size(file: Path, size: float | None, dimensions: Mapping[str, float] | None) -> float:
@@ -84,7 +101,6 @@ class _Job:
     case: Case
     folder: Path
     report: Report
-    allow_scripts: bool
 
     def path(self, name: str) -> Path:
         return self.folder / name
@@ -109,23 +125,27 @@ def run_case(
     if not file.is_file():
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
+    keys = _keys(case, file)
+    done = {} if fresh else _read_json(folder / "stages.json")
+    results: dict[str, Any] = {}
+    began = time.perf_counter()
+    if done.get("surface") != keys["surface"]:  # before anything is written: most bad input is a bad surface
+        report("surface", f"reading {file}")
+        results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
+        report("surface", f"size {told_size(results['surface'])}")
     try:
         for part in ("designs", "states", "figures"):
             (folder / part).mkdir(parents=True, exist_ok=True)
         write_text(folder / "case.toml", dump_case(case))
     except OSError as error:
         raise InputError(f"can't be written: {error}", where=str(folder), remedy="Choose another --output.") from error
-    job = _Job(case, folder, report, allow_scripts)
-    keys = _keys(case, file)
-    done = {} if fresh else _read_json(folder / "stages.json")
+    job = _Job(case, folder, report)
     summary = _read_json(folder / "summary.json") if done else {}
     summary = {"format": "shellform-summary", "version": 1, **{k: v for k, v in summary.items() if k != "format"}}
     summary.setdefault("seconds", {})
-    results: dict[str, Any] = {}
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
     reusable = True
     for stage in STAGES[: STAGES.index(until) + 1]:
-        began = time.perf_counter()
         reusable = reusable and done.get(stage) == keys[stage]
         results[stage] = steps[stage](job, results, summary, reusable)
         if not reusable:
@@ -135,6 +155,7 @@ def run_case(
         write_text(folder / "summary.json", json.dumps(summary, indent=1))
         write_text(folder / "stages.json", json.dumps(done))
         report(stage, f"{'kept' if reusable else 'done'} in {time.perf_counter() - began:.1f} s")
+        began = time.perf_counter()
     return summary
 
 
@@ -161,24 +182,9 @@ def _surface(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
     if keep:
         with np.load(store, allow_pickle=False) as data:
             return Surface(data["vertices"], data["triangles"], data["normals"], entry.file)
-    job.report("surface", f"reading {entry.file}")
-    surface = read_surface(
-        Path(entry.file),
-        unit=entry.unit,
-        up=entry.up,
-        size=entry.size,
-        dimensions=entry.dimensions,
-        allow_scripts=job.allow_scripts,
-    )
+    surface: Surface = results["surface"]
     _save_arrays(store, vertices=surface.vertices, triangles=surface.triangles, normals=surface.normals)
-    summary["surface"] = {
-        "source": entry.file,
-        "area": surface.area,
-        "size": surface.size.tolist(),
-        "triangles": len(surface.triangles),
-        "holes": surface.holes,
-        "mended": list(surface.mended),
-    }
+    summary["surface"] = surface_summary(surface, entry.file)
     return surface
 
 

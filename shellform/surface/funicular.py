@@ -12,18 +12,26 @@ pointing up.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import SuperLU, splu
 
-from shellform.arrays import Indices, Reals, flags, indices, reals
+from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
 from shellform.errors import InputError, NotConverged
+
+if TYPE_CHECKING:  # which load gmsh and numba
+    from shellform.surface.target import Surface
 
 _ROUNDS = 200
 _SETTLED = 1e-10  # change of the heights in a round, of the rise
+_CENTRING = 0.1  # of the present complementarity that the next step aims at
+_TO_EDGE = 0.99  # of the way to a bound that a step goes at the most
+_NEAREST = 1e-9  # weight of being uniform in a fit, of the mean diagonal
 _SINGULAR = 1e-12  # of the diagonal: a pivot below that is rounding
 
 
@@ -65,18 +73,23 @@ def thrust_heights(
     are the cotangent weights of the triangles, with which the plan is in equilibrium with itself whatever the mesh; the rise sets their
     scale. Raises InputError where nothing is free or fixed, and NotConverged.
     """
-    if not (np.isfinite(rise) and rise > 0.0):
-        raise InputError("must be positive", where="rise", value=rise)
-    if load not in ("surface", "plan"):
-        raise InputError("must be surface or plan", where="load", value=load)
     place = reals("plan", plan, (None, 2))
     faces = indices("triangles", triangles, (None, 3), below=len(place))
     held = flags("fixed", fixed, (len(place),))
     if held.all() or not held.any():
         which = "every" if held.all() else "no"
         raise InputError(f"{which} vertex is fixed", where="fixed", remedy="Fix the edge, and mesh the plan finer if need be.")
+    return _raised(place, faces, held, *_isotropic_thrust(place, faces), rise, load)
+
+
+def _raised(place: Reals, faces: Indices, held: Flags, ends: Indices, density: Reals, rise: float, load: str) -> Reals:
+    """Heights (v,), m, over a plan in equilibrium with these force densities, for any scale of them: the rise sets it."""
+    if not (np.isfinite(rise) and rise > 0.0):
+        raise InputError("must be positive", where="rise", value=rise)
+    if load not in ("surface", "plan"):
+        raise InputError("must be surface or plan", where="load", value=load)
     free = ~held
-    solver = _definite(_stiffness(len(place), *_isotropic_thrust(place, faces))[free][:, free])
+    solver = _definite(_stiffness(len(place), ends, density)[free][:, free])
     shape = np.column_stack([place, np.zeros(len(place))])
     for _ in range(_ROUNDS):
         raised = np.zeros(len(place))
@@ -93,6 +106,188 @@ def thrust_heights(
         iterations=_ROUNDS,
         remedy="Choose a smaller rise, or mesh the plan more evenly.",
     )
+
+
+def thrust_shell(
+    outline: ArrayLike,
+    *,
+    rise: float,
+    size: float,
+    supports: Sequence[tuple[int, int]] | None = None,
+    openings: Sequence[ArrayLike] = (),
+    load: Literal["surface", "plan"] = "surface",
+    sag: float = 0.1,
+) -> Surface:
+    """A shell over a plan that bears a uniform weight by thrust alone, meshed at about `size`, m.
+
+    The `outline` (k, 2), m, runs counterclockwise. It stands on the ground from corner i to corner j for each of the `supports` (i, j),
+    numbered from 0, or all along where they are left out. Between supports it is free: an arch along the edge bears the thrust of the
+    shell, and its plan draws inwards by about `sag` of its span; so do the edges of the `openings`, plan polygons, which are rings. The
+    plan's branches have the cotangent weights of its triangles as force densities, the arches those that a cable of that sag has; all
+    coordinates are then in equilibrium. `rise` and `load` as in `thrust_heights`. Raises InputError for plans that carry no shell.
+    """
+    from shellform.surface import cad
+    from shellform.surface.target import make_surface
+
+    corners = reals("outline", outline, (None, 2))
+    if len(corners) < 3 or _turning(corners) <= 0.0:
+        raise InputError("must be at least three corners, counterclockwise", where="outline", value=corners.tolist())
+    if not 0.0 < sag < 0.5:
+        raise InputError("must be above 0 and below 0.5", where="sag", value=sag, remedy="0.1 is usual.")
+    if not (np.isfinite(size) and size > 0.0):
+        raise InputError("must be a positive length", where="size", value=size)
+    line, corner = _divided(corners, size)
+    stands = np.ones(len(line), dtype=bool) if supports is None else _standing(supports, corner, len(line))
+    rings = [_divided(reals("openings", each, (None, 2)), size)[0] for each in openings]
+    rings = [ring if _turning(ring) > 0.0 else ring[::-1] for ring in rings]
+    inside, faces = cad.mesh_plan([line, *rings], size=size)
+    plan = np.vstack([line, *rings, inside])
+    held = np.zeros(len(plan), dtype=bool)
+    held[: len(line)] = stands
+    ends, density = _isotropic_thrust(plan, faces)
+    arches, pull = _arches(line, stands, rings, sag)
+    ends, density = np.vstack([ends, arches]), np.concatenate([density, pull])
+    flat = np.column_stack([plan, np.zeros(len(plan))])
+    drawn = force_density(flat, ends, density, np.zeros_like(flat), held)[:, :2]
+    first, second = drawn[faces[:, 1]] - drawn[faces[:, 0]], drawn[faces[:, 2]] - drawn[faces[:, 0]]
+    if (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] <= 0.0).any():
+        raise InputError("the plan folds where its free edges draw in", where="sag", value=sag, remedy="Choose a smaller sag, or longer supports.")
+    heights = _raised(drawn, faces, held, ends, density, rise, load)
+    return make_surface(np.column_stack([drawn, heights]), faces, source="thrust shell")
+
+
+def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least: float = 0.05) -> Surface:
+    """The thrust shell nearest to a wished-for `surface` under its own uniform weight, with the same plan of branches.
+
+    Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held. The force densities are those
+    that leave the least unbalanced force on the surface as it is, none below `least` of their mean, so that all stays in compression.
+    Raises InputError where nothing is held.
+    """
+    from shellform.surface.target import make_surface
+
+    points, faces = surface.vertices, surface.triangles
+    level = float(points[:, 2].min()) if ground is None else ground
+    held = np.zeros(len(points), dtype=bool)
+    edge = np.concatenate(surface.boundary)
+    held[edge] = points[edge, 2] < level + 0.01 * (float(points[:, 2].max()) - level)
+    if not held.any():
+        raise InputError("nothing of its edge stands on the ground", where="ground", value=ground, remedy="State its height.")
+    edges = np.unique(np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
+    weight = np.column_stack([np.zeros((len(points), 2)), -_tributary_areas(points, faces)])
+    density = fitted_densities(points, edges, weight, held, least=least)
+    return make_surface(force_density(points, edges, density, weight, held), faces, source=f"thrust shell near {surface.source}")
+
+
+def fitted_densities(
+    nodes: ArrayLike, edges: ArrayLike, loads: ArrayLike, fixed: ArrayLike, *, least: float = 0.05
+) -> Reals:
+    """Force densities (m,), N/m, all in compression (negative), with which the network as it stands is nearest to equilibrium.
+
+    They minimise the squared unbalanced forces on the free `nodes` (n, 3), m, under `loads` (n, 3), N, with the size of each at least
+    `least` times that of the uniform density that fits best; of many such, those nearest to uniform. Arguments as in `force_density`.
+    Raises InputError where no compression bears the loads better than none.
+    """
+    place = reals("nodes", nodes, (None, 3))
+    ends = indices("edges", edges, (None, 2), below=len(place))
+    load = reals("loads", loads, (len(place), 3))
+    free = ~flags("fixed", fixed, (len(place),))
+    across = place[ends[:, 1]] - place[ends[:, 0]]
+    columns = np.tile(np.arange(len(ends)), 2)
+    rows = ends.T.ravel()
+    # Compression of size q pushes node a along x_a - x_b and node b the other way: the force on the nodes is B q + p.
+    blocks = [sp.csr_array((np.concatenate([-across[:, k], across[:, k]]), (rows, columns)), shape=(len(place), len(ends))) for k in range(3)]
+    push = sp.vstack([block[free] for block in blocks]).tocsc()
+    right = -np.concatenate([load[free, k] for k in range(3)])
+    even = push.sum(axis=1)
+    uniform = float(even @ right / (even @ even)) if even.any() else 0.0
+    if not uniform > 0.0:
+        raise InputError("no compression bears the loads", where="loads", remedy="Check that they press on the shell from outside.")
+    normal = push.T @ push
+    nearest = _NEAREST * float(normal.diagonal().mean())
+    matrix = sp.csc_array(normal + nearest * sp.eye_array(len(ends)))
+    return -_bounded(matrix, push.T @ right + nearest * uniform, least * uniform)
+
+
+def _bounded(matrix: sp.csc_array, right: Reals, least: float) -> Reals:
+    """The minimum of x'Ax/2 - b'x with all x at least `least`, by a primal-dual interior-point method (Wright 1997)."""
+    target = right - matrix @ np.full(len(right), least)
+    x = np.full(len(right), least)
+    push = np.full(len(right), np.abs(target).max())  # multipliers of x >= 0
+    scale = float(x @ push)
+    for _ in range(_ROUNDS):
+        centre = _CENTRING * float(x @ push) / len(x)
+        residual = matrix @ x - target - push
+        step = splu(sp.csc_array(matrix + sp.diags_array(push / x))).solve(-residual - push + centre / x)
+        turn = centre / x - push - push / x * step
+        x = x + _share(x, step) * step
+        push = push + _share(push, turn) * turn
+        if float(x @ push) < _SETTLED * scale and np.abs(residual).max() < _SETTLED * np.abs(target).max():
+            return x + least
+    raise NotConverged(
+        "the force densities don't settle", state=x + least, residual=float(x @ push), iterations=_ROUNDS, remedy="Raise least."
+    )
+
+
+def _share(value: Reals, step: Reals) -> float:
+    """How much of a step keeps values positive."""
+    down = step < 0.0
+    return min(1.0, _TO_EDGE * float((-value[down] / step[down]).min())) if down.any() else 1.0
+
+
+def _turning(polygon: Reals) -> float:
+    """Twice the area, m², of a closed polygon, positive counterclockwise."""
+    after = np.roll(polygon, -1, axis=0)
+    return float(np.sum(polygon[:, 0] * after[:, 1] - polygon[:, 1] * after[:, 0]))
+
+
+def _divided(polygon: Reals, size: float) -> tuple[Reals, Indices]:
+    """A closed polygon's points (n, 2) about `size` apart, and the places of its corners among them."""
+    points: list[Reals] = []
+    corner: list[int] = []
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        corner.append(len(points))
+        count = max(1, round(float(np.linalg.norm(b - a)) / size))
+        points += [a + (b - a) * k / count for k in range(count)]
+    return np.array(points), np.array(corner)
+
+
+def _standing(supports: Sequence[tuple[int, int]], corner: Indices, count: int) -> Flags:
+    held = np.zeros(count, dtype=bool)
+    for i, j in supports:
+        if not (0 <= i < len(corner) and 0 <= j < len(corner)):
+            remedy = f"Corners run from 0 to {len(corner) - 1}."
+            raise InputError("names a corner that isn't there", where="supports", value=(i, j), remedy=remedy)
+        length = int((corner[j] - corner[i]) % count)
+        held[(corner[i] + np.arange(length + 1)) % count] = True
+    if held.sum() < 2:
+        raise InputError("hold the shell in fewer than two points", where="supports", value=list(supports), remedy="Support more.")
+    return held
+
+
+def _arches(line: Reals, stands: Flags, rings: Sequence[Reals], sag: float) -> tuple[Indices, Reals]:
+    """Branches (m, 2) along free edges and their force densities (m,), for a thrust of 1 N/m in the shell.
+
+    An edge of span L that sags by f bears a pull of 1 N/m with a force of L²/8f; a ring of radius R with R.
+    """
+    ends, density = [np.zeros((0, 2), dtype=np.int64)], [np.zeros(0)]
+    count = len(line)
+    start = int(np.argmax(stands))
+    order = np.append((start + np.arange(count)) % count, start)
+    feet = np.flatnonzero(stands[order])
+    for a, b in pairwise(feet.tolist()):
+        if b - a < 2:
+            continue
+        mine = np.column_stack([order[a:b], order[a + 1 : b + 1]])
+        span = float(np.linalg.norm(line[order[b]] - line[order[a]]))
+        ends.append(mine)
+        density.append(span / (8.0 * sag) / np.linalg.norm(line[mine[:, 1]] - line[mine[:, 0]], axis=1))
+    for ring in rings:
+        mine = count + np.column_stack([np.arange(len(ring)), np.roll(np.arange(len(ring)), -1)])
+        length = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+        ends.append(mine)
+        density.append(float(length.sum()) / (2.0 * np.pi) / length)
+        count += len(ring)
+    return np.vstack(ends), np.concatenate(density)
 
 
 def _stiffness(count: int, ends: Indices, density: Reals) -> sp.csr_array:

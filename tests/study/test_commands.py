@@ -108,6 +108,33 @@ def test_bad_surfaces_and_cases_are_refused_without_a_traceback(tmp_path):
     refused(shellform("net", own, "--spacing", 0.1, "--output", tmp_path / "net"), "--allow-scripts")
 
 
+def test_check_takes_what_a_file_leaves_open_and_tells_what_was_mended(tmp_path):
+    standing = shellform("check", "surfaces/hypar.obj", "--unit", "cm", "--up", "y")
+    assert standing.returncode == 0, standing.stderr
+    assert "0.05 × 0.03 × 0.05 m (is the unit right?)" in standing.stdout
+    closed = shellform("check", "tests/data/rhinovault_holes.json", "--fill", "all")
+    assert "1 holes were closed" in closed.stdout
+    assert "COMPAS JSON" in closed.stdout
+    one = shellform("check", "tests/data/tna_tutorial.3dm", "--object", "mesh 1")
+    assert "0.01 × 0.01 × 0 m" in one.stdout
+    refused(shellform("check", "surfaces/hypar.obj", "--piece", 2), "surface.piece", "There are 1")
+    refused(shellform("check", "surfaces/hypar.obj", "--piece", 0), "surface.piece")
+    refused(shellform("check", "surfaces/hypar.obj", "--up", "x"), "surface.up")
+
+
+def test_a_refused_surface_leaves_nothing_behind(tmp_path):
+    bad = tmp_path / "bad.stl"
+    bad.write_text("solid cut off\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n")
+    case = tmp_path / "case.toml"
+    text = (ROOT / "scripts/scale_model.toml").read_text(encoding="utf-8").replace("../surfaces/vault.py", "bad.stl")
+    before, _, after = text.partition("[surface.dimensions]")
+    case.write_text(before + after[after.index("[net]") :], encoding="utf-8")
+    refused(shellform("net", bad, "--spacing", 0.5, "--output", tmp_path / "net"), "bad.stl")
+    refused(shellform("design", case, "--output", tmp_path / "run"), "bad.stl")
+    refused(shellform("check", bad), "bad.stl")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.stl", "case.toml"]
+
+
 def test_net_alone_writes_the_contract_s_file_for_a_mesh(tmp_path):
     result = shellform("net", "surfaces/hypar.obj", "--spacing", 0.5, "--angle", 20, "--output", tmp_path)
     assert result.returncode == 0, result.stderr

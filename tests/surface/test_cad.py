@@ -253,7 +253,7 @@ def test_files_that_hold_no_open_surface_are_refused_with_what_to_do(tmp_path):
         cad.import_surface(DATA / "dome_mm.brep", unit="furlong")
     box = "def build(gmsh, *, side=1.0): gmsh.model.occ.addBox(0, 0, 0, side, side, side)\n"
     cad.write_cad(tmp_path / "box.step", script(tmp_path, box))
-    with pytest.raises(InputError, match=r"holds a solid\. Export the upper face"):
+    with pytest.raises(InputError, match=r"holds a solid\. Choose its upper or lower face"):
         cad.import_surface(tmp_path / "box.step")
     edge = "def build(gmsh, *, side=1.0): gmsh.model.occ.addCircle(0, 0, 0, side)\n"
     cad.write_cad(tmp_path / "edge.brep", script(tmp_path, edge))

@@ -1,13 +1,24 @@
 """Force densities against closed forms (verification.md, E), and shells that bear a uniform weight by thrust alone."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial import Delaunay
 
 from shellform.errors import InputError, NotConverged
-from shellform.surface import funicular
-from shellform.surface.funicular import force_density, thrust_heights
+from shellform.surface import cad, funicular
+from shellform.surface.funicular import (
+    fitted_densities,
+    force_density,
+    nearest_thrust_shell,
+    thrust_heights,
+    thrust_shell,
+)
+from shellform.surface.reading import read_surface
+
+SURFACES = Path(__file__).parent.parent.parent / "surfaces"
 
 
 def line(count, load):
@@ -151,3 +162,137 @@ def test_a_shell_that_still_changes_is_not_given_out(monkeypatch):
         thrust_heights(*disc(6), rise=1.0)
     assert stopped.value.iterations == 2
     assert stopped.value.state.shape[1] == 3
+
+
+SQUARE = [(-4, -5), (4, -5), (5, -4), (5, 4), (4, 5), (-4, 5), (-5, 4), (-5, -4)]
+CORNERS = [(1, 2), (3, 4), (5, 6), (7, 0)]
+
+
+def test_a_shell_that_stands_all_round_is_the_one_of_its_plan():
+    turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    shell = thrust_shell(np.column_stack([3 * np.cos(turn), 2 * np.sin(turn)]), rise=1.0, size=0.3)
+    edge = np.zeros(len(shell.vertices), dtype=bool)
+    edge[shell.boundary[0]] = True
+    np.testing.assert_allclose(shell.vertices[edge, 2], 0.0, atol=1e-12)
+    assert shell.size[2] == pytest.approx(1.0, rel=1e-12)
+    inside = thrust_heights(shell.vertices[:, :2], shell.triangles, edge, rise=1.0)
+    np.testing.assert_allclose(shell.vertices[:, 2], inside, atol=1e-9)
+
+
+def test_free_edges_stand_up_as_arches_that_draw_in_by_their_sag():
+    shell = thrust_shell(SQUARE, supports=CORNERS, rise=3.0, size=0.4, sag=0.1)
+    edge = shell.vertices[shell.boundary[0]]
+    front = edge[(edge[:, 1] < -3.0) & (np.abs(edge[:, 0]) < 3.9)]
+    crown = front[np.argmin(np.abs(front[:, 0]))]
+    assert 0.05 * 8 < crown[1] + 5.0 < 0.13 * 8
+    assert 0.5 < crown[2] < 2.5
+    assert front[:, 2].max() == pytest.approx(crown[2], abs=0.01)
+    feet = edge[edge[:, 2] < 1e-9]
+    assert len(feet) == 4 * (1 + round(2**0.5 / 0.4))
+    assert shell.normals[:, 2].min() > 0.3
+
+
+def test_an_opening_stays_open_on_its_ring():
+    turn = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    hole = np.column_stack([0.8 * np.cos(-turn), 0.8 * np.sin(-turn)])
+    shell = thrust_shell(SQUARE, supports=CORNERS, rise=3.0, size=0.4, openings=[hole])
+    assert shell.holes == 1
+    rim = shell.vertices[shell.boundary[1]]
+    assert rim[:, 2].min() > 2.5
+    assert np.hypot(rim[:, 0], rim[:, 1]).mean() == pytest.approx(0.8, abs=0.25)
+
+
+def test_a_load_of_the_plan_needs_no_rounds_and_gives_a_flatter_foot():
+    by_surface, by_plan = (thrust_shell(SQUARE, rise=3.0, size=0.5, load=load) for load in ("surface", "plan"))
+    assert by_plan.vertices[:, 2].mean() != pytest.approx(by_surface.vertices[:, 2].mean(), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"outline": SQUARE[::-1]}, "counterclockwise"),
+        ({"outline": SQUARE[:2]}, "at least three corners"),
+        ({"sag": 0.6}, "sag"),
+        ({"size": 0.0}, "size"),
+        ({"rise": -1.0}, "rise"),
+        ({"supports": [(0, 9)]}, "corner that isn't there"),
+        ({"supports": [(0, 0)]}, "fewer than two points"),
+        ({"openings": [[(4, 4), (9, 4), (9, 9), (4, 9)]]}, "outline can't be meshed"),
+        ({"supports": [(0, 0), (4, 4)], "sag": 0.49}, "plan folds"),
+    ],
+)
+def test_plans_for_a_shell_that_make_no_sense_are_refused(change, words):
+    with pytest.raises(InputError, match=words):
+        thrust_shell(**{"outline": SQUARE, "supports": CORNERS, "rise": 3.0, "size": 0.5, **change})
+
+
+def test_fitted_densities_bear_a_shape_that_some_densities_bear():
+    rng = np.random.default_rng(3)
+    plan, triangles, fixed = disc(6)
+    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    loads = np.column_stack([np.zeros((len(plan), 2)), -rng.uniform(0.5, 1.0, len(plan))])
+    flat = np.column_stack([plan, np.zeros(len(plan))])
+    shape = force_density(flat, edges, -rng.uniform(1.0, 3.0, len(edges)), loads, fixed)
+    found = fitted_densities(shape, edges, loads, fixed)
+    assert (found < 0.0).all()
+    np.testing.assert_allclose(force_density(shape, edges, found, loads, fixed), shape, atol=1e-6)
+    with pytest.raises(InputError, match="no compression"):
+        fitted_densities(shape, edges, -loads, fixed)
+
+
+def test_no_density_falls_below_the_least_where_the_shape_asks_for_tension():
+    # A crown with a dent: in equilibrium with tension only.
+    plan, triangles, fixed = disc(6)
+    radius = np.hypot(*plan.T)
+    shape = np.column_stack([plan, (1 - radius**2) * (0.4 + radius**2)])
+    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    loads = np.column_stack([np.zeros((len(plan), 2)), -np.ones(len(plan))])
+    found = fitted_densities(shape, edges, loads, fixed, least=0.1)
+    least = -found.max()
+    assert least > 0.0
+    assert (np.isclose(-found, least, rtol=1e-6)).sum() > 5
+
+
+def test_densities_that_do_not_settle_are_not_given_out(monkeypatch):
+    monkeypatch.setattr(funicular, "_ROUNDS", 2)
+    plan, triangles, fixed = disc(4)
+    shape = np.column_stack([plan, 1 - (plan**2).sum(axis=1)])
+    loads = np.column_stack([np.zeros((len(plan), 2)), -np.ones(len(plan))])
+    with pytest.raises(NotConverged, match="don't settle"):
+        fitted_densities(shape, triangles[:, :2], loads, fixed)
+
+
+def test_the_thrust_shell_nearest_to_one_is_itself_and_to_a_dome_is_near():
+    dome = cad.build_surface(SURFACES / "dome.py", size=0.05)
+    near = nearest_thrust_shell(dome)
+    away = np.linalg.norm(near.vertices - dome.vertices, axis=1).max()
+    assert away < 2e-3
+    edge = dome.vertices[:, 2] < 1e-9
+    same = thrust_heights(dome.vertices[:, :2], dome.triangles, edge, rise=0.2)
+    assert away < 0.5 * np.abs(same - dome.vertices[:, 2]).max()
+    again = nearest_thrust_shell(near)
+    np.testing.assert_allclose(again.vertices, near.vertices, atol=0.2 * away)
+    with pytest.raises(InputError, match="stands on the ground"):
+        nearest_thrust_shell(dome, ground=-5.0)
+
+
+@pytest.mark.parametrize("ending", ["step", "igs", "brep"])
+def test_a_thrust_shell_written_as_cad_comes_back_within_a_thousandth(tmp_path, ending):
+    shell = thrust_shell(SQUARE, supports=CORNERS, rise=3.0, size=0.5)
+    off = cad.write_fitted(tmp_path / f"shell.{ending}", shell)
+    assert 0.0 < off < 1e-3 * 10
+    back = read_surface(tmp_path / f"shell.{ending}")
+    np.testing.assert_allclose(back.size, shell.size, atol=0.02)
+    assert back.area == pytest.approx(shell.area, rel=3e-3)
+
+
+def test_what_one_b_spline_can_not_be_is_not_written(tmp_path):
+    shell = thrust_shell(SQUARE, rise=3.0, size=0.5)
+    with pytest.raises(NotConverged, match="m off"):
+        cad.write_fitted(tmp_path / "shell.step", shell, within=1e-9)
+    with pytest.raises(InputError, match="isn't a CAD file"):
+        cad.write_fitted(tmp_path / "shell.obj", shell)
+    hole = thrust_shell(SQUARE, rise=3.0, size=0.5, openings=[[(-1, -1), (1, -1), (1, 1), (-1, 1)]])
+    with pytest.raises(InputError, match="has openings"):
+        cad.write_fitted(tmp_path / "shell.step", hole)
+    assert not list(tmp_path.iterdir())

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from shellform.surface import cad, meshes
+from shellform.surface import cad
+from shellform.surface.reading import read_surface
 from shellform.surface.target import curvature
 
 SURFACES = Path(__file__).parent.parent.parent / "surfaces"
@@ -95,7 +96,7 @@ def test_the_shipped_step_file_is_the_dome():
 
 
 def test_the_shipped_obj_file_is_a_hyperbolic_paraboloid_in_metres():
-    surface = meshes.read_mesh(SURFACES / "hypar.obj")
+    surface = read_surface(SURFACES / "hypar.obj")
     np.testing.assert_allclose(surface.size, [5.0, 5.0, 3.0], rtol=1e-9)
     inner = away_from_edge(surface, 0.7)
     assert (curvature(surface)[inner].prod(axis=1) < 0.0).all()

@@ -8,9 +8,10 @@ import pytest
 from scipy.spatial import Delaunay
 
 from shellform.errors import InputError
-from shellform.surface import cad, meshes
+from shellform.surface import cad
 from shellform.surface.funicular import force_density
 from shellform.surface.locate import Locator
+from shellform.surface.reading import read_surface
 from shellform.surface.target import curvature, make_surface
 
 ROOT = Path(__file__).parent.parent.parent
@@ -125,9 +126,9 @@ def test_what_is_no_surface_is_refused_with_a_reason(tmp_path):
     ]:
         (tmp_path / name).write_text(content)
         with pytest.raises(InputError):
-            meshes.read_mesh(tmp_path / name)
+            read_surface(tmp_path / name)
     with pytest.raises(InputError, match="no such file"):
-        meshes.read_mesh(tmp_path / "missing.obj")
+        read_surface(tmp_path / "missing.obj")
 
 
 def test_meshes_that_no_shell_can_be_are_refused():
@@ -151,7 +152,7 @@ def test_duplicate_vertices_and_flipped_faces_are_mended_and_said():
 
 
 def test_the_shipped_hypar_is_read_and_keeps_its_vertices():
-    surface = meshes.read_mesh(ROOT / "surfaces/hypar.obj")
+    surface = read_surface(ROOT / "surfaces/hypar.obj")
     np.testing.assert_allclose(surface.size, [5.0, 5.0, 3.0], atol=0.01)
 
 

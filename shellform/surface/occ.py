@@ -1,0 +1,186 @@
+"""Gmsh's one global session, and the mesh of the faces in it with their CAD normals; the door to gmsh."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError, ShellformError
+from shellform.surface.draft import MOST_TRIANGLES
+from shellform.surface.units import turned_up
+
+if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
+    from shellform.surface.target import Surface
+
+try:
+    import gmsh
+except (ImportError, OSError) as error:  # a shared library that gmsh's wheel needs isn't there
+    raise InputError(
+        f"gmsh can't be loaded: {error}",
+        remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
+    ) from error
+
+_AGREES = 0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
+_SAMPLES = 33  # points on a curve that tell its extent
+
+
+@contextlib.contextmanager
+def session() -> Iterator[None]:
+    """Gmsh's one global session, quiet, without its signal handlers, and repeatable."""
+    if gmsh.isInitialized():
+        raise InputError("gmsh is already in use in this process", remedy="Call gmsh.finalize() first.")
+    gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
+    try:
+        for name, value in [
+            ("General.Terminal", 0),
+            ("General.NumThreads", 1),
+            ("Mesh.RandomSeed", 1),
+            ("Mesh.Algorithm", 6),
+            ("Mesh.MeshSizeExtendFromBoundary", 0),
+            ("Mesh.MeshSizeFromPoints", 0),
+        ]:
+            gmsh.option.setNumber(name, value)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "M")
+        gmsh.model.add("surface")
+        yield
+    finally:
+        gmsh.finalize()
+
+
+@contextlib.contextmanager
+def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
+    """Gmsh raises plain exceptions with its last message; scripts raise anything. The user gets a sentence."""
+    try:
+        yield
+    except ShellformError:
+        raise
+    except Exception as error:
+        said = str(error) if type(error) is Exception else f"{type(error).__name__}: {error}"
+        raise InputError(f"{what}: {said.rstrip('.')}", where=str(path), remedy=remedy) from error
+
+
+@contextlib.contextmanager
+def silence() -> Iterator[None]:
+    """Nothing on standard output: OpenCASCADE writes there past Python and past gmsh's own setting."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    try:
+        with open(os.devnull, "wb") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def extent() -> Reals:
+    """The extents (3,), m, of the model's curves along x, y and z: gmsh's own boxes are those of the control points."""
+    ends = [np.reshape(gmsh.model.getValue(0, point, []), (-1, 3)) for _, point in gmsh.model.getEntities(0)]
+    for _, curve in gmsh.model.getEntities(1):
+        low, high = (float(bound[0]) for bound in gmsh.model.getParametrizationBounds(1, curve))
+        ends.append(np.reshape(gmsh.model.getValue(1, curve, np.linspace(low, high, _SAMPLES)), (-1, 3)))
+    if not ends:  # a discrete surface of nothing but triangles
+        return np.asarray(np.ptp(np.reshape(gmsh.model.getBoundingBox(-1, -1), (2, 3)), axis=0))
+    return np.asarray(np.ptp(np.vstack(ends), axis=0))
+
+
+def mesh_faces(
+    size: float, where: Path, side: str | None = None, up: str = "z"
+) -> tuple[Reals, Indices, Reals | None]:
+    """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's faces.
+
+    Of a solid, only the triangles of its upper or lower `side`.
+    """
+    if not (size > 0.0 and math.isfinite(size)):
+        raise InputError("must be a positive length", where="surface.size", value=size)
+    if not gmsh.model.getEntities(2):
+        raise InputError("makes no surface", where=str(where), remedy="See surfaces/dome.py.")
+    spans = np.sort(extent())
+    if 2.5 * spans[2] * spans[1] / size**2 > MOST_TRIANGLES:
+        raise InputError(
+            f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × {spans[1]:.3g} m",
+            where="surface.size",
+            value=size,
+            remedy="Choose a larger mesh size, or check the surface's unit.",
+        )
+    gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+    gmsh.model.mesh.generate(2)
+    tags, coordinates, _ = gmsh.model.mesh.getNodes()
+    number = np.full(int(tags.max()) + 1, -1)
+    number[tags] = np.arange(len(tags))
+    points = coordinates.reshape(-1, 3)
+    triangles, normals = {}, np.zeros_like(points)
+    for _, face in gmsh.model.getEntities(2):
+        _, nodes = gmsh.model.mesh.getElementsByType(2, face)
+        triangles[face] = number[nodes.reshape(-1, 3)]
+        if not len(triangles[face]):
+            raise InputError(f"gmsh made no triangles of its face {face}", where=str(where), remedy="Check the surface.")
+    if side is not None and gmsh.model.getEntities(3):
+        triangles = _on_side(points, triangles, side, up, where)
+    for face, mine in triangles.items():
+        _add_normals(normals, points, mine, face, number)
+    faces = np.vstack(list(triangles.values()))
+    length = np.linalg.norm(normals, axis=1)  # zero where no face knows it
+    used = np.zeros(len(points), dtype=bool)
+    used[faces.ravel()] = True
+    points, faces = points[used], (np.cumsum(used) - 1)[faces]
+    normals, known = normals[used], length[used] > 0.5
+    if not known.any():
+        return points, faces, None
+    if not known.all():
+        estimated = made(points, faces, None, str(where))
+        from scipy.spatial import cKDTree
+
+        normals[~known] = estimated.normals[cKDTree(estimated.vertices).query(points[~known])[1]]
+    return points, faces, normals
+
+
+def _on_side(points: Reals, triangles: dict[int, Indices], side: str, up: str, where: Path) -> dict[int, Indices]:
+    """The triangles of a solid's skin on one side, by their CAD faces."""
+    from shellform.surface.mend import turned_alike
+    from shellform.surface.sides import side_of
+
+    whole = np.vstack(list(triangles.values()))
+    kept = side_of(turned_up(points, up), turned_alike(whole, str(where)), side, str(where))
+    ends = np.cumsum([len(each) for each in triangles.values()])[:-1]
+    chosen = zip(triangles, np.split(whole, ends), np.split(kept, ends), strict=True)
+    return {face: mine[mask] for face, mine, mask in chosen if mask.any()}
+
+
+def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, number: Indices) -> None:
+    """Adds the CAD normals at the face's nodes, turned to the side of its triangles or, where another face came first, to its."""
+    tags, _, parameters = gmsh.model.mesh.getNodes(2, face, includeBoundary=True, returnParametricCoord=True)
+    if not len(triangles) or len(parameters) != 2 * len(tags):
+        return
+    exact = np.reshape(gmsh.model.getNormal(face, parameters), (-1, 3))
+    corner = points[triangles]
+    rough = np.zeros_like(points)
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    for k in range(3):
+        np.add.at(rough, triangles[:, k], across)
+    rows = number[tags]
+    seen = rough[rows]
+    seen /= np.maximum(np.linalg.norm(seen, axis=1, keepdims=True), 1e-300)
+    agreement = np.sum(exact * seen, axis=1)
+    # At a pole the CAD normal means nothing: it stays zero here, unless another face knows it.
+    good = np.isfinite(exact).all(axis=1) & (np.abs(agreement) > _AGREES)
+    signed = np.where(good[:, None], exact * np.sign(agreement)[:, None], 0.0)
+    rest, first = np.unique(rows, return_index=True)
+    mine = signed[first]
+    # Two faces of a script need not turn the same way; make_surface turns all upwards, so only the sum has to agree.
+    normals[rest] += np.where(np.sum(normals[rest] * mine, axis=1, keepdims=True) < 0.0, -mine, mine)
+
+
+def made(points: Reals, triangles: Indices, normals: Reals | None, source: str) -> Surface:
+    from shellform.surface.target import make_surface
+
+    return make_surface(points, triangles, normals=normals, source=source)

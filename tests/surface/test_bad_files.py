@@ -1,0 +1,254 @@
+"""What no shell can be read from is refused with a message that says what is wrong and what to do; foreign readers can't take us down."""
+
+import json
+import os
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+
+from shellform.errors import InputError
+from shellform.surface import cad, draft, foreign, reading
+from shellform.surface.reading import read_surface
+from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl
+
+ROOT = Path(__file__).parent.parent.parent
+DATA = ROOT / "tests/data"
+POINTS, QUADS = cap()
+TRIANGLES = split(QUADS)
+SETTINGS = {"unit": None, "size": None, "up": "z", "layer": "", "name": "", "face": None}
+
+
+def refused(file, *words, **choice):
+    with pytest.raises(InputError) as caught:
+        read_surface(file, **choice)
+    said = str(caught.value)
+    assert str(file) in said or "surface." in said
+    assert caught.value.remedy
+    for word in words:
+        assert word in said, said
+
+
+def every_format(folder):
+    """One good file of each format that isn't a copy of shellform's own."""
+    mesh = pyvista.PolyData(POINTS, np.column_stack([np.full(len(QUADS), 4), QUADS]).ravel())
+    files = [
+        write_obj(folder / "a.obj", POINTS, QUADS),
+        write_off(folder / "a.off", POINTS, QUADS),
+        write_stl(folder / "binary.stl", POINTS, TRIANGLES),
+        write_stl(folder / "text.stl", POINTS, TRIANGLES, text=True),
+        write_gltf(folder / "a.gltf", POINTS, TRIANGLES),
+        write_gltf(folder / "a.glb", POINTS, TRIANGLES),
+    ]
+    (folder / "a.json").write_text(json.dumps(compas_mesh(POINTS, QUADS)))
+    for name, binary in [("a.ply", True), ("text.ply", False), ("a.msh", True), ("text.msh", False)]:
+        kind = {"ply": "ply", "msh": "gmsh"}[name[-3:]]
+        meshio.Mesh(POINTS, [("quad", QUADS)]).write(folder / name, file_format=kind, binary=binary)
+        files.append(folder / name)
+    for name in ("a.vtk", "a.vtp"):
+        mesh.save(folder / name)
+        files.append(folder / name)
+    mesh.cast_to_unstructured_grid().save(folder / "a.vtu")
+    copies = [DATA / name for name in ("dome_mm.step", "dome_mm.igs", "dome_mm.brep", "tna_tutorial.3dm")]
+    return [*files, folder / "a.json", folder / "a.vtu", *copies]
+
+
+def test_files_cut_off_in_the_middle_are_refused_in_every_format(tmp_path):
+    for file in every_format(tmp_path):
+        data = file.read_bytes()
+        half = tmp_path / f"half-{file.name}"
+        half.write_bytes(data[: len(data) * 2 // 5])
+        refused(half)
+
+
+def test_empty_files_and_files_that_are_not_there_are_refused(tmp_path):
+    refused_name = tmp_path / "none.obj"
+    with pytest.raises(InputError, match="there is no such file"):
+        read_surface(refused_name)
+    for ending in reading.ENDINGS:
+        (tmp_path / f"empty{ending}").write_bytes(b"")
+        refused(tmp_path / f"empty{ending}", "is empty")
+
+
+def test_a_file_named_as_what_it_is_not_is_refused_with_its_true_format(tmp_path):
+    for file in every_format(tmp_path):
+        wrong = tmp_path / f"wrong-{file.stem}-{file.suffix[1:]}{'.off' if file.suffix != '.off' else '.stl'}"
+        wrong.write_bytes(file.read_bytes())
+        refused(wrong, "by its content, though its ending is", "Rename it to")
+
+
+def test_junk_is_refused_whatever_its_ending(tmp_path):
+    for ending in reading.ENDINGS:
+        (tmp_path / f"junk{ending}").write_text("this is a letter, not a shell\n")
+        refused(tmp_path / f"junk{ending}")
+    (tmp_path / "letter.txt").write_text("this is a letter, not a shell\n")
+    refused(tmp_path / "letter.txt", "in no format that is read here", ".step")
+    (tmp_path / "shell.3mf").write_bytes(b"PK\x03\x04 and so on")
+    refused(tmp_path / "shell.3mf", "zip archive")
+
+
+def test_files_of_points_or_curves_alone_hold_no_faces(tmp_path):
+    for name, text in [
+        ("points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n"),
+        ("lines.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n"),
+        ("points.off", "OFF\n3 0 0\n0 0 0\n1 0 0\n0 1 0\n"),
+    ]:
+        (tmp_path / name).write_text(text)
+        refused(tmp_path / name, "holds no faces")
+    for name in ("lines.vtk", "lines.ply", "lines.msh"):
+        kind = {"vtk": "vtk", "ply": "ply", "msh": "gmsh"}[name[-3:]]
+        cells = [("line", np.array([[0, 1], [1, 2]]))] if kind != "ply" else [("triangle", np.zeros((0, 3), dtype=int))]
+        meshio.Mesh(POINTS[:3], cells).write(tmp_path / name, file_format=kind)
+        refused(tmp_path / name, "no faces")
+    (tmp_path / "none.json").write_text(json.dumps(compas_mesh(POINTS, QUADS[:0])))
+    refused(tmp_path / "none.json", "holds no faces")
+    (tmp_path / "data.json").write_text('{"spacing": 3}')
+    refused(tmp_path / "data.json", "no COMPAS mesh")
+    pyvista.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "image.vtk")
+    refused(tmp_path / "image.vtk", "no faces")
+    (tmp_path / "table.vtk").write_text(
+        "# vtk DataFile Version 3.0\ntable\nASCII\nDATASET TABLE\nROW_DATA 2\nFIELD FieldData 1\na 1 2 float\n1 2\n"
+    )
+    refused(tmp_path / "table.vtk", "holds no points")
+
+
+def test_coordinates_that_are_no_numbers_are_named_by_vertex(tmp_path):
+    for value in (np.nan, np.inf):
+        points = POINTS.copy()
+        points[7, 1] = value
+        for file in (
+            write_obj(tmp_path / "a.obj", points, QUADS),
+            write_off(tmp_path / "a.off", points, QUADS),
+            write_stl(tmp_path / "a.stl", points, TRIANGLES),
+            write_gltf(tmp_path / "a.glb", points, TRIANGLES),
+        ):
+            refused(file, "coordinate that is no number")
+    write_obj(tmp_path / "a.obj", points, QUADS)
+    refused(tmp_path / "a.obj", "vertex 8")
+
+
+def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
+    good = write_obj(tmp_path / "a.obj", POINTS, QUADS).read_text()
+    for bad in ("v 1 2", "v one two three", "f 1 2 x"):
+        (tmp_path / "a.obj").write_text(good + bad + "\n")
+        refused(tmp_path / "a.obj", f"line {good.count(chr(10)) + 1}", bad)
+    (tmp_path / "a.obj").write_text(good + "f 1 2 999\n")
+    refused(tmp_path / "a.obj", "a face names vertex 998 of 117")
+    text = write_off(tmp_path / "a.off", POINTS, QUADS).read_text().splitlines()
+    (tmp_path / "a.off").write_text("\n".join([*text[:10], "0 0 x", *text[11:]]))
+    refused(tmp_path / "a.off", "line 11")
+    (tmp_path / "a.off").write_text("OFF BINARY\n\1\2")
+    refused(tmp_path / "a.off", "isn't a text OFF file")
+    (tmp_path / "a.obj").write_bytes(b"v 0 0 0\nv\0\n")
+    refused(tmp_path / "a.obj", "isn't a text file")
+    stl = write_stl(tmp_path / "a.stl", POINTS, TRIANGLES, text=True).read_text()
+    (tmp_path / "a.stl").write_text(stl.replace("vertex", "vertex x", 1))
+    refused(tmp_path / "a.stl", "line 4")
+    lines = stl.splitlines()
+    del lines[4]
+    (tmp_path / "a.stl").write_text("\n".join(lines))
+    refused(tmp_path / "a.stl", "not three a facet")
+
+
+def test_gltf_files_that_need_what_is_not_here_are_refused_by_name(tmp_path):
+    tree = json.loads(write_gltf(tmp_path / "a.gltf", POINTS, TRIANGLES).read_text())
+    for change, word in [
+        ({"extensionsRequired": ["KHR_draco_mesh_compression"]}, "compressed (KHR_draco_mesh_compression)"),
+        ({"nodes": [{"children": [0]}]}, "go round in a circle"),
+        ({"accessors": [{**each, "sparse": {}} for each in tree["accessors"]]}, "sparse"),
+        ({"accessors": [{**each, "count": 10000} for each in tree["accessors"]]}, "shorter than it says"),
+        ({"meshes": []}, "can't be read as glTF"),
+    ]:
+        (tmp_path / "a.gltf").write_text(json.dumps({**tree, **change}))
+        refused(tmp_path / "a.gltf", word)
+
+
+def test_a_damaged_compas_mesh_is_named(tmp_path):
+    mesh = compas_mesh(POINTS, QUADS)
+    mesh["data"]["face"]["3"] = [0, 1, 9999]
+    (tmp_path / "a.json").write_text(json.dumps(mesh))
+    refused(tmp_path / "a.json", "its mesh Mesh is damaged")
+
+
+def test_a_solid_is_refused_without_a_choice_of_face_and_read_with_one(tmp_path):
+    script = tmp_path / "solid.py"
+    script.write_text(
+        "def build(gmsh, *, side=2.0):\n"
+        "    occ = gmsh.model.occ\n"
+        "    ball = occ.addSphere(0, 0, -side, 2 * side)\n"
+        "    hole = occ.addSphere(0, 0, -side, 1.9 * side)\n"
+        "    box = occ.addBox(-3 * side, -3 * side, -4 * side, 6 * side, 6 * side, 4 * side)\n"
+        "    occ.cut([(3, ball)], [(3, hole), (3, box)])\n"
+    )
+    for ending in ("step", "brep"):
+        file = tmp_path / f"solid.{ending}"
+        cad.write_cad(file, script)
+        refused(file, "holds a solid", "--face")
+        upper, lower = (read_surface(file, face=face) for face in ("upper", "lower"))
+        for surface, radius in [(upper, 4.0), (lower, 3.8)]:
+            away = surface.vertices + np.array([0, 0, 2.0])
+            np.testing.assert_allclose(np.linalg.norm(away, axis=1), radius, atol=1e-6)
+            np.testing.assert_allclose(surface.normals, away / radius, atol=1e-6)
+            assert surface.vertices[:, 2].min() == pytest.approx(0.0, abs=1e-6)
+        assert any("the upper face of a solid was taken" in note for note in upper.mended)
+    with pytest.raises(InputError, match="upper or lower"):
+        read_surface(file, face="outer")
+
+
+def test_two_shells_in_a_cad_file_are_refused_or_chosen_from(tmp_path):
+    script = tmp_path / "two.py"
+    script.write_text(
+        "def build(gmsh, *, side=1.0):\n"
+        "    gmsh.model.occ.addRectangle(0, 0, 0, side, side)\n"
+        "    gmsh.model.occ.addRectangle(3 * side, 0, 0, 2 * side, side)\n"
+    )
+    cad.write_cad(tmp_path / "two.step", script)
+    refused(tmp_path / "two.step", "2 separate pieces, of 2, 1 m²")
+    np.testing.assert_allclose(read_surface(tmp_path / "two.step", piece=2).size, [1.0, 1.0, 0.0], atol=1e-9)
+
+
+def test_files_beyond_the_stated_limits_are_refused_before_they_are_read(tmp_path, monkeypatch):
+    huge = tmp_path / "huge.stl"
+    with huge.open("wb") as file:
+        file.truncate(2 * 1024**3)  # takes no room on the disk
+    refused(huge, "is 2,048 MB large; up to 512 MB are read")
+    monkeypatch.setattr(draft, "MOST_TRIANGLES", 100)
+    refused(write_obj(tmp_path / "a.obj", POINTS, QUADS), "has 192 triangles; up to 100 are read")
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", ["meshio crashed on it (SIGSEGV)"]),
+        ("import os; os._exit(3)", ["meshio failed on it: without a word"]),
+        ("raise RuntimeError('no such luck')", ["meshio failed on it: RuntimeError: no such luck"]),
+        ("import numpy; read = lambda *a, **k: numpy.ones(10**15)", ["can't be read as PLY", "Unable to allocate"]),
+        ("raise MemoryError", ["needs more memory"]),
+        ("import time; time.sleep(60)", ["meshio hadn't read it after 2 s"]),
+    ],
+)
+def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(tmp_path, monkeypatch, code, words):
+    file = tmp_path / "a.ply"
+    meshio.Mesh(POINTS, [("quad", QUADS)]).write(file)
+    (tmp_path / "meshio.py").write_text(code)
+    monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{ROOT}")
+    with pytest.raises(InputError) as caught:
+        foreign.read_foreign(file, "ply", SETTINGS, longest=2.0)
+    for word in [str(file), *words]:
+        assert word in str(caught.value)
+    assert "Open it in the program" in caught.value.remedy or "Check that" in caught.value.remedy or "coarser" in caught.value.remedy
+
+
+def test_a_refusal_in_the_reader_s_process_comes_back_whole():
+    with pytest.raises(InputError) as caught:
+        foreign.read_foreign(DATA / "dome_mm.step", "step", {**SETTINGS, "unit": "mm"})
+    assert (caught.value.where, caught.value.value, caught.value.remedy) == ("surface.unit", "mm", "Leave the unit out.")
+
+
+def test_wrong_settings_are_refused_before_the_file_is_read(tmp_path):
+    file = write_obj(tmp_path / "a.obj", POINTS, QUADS)
+    for choice, word in [({"unit": "furlong"}, "surface.unit"), ({"up": "x"}, "surface.up"), ({"fill": "some"}, "surface.fill")]:
+        with pytest.raises(InputError, match=word.replace(".", r"\.")):
+            read_surface(file, **choice)

@@ -1,0 +1,314 @@
+"""Every format comes out as the same shell, in metres and z up, and what a file holds besides can be chosen from."""
+
+import base64
+import json
+from pathlib import Path
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+import rhino3dm
+
+from shellform.errors import InputError
+from shellform.surface import cad
+from shellform.surface.meshes import write_mesh
+from shellform.surface.reading import read_surface
+from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
+
+ROOT = Path(__file__).parent.parent.parent
+POINTS, QUADS = cap()
+TRIANGLES = split(QUADS)
+SIZE = [6.0, 4.0, 1.5]
+AWAY = np.array([20.0, 0.0, 0.0])
+
+
+def polydata():
+    return pyvista.PolyData(POINTS, np.column_stack([np.full(len(QUADS), 4), QUADS]).ravel())
+
+
+def same_shell(surface, atol=1e-6):
+    np.testing.assert_allclose(surface.size, SIZE, atol=atol)
+    assert len(surface.vertices) == len(POINTS)
+    assert len(surface.triangles) == len(TRIANGLES)
+    assert len(surface.boundary) == 1
+    assert surface.normals[:, 2].min() > 0.0
+    place = surface.vertices - surface.vertices.mean(axis=0)
+    np.testing.assert_allclose(np.sort(place[:, 2]), np.sort(POINTS[:, 2] - POINTS[:, 2].mean()), atol=atol)
+
+
+def test_obj_off_and_both_kinds_of_stl_give_the_same_shell(tmp_path):
+    for file in (
+        write_obj(tmp_path / "a.obj", POINTS, QUADS, "# by hand\no shell\ng roof"),
+        write_off(tmp_path / "a.off", POINTS, QUADS),
+        write_stl(tmp_path / "b.stl", POINTS, TRIANGLES),
+        write_stl(tmp_path / "t.stl", POINTS, TRIANGLES, text=True),
+    ):
+        same_shell(read_surface(file))
+
+
+@pytest.mark.parametrize(("name", "binary"), [("a.ply", True), ("a.ply", False), ("a.msh", True), ("a.msh", False)])
+def test_meshio_s_own_files_come_back(tmp_path, name, binary):
+    kind = {"ply": "ply", "msh": "gmsh"}[name[-3:]]
+    meshio.Mesh(POINTS, [("quad", QUADS)]).write(tmp_path / name, file_format=kind, binary=binary)
+    same_shell(read_surface(tmp_path / name))
+
+
+def test_curved_elements_of_a_msh_file_count_by_their_corners(tmp_path):
+    middle = np.vstack([POINTS, POINTS[QUADS[:, :2]].mean(axis=1)])
+    quads = np.column_stack([QUADS, *[len(POINTS) + np.arange(len(QUADS))] * 4])
+    meshio.Mesh(middle, [("quad8", quads)]).write(tmp_path / "a.msh", file_format="gmsh")
+    surface = read_surface(tmp_path / "a.msh")
+    assert len(surface.vertices) == len(POINTS)
+    assert any("points of no face" in note for note in surface.mended)
+
+
+@pytest.mark.parametrize("name", ["a.vtk", "a.vtp", "grid.vtk", "grid.vtu"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_vtk_s_own_files_come_back(tmp_path, name, binary):
+    mesh = polydata().cast_to_unstructured_grid() if name.startswith("grid") else polydata()
+    mesh.save(tmp_path / name, binary=binary)
+    same_shell(read_surface(tmp_path / name))
+
+
+def test_a_strip_of_triangles_in_a_vtp_file_is_read(tmp_path):
+    polydata().triangulate().strip().save(tmp_path / "a.vtp")
+    same_shell(read_surface(tmp_path / "a.vtp"))
+
+
+@pytest.mark.parametrize("name", ["a.gltf", "a.glb"])
+def test_gltf_is_y_up_in_metres_and_its_nodes_place_the_meshes(tmp_path, name):
+    surface = read_surface(write_gltf(tmp_path / name, y_up(POINTS), TRIANGLES, (3.0, 10.0, 0.0)))
+    # The parent's quarter turn about the vertical swaps length and width, and the child is lifted by 10 m.
+    np.testing.assert_allclose(surface.size, [4.0, 6.0, 1.5], atol=1e-6)
+    np.testing.assert_allclose(surface.vertices[:, 2].max(), 11.5, atol=1e-5)
+    small = read_surface(tmp_path / name, unit="mm", up="z")
+    np.testing.assert_allclose(small.size, [0.004, 0.0015, 0.006], atol=1e-6)
+
+
+def test_a_gltf_buffer_may_stand_beside_the_file(tmp_path):
+    file = write_gltf(tmp_path / "a.gltf", y_up(POINTS), TRIANGLES)
+    tree = json.loads(file.read_text())
+    (tmp_path / "a.bin").write_bytes(base64.b64decode(tree["buffers"][0]["uri"].partition(",")[2]))
+    tree["buffers"][0]["uri"] = "a.bin"
+    file.write_text(json.dumps(tree))
+    assert len(read_surface(file).triangles) == len(TRIANGLES)
+    (tmp_path / "a.bin").unlink()
+    with pytest.raises(InputError, match=r"a\.bin isn't beside it"):
+        read_surface(file)
+
+
+def test_compas_meshes_of_both_versions_are_read(tmp_path):
+    new = compas_mesh(POINTS, QUADS)
+    old = {"datatype": "compas.datastructures.Mesh", "value": {**new["data"], "dva": new["data"]["default_vertex_attributes"]}}
+    del old["value"]["default_vertex_attributes"], old["value"]["facedata"], old["value"]["default_face_attributes"]
+    for name, tree in [("new.json", new), ("old.json", old), ("bare.json", new["data"])]:
+        (tmp_path / name).write_text(json.dumps(tree))
+        same_shell(read_surface(tmp_path / name))
+
+
+def test_of_several_compas_meshes_one_has_to_be_named(tmp_path):
+    two = [{**compas_mesh(POINTS, QUADS), "name": "shell"}, {**compas_mesh(2 * POINTS, QUADS), "name": "big"}]
+    (tmp_path / "two.json").write_text(json.dumps(two))
+    with pytest.raises(InputError, match=r"2 meshes.*shell, big"):
+        read_surface(tmp_path / "two.json")
+    np.testing.assert_allclose(read_surface(tmp_path / "two.json", name="big").size, np.array(SIZE) * 2)
+
+
+def test_faces_without_load_in_a_compas_mesh_are_openings(tmp_path):
+    mesh = compas_mesh(POINTS, QUADS)
+    mesh["data"]["facedata"] = {"44": {"_is_loaded": False}}
+    (tmp_path / "a.json").write_text(json.dumps(mesh))
+    surface = read_surface(tmp_path / "a.json")
+    assert surface.holes == 1
+    assert any("left out as openings" in note for note in surface.mended)
+
+
+@pytest.mark.parametrize(
+    ("unit", "up", "factor"), [("mm", "z", 1000.0), ("cm", "y", 100.0), ("m", "y", 1.0), ("ft", "z", 1 / 0.3048)]
+)
+def test_units_and_axes_are_as_stated(tmp_path, unit, up, factor):
+    points = factor * (y_up(POINTS) if up == "y" else POINTS)
+    same_shell(read_surface(write_obj(tmp_path / "a.obj", points, QUADS), unit=unit, up=up))
+
+
+def test_objects_and_groups_of_an_obj_file_can_be_chosen(tmp_path):
+    file = tmp_path / "two.obj"
+    write_obj(file, POINTS, QUADS, "o shell\ng roof")
+    write_obj(tmp_path / "more.obj", POINTS + AWAY, QUADS - len(POINTS) - 1, "o other\ng floor")
+    file.write_text(file.read_text() + (tmp_path / "more.obj").read_text())
+    same_shell(read_surface(file, name="Shell"))
+    np.testing.assert_allclose(read_surface(file, layer="floor").vertices[:, 0].mean(), 20.0)
+    with pytest.raises(InputError, match="There are 'shell', 'other'"):
+        read_surface(file, name="dome")
+    with pytest.raises(InputError, match="2 separate pieces"):
+        read_surface(file)
+
+
+def test_an_unknown_ending_is_read_by_its_content(tmp_path):
+    same_shell(read_surface(write_obj(tmp_path / "shell.txt", POINTS, QUADS)))
+    same_shell(read_surface(write_stl(tmp_path / "shell", POINTS, TRIANGLES)))
+    (tmp_path / "dome.p21").write_bytes((ROOT / "tests/data/dome_mm.step").read_bytes())
+    np.testing.assert_allclose(read_surface(tmp_path / "dome.p21").size, [0.9, 0.7, 0.2], rtol=1e-3)
+
+
+def test_concave_polygons_are_cut_inside_themselves(tmp_path):
+    # An L of six corners, of which a fan from the first would leave the L.
+    outline = np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [1, 1, 0], [1, 2, 0], [0, 2, 0]], dtype=float)
+    for turn in range(6):
+        order = np.roll(np.arange(6), turn)[None]
+        surface = read_surface(write_obj(tmp_path / "l.obj", outline, order))
+        assert surface.area == pytest.approx(3.0, rel=1e-12)
+
+
+def rhino_file(file, shapes, unit="Millimeters"):
+    """A 3DM file with (geometry, layer, name) shapes."""
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, unit)
+    layers = {}
+    for shape, layer, name in shapes:
+        if layer not in layers:
+            layers[layer] = model.Layers.AddLayer(layer, (0, 0, 0, 255))
+        attributes = rhino3dm.ObjectAttributes()
+        attributes.LayerIndex, attributes.Name = layers[layer], name
+        model.Objects.Add(shape, attributes)
+    model.Write(str(file), 7)
+    return file
+
+
+def rhino_mesh(points, quads):
+    mesh = rhino3dm.Mesh()
+    for x, y, z in points.tolist():
+        mesh.Vertices.Add(x, y, z)
+    for face in quads.tolist():
+        mesh.Faces.AddFace(*face)
+    return mesh
+
+
+def sphere(radius):
+    return rhino3dm.Sphere(rhino3dm.Point3d(0, 0, 0), radius)
+
+
+def nurbs_cap(scale=1.0):
+    """The paraboloid, exactly: a biquadratic Bézier surface."""
+    surface = rhino3dm.NurbsSurface.Create(3, False, 3, 3, 3, 3)
+    for i in range(3):
+        for j in range(3):
+            # Bernstein coefficients of 1 - (x² + y²)/2 over [-1, 1]²: x² has 1, -1, 1.
+            z = 1.5 * (1 - ((1, -1, 1)[i] + (1, -1, 1)[j]) / 2)
+            surface.Points[i, j] = rhino3dm.Point4d(scale * 3.0 * (i - 1), scale * 2.0 * (j - 1), scale * z, 1.0)
+    for knots in (surface.KnotsU, surface.KnotsV):
+        for k, value in enumerate((0.0, 0.0, 1.0, 1.0)):
+            knots[k] = value
+    return surface
+
+
+def test_rhino_meshes_come_in_the_unit_of_their_file(tmp_path):
+    file = rhino_file(tmp_path / "a.3dm", [(rhino_mesh(100 * POINTS, QUADS), "Shell", "roof")], "Centimeters")
+    same_shell(read_surface(file), atol=1e-5)
+    same_shell(read_surface(file, unit="cm"), atol=1e-5)
+    with pytest.raises(InputError, match="centimeters"):
+        read_surface(file, unit="mm")
+    none = rhino_file(tmp_path / "b.3dm", [(rhino_mesh(POINTS, QUADS), "Shell", "roof")], "Unset")
+    with pytest.raises(InputError, match="no usable unit"):
+        read_surface(none)
+    same_shell(read_surface(none, unit="m"), atol=1e-5)
+
+
+def test_rhino_s_nurbs_surfaces_keep_their_exact_normals(tmp_path):
+    surface = read_surface(rhino_file(tmp_path / "a.3dm", [(nurbs_cap(1000.0), "Shell", "roof")]))
+    np.testing.assert_allclose(surface.size, SIZE, atol=2e-4)
+    x, y, z = surface.vertices.T
+    np.testing.assert_allclose(z, 1.5 * (1 - (x**2 / 9 + y**2 / 4) / 2), atol=1e-9)
+    normal = np.column_stack([x / 6, 3 * y / 8, np.ones_like(x)])
+    np.testing.assert_allclose(surface.normals, normal / np.linalg.norm(normal, axis=1, keepdims=True), atol=1e-9)
+
+
+def test_rhino_s_rational_surfaces_are_round(tmp_path):
+    # The upper half of a sphere's revolution, a brep with poles, on a solid that asks for a face.
+    file = rhino_file(tmp_path / "a.3dm", [(rhino3dm.Extrusion.Create(half_circle(2.0), 5.0, False), "Shell", "barrel")], "Meters")
+    surface = read_surface(file, size=0.2)
+    np.testing.assert_allclose(np.hypot(surface.vertices[:, 0], surface.vertices[:, 2]), 2.0, atol=1e-9)
+    np.testing.assert_allclose(np.sort(surface.size), [2.0, 4.0, 5.0], atol=1e-2)
+
+
+def half_circle(radius):
+    points = [rhino3dm.Point3d(*p) for p in [(radius, 0, 0), (0, 0, radius), (-radius, 0, 0)]]
+    return rhino3dm.Arc(*points).ToNurbsCurve()
+
+
+def test_a_rhino_sphere_is_closed_and_refused(tmp_path):
+    file = rhino_file(tmp_path / "a.3dm", [(sphere(1000.0).ToBrep(), "Shell", "ball")])
+    with pytest.raises(InputError, match="closed"):
+        read_surface(file)
+
+
+def test_rhino_s_trimmed_breps_are_trimmed(tmp_path):
+    plane = rhino3dm.Plane(rhino3dm.Point3d(0, 0, 0), rhino3dm.Vector3d(0, 0, 1))
+    disc = rhino3dm.Brep.CreateTrimmedPlane(plane, rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 2.0).ToNurbsCurve())
+    surface = read_surface(rhino_file(tmp_path / "a.3dm", [(disc, "Shell", "disc")], "Meters"), size=0.05)
+    assert surface.area == pytest.approx(np.pi * 4.0, rel=1e-3)
+
+
+def test_rhino_s_patches_that_touch_are_one_surface(tmp_path):
+    left, right = nurbs_cap(), nurbs_cap()
+    right.Translate(rhino3dm.Vector3d(0, 4.0, 0))
+    surface = read_surface(rhino_file(tmp_path / "a.3dm", [(left, "Shell", ""), (right, "Shell", "")], "Meters"))
+    np.testing.assert_allclose(surface.size, [6.0, 8.0, 1.5], atol=2e-4)
+    assert len(surface.boundary) == 1
+
+
+def test_layers_and_names_of_a_rhino_file_are_listed_to_choose_from(tmp_path):
+    shapes = [(nurbs_cap(), "Shell", "roof"), (rhino_mesh(POINTS + AWAY, QUADS), "Old", ""), (half_circle(1.0), "Shell", "edge")]
+    file = rhino_file(tmp_path / "a.3dm", shapes, "Meters")
+    with pytest.raises(InputError, match="both meshes and surfaces: 'roof' on layer 'Shell', 'mesh 1' on layer 'Old'"):
+        read_surface(file)
+    with pytest.raises(InputError, match="There are 'Shell', 'Old'"):
+        read_surface(file, layer="Shells")
+    np.testing.assert_allclose(read_surface(file, layer="shell").size, SIZE, atol=2e-4)
+    same_shell(read_surface(file, name="mesh 1"), atol=1e-5)
+
+
+def test_a_rhino_file_of_curves_holds_no_surface(tmp_path):
+    with pytest.raises(InputError, match="holds no surface, only Curve"):
+        read_surface(rhino_file(tmp_path / "a.3dm", [(half_circle(1.0), "Shell", "edge")]))
+
+
+def test_rhino_s_blocks_stand_where_their_instances_are(tmp_path):
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    model.InstanceDefinitions.Add("roof", "", "", "", rhino3dm.Point3d(0, 0, 0), (rhino_mesh(POINTS, QUADS),), (rhino3dm.ObjectAttributes(),))
+    block = model.InstanceDefinitions[0]
+    model.Objects.AddInstanceObject(rhino3dm.InstanceReference(block.Id, rhino3dm.Transform.Translation(50.0, 0.0, 0.0)))
+    model.Write(str(tmp_path / "a.3dm"), 7)
+    surface = read_surface(tmp_path / "a.3dm")
+    same_shell(surface, atol=1e-5)
+    assert surface.vertices[:, 0].mean() == pytest.approx(50.0, abs=1e-4)
+
+
+def test_rhino_tutorial_file_of_others_is_read_by_object():
+    # 220 curves, a mesh and a plane brep of 10 × 10 mm.
+    file = ROOT / "tests/data/tna_tutorial.3dm"
+    for name in ("mesh 1", "brep 1"):
+        np.testing.assert_allclose(read_surface(file, name=name).size, [0.01, 0.01, 0.0], atol=1e-9)
+
+
+def test_a_rhinovault_session_gives_its_thrust_diagram_without_openings():
+    surface = read_surface(ROOT / "tests/data/rhinovault_holes.json")
+    np.testing.assert_allclose(surface.size, [9.379, 9.465, 1.5], atol=1e-3)
+    assert surface.holes == 1
+    pillow = read_surface(ROOT / "tests/data/rhinovault_pillow_vault.json")
+    np.testing.assert_allclose(pillow.size, [10.0, 10.0, 3.535], atol=1e-3)
+
+
+@pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "vtk", "vtu", "msh"])
+def test_a_surface_written_as_a_mesh_comes_back(tmp_path, ending):
+    surface = cad.build_surface(ROOT / "surfaces/dome.py", size=0.05)
+    write_mesh(tmp_path / f"dome.{ending}", surface)
+    back = read_surface(tmp_path / f"dome.{ending}")
+    np.testing.assert_allclose(back.size, surface.size, atol=1e-6)
+    assert len(back.triangles) == len(surface.triangles)
+    with pytest.raises(InputError, match=r"isn't a mesh format.*\.stl"):
+        write_mesh(tmp_path / "dome.xyz", surface)
+    with pytest.raises(InputError, match="can't be written"):
+        write_mesh(tmp_path / f"none/dome.{ending}", surface)
