@@ -49,12 +49,13 @@ class Locator:
 
     def __init__(self, surface: Surface, reach: float = 0.0) -> None:
         self._own = len(surface.triangles)
-        whole = extended(surface, reach) if reach > 0.0 else surface
+        whole, self._closed = extended(surface, reach) if reach > 0.0 else (surface, self._own)
         self._vertices, self._normals, self._triangles = whole.vertices, whole.normals, whole.triangles
         self._tree = Tree(whole.vertices[whole.triangles])
         self._across, self._rim = _joined(across_edges(whole.triangles, len(whole.vertices)), whole.triangles)
-        edges = np.argwhere(across_edges(surface.triangles, len(surface.vertices)) < 0)
-        self._edge = Tree(_edge_pieces(surface, edges))
+        loops = surface.boundary
+        self._edge = Tree(_edge_pieces(surface, loops))
+        self._outline = Tree(_edge_pieces(surface, loops[:1]))
 
     def facet(self, points: Reals) -> tuple[Indices, Reals, Reals]:
         """The triangle (k,), the exact closest point (k, 3) on the flat facets and its distance (k,) of points (k, 3)."""
@@ -76,6 +77,11 @@ class Locator:
         """Signed distance (k,), m, of the feet from the surface's edge: positive past it, negative on the surface."""
         return np.where(foot.past, 1.0, -1.0) * self._edge.nearest(foot.point)[2]
 
+    def past_outline(self, foot: Foot) -> Reals:
+        """The same as if the surface had no openings."""
+        over = foot.past & ((foot.triangle < self._own) | (foot.triangle >= self._closed))
+        return np.where(over, 1.0, -1.0) * self._outline.nearest(foot.point)[2]
+
 
 def _joined(across: Indices, triangles: Indices) -> tuple[Indices, Indices]:
     """`across` (t, 3) with -1 - r in place of -1 for the r-th piece of the edge; and of those pieces (r, 4) the triangle, its edge,
@@ -92,14 +98,13 @@ def _joined(across: Indices, triangles: Indices) -> tuple[Indices, Indices]:
     return coded, np.ascontiguousarray(np.column_stack([pieces, before, after]))
 
 
-def _edge_pieces(surface: Surface, edges: Indices) -> Reals:
-    """Straight pieces (m, 3, 3) of the smooth curves over the edges (r, 2), triangle and edge, as triangles without width."""
-    a = surface.triangles[edges[:, 0], edges[:, 1]]
-    b = surface.triangles[edges[:, 0], (edges[:, 1] + 1) % 3]
-    points = np.empty((len(edges), _PIECES + 1, 3))
+def _edge_pieces(surface: Surface, loops: list[Indices]) -> Reals:
+    """Straight pieces (m, 3, 3) of the smooth curves over edge loops, as triangles without width."""
+    a, b = np.concatenate(loops), np.concatenate([np.roll(loop, -1) for loop in loops])
+    points = np.empty((len(a), _PIECES + 1, 3))
     _along_edges(surface.vertices[a], surface.vertices[b], surface.normals[a], surface.normals[b], points)
     pieces = np.stack([points[:, :-1], points[:, 1:], points[:, 1:]], axis=2)
-    return pieces.reshape(-1, 3, 3)
+    return np.asarray(pieces.reshape(-1, 3, 3))
 
 
 @njit(cache=True)

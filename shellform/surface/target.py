@@ -52,7 +52,7 @@ class Surface:
 
     @property
     def boundary(self) -> list[Indices]:
-        """The closed loops of vertices round the surface and round its holes, the longest first."""
+        """The closed loops of vertices round the surface and round its holes, the longest, in metres, first."""
         across = across_edges(self.triangles, len(self.vertices))
         at = np.argwhere(across < 0)
         rim = np.column_stack([self.triangles[at[:, 0], (at[:, 1] + k) % 3] for k in (0, 1)])
@@ -65,7 +65,7 @@ class Surface:
                 loop.append(here)
                 here = following.pop(here)
             loops.append(np.array(loop))
-        return sorted(loops, key=len, reverse=True)
+        return sorted(loops, key=lambda loop: -_length(self.vertices[loop]))
 
     @property
     def holes(self) -> int:
@@ -94,7 +94,7 @@ def make_surface(
     up = _area_vectors(points, faces).sum(axis=0)
     if up[2] < 0.0:
         faces = faces[:, ::-1].copy()
-    rough = _rough_normals(points, faces)
+    rough = rough_normals(points, faces)
     if given is None:
         unit = jets(points, faces, rough)[0]
     else:
@@ -222,7 +222,7 @@ def _turn(faces, across, turned):  # type: ignore[no-untyped-def]
     return True
 
 
-def _rough_normals(points: Reals, faces: Indices) -> Reals:
+def rough_normals(points: Reals, faces: Indices) -> Reals:
     """Unit vertex normals (v, 3): triangle normals weighted by the angle at the vertex."""
     corner = points[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -256,6 +256,10 @@ def _area_vectors(points: Reals, faces: Indices) -> Reals:
 def _directed_edges(faces: Indices) -> Indices:
     """Edges (3 t, 2): of all triangles their first, then their second, then their third."""
     return np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _length(loop: Reals) -> float:
+    return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
 
 
 def across_edges(faces: Indices, count: int) -> Indices:
