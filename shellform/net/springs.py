@@ -50,13 +50,14 @@ class SlidingSprings:
         """How far (k,), m, each node lies above its level; the spring's force is `density` times that."""
         return self.distance(state.positions[self.nodes])[0] - self.level
 
-    def evaluate(self, state: State, *, tangent: bool) -> Evaluation:
-        """Energy (k,) J, forces (k, 3) N, packed lower tangents (k, 6) N/m."""
+    def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
+        """Energy (k,) J, forces (k, 3) N, packed lower tangents (k, 6) N/m, filled `into`."""
         distance, normal, hessian = self.distance(state.positions[self.nodes])
         stretch = distance - self.level
         force = (self.density * stretch)[:, None] * normal
         energy = 0.5 * self.density * stretch**2
         if not tangent:
             return Evaluation(energy, force, None)
-        block = self.density[:, None] * (normal[:, _LOWER[0]] * normal[:, _LOWER[1]] + stretch[:, None] * hessian)
-        return Evaluation(energy, force, block)
+        packed = np.empty((len(energy), 6)) if into is None else into
+        packed[:] = self.density[:, None] * (normal[:, _LOWER[0]] * normal[:, _LOWER[1]] + stretch[:, None] * hessian)
+        return Evaluation(energy, force, packed)
