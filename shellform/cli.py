@@ -172,22 +172,67 @@ def analyse(
     increments: Annotated[int, typer.Option(help="Equal increments.")] = 1,
     tolerance: Annotated[float, typer.Option(help="Unbalanced over largest force.")] = 1e-8,
     output: Annotated[Path | None, typer.Option(help="Result file; left out: standard output.")] = None,
+    method: Annotated[str, typer.Option(help="relaxation or newton.")] = "relaxation",
+    path: Annotated[bool, typer.Option("--path", help="Follow the path through limit points by its length.")] = False,
+    lead: Annotated[str | None, typer.Option(help="NODE:AXIS:METRES, a free displacement that leads the path (axis x, y or z).")] = None,
+    limit: Annotated[int, typer.Option(help="Most factorisations of one relaxation.")] = 1000,
+    modes: Annotated[int, typer.Option(help="How many of the softest modes.")] = 0,
+    critical: Annotated[float | None, typer.Option(help="Seek the critical load factor up to this one.")] = None,
+    sections: Annotated[Path | None, typer.Option(help="Sections by kind of beam (TOML), for stresses.")] = None,
+    figures: Annotated[Path | None, typer.Option(help="Folder for pictures of the state and the modes.")] = None,
 ) -> None:
     """Solve a structural model."""
-    from shellform.structure import model as models
+    from shellform.structure.analysis import analyse as solve
+    from shellform.structure.analysis import result
+    from shellform.structure.memory import limit_to_free_memory
+    from shellform.structure.model import read_model
+    from shellform.structure.results import read_sections
 
-    analysis = models.analyse(
-        models.read_model(model), load=load, factor=factor, increments=increments, tolerance=tolerance
-    )
-    text = json.dumps(models.result(analysis), default=_no_number)
+    if figures is None:  # pictures ask the graphics driver for memory on terms of its own
+        limit_to_free_memory()
+    report = _Progress()
+    try:
+        known = read_sections(sections) if sections is not None else None
+        analysis = solve(
+            read_model(model),
+            load=load,
+            factor=factor,
+            increments=increments,
+            tolerance=tolerance,
+            method="path" if path or lead else method,
+            lead=_lead(lead) if lead else None,
+            limit=limit,
+            mode_count=modes,
+            critical_to=critical,
+            progress=lambda reached, spent: report("analysis", f"load factor {reached:.4g}, {spent} factorisations"),
+        )
+        document = result(analysis, sections=known)
+    finally:
+        report.close()
+    for warning in analysis.warnings:
+        print(f"shellform: note: {warning}", file=sys.stderr)
+    text = json.dumps(document, default=_no_number, allow_nan=False)
     if output is None:
         print(text)
     else:
         from shellform.study.case import write_text
 
         write_text(output, text)
+    if figures is not None:
+        from shellform.output.states import draw_analysis
+
+        for file in draw_analysis(analysis, figures):
+            print(file, file=sys.stderr)
     if not analysis.converged:
         raise NotConverged(analysis.message)
+
+
+def _lead(text: str) -> tuple[int, int, float]:
+    try:
+        node, axis, metres = text.split(":")
+        return int(node), "xyz".index(axis), float(metres)
+    except ValueError as error:
+        raise InputError("must read NODE:AXIS:METRES", where="--lead", value=text, remedy="For example 17:z:-0.05.") from error
 
 
 @app.command()
@@ -209,14 +254,19 @@ def verify() -> None:
     """Run the published cases and gradient checks."""
     from shellform.structure.verification import verify as rows
 
-    failed = 0
-    print(f"{'case':42} {'value':>14} {'reference':>14} {'difference':>11}       source")
+    failed, cases, number = 0, set(), 0
+    head = f"{'case':40} {'quantity':38} {'value':>12} {'reference':>12} {'difference':>10} {'allowed':>8}"
+    print(f"{head}       source")
     for row in rows():
         failed += not row.passed
+        cases.add(row.case)
+        number += 1
+        numbers = f"{row.value:12.7g} {row.reference:12.7g} {row.difference:10.1e} {row.tolerance:8.0e}"
         mark = "pass" if row.passed else "FAIL"
-        print(f"{row.name:42} {row.value:14.7g} {row.reference:14.7g} {row.difference:11.1e} {mark}  {row.source}", flush=True)
+        print(f"{row.case:40} {row.quantity:38} {numbers} {mark}  {row.source}", flush=True)
     if failed:
-        raise NotConverged(f"{failed} cases do not hold")
+        raise NotConverged(f"{failed} of {number} numbers do not hold")
+    print(f"all {number} numbers of {len(cases)} cases hold")
 
 
 class _Progress:

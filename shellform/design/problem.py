@@ -19,13 +19,13 @@ import scipy.sparse as sp
 
 from shellform.arrays import Flags, Reals
 from shellform.design.gridshell import Design, Gridshell
-from shellform.design.sensitivity import gradients, respond
 from shellform.design.terms import AtMost, RodRadius, Share, Term
 from shellform.errors import InputError, NotConverged
 from shellform.structure.assembly import Assembly
 from shellform.structure.equilibrium import find_equilibrium
 from shellform.structure.loading import Loaded, apply_load
 from shellform.structure.network import assemble
+from shellform.structure.sensitivity import by_rest_length, by_stiffness, gradients, respond
 from shellform.structure.sparse import NotPositiveDefinite
 from shellform.structure.state import State
 
@@ -218,7 +218,9 @@ def linearise(
     size = len(shell.cable_ends) + problem.frees_radius
     scale = np.append(shell.cable_lengths, design.radius / variables[-1]) if problem.frees_radius else shell.cable_lengths
     cables = shell.cables(design)
-    rate = shell.beams_by_radius(design.radius) if problem.frees_radius else None
+    rates = [shell.beams_by_radius(design.radius)] if problem.frees_radius else []
+    # A column of each candidate cable, empty for the absent ones.
+    spread = sp.csr_array((np.ones(len(present)), (np.arange(len(present)), present)), shape=(len(present), len(shell.cable_ends)))
     values: list[Reals] = [np.zeros(0)] * len(problem.limits)
     rows: list[Reals] = [np.zeros((0, size))] * len(problem.limits)
     objective = np.zeros(len(problem.minimize))
@@ -235,7 +237,8 @@ def linearise(
             ]
         ).toarray()[:, :size]
         if name:
-            response = respond(assembly, state, cables, present, size, rate)
+            columns = sp.csc_array(by_rest_length(assembly, state, cables) @ spread)
+            response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
             by_state = _on_free(sp.vstack([m.by_position for m in measures]), assembly)
             total = gradients(response, by_state, partial)
         else:

@@ -29,6 +29,9 @@ class Finder(Protocol):
     def past_edge(self, foot: Any) -> Reals:
         """Signed distance (k,), m, of feet from the edge, positive past it."""
 
+    def past_outline(self, foot: Any) -> Reals:
+        """The same as if the surface had no openings."""
+
 
 def covering_lattice(
     finder: Finder, origin: Reals, direction: Reals, spacing: float, *, margin: float, most: int = 100_000
@@ -65,7 +68,7 @@ def _guide(finder: Finder, origin: Reals, direction: Reals, spacing: float, marg
                 break
             step *= spacing / max(reached, 0.1 * spacing)
         yield there
-        if finder.past_edge(foot)[0] > margin:
+        if finder.past_outline(foot)[0] > margin:
             return
         chord = there - here
         chord = chord - (chord @ foot.normal[0]) * foot.normal[0]
@@ -131,4 +134,4 @@ def _corner(finder: Finder, a: Reals, b: Reals, c: Reals, spacing: float) -> tup
         size = np.linalg.norm(step, axis=1, keepdims=True)
         point = point + np.where(good[:, None], step * np.minimum(1.0, 0.5 * spacing / np.maximum(size, 1e-300)), 0.0)
     good &= np.abs(off).max(axis=1) < 1e-3 * spacing**2
-    return point, finder.past_edge(foot), good
+    return point, finder.past_outline(foot), good

@@ -1,7 +1,7 @@
 """Pulling an oversized flat grid onto a surface (operation 1 of the framework, after Kuijenhoven and Hoogenboom).
 
 The grid is the structural model of section 3, with fictitious stiffness: rods, connectors between their two layers that
-resist shear of the grid a little, and on every node a spring that slides on the surface (structure/spring.py). Implicit
+resist shear of the grid a little, and on every node a spring that slides on the surface (springs.py). Implicit
 dynamic relaxation finds the equilibrium for one spring density after the other: soft springs let the grid find its place
 without folding, stiff ones bring it close.
 
@@ -21,11 +21,11 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import NotConverged
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, grid_beams
+from shellform.net.springs import Distance, SlidingSprings
 from shellform.structure import rotation
 from shellform.structure.assembly import Assembly
 from shellform.structure.beam import Beams
 from shellform.structure.equilibrium import find_equilibrium
-from shellform.structure.spring import Distance, SlidingSprings
 from shellform.structure.state import State
 
 FROM_FLAT = (0.05, 0.5, 5.0)  # EI/s³; directly at 5 a flat grid folds (findings: 1e3 N/m at EI/s³ = 189 N/m)
@@ -36,7 +36,7 @@ _SLENDERNESS = 50.0  # s/r
 _TORSION = 1.0 / 1.3  # GJ/EI of a round rod with Poisson's ratio 0.3
 _CONNECTOR = 10.0  # bending stiffness of a connector, EI/s a radian: stiff beside the rods
 _TETHER = 5.0  # of the springs that hold the net's place and direction, EI/s³
-_TOLERANCE = 1e-4  # residual; a node is then within 1e-5 spacings of where it would end
+_TOLERANCE = 1e-8  # residual
 _LEADING = 1e-3
 
 Progress = Callable[[str, float], None]
@@ -155,9 +155,9 @@ def fictitious_beams(grid: Grid, shear_stiffness: float) -> Beams:
 def sliding_springs(grid: Grid, finder: Finder, density: float) -> SlidingSprings:
     """Springs of `density` EI/s³ on every node, each pulling to its layer's distance from the surface."""
 
-    def distance(points: Reals) -> tuple[Reals, Reals]:
+    def distance(points: Reals) -> tuple[Reals, Reals, Reals]:
         foot = finder.foot(points)
-        return foot.distance, foot.normal
+        return foot.distance, foot.normal, foot.hessian
 
     count = len(grid.flat)
     strength = np.full(count, density * grid.spacing**2 / grid.spacing**3)
@@ -181,7 +181,7 @@ def _tethers(grid: Grid, origin: Reals, frame: Reals) -> tuple[SlidingSprings, S
     """
 
     def plane(normal: Reals) -> Distance:
-        return lambda points: ((points - origin) @ normal, np.broadcast_to(normal, points.shape))
+        return lambda points: ((points - origin) @ normal, np.broadcast_to(normal, points.shape), np.zeros((len(points), 6)))
 
     middle = int(np.argmin(np.abs(grid.lattice).sum(axis=1)))
     along = np.flatnonzero(grid.lattice[:, 1] == grid.lattice[middle, 1])

@@ -69,7 +69,8 @@ class Panel:
 
     `positions` (n, 3), m; rod elements `beams` (m, 2); `deviation` (n,), m, of each node from its target; `cables` (c, 2)
     with their `cable_forces` (c,), N, slack at or below zero; nodes of `supports` (s,) and of loads, `load_points` (k,);
-    `rod_radius`, m, drawn thicker where it would be too thin to be seen. Raises InputError for wrong shapes and indices.
+    `rod_radius`, m, drawn thicker where it would be too thin to be seen. `quantity`
+    says what `deviation` measures where it is another length. Raises InputError for wrong shapes and indices.
     """
 
     title: str
@@ -81,6 +82,7 @@ class Panel:
     supports: Indices
     load_points: Indices
     rod_radius: float
+    quantity: str = "deviation from the target"
 
     def __post_init__(self) -> None:
         put = functools.partial(object.__setattr__, self)
@@ -211,6 +213,7 @@ class _Scale:
     force: float  # N, the largest
     reach: float  # m, the largest extent, which loads are drawn by
     letters: int  # pixels
+    quantity: str  # what the colours measure
 
 
 def _draw(
@@ -238,7 +241,7 @@ def _draw(
     further += [] if skin is None else [np.asarray(skin.points, dtype=np.float64)]
     reach = max(max(float(np.ptp(panel.positions, axis=0).max()) for panel in panels), 1e-9)
     force = max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
-    scale = _Scale(limit, force, reach, max(11, round(0.034 * min(height, 0.7 * width))))
+    scale = _Scale(limit, force, reach, max(11, round(0.034 * min(height, 0.7 * width))), panels[0].quantity)
     camera = _camera(panels, further, view, size, scale)
 
     if not _window_works():
@@ -295,7 +298,7 @@ def _add(
             tip_length=0.35, tip_radius=0.11, shaft_radius=0.03,
         )  # fmt: skip
         plotter.add_mesh(_copies(panel.positions[panel.load_points], arrow), color=_LOAD, ambient=0.6, diffuse=0.4, render=False)
-    told = f"deviation: maximum {1e3 * panel.deviation.max():.1f} mm, mean {1e3 * panel.deviation.mean():.1f} mm"
+    told = f"{panel.quantity.split()[0]}: maximum {1e3 * panel.deviation.max():.1f} mm, mean {1e3 * panel.deviation.mean():.1f} mm"
     line = scale.letters
     _text(plotter, panel.title, line, (0.8 * line, size[1] - 1.7 * line), bold=True)
     _text(plotter, told, round(0.9 * line), (0.8 * line, size[1] - 3.1 * line), colour=_QUIET)
@@ -315,7 +318,7 @@ def _bar(plotter: pv.Plotter, scale: _Scale, size: tuple[int, int], height: int)
         value = f"{1e3 * scale.limit * k / steps:.{decimals}f}"
         label = "0 mm" if k == 0 else f"≥ {value} mm" if k == steps else value
         _text(plotter, label, line, (left + (right - left) * k / steps, 0.55 * line), justify="center")
-    _text(plotter, "deviation from the target", line, (0.5 * (left + right), 3.2 * line), justify="center", colour=_QUIET)
+    _text(plotter, scale.quantity, line, (0.5 * (left + right), 3.2 * line), justify="center", colour=_QUIET)
     strip = _shot(plotter)[-height:]
     painted = _colours((np.arange(right - left) + 0.5) / (right - left))
     strip[height - high : height - low, left:right] = painted

@@ -22,13 +22,14 @@ from shellform.structure.chords import ChordKeeper
 from shellform.structure.parts import Part
 from shellform.structure.sparse import Factor, Symmetric
 from shellform.structure.state import State
+from shellform.structure.threads import share
 
 
 @dataclass(frozen=True)
 class Balance:
     """All elements at one state: strain `energy` J, nodal internal `force` (n, 6), lower `tangent` values (or None).
 
-    `largest` is the largest component of any element's end force, N: the scale for residuals.
+    `largest` is the largest component of any element's end force, moments over the node's arm, N: the scale for residuals.
     """
 
     energy: float
@@ -39,6 +40,7 @@ class Balance:
 
 class Assembly:
     """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in order;
+    `arms` (count,), m: the mean rest length of each node's beams;
     `clock` adds up the seconds spent on assembly, factorisation and solve."""
 
     def __init__(self, count: int, parts: Sequence[Part], fixed: Flags) -> None:
@@ -54,19 +56,32 @@ class Assembly:
         number[self.free] = np.arange(len(self.free))
         self.clock: dict[str, float] = {"assembly": 0.0, "factorisation": 0.0, "solve": 0.0}
         self._freedoms = freedoms
-        self._translational = [(each[0] % 6 < 3) if len(each) else np.zeros(0, dtype=bool) for each in freedoms]
-        self.matrix, self._slots = _pattern(number, freedoms)
+        self.arms = _arms(count, self.beams)
+        # What turns a force or a moment into a force: 1 for translations, 1 over the node's arm for rotations.
+        self.reach: Reals = np.repeat(1.0 / self.arms[:, None], 6, axis=1)
+        self.reach[:, :3] = 1.0
+        self.reach = self.reach.ravel()
+        self.matrix, self._starts, self._sources = _pattern(number, freedoms)
+        ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
+        self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+        self._entries = np.empty(int(ends[-1]))
 
     def with_parts(self, parts: Sequence[Part]) -> Assembly:
         """The same assembly, its pattern shared, with parts of the same elements and other properties."""
         other = copy.copy(self)
         other.parts = tuple(parts)
+        other._entries = np.empty_like(self._entries)
         return other
 
     @property
     def beams(self) -> list[Beams]:
         """The parts that are beams."""
         return [part for part in self.parts if isinstance(part, Beams)]
+
+    @cached_property
+    def turns(self) -> Indices:
+        """Places of the free rotations' diagonal entries among the tangent's values."""
+        return self.matrix.diagonal[self.free % 6 >= 3]
 
     @cached_property
     def chords(self) -> ChordKeeper:
@@ -78,20 +93,29 @@ class Assembly:
         began = time.perf_counter()
         energy, largest = 0.0, 0.0
         force = np.zeros(6 * self.count)
-        values = np.zeros(len(self.matrix.indices) + 1)  # the last collects what belongs to held freedoms
-        for part, freedoms, slots, moved in zip(
-            self.parts, self._freedoms, self._slots, self._translational, strict=True
-        ):
+        for part, freedoms, (first, last) in zip(self.parts, self._freedoms, self._shares, strict=True):
             if not len(freedoms):
                 continue
-            result = part.evaluate(state, tangent=tangent)
+            block = self._entries[first:last].reshape(len(freedoms), -1) if tangent else None
+            result = part.evaluate(state, tangent=tangent, into=block)
             energy += float(result.energy.sum())
-            largest = max(largest, float(np.abs(result.force[:, moved]).max()))
-            _scatter(freedoms, result.force, force)
-            if result.tangent is not None:
-                _scatter(slots, result.tangent, values)
+            largest = max(largest, _add_forces(freedoms, self.reach, result.force, force))
+        values = None
+        if tangent:
+            values = np.empty(len(self.matrix.indices))
+            share(_gather, len(values), self._starts, self._sources, self._entries, values)
         self.clock["assembly"] += time.perf_counter() - began
-        return Balance(energy, force.reshape(-1, 6), values[:-1] if tangent else None, largest)
+        return Balance(energy, force.reshape(-1, 6), values, largest)
+
+    def force_along(self, state: State, motion: Reals) -> Reals:
+        """How the internal forces (n, 6) begin to change, N and N·m, as the nodes move by `motion` (n, 6), held freedoms too."""
+        change = np.zeros(6 * self.count)
+        for part, freedoms in zip(self.parts, self._freedoms, strict=True):
+            if len(freedoms):
+                tangent = part.evaluate(state, tangent=True).tangent
+                assert tangent is not None
+                _multiply(freedoms, tangent, motion.ravel(), change)
+        return change.reshape(-1, 6)
 
     def factor(self, state: State) -> Factor:
         """Cholesky factor of the tangent at the state, good until the next factorisation here.
@@ -103,25 +127,82 @@ class Assembly:
         return self.matrix.factor(values)
 
 
-def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, list[Indices]]:
-    """The common lower pattern, and for each part the slot (m, k (k + 1) / 2) of each packed entry (nnz: nowhere)."""
+def _arms(count: int, beams: Sequence[Beams]) -> Reals:
+    """A length (count,) for each node, m: the mean rest length of the beams that meet there (1 where there are none)."""
+    total, number = np.zeros(count), np.zeros(count)
+    for part in beams:
+        for end in part.ends.T:
+            np.add.at(total, end, part.rest_length)
+            np.add.at(number, end, 1.0)
+    return np.where(number > 0.0, total / np.maximum(number, 1.0), 1.0)
+
+
+def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, Indices, Indices]:
+    """The common lower pattern, and which packed entries of all elements, one after the other, add up to each of its values:
+    `sources[starts[v] : starts[v + 1]]` for value v."""
     size = int(number.max(initial=-1)) + 1
-    keys = [np.arange(size) * (size + 1)]  # every diagonal entry is stored, whatever touches it
+    rows, columns = [], []
     for each in freedoms:
         row, column = np.tril_indices(each.shape[1])
-        mapped = number[each]
-        upper, lower = np.minimum(mapped[:, row], mapped[:, column]), np.maximum(mapped[:, row], mapped[:, column])
-        keys.append(np.where(upper < 0, -1, upper * size + lower))
-    entries = np.unique(np.concatenate([key.ravel() for key in keys]))
-    entries = entries[entries >= 0]
-    slots = [np.where(key < 0, len(entries), np.searchsorted(entries, key)) for key in keys[1:]]
-    columns, rows = np.divmod(entries, size) if size else (entries, entries)
-    indptr = np.searchsorted(columns, np.arange(size + 1))
-    return Symmetric(indptr, rows), slots
+        mapped = number[each].astype(np.int32)
+        lower, upper = np.maximum(mapped[:, row], mapped[:, column]), np.minimum(mapped[:, row], mapped[:, column])
+        rows.append(lower.ravel())
+        columns.append(upper.ravel())
+    row, column = (np.concatenate([*each, np.zeros(0, dtype=np.int32)]) for each in (rows, columns))
+    order = _counted(column, _counted(row, np.arange(len(row)), size), size)
+    order = order[column[order] >= 0]
+    row, column = row[order], column[order]
+    new = np.ones(len(order), dtype=bool)
+    new[1:] = (row[1:] != row[:-1]) | (column[1:] != column[:-1])
+    starts = np.append(np.flatnonzero(new), len(order))
+    indptr = np.searchsorted(column[new], np.arange(size + 1))
+    return Symmetric(indptr, row[new].astype(np.int64)), starts, order
 
 
 @njit(cache=True)
-def _scatter(slots, values, total):  # type: ignore[no-untyped-def]
-    for e in range(slots.shape[0]):
-        for k in range(slots.shape[1]):
-            total[slots[e, k]] += values[e, k]
+def _counted(keys, order, size):  # type: ignore[no-untyped-def]
+    """`order` sorted by keys[order], which run from -1 to size - 1; equal ones stay in order (counting sort)."""
+    place = np.zeros(size + 2, dtype=np.int64)
+    for k in order:
+        place[keys[k] + 2] += 1
+    for k in range(1, size + 2):
+        place[k] += place[k - 1]
+    result = np.empty_like(order)
+    for k in order:
+        result[place[keys[k] + 1]] = k
+        place[keys[k] + 1] += 1
+    return result
+
+
+@njit(cache=True, nogil=True)
+def _gather(start, stop, starts, sources, entries, values):  # type: ignore[no-untyped-def]
+    for v in range(start, stop):
+        total = 0.0
+        for k in range(starts[v], starts[v + 1]):
+            total += entries[sources[k]]
+        values[v] = total
+
+
+@njit(cache=True)
+def _add_forces(freedoms, reach, element, total):  # type: ignore[no-untyped-def]
+    """Adds the elements' end forces to the nodes' and returns the largest component, moments over the node's arm."""
+    largest = 0.0
+    for e in range(freedoms.shape[0]):
+        for k in range(freedoms.shape[1]):
+            freedom = freedoms[e, k]
+            total[freedom] += element[e, k]
+            largest = max(largest, abs(element[e, k]) * reach[freedom])
+    return largest
+
+
+@njit(cache=True)
+def _multiply(freedoms, tangent, motion, total):  # type: ignore[no-untyped-def]
+    """Adds each element's packed symmetric tangent times its motion."""
+    for e in range(freedoms.shape[0]):
+        at = 0
+        for i in range(freedoms.shape[1]):
+            for j in range(i + 1):
+                total[freedoms[e, i]] += tangent[e, at] * motion[freedoms[e, j]]
+                if j < i:
+                    total[freedoms[e, j]] += tangent[e, at] * motion[freedoms[e, i]]
+                at += 1

@@ -13,14 +13,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
 from shellform.structure.parts import Evaluation
 from shellform.structure.state import State
+from shellform.structure.threads import share
 
-_LOWER = np.tril_indices(6)
+_NOTHING = np.empty((0, 21))
 _NO_LENGTH = 1e-300  # a cable whose ends meet is slack and pulls nowhere
 
 
@@ -74,23 +76,13 @@ class Cables:
         along = self.tension_by_rest_length(state)[:, None] * chord / np.linalg.norm(chord, axis=1)[:, None]
         return np.hstack([-along, along])
 
-    def evaluate(self, state: State, *, tangent: bool) -> Evaluation:
-        """Energy (c,) J, forces (c, 6) N on the ends, packed lower tangents (c, 21) N/m."""
-        chord = self._chord(state)
-        length = np.linalg.norm(chord, axis=1)
-        stretch = np.maximum(length - self.rest_length, 0.0)
-        pull = self.stiffness * stretch / self.rest_length
-        unit = chord / np.maximum(length, _NO_LENGTH)[:, None]
-        along = pull[:, None] * unit
-        force = np.hstack([-along, along])
-        if not tangent:
-            return Evaluation(0.5 * pull * stretch, force, None)
-        taut = np.where(stretch > 0.0, self.stiffness / self.rest_length, 0.0)
-        lateral = pull / np.maximum(length, _NO_LENGTH)
-        outer = unit[:, :, None] * unit[:, None, :]
-        block = (taut - lateral)[:, None, None] * outer + lateral[:, None, None] * np.eye(3)
-        full = np.block([[block, -block], [-block, block]])
-        return Evaluation(0.5 * pull * stretch, force, full[:, _LOWER[0], _LOWER[1]])
+    def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
+        """Energy (c,) J, forces (c, 6) N on the ends, packed lower tangents (c, 21) N/m, filled `into`."""
+        count = len(self.ends)
+        energy, force = np.empty(count), np.empty((count, 6))
+        blocks = _NOTHING if not tangent else np.empty((count, 21)) if into is None else into
+        share(_evaluate, count, state.positions, self.ends, self.rest_length, self.stiffness, energy, force, blocks)
+        return Evaluation(energy, force, blocks if tangent else None)
 
     def _chord(self, state: State) -> Reals:
         return state.positions[self.ends[:, 1]] - state.positions[self.ends[:, 0]]
@@ -102,3 +94,32 @@ def make_cables(ends: ArrayLike, *, rest_length: ArrayLike, stiffness: ArrayLike
     count = len(pairs)
     rest = np.broadcast_to(np.asarray(rest_length, dtype=float), (count,))
     return Cables(pairs, rest, np.broadcast_to(np.asarray(stiffness, dtype=float), (count,)))
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _evaluate(start, stop, positions, ends, rest_length, stiffness, energy, force, blocks):  # type: ignore[no-untyped-def]
+    """One pass over the cables from `start` to `stop`; `blocks` is filled where it has rows."""
+    e = np.empty(3)
+    for c in range(start, stop):
+        a, b = ends[c, 0], ends[c, 1]
+        for i in range(3):
+            e[i] = positions[b, i] - positions[a, i]
+        l = np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
+        stretch = max(l - rest_length[c], 0.0)
+        slope = stiffness[c] / rest_length[c]
+        N = slope * stretch
+        energy[c] = 0.5 * N * stretch
+        for i in range(3):
+            e[i] /= max(l, _NO_LENGTH)
+            force[c, i], force[c, 3 + i] = -N * e[i], N * e[i]
+        if blocks.shape[0] == 0:
+            continue
+        taut = slope if stretch > 0.0 else 0.0
+        lateral = N / max(l, _NO_LENGTH)
+        at = 0
+        for row in range(6):
+            for column in range(row + 1):
+                i, j = row % 3, column % 3
+                value = (taut - lateral) * e[i] * e[j] + (lateral if i == j else 0.0)
+                blocks[c, at] = value if row // 3 == column // 3 else -value
+                at += 1

@@ -39,13 +39,19 @@ class ChordKeeper:
         ).tocsr()
         self.weighted = sp.csr_array(incidence.T.tocsr() * weight)
         laplacian = sp.csc_array(self.weighted @ incidence)
-        self.axes: list[tuple[Indices, Factor]] = []
-        for axis in range(3):
-            nodes = free[free % 6 == axis] // 6
+        # Axes with the same supports share a factor; with pinned supports all three do.
+        nodes_of = [free[free % 6 == axis] // 6 for axis in range(3)]
+        together: list[list[int]] = []
+        for axis, nodes in enumerate(nodes_of):
+            same = next((group for group in together if np.array_equal(nodes_of[group[0]], nodes)), None)
+            together.append([axis]) if same is None else same.append(axis)
+        self.axes: list[tuple[Indices, Indices, Factor]] = []
+        for group in together:
+            nodes = nodes_of[group[0]]
             block = sp.csc_array(sp.tril(laplacian[nodes][:, nodes] + _ANCHOR * weight.max() * sp.eye_array(len(nodes))))
             block.sort_indices()
-            family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64))
-            self.axes.append((nodes, family.factor(block.data)))
+            family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64), often_solved=True)
+            self.axes.append((nodes, np.array(group), family.factor(block.data)))
 
     def corrected(self, state: State, step: Reals) -> Reals:
         """The step (n, 6) with its translations corrected."""
@@ -62,6 +68,6 @@ class ChordKeeper:
         turned = (length + axial) * (np.cos(turn) * along + np.sinc(turn / np.pi) * lateral)
         right = self.weighted @ (turned - chord - change)
         result = step.copy()
-        for axis, (nodes, factor) in enumerate(self.axes):
-            result[nodes, axis] += factor.solve(right[nodes, axis])
+        for nodes, group, factor in self.axes:
+            result[np.ix_(nodes, group)] += factor.solve(right[np.ix_(nodes, group)])
         return result

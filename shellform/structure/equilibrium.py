@@ -29,6 +29,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.structure.assembly import Assembly, Balance
+from shellform.structure.residual import Measure, Turning, held
 from shellform.structure.sparse import Factor, NotPositiveDefinite
 from shellform.structure.state import State, moved
 
@@ -40,8 +41,10 @@ _CLOSE, _CONTRACTION = 1e-2, 0.9  # a residual near the goal that falls this muc
 # sliding springs on a surface known to a finite order have no exact potential
 _SHORTEST = 0.1  # share of a step to which it is cut before the mass is raised instead
 _PATIENCE = 3  # steps with mass between two looks for a symmetric path
+_STAGNANT = 0.1  # ratio of two residuals one after the other: a step that brings less than this may be down to rounding
+_HEAVY = 1e6  # times the largest stiffness
+_FAR = 1e6  # m or rad, a step of Newton's iteration that leads nowhere
 _HALVINGS = 4  # of one step before the mass is raised instead
-_SPIN = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def find_equilibrium(
     at every step. Raises NotConverged with the last state, LostBranch where `on_branch` is set and definiteness is lost.
     """
     walk = _Walk(assembly, start, load, reach)
-    while walk.residual > max(tolerance, walk.rounding()):
+    while walk.residual > tolerance and walk.residual > walk.rounding():
         if progress is not None:
             progress(walk.factorisations, walk.residual)
         if walk.factorisations >= limit:
@@ -101,6 +104,45 @@ def find_equilibrium(
     return Equilibrium(walk.state, walk.now.energy, walk.residual, walk.factorisations, stable, negative)
 
 
+def newton(
+    assembly: Assembly, start: State, load: Reals, *, tolerance: float = TOLERANCE, limit: int = 50, progress: Progress | None = None
+) -> Equilibrium:
+    """The equilibrium that plain Newton-Raphson reaches from `start` under the dead `load` (n, 6): K dx = r, whole steps, no mass.
+
+    It may end on an unstable equilibrium, which implicit dynamic relaxation never does. Raises NotConverged with the state of the
+    smallest residual after `limit` factorisations, or where a step isn't finite.
+    """
+    measure, turning = Measure(assembly), Turning(assembly, load)
+    state, best, least, before = start, start, np.inf, np.inf
+    for spent in range(limit + 1):
+        now = assembly.evaluate(state)
+        residual = measure.residual(now, load)
+        if progress is not None:
+            progress(spent, residual)
+        if residual < least:
+            best, least = state, residual
+        noise = measure.rounding(now, state, load) if residual > _STAGNANT * before else 0.0
+        before = residual
+        if residual <= max(tolerance, noise):
+            stable, negative = stability(assembly, now)
+            return Equilibrium(state, now.energy, residual, spent, stable, negative)
+        if not np.isfinite(residual):
+            break
+        step = np.zeros(6 * assembly.count)
+        unbalanced = (load - now.force).ravel()[assembly.free]
+        step[assembly.free] = turning.solve(assembly.matrix.factor_indefinite(held(assembly, now)), now, unbalanced)
+        if not np.isfinite(step).all() or np.abs(step).max() > _FAR:
+            break
+        state = moved(state, step.reshape(-1, 6))
+    raise NotConverged(
+        f"Newton's iteration found no equilibrium (smallest residual {least:.1e})",
+        state=best,
+        residual=least,
+        iterations=spent,
+        remedy="Apply the load in more increments, or use the relaxation, which finds stable states from afar.",
+    )
+
+
 def stability(assembly: Assembly, balance: Balance) -> tuple[bool, int]:
     """Whether the tangent is positive definite, and its number of negative eigenvalues; spins about rod axes are held."""
     values = held(assembly, balance)
@@ -111,31 +153,20 @@ def stability(assembly: Assembly, balance: Balance) -> tuple[bool, int]:
     return True, 0
 
 
-def held(assembly: Assembly, balance: Balance) -> Reals:
-    """The tangent's lower values with rotations held by 1e-10 of their own stiffness.
-
-    A pinned straight rod can spin about its axis without any force; that much stiffness makes the matrix regular and is far
-    below what rounding leaves of the softest mode that matters.
-    """
-    assert balance.tangent is not None
-    values = balance.tangent.copy()
-    turns = assembly.matrix.diagonal[assembly.free % 6 >= 3]
-    values[turns] += _SPIN * np.abs(values[turns])
-    return values
-
-
 class _Walk:
     """The moving state of one relaxation."""
 
     def __init__(self, assembly: Assembly, start: State, load: Reals, reach: float) -> None:
         self.assembly, self.load, self.state, self.reach = assembly, load, start, reach
         self.now = assembly.evaluate(start)
-        self.arms = _arms(assembly)
-        self.mass_shape = np.where(assembly.free % 6 < 3, 1.0, self.arms[assembly.free // 6] ** 2)
+        self.measure = Measure(assembly)
+        self.mass_shape = self.measure.mass_shape
         self.mass = 0.0
         self.factorisations = 0
         self.patience = _PATIENCE
-        self.residual = self._measure(self.now)
+        self.turning = Turning(assembly, load)
+        self.before = np.inf
+        self.residual = self.measure.residual(self.now, load)
 
     def step(self, on_branch: bool) -> None:
         """One accepted step."""
@@ -148,20 +179,12 @@ class _Walk:
             began = time.perf_counter()
             factor = self._factor(values, on_branch)
             then = time.perf_counter()
-            direction = factor.solve(unbalanced)
+            direction = self.turning.solve(factor, self.now, unbalanced)
             clock["factorisation"] += then - began
             clock["solve"] += time.perf_counter() - then
             if self._advance(direction, float(unbalanced @ direction)):
                 return
             self._raise_mass()
-            if self.mass > 1e6 * float(np.abs(values[self.assembly.matrix.diagonal]).max()):
-                raise NotConverged(
-                    f"The relaxation stalled (residual {self.residual:.1e})",
-                    state=self.state,
-                    residual=self.residual,
-                    iterations=self.factorisations,
-                    remedy="Apply the load in more increments, or loosen the tolerance.",
-                )
 
     def _factor(self, values: Reals, on_branch: bool) -> Factor:
         while True:
@@ -183,10 +206,24 @@ class _Walk:
                     ) from error
                 self._raise_mass()
 
+    def _heaviest(self) -> float:
+        """The mass at which a step leads nowhere; 0 where the tangent isn't finite."""
+        assert self.now.tangent is not None
+        largest = float(np.abs(self.now.tangent[self.assembly.matrix.diagonal]).max(initial=0.0))
+        return _HEAVY * max(largest, 1.0) if np.isfinite(largest) else 0.0
+
     def _raise_mass(self) -> None:
         diagonal = np.abs(self.now.tangent[self.assembly.matrix.diagonal]) if self.now.tangent is not None else np.ones(1)
         least = 1e-7 * float(np.mean(diagonal[self.assembly.free % 6 < 3]))
         self.mass = max(_GROWTH * self.mass, least if least > 0.0 else max(float(np.abs(self.load).max()), 1.0))
+        if not self.mass <= self._heaviest():
+            raise NotConverged(
+                f"The relaxation stalled (residual {self.residual:.1e})",
+                state=self.state,
+                residual=self.residual,
+                iterations=self.factorisations,
+                remedy="Apply the load in more increments, or loosen the tolerance.",
+            )
 
     def _saddle(self, values: Reals, unbalanced: Reals) -> bool:
         """A Newton step where the tangent has negative eigenvalues that the unbalanced forces don't touch.
@@ -216,16 +253,18 @@ class _Walk:
             return False
         full = share == 1.0
         for halving in range(_HALVINGS + 1):
-            trial = moved(self.state, self.assembly.chords.corrected(self.state, share * step))
+            whole_step = self.assembly.chords.corrected(self.state, share * step)
+            trial = moved(self.state, whole_step)
             then = self.assembly.evaluate(trial)
-            rise = then.energy - self.now.energy - share * float((self.load * step).sum())
+            rise = then.energy - self.now.energy - float((self.load * whole_step).sum())
             rounding = 1e-12 * (abs(then.energy) + abs(self.now.energy))
-            residual = self._measure(then)
+            residual = self.measure.residual(then, self.load)
             lower = rise <= -_SUFFICIENT * share * downhill
             # Next to the goal the change of the potential drowns in rounding: there the residual decides.
-            settling = share * downhill <= rounding and residual < max(2.0 * self.residual, self.rounding())
-            closing = self.residual < _CLOSE and residual < _CONTRACTION * self.residual
+            settling = share * downhill <= rounding and residual < max(2.0 * self.residual, self._noise())
+            closing = (self.residual < _CLOSE or self.turns) and residual < _CONTRACTION * self.residual
             if lower or settling or closing:
+                self.before = self.residual
                 self.state, self.now, self.residual = trial, then, residual
                 if halving == 0 and full:
                     self._lower_mass()
@@ -240,26 +279,17 @@ class _Walk:
             if self.mass < 1e-10 * float(diagonal.mean()):
                 self.mass = 0.0
 
-    def _measure(self, balance: Balance) -> float:
-        unbalanced = (self.load - balance.force).ravel()[self.assembly.free]
-        if not np.isfinite(unbalanced).all():
-            return float("inf")
-        turns = self.assembly.free % 6 >= 3
-        unbalanced[turns] /= self.arms[self.assembly.free[turns] // 6]
-        scale = self._scale(balance)
-        return float(np.abs(unbalanced).max(initial=0.0)) / scale if scale > 0.0 else 0.0
-
-    def _scale(self, balance: Balance) -> float:
-        applied = np.abs(self.load)
-        return max(float(applied[:, :3].max()), balance.largest, float((applied[:, 3:] / self.arms[:, None]).max()))
+    @property
+    def turns(self) -> bool:
+        """Whether moments turn nodes in space: the potential is a guide then, not a measure."""
+        return len(self.turning.nodes) > 0
 
     def rounding(self) -> float:
-        """The residual that rounding of the coordinates alone leaves: stiff short elements answer to the last bit."""
-        assert self.now.tangent is not None
-        stiffest = float(np.abs(self.now.tangent).max(initial=0.0))
-        last_bit = 4.0 * np.finfo(float).eps * float(np.abs(self.state.positions).max(initial=0.0))
-        scale = self._scale(self.now)
-        return stiffest * last_bit / scale if scale > 0.0 else 0.0
+        """The residual that rounding leaves, once steps have stopped to bring more than that; 0 before."""
+        return self._noise() if self.residual > _STAGNANT * self.before else 0.0
+
+    def _noise(self) -> float:
+        return self.measure.rounding(self.now, self.state, self.load)
 
 
 def _minimum(rise: float, downhill: float, share: float) -> float:
@@ -267,13 +297,3 @@ def _minimum(rise: float, downhill: float, share: float) -> float:
     slope = -downhill * share
     curvature = rise - slope
     return 0.5 * -slope / curvature if curvature > 0.0 else 0.5
-
-
-def _arms(assembly: Assembly) -> Reals:
-    """A length (n,) for each node, m: the mean rest length of the beams that meet there (1 where there are none)."""
-    total, number = np.zeros(assembly.count), np.zeros(assembly.count)
-    for part in assembly.beams:
-        for end in part.ends.T:
-            np.add.at(total, end, part.rest_length)
-            np.add.at(number, end, 1.0)
-    return np.where(number > 0.0, total / np.maximum(number, 1.0), 1.0)

@@ -14,6 +14,10 @@ from shellform.structure.assembly import Assembly
 from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables
 
+_APART = 1e12  # ratio of stiffnesses of which double precision leaves four digits
+_MISFIT = 2.0  # ratio of a beam's rest length to the distance of its nodes
+_STRAIGHT = 1e-9  # off the axis, over the rod's length
+
 
 @dataclass(frozen=True)
 class Network:
@@ -76,3 +80,87 @@ def connected(count: int, ends: Indices) -> tuple[int, Indices]:
     graph = sp.coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
     parts, label = connected_components(graph, directed=False)
     return int(parts), np.asarray(label, dtype=np.int64)
+
+
+def doubts(network: Network) -> list[str]:
+    """What is allowed but rarely meant, a sentence each: nodes in one place, stiffnesses too far apart, rest lengths far from the distance
+    of their nodes, and straight rods that nothing keeps from spinning about their own axis (that spin is held in the solution)."""
+    return [*_coincident(network), *_far_apart(network), *_misfitting(network), *_spinning(network)]
+
+
+def _coincident(network: Network) -> list[str]:
+    order = np.lexsort(network.nodes.T)
+    same = (network.nodes[order[1:]] == network.nodes[order[:-1]]).all(axis=1)
+    if not same.any():
+        return []
+    k = int(np.argmax(same))
+    pair = sorted((int(order[k]), int(order[k + 1])))
+    return [f"{int(same.sum())} nodes lie where another one does, nodes[{pair[0]}] and nodes[{pair[1]}] the first; they don't touch."]
+
+
+def _far_apart(network: Network) -> list[str]:
+    beams, cables = network.beams, network.cables
+    length = beams.rest_length
+    values = np.concatenate(
+        [
+            beams.axial / length,
+            12.0 * beams.bending_y / length**3,
+            12.0 * beams.bending_z / length**3,
+            cables.stiffness / cables.rest_length,
+        ]
+    )
+    if not len(values) or values.max() <= _APART * values.min():
+        return []
+    count = len(beams.ends)
+
+    def named(k: int) -> str:
+        return f"beams[{k % count}]" if k < 3 * count else f"cables[{k - 3 * count}]"
+
+    stiff, soft = int(values.argmax()), int(values.argmin())
+    return [
+        f"{named(stiff)} ({values[stiff]:.1e} N/m) is {values[stiff] / values[soft]:.1e} times as stiff as {named(soft)}; digits are lost."
+    ]
+
+
+def _misfitting(network: Network) -> list[str]:
+    beams = network.beams
+    length = np.linalg.norm(network.nodes[beams.ends[:, 1]] - network.nodes[beams.ends[:, 0]], axis=1)
+    off = (beams.rest_length > _MISFIT * length) | (beams.rest_length < length / _MISFIT)
+    if not off.any():
+        return []
+    k = int(np.argmax(off))
+    return [
+        f"{int(off.sum())} beams have rest lengths far from the distance of their nodes, beams[{k}] the first "
+        f"({beams.rest_length[k]:.4g} m over {length[k]:.4g} m)."
+    ]
+
+
+def _spinning(network: Network) -> list[str]:
+    ends = network.beams.ends
+    if not len(ends):
+        return []
+    parts, label = connected(len(network.nodes), ends)
+    touched = np.unique(ends)
+    anchor = np.zeros(parts, dtype=np.int64)
+    anchor[label[ends[::-1, 0]]] = ends[::-1, 0]
+    axis = network.nodes[ends[:, 1]] - network.nodes[ends[:, 0]]
+    direction = np.zeros((parts, 3))
+    direction[label[ends[::-1, 0]]] = axis[::-1]
+    direction[label[touched]] /= np.linalg.norm(direction[label[touched]], axis=1)[:, None]
+    away = network.nodes[touched] - network.nodes[anchor[label[touched]]]
+    own = direction[label[touched]]
+    off = np.linalg.norm(np.cross(away, own), axis=1)
+    size = np.zeros(parts)
+    np.maximum.at(size, label[touched], np.linalg.norm(away, axis=1))
+    crooked = np.zeros(parts, dtype=bool)
+    np.logical_or.at(crooked, label[touched], off > _STRAIGHT * size[label[touched]])
+    # A held rotation stops the spin where its axis has a part along the rod.
+    held = np.zeros(parts, dtype=bool)
+    np.logical_or.at(held, label[touched], (network.fixed[touched, 3:] & (np.abs(own) > _STRAIGHT)).any(axis=1))
+    has_beam = np.zeros(parts, dtype=bool)
+    has_beam[label[touched]] = True
+    free = np.flatnonzero(has_beam & ~crooked & ~held)
+    if not len(free):
+        return []
+    first = int(anchor[free[0]])
+    return [f"{len(free)} straight rods are free to spin about their own axis, the one at nodes[{first}] the first; the spin is held."]

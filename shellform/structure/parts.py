@@ -30,5 +30,5 @@ class Part(Protocol):
     def freedoms(self) -> Indices:
         """Freedoms (m, k) of each element, in the order of the columns of `force`."""
 
-    def evaluate(self, state: State, *, tangent: bool) -> Evaluation:
-        """Energy, forces and, if asked for, tangents of all elements."""
+    def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
+        """Energy, forces and, if asked for, tangents of all elements, written `into` an array of their shape if one is given."""

@@ -1,12 +1,14 @@
 """Symmetric sparse factorisation with the symbolic analysis done once.
 
-CHOLMOD's supernodal Cholesky, from the `cvxopt` wheel, is the fastest that pip installs (findings.md); SciPy's SuperLU in
-symmetric mode without pivoting takes its place where cvxopt has no wheel, about six times slower. A Cholesky
-factorisation that fails is information (the state is no stable equilibrium), so it is an exception of its own.
+MKL's PARDISO is the fastest Cholesky that pip installs; CHOLMOD's supernodal one, from the `cvxopt` wheel, takes its place where
+there is no MKL, and SciPy's SuperLU in symmetric mode without pivoting where there is neither. SHELLFORM_SOLVER=mkl, cholmod or superlu asks for one of them. A Cholesky factorisation that fails is
+information (the state is no stable equilibrium), so it is an exception of its own.
 """
 
 from __future__ import annotations
 
+import os
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -14,13 +16,35 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.structure import pardiso
 
 try:
     from cvxopt import cholmod, matrix, spmatrix
 except ImportError:  # no wheel for this platform: SuperLU serves
     cholmod = None
 
-BACKEND = "SuperLU (SciPy)" if cholmod is None else "CHOLMOD (cvxopt)"
+_NAMES = {"mkl": "PARDISO (MKL)", "cholmod": "CHOLMOD (cvxopt)", "superlu": "SuperLU (SciPy)"}
+
+
+def installed() -> list[str]:
+    """The solvers there are, the fastest first."""
+    there = {"mkl": pardiso.library() is not None, "cholmod": cholmod is not None, "superlu": True}
+    return [name for name, here in there.items() if here]
+
+
+def backend() -> str:
+    """Which solver factorises: the one that SHELLFORM_SOLVER names, or the fastest there is. Raises InputError."""
+    known = installed()
+    asked = os.environ.get("SHELLFORM_SOLVER", known[0])
+    if asked not in known:
+        raise InputError("is no solver installed here", where="SHELLFORM_SOLVER", value=asked, remedy=f"There are: {', '.join(known)}.")
+    return asked
+
+
+def backend_name() -> str:
+    """The solver's full name, for reports."""
+    return _NAMES[backend()]
 
 
 class NotPositiveDefinite(ArithmeticError):
@@ -34,14 +58,28 @@ class Factor(Protocol):
         """The solution for right-hand sides (n,) or (n, k)."""
 
 
-class Symmetric:
-    """A family of symmetric matrices with one pattern: lower triangle in CSC form, `indptr` (n + 1,), `indices` (nnz,)."""
+class Indefinite(Factor, Protocol):
+    """A factorised matrix that needn't be positive definite."""
 
-    def __init__(self, indptr: Indices, indices: Indices) -> None:
+    @property
+    def negative(self) -> int:
+        """How many of its eigenvalues are negative."""
+
+
+class Symmetric:
+    """A family of symmetric matrices with one pattern: lower triangle in CSC form, `indptr` (n + 1,), `indices` (nnz,).
+
+    `often_solved`: one factor serves many solves, in which CHOLMOD is quicker than the quicker factoriser.
+    """
+
+    def __init__(self, indptr: Indices, indices: Indices, *, often_solved: bool = False) -> None:
         self.size = len(indptr) - 1
         self.indptr, self.indices = indptr, indices
         self.columns = np.repeat(np.arange(self.size), np.diff(indptr))
         self.diagonal = indptr[:-1]  # the first stored entry of each column of a lower triangle
+        self._backend = "cholmod" if often_solved and cholmod is not None else backend()
+        self._pardiso: pardiso.Factoriser | None = None
+        self._bunch_kaufman: pardiso.Factoriser | None = None
         self._symbolic: Any = None
         self._matrix: Any = None
         self._generation = 0
@@ -51,10 +89,12 @@ class Symmetric:
 
         Raises NotPositiveDefinite.
         """
-        if not np.isfinite(values).all():
+        if not np.isfinite(values.sum()):
             raise NotPositiveDefinite("the matrix has entries that are not finite")
-        if cholmod is None:
-            return _SuperLU(self._full(values))
+        if self._backend == "mkl":
+            return self._factor_with_pardiso(values)
+        if self._backend == "superlu":
+            return _SuperLU(self.full(values))
         if self._symbolic is None:
             self._matrix = spmatrix(
                 matrix(values), matrix(self.indices.astype(np.int64)), matrix(self.columns), (self.size, self.size)
@@ -69,21 +109,49 @@ class Symmetric:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
         return _Cholmod(self, self._symbolic, self._generation)
 
+    def _factor_with_pardiso(self, values: Reals) -> Factor:
+        if self._pardiso is None:
+            self._pardiso = pardiso.Factoriser(self.indptr, self.indices)
+        self._generation += 1
+        try:
+            self._pardiso.factor(values)
+        except pardiso.NotDefinite as error:
+            raise NotPositiveDefinite("the matrix is not positive definite") from error
+        return _Pardiso(self, self._pardiso, self._generation)
+
+    def factor_indefinite(self, values: Reals) -> Indefinite:
+        """L D L' of a matrix that needn't be positive definite, with its number of negative eigenvalues (Sylvester's law).
+
+        It serves until the next factorisation of either kind.
+        """
+        if self._backend == "mkl":
+            if self._bunch_kaufman is None:
+                self._bunch_kaufman = pardiso.Factoriser(self.indptr, self.indices, definite=False)
+            self._generation += 1
+            self._bunch_kaufman.factor(values)
+            return _Pardiso(self, self._bunch_kaufman, self._generation)
+        if self._backend == "superlu":
+            return _SuperLU(self.full(values), definite=False)
+        try:
+            symbolic, pivots = self._indefinite(values)
+        except ArithmeticError:  # a pivot is exactly zero; SuperLU exchanges rows
+            return _SuperLU(self.full(values), definite=False)
+        return _Indefinite(symbolic, int((pivots < 0.0).sum()))
+
     def negative_eigenvalues(self, values: Reals) -> int:
-        """How many eigenvalues are negative (Sylvester's law on an LDLᵀ factorisation)."""
-        if cholmod is None:
-            return _SuperLU(self._full(values), definite=False).negative
-        _, pivots = self._indefinite(values)
-        return int((pivots < 0.0).sum())
+        """How many eigenvalues are negative."""
+        return self.factor_indefinite(values).negative
 
     def newton(self, values: Reals, right: Reals) -> tuple[Reals, bool]:
         """The solution for `right` (n,) with a matrix that needn't be definite, and whether `right` leaves its negative part
         untouched: whether below 1e-9 of y'|D|y, L D L' = A and L D y = right, comes from negative pivots."""
         if cholmod is None:
-            factor = _SuperLU(self._full(values), definite=False)
-            solution = factor.solve(right)
-            return solution, factor.negative == 0
-        symbolic, pivots = self._indefinite(values)
+            plain = _SuperLU(self.full(values), definite=False)
+            return plain.solve(right), plain.negative == 0
+        try:
+            symbolic, pivots = self._indefinite(values)
+        except ArithmeticError:  # a pivot is exactly zero: no Newton step is to be had
+            return np.zeros_like(right), False
         lower = matrix(right)
         cholmod.solve(symbolic, lower, sys=7)
         cholmod.solve(symbolic, lower, sys=4)
@@ -108,9 +176,24 @@ class Symmetric:
             cholmod.options["supernodal"] = 2
         return symbolic, 1.0 / np.array(inverse)[:, 0]
 
-    def _full(self, values: Reals) -> sp.csc_array:
+    def _check(self, generation: int) -> None:
+        if generation != self._generation:
+            raise RuntimeError("this factor was replaced by a later factorisation of the same family")
+
+    def full(self, values: Reals) -> sp.csc_array:
+        """The whole matrix (n, n) with lower `values` (nnz,)."""
         lower = sp.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
         return sp.csc_array(lower + sp.tril(lower, -1).T)
+
+
+class _Pardiso:
+    def __init__(self, family: Symmetric, factor: pardiso.Factoriser, generation: int) -> None:
+        self._family, self._factor, self._generation = family, factor, generation
+        self.negative = factor.negative
+
+    def solve(self, right: Reals) -> Reals:
+        self._family._check(self._generation)
+        return self._factor.solve(right)
 
 
 class _Cholmod:
@@ -118,13 +201,24 @@ class _Cholmod:
         self._family, self._factor, self._generation = family, factor, generation
 
     def solve(self, right: Reals) -> Reals:
-        if self._generation != self._family._generation:
-            raise RuntimeError("this factor was replaced by a later factorisation of the same family")
+        self._family._check(self._generation)
         vector = right.ndim == 1
         solution = matrix(np.ascontiguousarray(right[:, None] if vector else right))
         cholmod.solve(self._factor, solution)
         result = np.array(solution)
         return result[:, 0] if vector else result
+
+
+@dataclass(frozen=True)
+class _Indefinite:
+    factor: Any
+    negative: int
+
+    def solve(self, right: Reals) -> Reals:
+        solution = matrix(np.ascontiguousarray(right[:, None] if right.ndim == 1 else right))
+        cholmod.solve(self.factor, solution)
+        result = np.array(solution)
+        return result[:, 0] if right.ndim == 1 else result
 
 
 class _SuperLU:

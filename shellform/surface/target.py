@@ -1,9 +1,7 @@
 """The target surface: triangles with a normal at every vertex.
 
 Triangles are only the skeleton: between them the surface is taken as smooth (locate.py), so that what matters about the mesh are its
-vertices and their normals. Where a CAD kernel doesn't give these, they come from local jets: each vertex's neighbourhood of
-two rings is fitted by a cubic height function over the plane of a first, angle-weighted normal, in the sense of least squares
-(Cazals and Pouget 2005); its slope corrects the normal to third order in the mesh size, its second derivatives give the curvature.
+vertices and their normals. Where a CAD kernel doesn't give these, they come from local jets (jets.py).
 """
 
 from __future__ import annotations
@@ -14,10 +12,11 @@ import numpy as np
 import scipy.sparse as sp
 from numba import njit
 from numpy.typing import ArrayLike
-from scipy.sparse.csgraph import breadth_first_order, connected_components
+from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
+from shellform.surface.jets import jets
 
 _SAME = 1e-9  # of the size: vertices nearer than that are one
 _FLAT = 1e-12  # of the squared size: triangles smaller than that have no area
@@ -53,11 +52,10 @@ class Surface:
 
     @property
     def boundary(self) -> list[Indices]:
-        """The closed loops of vertices round the surface and round its holes, the longest first."""
-        edges = _directed_edges(self.triangles)
-        key = edges[:, 0] * len(self.vertices) + edges[:, 1]
-        back = edges[:, 1] * len(self.vertices) + edges[:, 0]
-        rim = edges[~np.isin(key, back)]
+        """The closed loops of vertices round the surface and round its holes, the longest, in metres, first."""
+        across = across_edges(self.triangles, len(self.vertices))
+        at = np.argwhere(across < 0)
+        rim = np.column_stack([self.triangles[at[:, 0], (at[:, 1] + k) % 3] for k in (0, 1)])
         following = dict(zip(rim[:, 0].tolist(), rim[:, 1].tolist(), strict=True))
         loops = []
         while following:
@@ -67,7 +65,7 @@ class Surface:
                 loop.append(here)
                 here = following.pop(here)
             loops.append(np.array(loop))
-        return sorted(loops, key=len, reverse=True)
+        return sorted(loops, key=lambda loop: -_length(self.vertices[loop]))
 
     @property
     def holes(self) -> int:
@@ -96,7 +94,7 @@ def make_surface(
     up = _area_vectors(points, faces).sum(axis=0)
     if up[2] < 0.0:
         faces = faces[:, ::-1].copy()
-    rough = _rough_normals(points, faces)
+    rough = rough_normals(points, faces)
     if given is None:
         unit = jets(points, faces, rough)[0]
     else:
@@ -121,65 +119,6 @@ def largest_curvature(surface: Surface) -> float:
     return float(np.percentile(bent[inner], 99.5)) if inner.any() else 0.0
 
 
-def jets(points: Reals, faces: Indices, normals: Reals) -> tuple[Reals, Reals]:
-    """Unit normals (v, 3) and principal curvatures (v, 2), 1/m, by cubic jets over two rings, from first `normals`."""
-    one = _adjacency(faces, len(points))
-    two = sp.csr_array((one @ one + one) > 0)
-    two.setdiag(False)
-    two.eliminate_zeros()
-    return _jets(points, normals, two.indptr.astype(np.int64), two.indices.astype(np.int64))
-
-
-@njit(cache=True)
-def _jets(points, normals, indptr, neighbours):  # type: ignore[no-untyped-def]
-    count = points.shape[0]
-    unit = np.empty((count, 3))
-    bent = np.empty((count, 2))
-    for v in range(count):
-        n = normals[v]
-        k = 0 if abs(n[0]) < abs(n[1]) and abs(n[0]) < abs(n[2]) else (1 if abs(n[1]) < abs(n[2]) else 2)
-        a = np.zeros(3)
-        a[k] = 1.0
-        e1 = np.cross(a, n)
-        e1 /= np.sqrt(np.dot(e1, e1))
-        e2 = np.cross(n, e1)
-        first, last = indptr[v], indptr[v + 1]
-        near = last - first
-        # Nine unknowns of a cubic through the vertex, five of a quadratic, two of a plane: as many as there are points for.
-        unknowns = 9 if near >= 11 else (5 if near >= 6 else 2)
-        rows = np.empty((near, unknowns))
-        height = np.empty(near)
-        size = 0.0
-        for r in range(near):
-            d = points[neighbours[first + r]] - points[v]
-            size = max(size, np.sqrt(np.dot(d, d)))
-        for r in range(near):
-            d = (points[neighbours[first + r]] - points[v]) / size
-            x, y = np.dot(d, e1), np.dot(d, e2)
-            height[r] = np.dot(d, n)
-            rows[r, 0], rows[r, 1] = x, y
-            if unknowns >= 5:
-                rows[r, 2], rows[r, 3], rows[r, 4] = 0.5 * x * x, x * y, 0.5 * y * y
-            if unknowns >= 9:
-                rows[r, 5], rows[r, 6], rows[r, 7], rows[r, 8] = x * x * x, x * x * y, x * y * y, y * y * y
-        fit = np.linalg.lstsq(rows, height)[0]
-        p, q = fit[0], fit[1]
-        slope = np.sqrt(1.0 + p * p + q * q)
-        for i in range(3):
-            unit[v, i] = (n[i] - p * e1[i] - q * e2[i]) / slope
-        bent[v] = 0.0
-        if unknowns >= 5:
-            # Shape operator of a graph: second form over first form; a crown (z down) counts positive.
-            L, M, N = -fit[2] / slope / size, -fit[3] / slope / size, -fit[4] / slope / size
-            E, F, G = 1.0 + p * p, p * q, 1.0 + q * q
-            det = E * G - F * F
-            mean = 0.5 * (E * N - 2.0 * F * M + G * L) / det
-            gauss = (L * N - M * M) / det
-            root = np.sqrt(max(mean * mean - gauss, 0.0))
-            bent[v, 0], bent[v, 1] = mean + root, mean - root
-    return unit, bent
-
-
 def _cleaned(
     points: Reals, faces: Indices, normals: Reals | None
 ) -> tuple[Reals, Indices, Reals | None, list[str]]:
@@ -188,8 +127,7 @@ def _cleaned(
     size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
     if size > 0.0:
         grid = np.round(points / (_SAME * size)).astype(np.int64)
-        _, first, same = np.unique(grid, axis=0, return_index=True, return_inverse=True)
-        same = same.ravel()
+        first, same = _distinct(grid)
         order = np.argsort(first)
         rank = np.empty_like(order)
         rank[order] = np.arange(len(order))
@@ -202,7 +140,7 @@ def _cleaned(
     if thin.any():
         mended.append(f"{int(thin.sum())} triangles without area were dropped")
         faces = faces[~thin]
-    _, once = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)
+    once, _ = _distinct(np.sort(faces, axis=1))
     if len(once) < len(faces):
         mended.append(f"{len(faces) - len(once)} triangles given twice were dropped")
         faces = faces[np.sort(once)]
@@ -218,9 +156,9 @@ def _cleaned(
 
 def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
     edges = np.sort(_directed_edges(faces), axis=1)
-    pairs, counts = np.unique(edges, axis=0, return_counts=True)
+    keys, counts = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_counts=True)
     if (counts > 2).any():
-        a = pairs[np.argmax(counts > 2), 0]
+        a = keys[np.argmax(counts > 2)] // len(points)
         raise InputError(
             f"{int((counts > 2).sum())} edges belong to more than two triangles, the first at {points[a].round(4).tolist()}",
             where=where,
@@ -245,30 +183,46 @@ def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
 
 def _oriented(faces: Indices, count: int, where: str) -> Indices:
     """Faces turned so that neighbours pass their common edge in opposite directions, from the first face outwards."""
-    edges = _directed_edges(faces)
-    owner = np.tile(np.arange(len(faces)), 3)
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    order = np.lexsort((high, low))
-    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
-    first, second = order[:-1][same], order[1:][same]
-    clash = edges[first, 0] == edges[second, 0]
-    if not clash.any():
-        return faces
-    ends = np.concatenate([owner[first], owner[second]]), np.concatenate([owner[second], owner[first]])
-    graph = sp.csr_array((np.where(np.tile(clash, 2), 2.0, 1.0), ends), shape=(len(faces), len(faces)))
-    visited, parent = breadth_first_order(graph, 0, directed=False)
-    turned = np.zeros(len(faces), dtype=bool)
-    link = graph.tolil()
-    for face in visited[1:]:
-        turned[face] = turned[parent[face]] ^ (link[parent[face], face] == 2.0)
-    if (turned[owner[first]] ^ turned[owner[second]] ^ clash).any():
+    turned = np.zeros(len(faces), dtype=np.bool_)
+    if not _turn(faces, across_edges(faces, count), turned):
         raise InputError("the surface has one side only, like a Möbius strip", where=where, remedy="Check the faces.")
+    if not turned.any():
+        return faces
     result = faces.copy()
     result[turned] = result[turned][:, ::-1]
     return result
 
 
-def _rough_normals(points: Reals, faces: Indices) -> Reals:
+@njit(cache=True)
+def _turn(faces, across, turned):  # type: ignore[no-untyped-def]
+    """Writes which faces (t,) are to be turned over; False where that can't be done."""
+    seen = np.zeros(len(faces), dtype=np.bool_)
+    queue = np.empty(len(faces), dtype=np.int64)
+    queue[0], head, tail = 0, 0, 1
+    seen[0] = True
+    while head < tail:
+        t = queue[head]
+        head += 1
+        for k in range(3):
+            other = across[t, k]
+            if other < 0:
+                continue
+            a, b = faces[t, k], faces[t, (k + 1) % 3]
+            clash = False
+            for j in range(3):
+                if faces[other, j] == a and faces[other, (j + 1) % 3] == b:
+                    clash = True
+            wanted = turned[t] != clash
+            if not seen[other]:
+                seen[other], turned[other] = True, wanted
+                queue[tail] = other
+                tail += 1
+            elif turned[other] != wanted:
+                return False
+    return True
+
+
+def rough_normals(points: Reals, faces: Indices) -> Reals:
     """Unit vertex normals (v, 3): triangle normals weighted by the angle at the vertex."""
     corner = points[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -277,9 +231,21 @@ def _rough_normals(points: Reals, faces: Indices) -> Reals:
     for k in range(3):
         a, b = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
         cosine = np.sum(a * b, axis=1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
-        np.add.at(total, faces[:, k], np.arccos(np.clip(cosine, -1.0, 1.0))[:, None] * normal)
+        share = np.arccos(np.clip(cosine, -1.0, 1.0))[:, None] * normal
+        for i in range(3):
+            total[:, i] += np.bincount(faces[:, k], share[:, i], len(points))
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return total / np.maximum(length, 1e-300)
+
+
+def _distinct(rows: Indices) -> tuple[Indices, Indices]:
+    """The places of the first of each kind of rows (k, 3), and for each row the number of its kind."""
+    order = np.lexsort(rows.T[::-1])
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (np.diff(rows[order], axis=0) != 0).any(axis=1)
+    kind = np.empty(len(rows), dtype=np.int64)
+    kind[order] = np.cumsum(new) - 1
+    return order[new], kind
 
 
 def _area_vectors(points: Reals, faces: Indices) -> Reals:
@@ -290,6 +256,23 @@ def _area_vectors(points: Reals, faces: Indices) -> Reals:
 def _directed_edges(faces: Indices) -> Indices:
     """Edges (3 t, 2): of all triangles their first, then their second, then their third."""
     return np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _length(loop: Reals) -> float:
+    return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
+
+
+def across_edges(faces: Indices, count: int) -> Indices:
+    """The triangle (t, 3) across the edge from corner k to corner k + 1, -1 at the surface's edge; of `count` vertices."""
+    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    key = low * count + high
+    order = np.argsort(key, kind="stable")
+    pair = np.flatnonzero(key[order][1:] == key[order][:-1])
+    first, second = order[pair], order[pair + 1]
+    result = np.full(len(key), -1)
+    result[first], result[second] = second // 3, first // 3
+    return result.reshape(-1, 3)
 
 
 def _adjacency(faces: Indices, count: int) -> sp.csr_array:

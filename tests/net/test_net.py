@@ -19,7 +19,7 @@ class Sphere:
         normal = points / np.linalg.norm(points, axis=1, keepdims=True)
         return type("Foot", (), {"point": normal, "normal": normal})()
 
-    def past_edge(self, foot):
+    def past_outline(self, foot):
         return np.full(len(foot.point), -1.0)
 
 

@@ -7,6 +7,7 @@ from shellform.errors import InputError
 from shellform.structure.cable import make_cables
 from shellform.structure.state import at_rest, moved
 from shellform.structure.verification import slack_pair
+from shellform.structure.verification.models import line, ropes, solved
 
 NODES = np.array([[0.0, 0.0, 0.0], [1.0, 0.3, -0.2]])
 LENGTH = float(np.linalg.norm(NODES[1]))
@@ -53,3 +54,15 @@ def test_cables_to_themselves_or_without_stiffness_are_refused():
         make_cables([[1, 1]], rest_length=1.0, stiffness=1.0)
     with pytest.raises(InputError, match="above zero"):
         make_cables([[0, 1]], rest_length=1.0, stiffness=-1.0)
+
+
+@pytest.mark.parametrize("rest", [1.01, 1.05, 1.2])
+def test_a_straight_loose_rope_finds_its_sag_under_load(rest):
+    rope = make_cables([[k, k + 1] for k in range(8)], rest_length=rest, stiffness=500.0)
+    load = np.zeros((9, 6))
+    load[:, 2] = -1.0
+    found = solved(ropes(line(8, 8.0), rope, [0, 8]), load)
+    tension = rope.tension(found)
+    # Statics: half of seven loads goes up at each end.
+    first = found.positions[1] - found.positions[0]
+    assert -tension[0] * first[2] / np.linalg.norm(first) == pytest.approx(3.5, rel=1e-6)

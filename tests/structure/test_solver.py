@@ -45,10 +45,9 @@ def random_matrix(shift):
     return a + a.T + shift * np.eye(30)
 
 
-@pytest.mark.parametrize("backend", ["cholmod", "superlu"])
-def test_both_backends_solve_and_count_negative_eigenvalues(backend, monkeypatch):
-    if backend == "superlu":
-        monkeypatch.setattr(sparse, "cholmod", None)
+@pytest.mark.parametrize("backend", sparse.installed())
+def test_every_solver_solves_and_counts_negative_eigenvalues(backend, monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", backend)
     definite, indefinite = random_matrix(30.0), random_matrix(0.0)
     symmetric, values = family(definite)
     right = np.arange(60.0).reshape(30, 2)
@@ -56,7 +55,23 @@ def test_both_backends_solve_and_count_negative_eigenvalues(backend, monkeypatch
     symmetric, values = family(indefinite)
     with pytest.raises(sparse.NotPositiveDefinite):
         symmetric.factor(values)
-    assert symmetric.negative_eigenvalues(values) == (np.linalg.eigvalsh(indefinite) < 0).sum()
+    factor = symmetric.factor_indefinite(values)
+    np.testing.assert_allclose(factor.solve(right), np.linalg.solve(indefinite, right), atol=1e-9)
+    assert factor.negative == symmetric.negative_eigenvalues(values) == (np.linalg.eigvalsh(indefinite) < 0).sum()
+
+
+def test_a_factor_that_was_replaced_refuses_to_solve():
+    symmetric, values = family(random_matrix(30.0))
+    first = symmetric.factor(values)
+    symmetric.factor(2.0 * values)
+    with pytest.raises(RuntimeError, match="replaced"):
+        first.solve(np.ones(30))
+
+
+def test_a_solver_that_is_not_installed_is_refused_by_name(monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", "abacus")
+    with pytest.raises(InputError, match=r"SHELLFORM_SOLVER.*abacus"):
+        family(random_matrix(30.0))
 
 
 def shallow_toggle():

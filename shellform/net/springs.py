@@ -1,11 +1,12 @@
 """Fictitious springs that pull nodes to a surface and slide on it (operation 1 of the framework).
 
 A spring of density q, N/m, joins a node at x to its closest point on the surface, found anew at every state, so that it
-pulls along the normal n only. With the signed distance d(x) = (x - foot)·n and the level at which the node is to lie,
+pulls along the normal n only. With the signed distance d(x), its gradient n and its Hessian H, and the level at which the node is to
+lie,
 
-    U = q (d - level)² / 2,   f = q (d - level) n,   K ≈ q n n'.
+    U = q (d - level)² / 2,   f = q (d - level) n,   K = q (n n' + (d - level) H),
 
-The tangent leaves out (d - level) times the surface's curvature: it is never negative, and exact where the node lies.
+each the exact derivative of the one before, so that Newton's method converges as it does for the rods.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ from shellform.arrays import Indices, Reals, indices, reals
 from shellform.structure.parts import Evaluation
 from shellform.structure.state import State
 
-Distance = Callable[[Reals], tuple[Reals, Reals]]
-"""From points (k, 3), m, to signed distances (k,), m, and unit normals (k, 3)."""
+Distance = Callable[[Reals], tuple[Reals, Reals, Reals]]
+"""From points (k, 3), m, to signed distances (k,), m, their gradients (k, 3) and packed lower Hessians (k, 6), 1/m."""
 
 _LOWER = np.tril_indices(3)
 
@@ -49,13 +50,14 @@ class SlidingSprings:
         """How far (k,), m, each node lies above its level; the spring's force is `density` times that."""
         return self.distance(state.positions[self.nodes])[0] - self.level
 
-    def evaluate(self, state: State, *, tangent: bool) -> Evaluation:
-        """Energy (k,) J, forces (k, 3) N, packed lower tangents (k, 6) N/m."""
-        distance, normal = self.distance(state.positions[self.nodes])
+    def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
+        """Energy (k,) J, forces (k, 3) N, packed lower tangents (k, 6) N/m, filled `into`."""
+        distance, normal, hessian = self.distance(state.positions[self.nodes])
         stretch = distance - self.level
         force = (self.density * stretch)[:, None] * normal
         energy = 0.5 * self.density * stretch**2
         if not tangent:
             return Evaluation(energy, force, None)
-        block = self.density[:, None, None] * normal[:, :, None] * normal[:, None, :]
-        return Evaluation(energy, force, block[:, _LOWER[0], _LOWER[1]])
+        packed = np.empty((len(energy), 6)) if into is None else into
+        packed[:] = self.density[:, None] * (normal[:, _LOWER[0]] * normal[:, _LOWER[1]] + stretch[:, None] * hessian)
+        return Evaluation(energy, force, packed)
