@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -213,7 +213,8 @@ def net_summary(net: Net) -> dict[str, Any]:
         "crossings": len(net.grid.lattice),
         "rods": len(net.grid.rods),
         "supports": len(net.supports),
-        **asdict(net.quality),
+        "spacing_v": net.grid.spacing_v,
+        **net.quality.summary(),
         "notes": list(net.notes),
     }
 
