@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from shellform.errors import InputError
-from shellform.net.chebyshev import pull_net
 from shellform.net.files import net_document, save_net
+from shellform.net.orient import oriented_net
 from shellform.study.case import load_case, write_text
 from shellform.study.run import Report, net_summary, read_surface
 from shellform.surface.target import largest_curvature
@@ -62,7 +62,7 @@ def net_alone(
     *,
     spacing: float,
     unit: str | None,
-    angle: float,
+    angle: str,
     gap: float | None,
     allow_scripts: bool,
     report: Report,
@@ -71,14 +71,9 @@ def net_alone(
     if not file.is_file():
         raise InputError("there is no such file", where=str(file))
     surface = read_surface(file, unit=unit, allow_scripts=allow_scripts)
-    net = pull_net(
-        surface,
-        spacing=spacing,
-        gap=gap or _GAP * spacing,
-        angle=np.deg2rad(angle),
-        progress=lambda what, residual: report("net", f"{what}, residual {residual:.1e}"),
-    )
-    told = net_summary(net)
+    settings = {"spacing": spacing, "gap": gap or _GAP * spacing}
+    net, found, offset = oriented_net(surface, settings, angle=_angle(angle), progress=lambda text: report("net", text))
+    told = net_summary(net) | {"angle": found, "offset": list(offset)}
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -89,3 +84,13 @@ def net_alone(
     document = {"format": "shellform-summary", "version": 1, "surface": head, "net": told}
     write_text(folder / "summary.json", json.dumps(document, indent=1))
     return told
+
+
+def _angle(text: str) -> float | Literal["auto"]:
+    """An angle, rad, from degrees or the word auto."""
+    if text == "auto":
+        return "auto"
+    try:
+        return float(np.deg2rad(float(text)))
+    except ValueError as error:
+        raise InputError("must be degrees or auto", where="--angle", value=text) from error
