@@ -21,7 +21,8 @@ def test_on_a_cylinder_rods_bend_least_at_45_degrees(cylinder):
     best, tried = best_orientation(cylinder, {"spacing": 0.25, "gap": 0.005}, progress=said.append)
     assert math.degrees(best.angle) == pytest.approx(45.0, abs=8.0)  # a cut-out of so few rods isn't quite even
     assert best.cost == min(trial.cost for trial in tried)
-    assert best.cost == pytest.approx(0.5 * 0.25 * 0.25**2, rel=0.15)  # κ² = 1/4; at 0° it would be twice as much
+    rolled = 0.5 * 0.25 * 0.25**2  # κ² = 1/4, of the flat grid rolled up; at 0° it would be twice as much
+    assert 0.7 * rolled < best.cost < rolled  # pulled, it gives way in shear to bend still less
     assert any("compass net 12/12" in line for line in said)
 
 
@@ -39,5 +40,5 @@ def test_a_given_angle_is_kept(cylinder):
 
 
 def test_where_no_angle_gives_a_net_it_is_said_why():
-    with pytest.raises(InputError, match="no angle gives a net: .*curved too much"):
+    with pytest.raises(InputError, match=r"no angle gives a net: .*curved too much"):
         best_orientation(ball(30), {"spacing": 0.3, "gap": 0.005})
