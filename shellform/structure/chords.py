@@ -50,8 +50,8 @@ class ChordKeeper:
             nodes = nodes_of[group[0]]
             block = sp.csc_array(sp.tril(laplacian[nodes][:, nodes] + _ANCHOR * weight.max() * sp.eye_array(len(nodes))))
             block.sort_indices()
-            family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64), often_solved=True)
-            self.axes.append((nodes, np.array(group), family.factor(block.data)))
+            family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64))
+            self.axes.append((nodes, np.array(group), family.factor_thin(block.data)))
 
     def corrected(self, state: State, step: Reals) -> Reals:
         """The step (n, 6) with its translations corrected."""
