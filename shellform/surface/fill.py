@@ -47,7 +47,7 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
     outer = loops[int(np.argmax(outline))]
     level = float(draft.points[outer, 2].min()) if ground is None else ground
     rise = float(draft.points[:, 2].max()) - level
-    low = draft.points[:, 2] < level + _ON_GROUND * rise
+    low = draft.points[:, 2] <= level + _ON_GROUND * rise
     own, closed = len(draft.points), replace(draft, normals=normals)
     holes = [loop for loop in loops if loop is not outer and not low[loop].any()]
     standing = len(loops) - 1 - len(holes)
