@@ -8,6 +8,8 @@ present design, and the trial is then evaluated by its true equilibria:
 
 - it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
 - a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
+- under the additional loads no mode may become softer than a share of what the softest one has at the start under the first load
+  (checks.py: Softness): deviations don't see buckling coming, its stiffness does, and designs keep away from the end of their branch;
 - additional loads are staged: each accepted design raises them as far as its own stable branch reaches, less a margin, so that a
   start that doesn't bear them is led to a design that does.
 
@@ -24,13 +26,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
+from shellform.design.checks import ConnectorTurn, RodUtilisation, Slackness, Softness, Uplift
 from shellform.design.gridshell import Design
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
 from shellform.design.tensions import TensionModel, tension_model
-from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Share, Term
+from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.design.thinning import kept_stiffness, spared
 from shellform.errors import InputError, NotConverged
 from shellform.structure.loading import Loaded, apply_load
+from shellform.structure.stability import modes
 from shellform.structure.state import State
 
 try:
@@ -39,12 +43,27 @@ except ImportError as error:  # pragma: no cover
     raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
+STIFFNESS = 0.1  # of the start's softest mode under the first load, kept under the additional ones
+_POLISHED = 0.8  # of that, which polishing may use up
+_NAMES: Mapping[type, str] = {
+    Misfit: "misfit",
+    RmsMisfit: "misfit",
+    CableForce: "cable_force",
+    CableForces: "cable_force",
+    RodRadius: "rod_radius",
+    RodUtilisation: "utilisation",
+    ConnectorTurn: "connector_turn",
+    Slackness: "slackness",
+    Softness: "softness",
+    Uplift: "uplift",
+}
 POLISHING = 20  # design evaluations
 _MARGIN = 0.15  # of the whole additional load that is left between a stage and the end of the stable branch
 _GROW, _SHRINK = 1.6, 0.4
 _GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
 _SETTLED = 1e-3  # relative improvement predicted for the largest window that ends the optimisation
 _SMALLEST = 0.03  # window, in mean tensions, at which no better design is to be found
+_FINEST = 0.003  # the same in polishing
 _MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
 _PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
 _FAILURES = 8  # single cables in a row that can't be taken away, after which thinning ends
@@ -74,7 +93,8 @@ class Step:
 @dataclass(frozen=True)
 class Optimum:
     """What the optimisation found: the `design` without its slack cables, how it carries each load on the documented path
-    (`loaded`, with "none" first), the `history`, a `status` sentence, and the work it took."""
+    (`loaded`, with "none" first), the `history`, a `status` sentence, the work it took, of which factorisations in rejected trials
+    were `wasted`, and the `stiffness`, N/m, that the softest mode had to keep under the additional loads."""
 
     problem: Problem
     design: Design
@@ -88,6 +108,8 @@ class Optimum:
     rejected: int
     equilibria: int
     factorisations: int
+    wasted: int
+    stiffness: float
 
     @property
     def states(self) -> dict[str, State]:
@@ -105,16 +127,20 @@ def optimize(
     evaluations: int = 100,
     window: float = WINDOW,
     thin: bool = True,
+    stiffness: float = STIFFNESS,
     progress: Watch | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
     `window`: half-width of the first step, in mean cable tensions; `thin`: whether cables that do little are taken away at the end;
+    `stiffness`: what the softest mode must keep under the additional loads, as a share of the start's under the first (0: nothing);
     `progress(step)` is called at each trial.
 
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
-    return _Search(problem, start, window, progress).run(evaluations, thin=thin)
+    search = _Search(problem, start, window, progress)
+    search.keep_stiff(stiffness * search.stiffness())
+    return search.run(evaluations, thin=thin)
 
 
 def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | None = None) -> Optimum:
@@ -126,7 +152,9 @@ def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | Non
     base = next(iter(best.problem.loads))
     problem = replace(best.problem, minimize=[Share(1.0, Misfit(base))])
     search = _Search(problem, best.design, WINDOW, progress)
+    search.keep_stiff(_POLISHED * best.stiffness)
     search.braces[:] = True
+    search.smallest = _FINEST
     polished = search.run(evaluations, thin=False)
     better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
     return polished if better else replace(best, status="no design with less misfit was found", history=polished.history)
@@ -155,7 +183,24 @@ class _Search:
         self.history = [self._record(self.point, True)]
         self.status = "the number of evaluations was reached"
         self.most = 0
+        self.least = 0.0
+        self.smallest = _SMALLEST
         self._modelled: TensionModel | None = None
+
+    def stiffness(self) -> float:
+        """Of the softest mode of the start under the first load, N/m."""
+        return float(modes(self.evaluator.assembly(self.point.design), self.point.states[self.base], 1).stiffness[0])
+
+    def keep_stiff(self, least: float) -> None:
+        """Adds the limit on the softest mode, N/m, under each additional load."""
+        additional = [name for name in self.evaluator.used() if name != self.base]
+        if not (least > 0.0 and additional):
+            return
+        self.least = least
+        limits = [*self.evaluator.problem.limits, *(AtMost(1.0, Softness(name, least)) for name in additional)]
+        self.evaluator.problem = replace(self.evaluator.problem, limits=limits)
+        self.point = self.evaluator.seed(self.point.design, self.point.states, self.stage)
+        self.accepted, self.history = [self.point], [self._record(self.point, True)]
 
     def run(self, evaluations: int, *, thin: bool) -> Optimum:
         """First the objective alone, then thinning."""
@@ -178,7 +223,7 @@ class _Search:
                 if -predicted < _SETTLED * self.point.objective and self.window >= self.tension:
                     self.status = f"the model predicts less than {_SETTLED:.1%} improvement"
                     return
-                if self.window < _SMALLEST * self.tension:
+                if self.window < self.smallest * self.tension:
                     self.status = "the objective has no better design within the smallest window"
                     return
             trial = self._try(model, y)
@@ -452,9 +497,7 @@ class _Search:
         return step
 
     def _name(self, term: Term) -> str:
-        kind = {Misfit: "misfit", RmsMisfit: "misfit", CableForce: "cable_force", CableForces: "cable_force"}.get(
-            type(term), "rod_radius"
-        )
+        kind = _NAMES[type(term)]
         return kind if term.load in ("", self.base) else f"{kind}.{term.load}"
 
     def _finish(self) -> Optimum:
@@ -485,6 +528,8 @@ class _Search:
             self.evaluator.rejected,
             self.evaluator.equilibria,
             self.evaluator.factorisations,
+            self.evaluator.wasted,
+            self.least,
         )
 
     def _judge(self, design: Design, loaded: Mapping[str, Loaded]) -> Step:
@@ -497,7 +542,7 @@ class _Search:
 
 def _counted(judge: Evaluator, counts: Evaluator) -> Evaluator:
     judge.evaluations, judge.rejected = counts.evaluations, counts.rejected
-    judge.equilibria, judge.factorisations = counts.equilibria, counts.factorisations
+    judge.equilibria, judge.factorisations, judge.wasted = counts.equilibria, counts.factorisations, counts.wasted
     return judge
 
 

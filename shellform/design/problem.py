@@ -98,7 +98,7 @@ class Evaluator:
         self.problem, self.start = problem, start
         self.shell = problem.shell
         self.weights: Reals = np.ones(len(problem.minimize))
-        self.factorisations = self.equilibria = self.evaluations = self.rejected = 0
+        self.factorisations = self.equilibria = self.evaluations = self.rejected = self.wasted = 0
         self._assembly: Assembly | None = None
         self._present: Flags | None = None
         self._far = np.inf
@@ -166,6 +166,7 @@ class Evaluator:
     def evaluate(self, variables: Reals, near: Mapping[str, State], stage: float) -> Point:
         """The design at the variables, its equilibria sought from the states `near` them. Raises OffBranch."""
         self.evaluations += 1
+        before = self.factorisations
         design = self.design(variables)
         assembly = self.assembly(design)
         try:
@@ -175,6 +176,7 @@ class Evaluator:
             return self.seed(design, states, stage)
         except OffBranch:
             self.rejected += 1
+            self.wasted += self.factorisations - before
             raise
 
     def assembly(self, design: Design) -> Assembly:

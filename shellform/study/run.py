@@ -334,6 +334,8 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         "rejected": best.rejected,
         "equilibria": best.equilibria,
         "factorisations": best.factorisations,
+        "factorisations_rejected": best.wasted,
+        "stiffness_min": best.stiffness,
         "status": best.status,
         "constraints": dict(best.constraints),
     }
