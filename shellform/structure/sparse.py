@@ -13,10 +13,10 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.linalg import splu
 
 from shellform.arrays import Indices, Reals
+from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure import pardiso
 

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import breadth_first_order, connected_components
 
 from shellform.arrays import Indices, Reals, indices, reals
+from shellform.compiled import njit
 from shellform.errors import InputError
 
 _SAME = 1e-9  # of the size: vertices nearer than that are one
