@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from shellform.arrays import Flags, Indices, Reals
+from shellform.compiled import njit
 from shellform.structure.beam import Beams
 from shellform.structure.chords import ChordKeeper
 from shellform.structure.parts import Part

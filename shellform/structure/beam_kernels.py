@@ -14,8 +14,8 @@ the lever arms of g, is written out with its symmetric part. Rotations don't com
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shellform.compiled import njit
 from shellform.structure.rotation import matrix
 
 

@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 
 from shellform.arrays import Indices, Reals
+from shellform.compiled import njit
 from shellform.structure.beam import Beams
 from shellform.structure.sparse import Factor, Symmetric
 from shellform.structure.state import State

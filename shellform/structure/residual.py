@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from shellform.arrays import Reals
+from shellform.compiled import njit
 from shellform.structure.assembly import Assembly, Balance
 from shellform.structure.sparse import Factor
 from shellform.structure.state import State

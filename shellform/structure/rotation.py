@@ -9,9 +9,9 @@ need no special case at any angle, and are made unit again after every product, 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
 from shellform.arrays import Reals
+from shellform.compiled import njit
 
 
 def identity(count: int) -> Reals:

@@ -9,7 +9,8 @@ For a measure g(x, s) there are two ways to its derivative: direct, solving for 
     dg/ds = ∂g/∂s - y' df/ds,   K y = (∂g/∂x)',
 
 solving once for every measure. Both are exact, K being symmetric in an equilibrium without applied moments; `gradients`
-counts the solves and takes the cheaper way. The right-hand sides go to the solver as one block, with one factor for all.
+counts the solves and takes the cheaper way. The right-hand sides go to the solver as one block, with one factor for all. Where
+the measures are as local as the variables (tensions by rest lengths), `direct` condenses K to the few freedoms that they touch.
 
 A design variable is a column of df/ds: `by_rest_length` for cables, `by_stiffness` for whatever the beams' stiffness depends on (a rod's
 radius or another size, a connector's EA, GJ or EI), `by_load` for the load factor. A measure is a row of ∂g/∂x: `tension_rows`,
@@ -30,18 +31,23 @@ from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables
 from shellform.structure.results import end_stress_by_force
 from shellform.structure.sections import Section
-from shellform.structure.sparse import Factor
+from shellform.structure.sparse import Factor, Symmetric
 from shellform.structure.state import State, moved
+
+_MOST = 4000  # freedoms to which K is condensed: a dense matrix of 128 MB
+_FEW = 3  # freedoms that a design variable and the measures touch, for each variable: two nodes' translations shared by several cables
 
 
 @dataclass(frozen=True)
 class Response:
     """An equilibrium ready for sensitivities: `factor` of the tangent at `state`, and `force_by_design` (f, s), the derivative
-    of the unbalanced internal forces on the free freedoms by the design variables."""
+    of the unbalanced internal forces on the free freedoms by the design variables; `family` and `tangent` (nnz,) are what was factorised."""
 
     state: State
     factor: Factor
     force_by_design: sp.csc_array
+    family: Symmetric
+    tangent: Reals
 
 
 def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Response:
@@ -49,7 +55,10 @@ def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Respons
 
     Raises NotPositiveDefinite where the state isn't stable.
     """
-    return Response(state, assembly.factor(state), sp.csc_array(sp.hstack(columns, format="csc")))
+    tangent = assembly.evaluate(state).tangent
+    assert tangent is not None
+    together = sp.csc_array(sp.hstack(columns, format="csc"))
+    return Response(state, assembly.matrix.factor(tangent), together, assembly.matrix, tangent)
 
 
 def by_rest_length(assembly: Assembly, state: State, cables: Cables) -> sp.csc_array:
@@ -139,8 +148,25 @@ def adjoint(response: Response, by_state: Reals | sp.csr_array) -> Reals:
 
 
 def direct(response: Response, by_state: Reals | sp.csr_array) -> Reals:
-    """∂g/∂x dx/ds (g, s), one solve for each design variable."""
+    """∂g/∂x dx/ds (g, s), one solve for each design variable, or through the few freedoms that both touch."""
+    if sp.issparse(by_state):
+        kept = _touched(response, sp.csr_array(by_state))
+        if len(kept) <= min(_FEW * response.force_by_design.shape[1], _MOST):
+            moves = response.family.solve_kept(response.tangent, kept, response.force_by_design[kept].toarray())
+            if moves is not None:
+                return np.asarray(-(by_state[:, kept] @ moves))
     return np.asarray(by_state @ state_by_design(response))
+
+
+def _touched(response: Response, by_state: sp.csr_array) -> np.ndarray:
+    """The freedoms, ascending, that the design's forces act on or that the measures read.
+
+    dx/ds is wanted there only, and K condensed to them says as much of it as K: the solves are dense ones of their number.
+    """
+    marked = np.zeros(by_state.shape[1], dtype=bool)
+    marked[response.force_by_design.indices] = True
+    marked[by_state.indices] = True
+    return np.flatnonzero(marked)
 
 
 def state_by_design(response: Response) -> Reals:

@@ -13,10 +13,10 @@ from typing import Any, Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from scipy.sparse.linalg import splu
 
 from shellform.arrays import Indices, Reals
+from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure import pardiso
 
@@ -78,6 +78,7 @@ class Symmetric:
         self._backend = backend()
         self._pardiso: pardiso.Factoriser | None = None
         self._bunch_kaufman: pardiso.Factoriser | None = None
+        self._condensed: tuple[Indices, pardiso.Factoriser] | None = None
         self._symbolic: Any = None
         self._matrix: Any = None
         self._generation = 0
@@ -116,6 +117,21 @@ class Symmetric:
         except pardiso.NotDefinite as error:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
         return _Pardiso(self, self._pardiso, self._generation)
+
+    def solve_kept(self, values: Reals, kept: Indices, right: Reals) -> Reals | None:
+        """The solution (k, s) on the freedoms `kept` (k,), ascending, for right-hand sides (k, s) on them that are zero elsewhere.
+
+        All others are eliminated, which costs as much as a factorisation. Earlier factors go on serving. None where the solver
+        can't do it. Raises NotPositiveDefinite.
+        """
+        if self._backend != "mkl":
+            return None
+        if self._condensed is None or not np.array_equal(self._condensed[0], kept):
+            self._condensed = kept, pardiso.Factoriser(self.indptr, self.indices, kept=kept)
+        try:
+            return self._condensed[1].solve_kept(values, right)
+        except pardiso.NotDefinite as error:
+            raise NotPositiveDefinite("the matrix is not positive definite") from error
 
     def factor_thin(self, values: Reals) -> Factor:
         """L D L' of a matrix whose factor has a few entries a column, as the graph of a gridshell's beams: the compiled
