@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, reals
-from shellform.design.loads import crossings_to_load
+from shellform.design.loads import points
 from shellform.errors import InputError
 from shellform.net.grid import grid_beams
 from shellform.net.net import Net, cells
@@ -139,10 +139,7 @@ class Gridshell:
 
         With 2 it is every second crossing of the checkerboard, as in section 4.1. It acts on the upper rod.
         """
-        loaded = crossings_to_load(self.net, every, openings)
-        load = np.zeros((len(self.net.grid.flat), 6))
-        load[self.net.grid.crossing_nodes[loaded, 1], 2] = -force
-        return load
+        return points(self.net, force, every=every, openings=openings)
 
     def beams(self, radius: float) -> Beams:
         """Rods of the radius, m, and connectors."""
