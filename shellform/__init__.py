@@ -16,6 +16,7 @@ __version__ = "0.1.0"
 _HOMES = {
     "shellform.errors": ("InputError", "NotConverged", "ShellformError"),
     "shellform.surface.target": ("Surface", "make_surface"),
+    "shellform.surface.reading": ("read_surface",),
     "shellform.net.chebyshev": ("pull_net",),
     "shellform.net.net": ("Net",),
     "shellform.design.gridshell": ("Rod", "Joint", "Cable", "Design", "Gridshell", "brace"),

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from shellform.arrays import Flags, Indices, Reals, reals
 from shellform.design.loads import points
 from shellform.errors import InputError
-from shellform.net.grid import grid_beams
-from shellform.net.net import Net, cells
+from shellform.net.grid import cells, grid_beams
+from shellform.net.net import Net
 from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables, make_cables
 from shellform.structure.network import Network

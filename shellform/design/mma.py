@@ -23,14 +23,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Flags, Indices, Reals
 from shellform.design.gridshell import Design
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
 from shellform.design.tensions import TensionModel, tension_model
 from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Term
+from shellform.design.thinning import kept_stiffness, spared
 from shellform.errors import InputError, NotConverged
 from shellform.structure.loading import Loaded, apply_load
-from shellform.structure.stability import lowest_mode
 from shellform.structure.state import State
 
 try:
@@ -47,6 +47,8 @@ _SMALLEST = 0.03  # window, in mean tensions, at which no better design is to be
 _MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
 _PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
 _FAILURES = 8  # single cables in a row that can't be taken away, after which thinning ends
+_BATCHES = 8  # share of the taut cables that the first batch takes, one in so many
+_KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
 _THINNING = 1.5  # of the objective that cables with little use may cost
 _REPAIRS = 2  # steps after each batch
 _BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
@@ -137,6 +139,7 @@ class _Search:
         self.history = [self._record(self.point, True)]
         self.status = "the number of evaluations was reached"
         self.most = 0
+        self._modelled: TensionModel | None = None
 
     def run(self, evaluations: int, *, thin: bool) -> Optimum:
         """First the objective alone, then thinning."""
@@ -173,36 +176,32 @@ class _Search:
             model = self._model()
 
     def _thin(self, evaluations: int) -> None:
-        """Takes away cables that do little for stability, in batches, and lets the others make up for them.
+        """Takes away cables that the shell can spare (thinning.py), in batches, and lets the others make up for them.
 
-        The L1 term empties the cables with the least tension, until the shell with those left is about to buckle under the
-        additional load; but tension says little about what a cable does against buckling. What it does is its part of the stiffness
-        in the softest mode of the tangent there: cables with the least of it are taken away, the others are kept taut, their
-        tensions optimised again. A batch that the shell doesn't bear, or that costs too much of the objective, is halved.
+        Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or that costs too
+        much of the objective, is cut; a single cable that can't go is kept for good.
         """
         budget = _THINNING * self.point.objective
-        batch = max(1, self._taut(self.point) // 10)
+        batch = max(1, self._taut(self.point) // _BATCHES)
         needed = np.zeros(len(self.braces), dtype=bool)
         self.window = max(self.window, 0.1 * self.tension)
         failures = 0
         while failures < _FAILURES and self.evaluator.evaluations < evaluations:
             model = self._model()
-            order = self._least_bracing(model)
-            order = order[~needed[order]]
-            if not len(order):
-                break
-            leaving = order[:batch]
-            y = model.origin.copy()
-            y[leaving] = 0.0
-            self.braces = y[: len(self.braces)] > 0.0
-            trial = self._try(model, y)
+            leaving = self._spared(model, needed, batch)
+            if not len(leaving):
+                self.status += ", and every cable that is left is needed for stability"
+                return
+            self.braces = model.origin[: len(self.braces)] > 0.0
+            self.braces[leaving] = False
+            trial = self._without(model, leaving)
             if trial is not None and self._merit(trial) < 2.0 * budget:
                 trial = self._repair(trial, budget)
             if trial is None or self._merit(trial) > budget or self._violation(trial) > 0.0 or not self._sound(trial):
                 self.history.append(self._record(trial or self.point, False))
-                needed[leaving] = batch == 1
-                failures += batch == 1
-                batch = max(1, batch // 3)
+                needed[leaving] = len(leaving) == 1
+                failures += len(leaving) == 1
+                batch = max(1, len(leaving) // 3)
                 continue
             self._accept(trial)
             failures = 0
@@ -225,19 +224,15 @@ class _Search:
         best, self.point = self.point, before
         return best
 
-    def _least_bracing(self, model: TensionModel) -> Indices:
-        """The taut cables, numbered among those present, from the one that does least in the softest mode."""
-        name = self.evaluator.used()[-1]
-        mode = lowest_mode(model.assembly, self.point.states[name])
-        cables = self.problem.shell.cables(self.point.design)
-        place = self.point.states[name].positions[cables.ends]
-        chord = place[:, 1] - place[:, 0]
-        stretch = np.sum(chord * (mode[cables.ends[:, 1], :3] - mode[cables.ends[:, 0], :3]), axis=1)
-        resists = stretch**2 / np.sum(chord**2, axis=1) / cables.rest_length
-        pull = model.origin[: len(resists)]
-        score = resists / resists.sum() + pull / pull.sum()
-        taut = np.flatnonzero(pull > 0.0)
-        return taut[np.argsort(score[taut], kind="stable")]
+    def _spared(self, model: TensionModel, needed: Flags, most: int) -> Indices:
+        """Taut cables, numbered among those present, that can go at once, from the one with the least use."""
+        state = self.point.states[self.evaluator.used()[-1]]
+        kept = kept_stiffness(model.assembly, state, self.problem.shell.cables(self.point.design))
+        loss = 1.0 - np.diag(kept)
+        pull = model.origin[: len(loss)]
+        score = loss / loss.sum() + pull / pull.sum()
+        free = np.flatnonzero((pull > 0.0) & ~needed)
+        return spared(kept, free[np.argsort(score[free], kind="stable")], most, _KEPT)
 
     def _accept(self, trial: Point) -> None:
         self.point = trial
@@ -260,6 +255,12 @@ class _Search:
         return isinstance(term, CableForces) and term.load == self.base and term.chosen is None
 
     def _model(self) -> TensionModel:
+        """The convex model at the present point, made once for each."""
+        if self._modelled is None or self._modelled.point is not self.point:
+            self._modelled = self._new_model()
+        return self._modelled
+
+    def _new_model(self) -> TensionModel:
         shell, design = self.problem.shell, self.point.design
         longest = (self.evaluator.bounds()[1][: len(shell.cable_lengths)] * shell.cable_lengths)[design.present]
         return tension_model(
@@ -351,6 +352,17 @@ class _Search:
         near = {**self.point.states, self.base: model.predicted(y)}
         try:
             return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage)
+        except OffBranch:
+            return None
+
+    def _without(self, model: TensionModel, leaving: Indices) -> Point | None:
+        """The point without some cables, the others at the rest lengths that they have: the shell moves less than at their tensions."""
+        design = self.point.design
+        rest = design.rest_length.copy()
+        rest[np.flatnonzero(design.present)[leaving]] = model.longest[leaving]
+        variables = self.evaluator.variables(replace(design, rest_length=rest))
+        try:
+            return self.evaluator.evaluate(variables, self.point.states, self.stage)
         except OffBranch:
             return None
 

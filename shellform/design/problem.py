@@ -30,6 +30,7 @@ from shellform.structure.sparse import NotPositiveDefinite
 from shellform.structure.state import State
 
 _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
+_LED = 0.5  # of an additional load, its steps from the first case where the state before is no start
 _FAR = 20.0  # times the larger of the start's misfit: a trial this far off has left the branch unnoticed
 _SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
 
@@ -167,7 +168,9 @@ class Evaluator:
         design = self.design(variables)
         assembly = self.assembly(design)
         try:
-            states = {name: self._settle(assembly, near[name], self.load(name, stage)) for name in self.used()}
+            states: dict[str, State] = {}
+            for name in self.used():
+                states[name] = self._settled(assembly, near[name], states, self.load(name, stage), stage)
             return self.seed(design, states, stage)
         except OffBranch:
             self.rejected += 1
@@ -185,6 +188,26 @@ class Evaluator:
         """The load cases that objective or constraints need."""
         names = {term.load for term in self.problem.terms}
         return [name for name in self.problem.loads if name in names]
+
+    def _settled(
+        self, assembly: Assembly, near: State, known: Mapping[str, State], load: Reals, stage: float
+    ) -> State:
+        """The equilibrium next to `near`, or where that is too far off, the one that the load leads to from the first case's.
+
+        The state of the design before is near in most cases; where it isn't, the load's own path tells whether the design bears it.
+        """
+        try:
+            return self._settle(assembly, near, load)
+        except OffBranch:
+            if not known:
+                raise
+        first, state = next(iter(known.items()))
+        before = self.load(first, stage)
+        loaded = apply_load(assembly, state, before, load, step=_LED, smallest=_LED, stay=True)
+        self._count(loaded.factorisations)
+        if not loaded.on_branch:
+            raise OffBranch("the design doesn't bear the load on its stable branch")
+        return loaded.equilibrium.state
 
     def _settle(self, assembly: Assembly, start: State, load: Reals) -> State:
         try:

@@ -156,7 +156,9 @@ def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, I
     new[1:] = (row[1:] != row[:-1]) | (column[1:] != column[:-1])
     starts = np.append(np.flatnonzero(new), len(order))
     indptr = np.searchsorted(column[new], np.arange(size + 1))
-    return Symmetric(indptr, row[new].astype(np.int64)), starts, order
+    # Half the width is half the memory that an assembly has to read.
+    width = np.int32 if len(row) < np.iinfo(np.int32).max else np.int64
+    return Symmetric(indptr, row[new].astype(np.int64)), starts.astype(width), order.astype(width)
 
 
 @njit(cache=True)

@@ -274,7 +274,7 @@ class _Walk:
 
     def _lower_mass(self) -> None:
         self.mass *= _DECAY
-        if self.now.tangent is not None:
+        if self.mass > 0.0 and self.now.tangent is not None:
             diagonal = np.abs(self.now.tangent[self.assembly.matrix.diagonal])
             if self.mass < 1e-10 * float(diagonal.mean()):
                 self.mass = 0.0

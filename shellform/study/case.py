@@ -48,13 +48,26 @@ class NetEntry(_Section):
     """The Chebyshev net."""
 
     spacing: PositiveFloat = Field(description="between rods, m")
-    angle: float = Field(0.0, description="of the u rods against the x axis in plan, degrees")
+    spacing_v: PositiveFloat | None = Field(None, description="along the v rods; left out: as along u, m")
+    angle: float | Literal["auto"] = Field(0.0, description="of u rods against the x axis, degrees; auto: with least bending")
     offset: tuple[float, float] = Field((0.0, 0.0), description="of the net's origin from the middle, in spacings")
     elements: PositiveInt = Field(4, description="beam elements a segment")
+    guides: list[list[tuple[float, float]]] | None = Field(None, description="two plan curves in place of angle and offset, m")
+    method: Literal["pull", "compass"] = Field("pull", description="compass: the compass net as it is, unrelaxed")
     start: Literal["compass", "flat"] = Field("compass", description="from where the grid is pulled")
     spring_density: list[PositiveFloat] | None = Field(None, description="fictitious springs, rising, EI/s³")
     shear_stiffness: PositiveFloat = Field(0.1, description="fictitious, of a joint in the grid's plane, EI/s a radian")
     merge: float = Field(0.2, gt=0.0, lt=0.5, description="joints nearer to the edge, in spacings, are left out")
+    ground: float | None = Field(None, description="height at which rods end, m")
+    outline: list[tuple[float, float]] | None = Field(None, description="closed plan curve at which rods end, m")
+
+    @model_validator(mode="after")
+    def _guided(self) -> NetEntry:
+        if self.guides is not None and (len(self.guides) != 2 or min(len(each) for each in self.guides) < 2):
+            raise ValueError("guides must be two curves of at least two points each")
+        if self.guides is not None and self.angle == "auto":
+            raise ValueError("guides leave no angle to search for")
+        return self
 
 
 class RodEntry(_Section):

@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -26,14 +26,14 @@ from shellform.design.gridshell import Cable, Design, Gridshell, Joint, Rod, bra
 from shellform.design.problem import Problem, deviations, follow
 from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share
 from shellform.errors import InputError, NotConverged
-from shellform.net.chebyshev import pull_net
 from shellform.net.files import load_net, net_document, save_net
 from shellform.net.net import Net
+from shellform.net.orient import oriented_net
 from shellform.structure.equilibrium import Equilibrium
 from shellform.structure.loading import Loaded
 from shellform.structure.model import Model, write_model
 from shellform.structure.state import State
-from shellform.study.case import Case, SurfaceEntry, check_script, dump_case, write_text
+from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
 from shellform.surface.target import Surface
 
 STAGES = ("surface", "net", "initial", "optimise", "figures")
@@ -192,24 +192,32 @@ def _net(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: b
     if keep:
         return load_net(job.path("net.npz"))
     entry = job.case.net
-    net = pull_net(
+    net, angle, offset = oriented_net(
         results["surface"],
-        spacing=entry.spacing,
-        gap=job.case.joint.gap,
-        angle=np.deg2rad(entry.angle),
+        net_settings(entry, job.case.joint.gap),
+        angle=entry.angle if entry.angle == "auto" else float(np.deg2rad(entry.angle)),
         offset=entry.offset,
-        elements=entry.elements,
-        start=entry.start,
-        spring_density=entry.spring_density,
-        shear_stiffness=entry.shear_stiffness,
-        merge=entry.merge,
-        progress=lambda what, residual: job.report("net", f"{what}, residual {residual:.1e}"),
+        progress=lambda text: job.report("net", text),
     )
     save_net(job.path("net.npz"), net)
     write_text(job.path("net.json"), json.dumps(net_document(net)))
     rod = job.case.rod
-    summary["net"] = net_summary(net) | {"rod_radius_max": net.max_radius(young=rod.young, strength=rod.strength)}
+    largest = net.max_radius(young=rod.young, strength=rod.strength)
+    limit = rod.strength / (rod.young * (rod.radius or largest))
+    summary["net"] = net_summary(net) | {
+        "rod_radius_max": largest,
+        "curvature_limit": limit,
+        "curvature_utilisation": net.quality.curvature_max / limit,
+        "angle": angle,
+        "offset": list(offset),
+    }
     return net
+
+
+def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
+    """The settings of pull_net in a case but for angle and offset."""
+    names = ("spacing", "spacing_v", "guides", "elements", "method", "start", "spring_density", "shear_stiffness", "merge", "ground")
+    return {name: getattr(entry, name) for name in names} | {"outline": entry.outline, "gap": gap}
 
 
 def net_summary(net: Net) -> dict[str, Any]:
@@ -219,7 +227,8 @@ def net_summary(net: Net) -> dict[str, Any]:
         "crossings": len(net.grid.lattice),
         "rods": len(net.grid.rods),
         "supports": len(net.supports),
-        **asdict(net.quality),
+        "spacing_v": net.grid.spacing_v,
+        **net.quality.summary(),
         "notes": list(net.notes),
     }
 
