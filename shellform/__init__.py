@@ -21,6 +21,7 @@ _HOMES = {
     "shellform.net.net": ("Net",),
     "shellform.design.gridshell": ("Rod", "Joint", "Cable", "Design", "Gridshell", "brace"),
     "shellform.design.loads": ("Region",),
+    "shellform.design.catalogue": ("Catalogue", "read_catalogue", "rounded_up", "neighbours"),
     "shellform.design.problem": ("Problem", "follow", "deviations"),
     "shellform.design.terms": ("Share", "AtMost", "Misfit", "RmsMisfit", "CableForce", "CableForces", "RodRadius"),
 }

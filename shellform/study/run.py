@@ -527,13 +527,10 @@ def _deviation(shell: Gridshell, state: State) -> dict[str, float]:
 
 
 def utilisation(shell: Gridshell, design: Design, state: State) -> float:
-    """The largest bending stress of the rods over their flexural strength: M r / I over f_f (equation 1)."""
-    beams = shell.beams(design.radius)
-    rods = beams.kind == 0
-    moments = beams.local_forces(state)[rods]
-    largest = float(np.hypot(moments[:, [2, 5]], moments[:, [3, 6]]).max())
-    inertia = 0.25 * np.pi * design.radius**4
-    return largest * design.radius / inertia / shell.rod.strength
+    """The largest bending stress of the rods over their flexural strength: M r / I over f_f for round ones (1)."""
+    section = shell.rod.resized(design.radius).section
+    forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
+    return float(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]).max()) / section.material.strength
 
 
 def _save_arrays(path: Path, **arrays: Any) -> None:

@@ -1,5 +1,7 @@
 """Loads: true areas, weights, pours and combinations, on a flat net, a sphere's cap and the vault."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,8 @@ from shellform.design import areas, loads
 from shellform.design.loads import Region
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
-from shellform.net.net import Net, Quality
+from shellform.net.net import Net
+from shellform.net.quality import MAPS, Quality
 from shellform.structure.sections import Round, isotropic
 from shellform.structure.state import State
 from shellform.surface.target import make_surface
@@ -30,11 +33,12 @@ def square(cells):
 def flat_net(count, spacing=0.1, gap=0.002):
     """Crossings count × count at (i + 1/2) spacings; the rods' ends are the outermost crossings."""
     lattice = np.array([(i, j) for i in range(count) for j in range(count)])
-    grid = lattice_grid(lattice, spacing=spacing, gap=gap, elements=2)
+    grid = lattice_grid(lattice, spacing=(spacing, spacing), gap=gap, elements=2)
     place = grid.flat + np.array([0.5 * spacing, 0.5 * spacing, 0.0])
-    quality = Quality(0.0, 0.0, 0.0, 1.5, 0.0, 0.0, 0.0, 1)
     turns = np.tile([1.0, 0.0, 0.0, 0.0], (len(place), 1))
-    return Net(grid, State(place, turns), np.zeros(0, dtype=int), np.zeros((len(grid.rod_ends), 2)), quality)
+    maps = {name: np.zeros((len(grid.rod_ends), 2, 2) if name == "curvature" else 1) for name in MAPS}
+    numbers = {field.name: 0.0 for field in dataclasses.fields(Quality) if field.name not in MAPS}
+    return Net(grid, State(place, turns), np.zeros(0, dtype=int), Quality(**numbers, **maps))
 
 
 @pytest.fixture(scope="module")
