@@ -1,6 +1,6 @@
 """One load step of a model file in Kratos: co-rotational beams and cables, full Newton-Raphson. Prints one line of JSON.
 
-    python kratos.py MODEL.json DISPLACEMENTS.npy --tolerance N [--solver sparse_lu]
+    python kratos.py MODEL.json DISPLACEMENTS.npy --tolerance N [--unit M] [--solver sparse_lu]
 
 `iteration` is the time to equilibrium over the number of iterations: each sets its factorisation up anew.
 """
@@ -74,7 +74,7 @@ def build(model: models.Model) -> KM.ModelPart:
 def main() -> None:
     chosen = models.arguments(SOLVERS)
     KM.Logger.GetDefaultOutput().SetSeverity(KM.Logger.Severity.WARNING)
-    model = models.read(chosen.model)
+    model = models.read(chosen.model, chosen.unit)
     part = build(model)
     settings = KM.Parameters(json.dumps({"solver_type": chosen.solver}))
     solver = python_linear_solver_factory.ConstructSolver(settings)
@@ -102,7 +102,7 @@ def main() -> None:
     seconds = time.perf_counter() - began
     iterations = part.ProcessInfo[KM.NL_ITERATION_NUMBER]
     moved = np.array([list(node.GetSolutionStepValue(KM.DISPLACEMENT)) for node in part.Nodes])
-    np.save(chosen.displacements, moved)
+    np.save(chosen.displacements, chosen.unit * moved)
     print(
         json.dumps(
             {

@@ -1,6 +1,6 @@
 """One load step of a model file in OpenSeesPy: co-rotational frames and trusses, full Newton-Raphson. Prints one line of JSON.
 
-    python opensees.py MODEL.json DISPLACEMENTS.npy --tolerance N [--solver SparseSYM]
+    python opensees.py MODEL.json DISPLACEMENTS.npy --tolerance N [--unit M] [--solver SparseSYM]
 
 `seconds` is the time to equilibrium, with the numbering and the symbolic analysis, as the user waits for it; `iteration` is that of an
 iteration of a second, small load step, in which nothing is set up any more.
@@ -55,7 +55,7 @@ def build(model: models.Model) -> None:
 
 def main() -> None:
     chosen = models.arguments(list(SOLVERS))
-    model = models.read(chosen.model)
+    model = models.read(chosen.model, chosen.unit)
     build(model)
     ops.constraints("Plain")
     # A band needs Cuthill and McKee's order; the others order their equations themselves.
@@ -70,7 +70,7 @@ def main() -> None:
     seconds = time.perf_counter() - began
     iterations = ops.testIter()
     moved = np.array([ops.nodeDisp(tag + 1)[:3] for tag in range(len(model.nodes))])
-    np.save(chosen.displacements, moved)
+    np.save(chosen.displacements, chosen.unit * moved)
     ops.integrator("LoadControl", 0.01)
     began = time.perf_counter()
     again = ops.analyze(1)

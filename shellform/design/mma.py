@@ -27,7 +27,7 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.design.gridshell import Design
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
 from shellform.design.tensions import TensionModel, tension_model
-from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Term
+from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Share, Term
 from shellform.design.thinning import kept_stiffness, spared
 from shellform.errors import InputError, NotConverged
 from shellform.structure.loading import Loaded, apply_load
@@ -39,6 +39,7 @@ except ImportError as error:  # pragma: no cover
     raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
+POLISHING = 20  # design evaluations
 _MARGIN = 0.15  # of the whole additional load that is left between a stage and the end of the stable branch
 _GROW, _SHRINK = 1.6, 0.4
 _GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
@@ -114,6 +115,21 @@ def optimize(
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
     return _Search(problem, start, window, progress).run(evaluations, thin=thin)
+
+
+def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | None = None) -> Optimum:
+    """The design of `best` with the cables that it has and the least misfit under the first load, its limits kept.
+
+    The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the shape alone. The misfit
+    never rises: where no better design is found, `best` comes back. The radius stays.
+    """
+    base = next(iter(best.problem.loads))
+    problem = replace(best.problem, minimize=[Share(1.0, Misfit(base))])
+    search = _Search(problem, best.design, WINDOW, progress)
+    search.braces[:] = True
+    polished = search.run(evaluations, thin=False)
+    better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
+    return polished if better else replace(best, status="no design with less misfit was found", history=polished.history)
 
 
 class _Search:

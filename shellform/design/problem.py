@@ -262,7 +262,7 @@ def linearise(
         if name:
             columns = sp.csc_array(by_rest_length(assembly, state, cables) @ spread)
             response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
-            by_state = _on_free(sp.vstack([m.by_position for m in measures]), assembly)
+            by_state = sp.vstack([m.by_freedom for m in measures]).tocsc()[:, assembly.free].toarray()
             total = gradients(response, by_state, partial)
         else:
             total = partial
@@ -287,15 +287,6 @@ def linearise(
         np.vstack([np.zeros((0, size)), *rows]),
         stage,
     )
-
-
-def _on_free(by_position: sp.csr_array, assembly: Assembly) -> Reals:
-    """Rows by node coordinates (g, 3 n) as rows by the free freedoms (g, f)."""
-    freedoms = assembly.free
-    moving = freedoms % 6 < 3
-    result = np.zeros((by_position.shape[0], len(freedoms)))
-    result[:, moving] = by_position.tocsc()[:, 3 * (freedoms[moving] // 6) + freedoms[moving] % 6].toarray()
-    return result
 
 
 def follow(

@@ -61,7 +61,7 @@ class Assembly:
         self.reach: Reals = np.repeat(1.0 / self.arms[:, None], 6, axis=1)
         self.reach[:, :3] = 1.0
         self.reach = self.reach.ravel()
-        self.matrix, self._starts, self._sources = _pattern(number, freedoms)
+        self.matrix, self._sources = _pattern(number, freedoms)
         ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
         self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
         self._entries = np.empty(int(ends[-1]))
@@ -103,7 +103,7 @@ class Assembly:
         values = None
         if tangent:
             values = np.empty(len(self.matrix.indices))
-            share(_gather, len(values), self._starts, self._sources, self._entries, values)
+            share(_gather, len(values), *self._sources, self._entries, values)
         self.clock["assembly"] += time.perf_counter() - began
         return Balance(energy, force.reshape(-1, 6), values, largest)
 
@@ -137,9 +137,9 @@ def _arms(count: int, beams: Sequence[Beams]) -> Reals:
     return np.where(number > 0.0, total / np.maximum(number, 1.0), 1.0)
 
 
-def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, Indices, Indices]:
+def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """The common lower pattern, and which packed entries of all elements, one after the other, add up to each of its values:
-    `sources[starts[v] : starts[v + 1]]` for value v."""
+    `first` has one for each value, and `sources` what else adds to the values at `places`, which ascend."""
     size = int(number.max(initial=-1)) + 1
     rows, columns = [], []
     for each in freedoms:
@@ -154,11 +154,12 @@ def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, I
     row, column = row[order], column[order]
     new = np.ones(len(order), dtype=bool)
     new[1:] = (row[1:] != row[:-1]) | (column[1:] != column[:-1])
-    starts = np.append(np.flatnonzero(new), len(order))
     indptr = np.searchsorted(column[new], np.arange(size + 1))
     # Half the width is half the memory that an assembly has to read.
     width = np.int32 if len(row) < np.iinfo(np.int32).max else np.int64
-    return Symmetric(indptr, row[new].astype(np.int64)), starts.astype(width), order.astype(width)
+    order = order.astype(width)
+    places = (np.cumsum(new) - 1)[~new].astype(width)
+    return Symmetric(indptr, row[new].astype(np.int64)), (order[new], places, order[~new])
 
 
 @njit(cache=True)
@@ -177,12 +178,12 @@ def _counted(keys, order, size):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True)
-def _gather(start, stop, starts, sources, entries, values):  # type: ignore[no-untyped-def]
+def _gather(start, stop, first, places, sources, entries, values):  # type: ignore[no-untyped-def]
+    """The first entry of each value, then what adds to it: two loops without a branch that a processor could guess wrong."""
     for v in range(start, stop):
-        total = 0.0
-        for k in range(starts[v], starts[v + 1]):
-            total += entries[sources[k]]
-        values[v] = total
+        values[v] = entries[first[v]]
+    for k in range(np.searchsorted(places, start), np.searchsorted(places, stop)):
+        values[places[k]] += entries[sources[k]]
 
 
 @njit(cache=True)

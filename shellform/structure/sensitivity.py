@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.structure.assembly import Assembly
 from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables
@@ -97,6 +97,30 @@ def stress_rows(assembly: Assembly, state: State, beams: Beams, sections: Mappin
     """Derivative (2 m, f), Pa/m and Pa/rad, of the largest fibre stresses at both ends of each beam by the free freedoms."""
     by_force = end_stress_by_force(beams, beams.local_forces(state), sections)
     return _rows(assembly, beams.freedoms()[:, None, :], by_force @ beams.local_forces_by_freedom(state))
+
+
+def reaction_rows(assembly: Assembly, state: State, freedoms: Indices) -> sp.csr_array:
+    """Derivative (k, f), N/m and N/rad, of the internal forces at held `freedoms` (k,) by the free ones: of the reactions, the load given."""
+    wanted = np.full(6 * assembly.count, -1)
+    wanted[freedoms] = np.arange(len(freedoms))
+    number = _numbers(assembly)
+    result = sp.csr_array((len(freedoms), len(assembly.free)))
+    for part in assembly.parts:
+        own = part.freedoms()
+        size = own.shape[1] if own.ndim == 2 else 0
+        touched = np.flatnonzero((wanted[own] >= 0).any(axis=1)) if size else np.zeros(0, dtype=np.int64)
+        if not len(touched):
+            continue
+        packed = part.evaluate(state, tangent=True).tangent
+        assert packed is not None
+        lower = np.tril_indices(size)
+        full = np.zeros((len(touched), size, size))
+        full[:, lower[0], lower[1]] = full[:, lower[1], lower[0]] = packed[touched]
+        rows = np.broadcast_to(wanted[own[touched]][:, :, None], full.shape)
+        columns = np.broadcast_to(number[own[touched]][:, None, :], full.shape)
+        kept = (rows >= 0) & (columns >= 0)
+        result = result + sp.csr_array((full[kept], (rows[kept], columns[kept])), shape=result.shape)
+    return result
 
 
 def gradients(response: Response, by_state: Reals, by_design: Reals) -> Reals:
