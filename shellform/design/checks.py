@@ -20,19 +20,23 @@ from shellform.arrays import Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.terms import Measure
 from shellform.errors import InputError
+from shellform.structure import residual
 from shellform.structure.network import assemble
 from shellform.structure.results import end_stress, end_stress_by_force, twist
-from shellform.structure.sections import Material, Round, stress_by_size
+from shellform.structure.sections import stress_by_size
 from shellform.structure.sensitivity import reaction_rows
+from shellform.structure.softening import quadratic, stiffness_by_freedom, stiffness_by_rest_length
+from shellform.structure.stability import modes
 from shellform.structure.state import State
 
 SHARPNESS = 200.0  # per unit: 3000 rod ends that are all used to the full are told 4 % too high, and a single one not at all
+_MODES = 4
 _TURN = 0.1  # rad, the unit of turns
 
 
 @dataclass(frozen=True)
 class RodUtilisation:
-    """The largest fibre stress of the rods, |N|/A + |M| r/I at any end, over their strength; erection stress is in it."""
+    """The largest fibre stress of the rods, for round ones |N|/A + |M| r/I, at any end, over their strength; erection stress is in it."""
 
     load: str
 
@@ -41,7 +45,7 @@ class RodUtilisation:
         rod = shell.rod
         if not np.isfinite(rod.strength):
             raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
-        section = Round(design.radius, Material(rod.young, rod.shear, 0.0, rod.strength))
+        section = rod.resized(design.radius).section
         beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
         chosen = {beams.kinds[0]: section}
         forces = beams.local_forces(state)
@@ -52,7 +56,7 @@ class RodUtilisation:
         by_radius = (by_force @ rate.local_forces(state)[own][:, :, None])[:, :, 0]
         for end in range(2):
             at = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
-            by_radius[:, end] += stress_by_size(section, *at)[0] / rod.strength
+            by_radius[:, end] += np.array(section.sizes) / design.radius @ stress_by_size(section, *at) / rod.strength
         return _largest(shell, 1.0, values, np.repeat(beams.freedoms()[own], 2, axis=0), rows, by_radius.ravel())
 
 
@@ -100,6 +104,46 @@ class Slackness:
 
 
 @dataclass(frozen=True)
+class Softness:
+    """2 less the stiffness of the softest mode under the load over `least`, N/m: at most 1 where no mode is softer than `least`.
+
+    Stability ends where that stiffness comes to 0, long before deviations tell of it; a load case at F times the design load that keeps
+    this limit has a critical load factor above F. The softest four modes count, so that they may change places.
+    """
+
+    load: str
+    least: float
+
+    def __post_init__(self) -> None:
+        if not self.least > 0.0:
+            raise InputError("must be positive", where="softness.least", value=self.least)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value."""
+        assembly = assemble(shell.network(design))
+        found = modes(assembly, state, _MODES)
+        mass = residual.Measure(assembly).mass_shape
+        rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
+        rows, by_radius, by_rest = [], [], []
+        for shape in found.shapes:
+            unit = shape / np.sqrt(float(mass @ shape.ravel()[assembly.free] ** 2))
+            rows.append(stiffness_by_freedom(assembly, state, unit))
+            by_radius.append(quadratic(rate, state, unit))
+            by_rest.append(stiffness_by_rest_length(cables, state, unit))
+        values = 2.0 - found.stiffness / self.least
+        weight, value = _smooth(values, SHARPNESS)
+        slope = -(weight @ np.array(rows)) / self.least
+        spread = np.zeros(len(shell.cable_ends))
+        spread[np.flatnonzero(design.present)] = -(weight @ np.array(by_rest)) / self.least
+        return Measure(
+            np.array([value]),
+            sp.csr_array(slope[None]),
+            sp.csr_array(spread[None]),
+            np.array([-float(weight @ np.array(by_radius)) / self.least]),
+        )
+
+
+@dataclass(frozen=True)
 class Uplift:
     """The largest force, N, with which a support has to hold a rod's end down, plus `offset`, N, which keeps it above 0."""
 
@@ -134,15 +178,18 @@ def _largest(
     by_rest_length: Reals | None = None,
 ) -> Measure:
     """KS of `values` (k,) from their derivatives `rows` (k, q) at `freedoms` (k, q), `by_radius` (k,), and each by its own cable's rest length."""
-    sharpness = SHARPNESS / unit
-    top = float(values.max())
-    weight = np.exp(sharpness * (values - top))
-    total = float(weight.sum())
-    weight /= total
+    weight, value = _smooth(values, SHARPNESS / unit)
     slope = np.zeros(6 * len(shell.net.grid.flat))
     np.add.at(slope, freedoms, weight[:, None] * rows)
     by_rest = np.zeros(len(shell.cable_ends))
     if cables is not None and by_rest_length is not None:
         by_rest[cables] = weight * by_rest_length
-    value = top + np.log(total) / sharpness
     return Measure(np.array([value]), sp.csr_array(slope[None]), sp.csr_array(by_rest[None]), np.array([float(weight @ by_radius)]))
+
+
+def _smooth(values: Reals, sharpness: float) -> tuple[Reals, float]:
+    """Weights (k,), the derivatives of KS by the values, and KS."""
+    top = float(values.max())
+    weight = np.exp(sharpness * (values - top))
+    total = float(weight.sum())
+    return weight / total, top + float(np.log(total)) / sharpness

@@ -53,6 +53,11 @@ class Rod:
         return self.section.material.young
 
     @property
+    def shear(self) -> float:
+        """Shear modulus, Pa."""
+        return self.section.material.shear
+
+    @property
     def strength(self) -> float:
         """Flexural strength, Pa."""
         return self.section.material.strength

@@ -35,26 +35,30 @@ def evaluate(  # type: ignore[no-untyped-def]
     local_force,
     local_deformation,
 ):
-    """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled where they have rows."""
-    E = np.empty((3, 3))
-    A = np.empty((3, 3))
-    B = np.empty((3, 3))
-    Q = np.empty((3, 3))  # of a node, then of a quaternion's matrix
-    h = np.empty((6, 3))  # gradients of s_k by the spin of their end, E fixed
-    c = np.empty(6)
-    theta = np.empty(6)
-    sine, cosine = np.empty(6), np.empty(6)
-    moment = np.empty(6)
-    g = np.empty((2, 3))
-    Ma = np.empty((3, 3))
-    Mb = np.empty((3, 3))
+    """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled where they have rows.
+
+    Positions and quaternions may be complex, for derivatives by complex steps (softening.py).
+    """
+    dtype = positions.dtype
+    E = np.empty((3, 3), dtype)
+    A = np.empty((3, 3), dtype)
+    B = np.empty((3, 3), dtype)
+    Q = np.empty((3, 3), dtype)  # of a node, then of a quaternion's matrix
+    h = np.empty((6, 3), dtype)  # gradients of s_k by the spin of their end, E fixed
+    c = np.empty(6, dtype)
+    theta = np.empty(6, dtype)
+    sine, cosine = np.empty(6, dtype), np.empty(6, dtype)
+    moment = np.empty(6, dtype)
+    g = np.empty((2, 3), dtype)
+    Ma = np.empty((3, 3), dtype)
+    Mb = np.empty((3, 3), dtype)
     # Derivatives of the moments by the local rotations: at the same end (a, b), at the other end.
-    near_a, near_b, far = np.empty(3), np.empty(3), np.empty(3)
-    P = np.empty((6, 6))
-    R = np.empty((3, 6))
-    S = np.empty((3, 3))
-    alpha = np.zeros(6)
-    K = np.empty((9, 9))
+    near_a, near_b, far = np.empty(3, dtype), np.empty(3, dtype), np.empty(3, dtype)
+    P = np.empty((6, 6), dtype)
+    R = np.empty((3, 6), dtype)
+    S = np.empty((3, 3), dtype)
+    alpha = np.zeros(6, dtype)
+    K = np.empty((9, 9), dtype)
     for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
         l0 = rest_length[e]
@@ -237,7 +241,7 @@ def _pack(E, K, out):  # type: ignore[no-untyped-def]
 
     The six blocks of three rows and columns are written out, so that the compiler knows every place.
     """
-    X = np.empty((3, 3))
+    X = np.empty((3, 3), E.dtype)
     for p in (0, 3, 6):
         K[p, p + 1], K[p, p + 2], K[p + 1, p + 2] = K[p + 1, p], K[p + 2, p], K[p + 2, p + 1]
     # Rows and columns of x_a are minus those of d, those of x_b are d itself.
@@ -292,9 +296,10 @@ def _row(r):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy", nogil=True)
 def local_by_freedom(start, stop, positions, quaternions, ends, frames, rest_length, stiffness, result):  # type: ignore[no-untyped-def]
     """The gradients of (12), h_k on the own spin less G' h_k, times the local stiffness (18), in global axes."""
-    E, A, B, Q = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    rate = np.zeros((7, 9))
-    turned = np.empty(9)
+    dtype = positions.dtype
+    E, A, B, Q = np.empty((3, 3), dtype), np.empty((3, 3), dtype), np.empty((3, 3), dtype), np.empty((3, 3), dtype)
+    rate = np.zeros((7, 9), dtype)
+    turned = np.empty(9, dtype)
     for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
         l = _triads(positions, quaternions, frames[e], a, b, E, A, B, Q)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.design.checks import SHARPNESS, ConnectorTurn, RodUtilisation, Slackness, Uplift
+from shellform.design.checks import SHARPNESS, ConnectorTurn, RodUtilisation, Slackness, Softness, Uplift
 from shellform.design.problem import Evaluator
 from shellform.errors import InputError
 
@@ -19,13 +19,14 @@ def limited(shell, wet, term):
     return sf.Problem(shell, {"wet": wet}, shares, [sf.AtMost(1.0, term)], radius_bounds=(0.0005, 0.0014))
 
 
-@pytest.mark.parametrize("name", ["stress", "connectors", "slackness", "uplift"])
+@pytest.mark.parametrize("name", ["stress", "connectors", "slackness", "uplift", "softness"])
 def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet, name):
     term = {
         "stress": RodUtilisation("wet"),
         "connectors": ConnectorTurn("wet"),
         "slackness": Slackness("wet", 0.5),
         "uplift": Uplift("wet", wet, 2.0),
+        "softness": Softness("wet", 1.0),
     }[name]
     evaluator = Evaluator(limited(shell, wet, term), shell.design())
     states = {key: loaded.equilibrium.state for key, loaded in evaluator.begin().items()}
@@ -70,6 +71,8 @@ def test_supports_that_would_lift_are_told_with_their_force(shell, wet):
 def test_limits_that_make_no_sense_are_refused(shell, wet):
     with pytest.raises(InputError, match=r"slackness\.least"):
         Slackness("wet", 0.0)
+    with pytest.raises(InputError, match=r"softness\.least"):
+        Softness("wet", -1.0)
     import dataclasses
 
     unknown = dataclasses.replace(shell, rod=sf.Rod.round(young=40e9, radius=0.001))
