@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from shellform.design.gridshell import Design, Gridshell, Rod, erection_stress
 from shellform.errors import InputError
@@ -161,6 +162,20 @@ def largest(catalogue: Catalogue, net: Net) -> Section:
     return allowed(catalogue, net)[-1]
 
 
+def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, float]:
+    """Bounds (4), m, of the radius of sections similar to the rod's: from as stiff as the softest section that the net allows to as stiff as
+    the stiffest, so that each can be rounded up. Between two of different shape the stiffness about the weaker axis counts.
+
+    Raises InputError where the rod is stiffer than the stiffest.
+    """
+    sections = allowed(catalogue, net)
+    own = np.array(rod.stiffness[2:])
+    low, high = (rod.radius * float((np.array(stiffness(sections[k])[2:]) / own).min()) ** 0.25 for k in (0, -1))
+    if rod.radius > high * (1.0 + _EQUAL):
+        raise _too_stiff(rod.radius, catalogue, sections)
+    return low, max(high, rod.radius)
+
+
 def rounded_up(shell: Gridshell, design: Design, catalogue: Catalogue) -> tuple[Gridshell, Design]:
     """The gridshell and design with the next stiffer section of the catalogue, the cables as they are (operation 4).
 
@@ -170,10 +185,14 @@ def rounded_up(shell: Gridshell, design: Design, catalogue: Catalogue) -> tuple[
     at = _stiff_enough(sections, shell.rod.resized(design.radius).section)
     if at < len(sections):
         return with_section(shell, design, sections[at])
-    raise InputError(
+    raise _too_stiff(design.radius, catalogue, sections)
+
+
+def _too_stiff(radius: float, catalogue: Catalogue, sections: Sequence[Section]) -> InputError:
+    return InputError(
         f"no section of the catalogue {catalogue.title!r} that bears the net's curvature is as stiff as the design's",
         where="rod.catalogue",
-        value=design.radius,
+        value=radius,
         remedy=f"The stiffest is {label(sections[-1])}: bound the radius by it.",
     )
 

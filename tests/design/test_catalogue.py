@@ -17,6 +17,7 @@ from shellform.design.catalogue import (
     shipped_catalogues,
     with_section,
 )
+from shellform.design.checks import RodUtilisation
 from shellform.design.gridshell import erection_stress, max_radius
 from shellform.errors import InputError
 from shellform.structure.sections import Rectangle, Round, Tube, isotropic, stiffness
@@ -211,3 +212,15 @@ def test_unknown_catalogues_and_sections_are_answered_with_the_known_ones(mine):
         read_catalogue("bamboo")
     with pytest.raises(InputError, match=r"'3 mm'.*Known: ⌀ 2 mm, ⌀ 2.2 mm"):
         named(mine, "3 mm")
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=label)
+def test_the_stress_of_any_section_follows_its_radius(shell, section):
+    term = RodUtilisation("wet")
+    made, design = with_section(shell, shell.design(), section)
+    measured = term.measure(made, design, made.target)
+    step = 1e-6 * design.radius
+    up, down = (term.measure(made, replace(design, radius=design.radius + s * step), made.target).value[0] for s in (1, -1))
+    assert measured.by_radius[0] == pytest.approx((up - down) / (2.0 * step), rel=1e-6)
+    bending = erection_stress(shell.net, section) / section.material.strength
+    assert measured.value[0] == pytest.approx(bending, rel=0.15)  # axial stress and the smooth maximum come on top
