@@ -23,7 +23,7 @@ from pydantic import (
 )
 
 import shellform
-from shellform.design.catalogue import shipped_catalogues
+from shellform.design.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.errors import InputError
 
 
@@ -267,7 +267,7 @@ class Case(_Section):
 def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     """The case in a TOML file, with `settings` like "net.spacing=0.06" in place of its entries.
 
-    Its surface's path is made absolute. Raises InputError naming every entry that is wrong.
+    The paths of its surface and catalogue are made absolute. Raises InputError naming every entry that is wrong.
     """
     file = Path(path)
     try:
@@ -284,8 +284,14 @@ def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
         raise InputError("; ".join(_told(each) for each in error.errors()), where=str(file)) from error
     place = (file.parent / case.surface.file).resolve()
     found: dict[str, Any] = {"surface": case.surface.model_copy(update={"file": str(place)})}
-    if isinstance(case.rod, StockRodEntry) and case.rod.catalogue not in shipped_catalogues():
-        found["rod"] = case.rod.model_copy(update={"catalogue": str((file.parent / case.rod.catalogue).resolve())})
+    if isinstance(case.rod, StockRodEntry):
+        source = case.rod.catalogue
+        if source not in shipped_catalogues():
+            source = str((file.parent / source).resolve())
+        stock = read_catalogue(source)
+        if case.rod.section is not None:
+            named(stock, case.rod.section)
+        found["rod"] = case.rod.model_copy(update={"catalogue": source})
     return case.model_copy(update=found)
 
 

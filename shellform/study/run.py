@@ -40,6 +40,8 @@ from shellform.surface.target import Surface
 STAGES = ("surface", "net", "initial", "optimise", "figures")
 DESIGNS = ("unbraced", "initial", "unloaded", "optimised")
 
+_MARKED = 0.2  # of the largest load on a node: smaller ones, such as of the rods' own weight, would hide the shell behind arrows
+
 Report = Callable[[str, str], None]
 """Called with the stage and a line of progress."""
 
@@ -413,6 +415,7 @@ def draw_run(
 
 def _panel(render: Any, shell: Gridshell, title: str, design: Design, state: State, load: Reals) -> Any:
     cables = shell.cables(design)
+    weight = np.linalg.norm(load[:, :3], axis=1)
     return render.Panel(
         title,
         state.positions,
@@ -421,7 +424,7 @@ def _panel(render: Any, shell: Gridshell, title: str, design: Design, state: Sta
         cables.ends,
         cables.tension(state),
         shell.net.supports,
-        np.flatnonzero(load.any(axis=1)),
+        np.flatnonzero(weight > _MARKED * weight.max()),
         design.radius,
     )
 

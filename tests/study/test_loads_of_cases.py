@@ -208,9 +208,10 @@ def test_loads_that_do_not_fit_the_net_are_named(tmp_path, net, vault, old, new,
 
 
 def test_rods_that_do_not_fit_are_named(tmp_path, net, vault):
-    case = read(tmp_path, with_rod('catalogue = "gfrp_rods"\nsection = "7.5 mm"'))
     with pytest.raises(InputError, match=r"rod.section.*'7.5 mm'.*Known: ⌀ 1.5 mm"):
-        gridshell(case, net, vault)
+        read(tmp_path, with_rod('catalogue = "gfrp_rods"\nsection = "7.5 mm"'))
+    with pytest.raises(InputError, match=r"catalogue .*bamboo: can't be read"):
+        read(tmp_path, with_rod('catalogue = "bamboo"'))
     case = read(tmp_path, with_rod('catalogue = "gfrp_rods"\nsection = "20 mm"'))
     with pytest.raises(InputError, match="they break"):
         gridshell(case, net, vault)
