@@ -31,7 +31,7 @@ from shellform.structure.state import State
 
 _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
 _LED = 0.5  # of an additional load, its steps from the first case where the state before is no start
-_FAR = 20.0  # times the larger of the start's misfit: a trial this far off has left the branch unnoticed
+_FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed
 _SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
 
 
@@ -120,7 +120,8 @@ class Evaluator:
                 remedy="Choose a denser grid, thicker rods or stiffer cables.",
             )
         state = reached[first].equilibrium.state
-        self._far = _FAR * float(((state.positions - self.shell.target.positions) ** 2).sum())
+        found = [each.equilibrium.state for each in reached.values() if each.on_branch]
+        self._far = _FAR * max(float(((each.positions - self.shell.target.positions) ** 2).sum()) for each in found)
         values = [part.term.measure(self.shell, self.start, state).value[0] for part in self.problem.minimize]
         self.weights = np.array([part.share for part in self.problem.minimize]) / np.maximum(values, 1e-300)
         return reached
