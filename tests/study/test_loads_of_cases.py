@@ -1,5 +1,6 @@
 """Load cases, parts and rods of a case: how they are read, what they weigh, and every message."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from shellform.design.gridshell import max_radius
 from shellform.errors import InputError
 from shellform.structure.sections import Rectangle, Round, Tube
 from shellform.study.case import dump_case, load_case
+from shellform.study.run import run_case
 from shellform.study.shell import given_section, gridshell, rod_bounds, rod_limits, rod_of
 
 ROOT = Path(__file__).parent.parent.parent
@@ -215,3 +217,32 @@ def test_rods_that_do_not_fit_are_named(tmp_path, net, vault):
     case = read(tmp_path, with_rod('catalogue = "gfrp_rods"\nsection = "20 mm"'))
     with pytest.raises(InputError, match="they break"):
         gridshell(case, net, vault)
+
+
+def test_a_run_follows_every_case_and_starts_again_where_the_catalogue_has_changed(tmp_path):
+    shipped = (Path(read_catalogue.__code__.co_filename).parent.parent / "catalogues/gfrp_rods.toml").read_text(encoding="utf-8")
+    (tmp_path / "ours.toml").write_text(shipped, encoding="utf-8")
+    text = with_rod('catalogue = "ours.toml"\nsection = "2.5 mm"', with_loads())
+    case = read(tmp_path, text.replace("wet = 1.0, rods = 1.0, joints = 1.0", "wet = 0.5, rods = 1.0, joints = 1.0"))
+    said = []
+
+    def run():
+        said.clear()
+        return run_case(case, tmp_path / "run", until="initial", report=lambda stage, line: said.append(f"{stage}: {line}"))
+
+    summary = run()
+    cases = summary["designs"]["initial"]["loads"]
+    assert list(cases) == ["none", "design", "additional", "pour 1", "pour 2", "rest"]
+    assert cases["none"]["factor"] == 0.0
+    assert cases["design"]["factor"] == 1.0
+    assert cases["additional"]["factor"] == pytest.approx(1.2 / 0.5, rel=0.05)
+    model = json.loads((tmp_path / "run/designs/initial.json").read_text(encoding="utf-8"))
+    assert set(model["loads"]) == set(cases) - {"none"}
+    for name in cases:
+        assert (tmp_path / f"run/states/initial-{name}.vtp").is_file()
+    run()
+    assert any(line.startswith("initial: kept") for line in said)
+    (tmp_path / "ours.toml").write_text(shipped.replace("young = 40e9", "young = 41e9"), encoding="utf-8")
+    run()
+    assert any(line.startswith("net: kept") for line in said)
+    assert any(line.startswith("initial: done") for line in said)
