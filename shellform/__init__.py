@@ -20,6 +20,8 @@ _HOMES = {
     "shellform.net.chebyshev": ("pull_net",),
     "shellform.net.net": ("Net",),
     "shellform.design.gridshell": ("Rod", "Joint", "Cable", "Design", "Gridshell", "brace"),
+    "shellform.design.loads": ("Region",),
+    "shellform.design.catalogue": ("Catalogue", "read_catalogue", "rounded_up", "neighbours"),
     "shellform.design.problem": ("Problem", "follow", "deviations"),
     "shellform.design.terms": ("Share", "AtMost", "Misfit", "RmsMisfit", "CableForce", "CableForces", "RodRadius"),
 }

@@ -23,7 +23,7 @@ from shellform.errors import InputError
 from shellform.structure import residual
 from shellform.structure.network import assemble
 from shellform.structure.results import end_stress, end_stress_by_force, twist
-from shellform.structure.sections import Material, Round, stress_by_size
+from shellform.structure.sections import stress_by_size
 from shellform.structure.sensitivity import reaction_rows
 from shellform.structure.softening import quadratic, stiffness_by_freedom, stiffness_by_rest_length
 from shellform.structure.stability import modes
@@ -36,7 +36,7 @@ _TURN = 0.1  # rad, the unit of turns
 
 @dataclass(frozen=True)
 class RodUtilisation:
-    """The largest fibre stress of the rods, |N|/A + |M| r/I at any end, over their strength; erection stress is in it."""
+    """The largest fibre stress of the rods, for round ones |N|/A + |M| r/I, at any end, over their strength; erection stress is in it."""
 
     load: str
 
@@ -45,7 +45,7 @@ class RodUtilisation:
         rod = shell.rod
         if not np.isfinite(rod.strength):
             raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
-        section = Round(design.radius, Material(rod.young, rod.shear, 0.0, rod.strength))
+        section = rod.resized(design.radius).section
         beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
         chosen = {beams.kinds[0]: section}
         forces = beams.local_forces(state)
@@ -56,7 +56,7 @@ class RodUtilisation:
         by_radius = (by_force @ rate.local_forces(state)[own][:, :, None])[:, :, 0]
         for end in range(2):
             at = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
-            by_radius[:, end] += stress_by_size(section, *at)[0] / rod.strength
+            by_radius[:, end] += np.array(section.sizes) / design.radius @ stress_by_size(section, *at) / rod.strength
         return _largest(shell, 1.0, values, np.repeat(beams.freedoms()[own], 2, axis=0), rows, by_radius.ravel())
 
 

@@ -15,6 +15,7 @@ from shellform.net.files import net_document, save_net
 from shellform.net.orient import oriented_net
 from shellform.study.case import SurfaceEntry, load_case, write_text
 from shellform.study.run import Report, net_summary, surface_of, surface_summary, told_size
+from shellform.study.shell import rod_material
 from shellform.surface.reading import FORMATS, kind_of
 from shellform.surface.target import largest_curvature
 
@@ -47,7 +48,8 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
         spacing = case.net.spacing
         told["crossings to expect"] = f"about {surface.area / spacing**2:.0f} at {spacing:g} m"
         told["freedoms to expect"] = f"about {48 * surface.area / spacing**2:.0f}"
-        largest = case.rod.strength / (case.rod.young * bent) if bent > 0.0 else float("inf")
+        material = rod_material(case.rod)
+        largest = material.strength / (material.young * bent) if bent > 0.0 else float("inf")
         told["largest rod radius"] = f"at least {largest:.3g} m (equation 1, at the surface's largest curvature)"
     else:
         told["largest rod radius"] = f"{6.4e-3 / bent:.3g} m in GFRP (strength/E = 255 MPa/40 GPa)" if bent > 0.0 else "any"
