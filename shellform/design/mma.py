@@ -206,12 +206,14 @@ class _Search:
         """First the objective alone, then thinning."""
         self.most = evaluations
         self._descend(evaluations)
-        while self.accepted and not self._sound(self.accepted[-1]):
+        while self.accepted:
+            sound = self._sound(self.accepted[-1])
+            if sound is not None:
+                self.accepted[-1] = self.point = sound
+                break
             self.accepted.pop()
-        if self.accepted:
-            self.point = self.accepted[-1]
-            if thin:
-                self._thin(evaluations)
+        if self.accepted and thin:
+            self._thin(evaluations)
         return self._finish()
 
     def _descend(self, evaluations: int) -> None:
@@ -258,13 +260,15 @@ class _Search:
             trial = self._without(model, leaving)
             if trial is not None and self._merit(trial) < 2.0 * budget:
                 trial = self._repair(trial, budget)
-            if trial is None or self._merit(trial) > budget or self._violation(trial) > 0.0 or not self._sound(trial):
+            fits = trial is not None and self._merit(trial) <= budget and self._violation(trial) <= 0.0
+            sound = self._sound(trial) if trial is not None and fits else None
+            if sound is None:
                 self.history.append(self._record(trial or self.point, False))
                 needed[leaving] = len(leaving) == 1
                 failures += len(leaving) == 1
                 batch = max(1, len(leaving) // 3)
                 continue
-            self._accept(trial)
+            self._accept(sound)
             failures = 0
             batch = int(1.3 * batch) + 1
         self.status += ", and no further cable can be taken away" if failures else ""
@@ -301,13 +305,20 @@ class _Search:
         self.accepted.append(self.point)
         self.history.append(self._record(self.point, True))
 
-    def _sound(self, point: Point | None = None) -> bool:
-        """Whether the design bears all loads on the documented path, without its slack cables."""
-        point = point or self.point
+    def _sound(self, point: Point) -> Point | None:
+        """The same design in the states to which the documented path leads, without its slack cables; None where it doesn't bear all loads
+        there or breaks a limit: of two equilibria side by side, a search from design to design may have come to the other one."""
         design = without_slack(self.problem.shell, point.design, point.states[self.base])
         loaded = follow(self.problem.shell, design, self.problem.loads, stay=True)
         self.evaluator.factorisations += sum(each.factorisations for each in loaded.values())
-        return all(each.on_branch for each in loaded.values())
+        if not all(each.on_branch for each in loaded.values()):
+            return None
+        states = {name: loaded[name].equilibrium.state for name in self.evaluator.used()}
+        try:
+            found = self.evaluator.seed(point.design, states, 1.0)
+        except OffBranch:
+            return None
+        return found if self._violation(found) <= max(self._violation(point), 0.0) else None
 
     def _taut(self, point: Point) -> int:
         return int((self._tensions(point) > 0.0).sum())
