@@ -43,7 +43,7 @@ except ImportError as error:  # pragma: no cover
     raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
-STIFFNESS = 0.1  # of the start's softest mode under the first load, kept under the additional ones
+STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
 _POLISHED = 0.8  # of that, which polishing may use up
 _NAMES: Mapping[type, str] = {
     Misfit: "misfit",

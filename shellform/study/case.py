@@ -198,6 +198,10 @@ class OptimiseEntry(_Section):
     radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
     misfit_rms_additional: PositiveFloat = Field(description="constraint (6) as root mean square distance a node, m")
     evaluations: PositiveInt = Field(100, description="design evaluations at the most")
+    stiffness_min: float = Field(
+        0.08, ge=0.0, lt=1.0, description="of the softest mode under additional loads, over the start's under the design load"
+    )
+    polish: int = Field(20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none")
 
     @model_validator(mode="after")
     def _whole(self) -> OptimiseEntry:

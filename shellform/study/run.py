@@ -38,7 +38,7 @@ from shellform.study.shell import catalogue_bytes, gridshell, rod_bounds, rod_li
 from shellform.surface.target import Surface
 
 STAGES = ("surface", "net", "initial", "optimise", "figures")
-DESIGNS = ("unbraced", "initial", "unloaded", "optimised")
+DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "polished")
 
 _MARKED = 0.2  # of the largest load on a node: smaller ones, such as of the rods' own weight, would hide the shell behind arrows
 
@@ -297,8 +297,12 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         entry.rest_length_max,
         rod_bounds(job.case, shell),
     )
-    best = mma.optimize(problem, start, evaluations=entry.evaluations, progress=watch)
+    best = mma.optimize(problem, start, evaluations=entry.evaluations, stiffness=entry.stiffness_min, progress=watch)
     _keep_design(job, shell, "optimised", best.design, _follow(shell, best.design, loads), loads, summary)
+    if entry.polish:
+        job.report("optimise", "polishing the cables that are left")
+        polished = mma.polish(best, evaluations=entry.polish)
+        _keep_design(job, shell, "polished", polished.design, _follow(shell, polished.design, loads), loads, summary)
     job.report("optimise", "the design without regard to the loads")
     unloaded = mma.optimize(
         Problem(
