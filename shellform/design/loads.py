@@ -113,7 +113,10 @@ def sheet(net: Net, surface: Surface, mass: float, region: Region = EVERYWHERE) 
 
 
 def rods(net: Net, section: Section) -> Reals:
-    """Load (n, 6) of the rods themselves along their true lengths. Raises InputError where their density isn't known."""
+    """Load (n, 6) of the rods themselves along their true lengths. Raises InputError where their density isn't known.
+
+    It is the weight of this section: where the radius is a variable the load stays that of the section given.
+    """
     if not section.material.density > 0.0:
         raise InputError("the rods' density isn't known", where="rod.density", remedy="Give it in kg/m³.")
     half = 0.5 * GRAVITY * mass_per_length(section) * net.grid.rod_rest_lengths
@@ -132,10 +135,12 @@ def joints(net: Net, mass: float) -> Reals:
 def points(
     net: Net, force: float, *, every: int = 1, openings: Sequence[ArrayLike] = (), inside: Sequence[ArrayLike] = ()
 ) -> Reals:
-    """Load (n, 6) of `force`, N, on every `every`-th crossing (2: of the checkerboard, as in section 4.1), on its upper rod,
+    """Load (n, 6) of `force`, N (below 0: upwards), on every `every`-th crossing (2: of the checkerboard, as in section 4.1), on its upper rod,
     outside the plan polygons `openings` and, if any are given, inside one of `inside`."""
     loaded = crossings_to_load(net, every, openings, inside)
     weight = np.zeros(len(net.grid.flat))
+    if not math.isfinite(force):
+        raise InputError("must be finite", where="load.force", value=force)
     weight[net.grid.crossing_nodes[loaded, 1]] = force
     return _down(weight)
 
