@@ -8,10 +8,10 @@ from __future__ import annotations
 import sys
 from typing import Any
 
-from numba import njit, prange
+from numba import njit, prange, set_num_threads
 from numba.core import event
 
-__all__ = ["njit", "prange"]
+__all__ = ["njit", "prange", "set_num_threads"]
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]

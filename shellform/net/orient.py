@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from shellform.compiled import set_num_threads
 from shellform.errors import InputError, ShellformError
 from shellform.net.chebyshev import Method, pull_net
 from shellform.net.net import Net
@@ -137,9 +138,7 @@ _work: dict[str, Any] = {}
 
 
 def _begin(surface: Surface, settings: dict[str, Any]) -> None:
-    import numba
-
-    numba.set_num_threads(1)
+    set_num_threads(1)
     _work.update(surface=surface, settings=settings)
 
 
