@@ -16,9 +16,12 @@ __version__ = "0.1.0"
 _HOMES = {
     "shellform.errors": ("InputError", "NotConverged", "ShellformError"),
     "shellform.surface.target": ("Surface", "make_surface"),
+    "shellform.surface.reading": ("read_surface",),
     "shellform.net.chebyshev": ("pull_net",),
     "shellform.net.net": ("Net",),
     "shellform.design.gridshell": ("Rod", "Joint", "Cable", "Design", "Gridshell", "brace"),
+    "shellform.design.loads": ("Region",),
+    "shellform.design.catalogue": ("Catalogue", "read_catalogue", "rounded_up", "neighbours"),
     "shellform.design.problem": ("Problem", "follow", "deviations"),
     "shellform.design.terms": ("Share", "AtMost", "Misfit", "RmsMisfit", "CableForce", "CableForces", "RodRadius"),
 }

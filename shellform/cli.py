@@ -120,7 +120,7 @@ def net(
     piece: Piece = None,
     fill: Fill = None,
     ground: Ground = None,
-    angle: Annotated[float, typer.Option(help="Of the u rods against the x axis, degrees.")] = 0.0,
+    angle: Annotated[str, typer.Option(help="Of the u rods against the x axis, degrees, or auto: with least bending and shear.")] = "0",
     gap: Annotated[float | None, typer.Option(help="Between the rods' axes, m (default: spacing / 27.5).")] = None,
     allow_scripts: Scripts = False,
 ) -> None:

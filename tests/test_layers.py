@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent.parent / "shellform"
-FLOORS = {"errors": -1, "arrays": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "study": 5, "cli": 6}
+FLOORS = {"errors": -1, "compiled": -1, "arrays": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "study": 5, "cli": 6}
 DOORS = {
     "gmsh": {"surface/occ.py"},
     "meshio": {"surface/meshes.py"},
@@ -17,6 +17,7 @@ DOORS = {
     "vtk": {"output/render.py"},
     "matplotlib": {"output/plots.py"},
     "cvxopt": {"structure/sparse.py"},
+    "numba": {"compiled.py"},
 }
 NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "dask", "numba", "scipy", "numpy"]
 

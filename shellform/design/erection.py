@@ -27,7 +27,6 @@ from shellform.structure.equilibrium import Equilibrium, find_equilibrium
 from shellform.structure.loading import Drive, advance
 from shellform.structure.network import assemble
 from shellform.structure.results import end_stress
-from shellform.structure.sections import Material, Round
 from shellform.structure.state import State
 
 STEP = 0.1  # of a stage
@@ -153,8 +152,7 @@ class _Site:
     def __init__(self, shell: Gridshell, design: Design, assembly: Assembly | None = None) -> None:
         self.shell, self.design = shell, design
         self.assembly = assemble(shell.network(design)) if assembly is None else assembly
-        rod = shell.rod
-        self.sections = {"rod": Round(design.radius, Material(rod.young, rod.shear, strength=rod.strength))}
+        self.sections = {"rod": shell.rod.resized(design.radius).section}
 
     def step(self, stage: str, share: float, state: State, load: Reals) -> Step:
         """The state as a step."""

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, reals
-from shellform.design.loads import crossings_to_load
+from shellform.design.loads import points
 from shellform.errors import InputError
-from shellform.net.grid import grid_beams
-from shellform.net.net import Net, cells
+from shellform.net.grid import cells, grid_beams
+from shellform.net.net import Net
 from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables, make_cables
 from shellform.structure.network import Network
+from shellform.structure.sections import Round, Section, isotropic, stiffness, stiffness_by_size
 from shellform.structure.state import State
 from shellform.surface.locate import Locator
 from shellform.surface.target import Surface
@@ -26,35 +28,55 @@ _SAMPLES = (0.25, 0.5, 0.75)  # where along a cable its height over the surface 
 
 @dataclass(frozen=True)
 class Rod:
-    """A solid round rod: Young's and shear modulus, Pa; radius, m; flexural strength, Pa (inf: not known)."""
+    """Rods of one `section` and its material.
 
-    young: float
-    shear: float
-    radius: float
-    strength: float = math.inf
+    Where their thickness is a variable they vary among the sections similar to it, all sizes in proportion; `radius` tells these apart.
+    """
 
-    def __post_init__(self) -> None:
-        for name in ("young", "shear", "radius", "strength"):
-            value = getattr(self, name)
-            if not value > 0.0 or (name != "strength" and not math.isfinite(value)):
-                raise InputError("must be positive", where=f"rod.{name}", value=value)
+    section: Section
 
     @classmethod
-    def round(cls, *, young: float, radius: float, poisson: float = 0.3, strength: float = math.inf) -> Rod:
-        """A rod of an isotropic material."""
-        return cls(young, young / (2.0 * (1.0 + poisson)), radius, strength)
+    def round(
+        cls, *, young: float, radius: float, poisson: float = 0.3, strength: float = math.inf, density: float = 0.0
+    ) -> Rod:
+        """A solid round rod of an isotropic material: `radius`, m; moduli and flexural strength, Pa (inf: not known); kg/m³."""
+        return cls(Round(radius, isotropic(young=young, poisson=poisson, density=density, strength=strength)))
+
+    @property
+    def radius(self) -> float:
+        """Distance of the outermost fibre, m: the outer radius of round rods and tubes, half a lath's longer side."""
+        return max(self.section.fibres)
+
+    @property
+    def young(self) -> float:
+        """Young's modulus, Pa."""
+        return self.section.material.young
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus, Pa."""
+        return self.section.material.shear
+
+    @property
+    def strength(self) -> float:
+        """Flexural strength, Pa."""
+        return self.section.material.strength
 
     @property
     def stiffness(self) -> tuple[float, float, float, float]:
-        """EA, N; GJ, EI_y, EI_z, N·m²: A = pi r², I = pi r⁴/4, J = 2 I."""
-        area, inertia = math.pi * self.radius**2, 0.25 * math.pi * self.radius**4
-        return self.young * area, 2.0 * self.shear * inertia, self.young * inertia, self.young * inertia
+        """EA, N; GJ, EI_y, EI_z, N·m²."""
+        return stiffness(self.section)
 
     @property
     def stiffness_by_radius(self) -> tuple[float, float, float, float]:
-        """Derivatives of EA, GJ, EI_y, EI_z by the radius."""
-        area, inertia = 2.0 * math.pi * self.radius, math.pi * self.radius**3
-        return self.young * area, 2.0 * self.shear * inertia, self.young * inertia, self.young * inertia
+        """Derivatives of EA, GJ, EI_y, EI_z by the radius, all sizes in proportion to it."""
+        axial, torsion, about_y, about_z = (np.array(self.section.sizes) / self.radius) @ stiffness_by_size(self.section)
+        return float(axial), float(torsion), float(about_y), float(about_z)
+
+    def resized(self, radius: float) -> Rod:
+        """The rod with a similar section of that radius, m."""
+        kind: Any = type(self.section)
+        return Rod(kind(*(size / self.radius * radius for size in self.section.sizes), self.section.material))
 
 
 @dataclass(frozen=True)
@@ -91,7 +113,7 @@ class Cable:
 
 @dataclass(frozen=True)
 class Design:
-    """What is designed: `rest_length` (c,), m, of every candidate cable, which of them exist, and the rod `radius`, m."""
+    """What is designed: `rest_length` (c,), m, of every candidate cable, which of them exist, and the rods' `radius`, m."""
 
     rest_length: Reals
     present: Flags
@@ -139,19 +161,16 @@ class Gridshell:
 
         With 2 it is every second crossing of the checkerboard, as in section 4.1. It acts on the upper rod.
         """
-        loaded = crossings_to_load(self.net, every, openings)
-        load = np.zeros((len(self.net.grid.flat), 6))
-        load[self.net.grid.crossing_nodes[loaded, 1], 2] = -force
-        return load
+        return points(self.net, force, every=every, openings=openings)
 
     def beams(self, radius: float) -> Beams:
         """Rods of the radius, m, and connectors."""
-        return grid_beams(self.net.grid, replace(self.rod, radius=radius).stiffness, self.joint.stiffness)
+        return grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
 
     def beams_by_radius(self, radius: float) -> Beams:
         """Beams whose end forces are the derivative of `beams`' end forces by the radius: they are linear in the stiffness."""
         beams = self.beams(radius)
-        rate = replace(self.rod, radius=radius).stiffness_by_radius
+        rate = self.rod.resized(radius).stiffness_by_radius
         rods = beams.kind == 0
         axial, torsion, bending_y, bending_z = (np.where(rods, value, 0.0) for value in rate)
         return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
@@ -171,6 +190,22 @@ class Gridshell:
         return Network(flat, self.beams(design.radius), self.cables(design), fixed, imposed)
 
 
+def erection_stress(net: Net, section: Section) -> float:
+    """The largest bending stress, Pa, of rods bent into the net: σ = E κ c at the outermost fibre (equation 1).
+
+    A section's local z axis stands across the surface: curvature out of the surface bends it about y, curvature in it about z.
+    """
+    bent = net.quality.curvature
+    _, _, bending_y, bending_z = stiffness(section)
+    return float(section.bending(bending_y * bent[..., 0], bending_z * bent[..., 1]).max())
+
+
+def max_radius(net: Net, rod: Rod) -> float:
+    """Equation (1), m, for any section: the radius of the largest one similar to the rod's that bears the net's curvature."""
+    stress = erection_stress(net, rod.section)
+    return rod.radius * rod.strength / stress if stress > 0.0 else math.inf
+
+
 def brace(net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface) -> Gridshell:
     """The gridshell with a candidate cable on both diagonals of every cell whose corners are all joints.
 
@@ -184,10 +219,11 @@ def brace(net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface) -> 
             value=joint.gap,
             remedy="Pull the net with the joint's gap.",
         )
-    bearable = net.max_radius(young=rod.young, strength=rod.strength)
+    bearable = max_radius(net, rod)
     if rod.radius > bearable * (1.0 + 1e-9):
         raise InputError(
-            f"the net bends rods to {net.quality.curvature_max:.3g} 1/m; thicker than {bearable:.4g} m they break (equation 1)",
+            f"the net bends rods to {net.quality.curvature_max:.3g} 1/m; with the outermost fibre more than {bearable:.4g} m from the "
+            "axis they break (equation 1)",
             where="rod.radius",
             value=rod.radius,
             remedy="Choose a thinner rod, a stronger material, another angle of the net, or a flatter surface.",

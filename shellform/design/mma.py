@@ -8,6 +8,8 @@ present design, and the trial is then evaluated by its true equilibria:
 
 - it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
 - a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
+- under the additional loads no mode may become softer than a share of what the softest one has at the start under the first load
+  (checks.py: Softness): deviations don't see buckling coming, its stiffness does, and designs keep away from the end of their branch;
 - additional loads are staged: each accepted design raises them as far as its own stable branch reaches, less a margin, so that a
   start that doesn't bear them is led to a design that does.
 
@@ -23,14 +25,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Flags, Indices, Reals
+from shellform.design.checks import ConnectorTurn, RodUtilisation, Slackness, Softness, Uplift
 from shellform.design.gridshell import Design
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
 from shellform.design.tensions import TensionModel, tension_model
-from shellform.design.terms import CableForce, CableForces, Misfit, RmsMisfit, Term
+from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
+from shellform.design.thinning import kept_stiffness, spared
 from shellform.errors import InputError, NotConverged
 from shellform.structure.loading import Loaded, apply_load
-from shellform.structure.stability import lowest_mode
+from shellform.structure.stability import modes
 from shellform.structure.state import State
 
 try:
@@ -39,14 +43,32 @@ except ImportError as error:  # pragma: no cover
     raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
+STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
+_POLISHED = 0.8  # of that, which polishing may use up
+_NAMES: Mapping[type, str] = {
+    Misfit: "misfit",
+    RmsMisfit: "misfit",
+    CableForce: "cable_force",
+    CableForces: "cable_force",
+    RodRadius: "rod_radius",
+    RodUtilisation: "utilisation",
+    ConnectorTurn: "connector_turn",
+    Slackness: "slackness",
+    Softness: "softness",
+    Uplift: "uplift",
+}
+POLISHING = 20  # design evaluations
 _MARGIN = 0.15  # of the whole additional load that is left between a stage and the end of the stable branch
 _GROW, _SHRINK = 1.6, 0.4
 _GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
 _SETTLED = 1e-3  # relative improvement predicted for the largest window that ends the optimisation
 _SMALLEST = 0.03  # window, in mean tensions, at which no better design is to be found
+_FINEST = 0.003  # the same in polishing
 _MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
 _PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
-_FAILURES = 8  # single cables in a row that can't be taken away, after which thinning ends
+_FAILURES = 4  # single cables in a row that can't be taken away, after which thinning ends
+_BATCHES = 8  # share of the taut cables that the first batch takes, one in so many
+_KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
 _THINNING = 1.5  # of the objective that cables with little use may cost
 _REPAIRS = 2  # steps after each batch
 _BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
@@ -71,7 +93,8 @@ class Step:
 @dataclass(frozen=True)
 class Optimum:
     """What the optimisation found: the `design` without its slack cables, how it carries each load on the documented path
-    (`loaded`, with "none" first), the `history`, a `status` sentence, and the work it took."""
+    (`loaded`, with "none" first), the `history`, a `status` sentence, the work it took, of which factorisations in rejected trials
+    were `wasted`, and the `stiffness`, N/m, that the softest mode had to keep under the additional loads."""
 
     problem: Problem
     design: Design
@@ -85,6 +108,8 @@ class Optimum:
     rejected: int
     equilibria: int
     factorisations: int
+    wasted: int
+    stiffness: float
 
     @property
     def states(self) -> dict[str, State]:
@@ -102,16 +127,37 @@ def optimize(
     evaluations: int = 100,
     window: float = WINDOW,
     thin: bool = True,
+    stiffness: float = STIFFNESS,
     progress: Watch | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
     `window`: half-width of the first step, in mean cable tensions; `thin`: whether cables that do little are taken away at the end;
+    `stiffness`: what the softest mode must keep under the additional loads, as a share of the start's under the first (0: nothing);
     `progress(step)` is called at each trial.
 
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
-    return _Search(problem, start, window, progress).run(evaluations, thin=thin)
+    search = _Search(problem, start, window, progress)
+    search.keep_stiff(stiffness * search.stiffness())
+    return search.run(evaluations, thin=thin)
+
+
+def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | None = None) -> Optimum:
+    """The design of `best` with the cables that it has and the least misfit under the first load, its limits kept.
+
+    The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the shape alone. The misfit
+    never rises: where no better design is found, `best` comes back. The radius stays.
+    """
+    base = next(iter(best.problem.loads))
+    problem = replace(best.problem, minimize=[Share(1.0, Misfit(base))])
+    search = _Search(problem, best.design, WINDOW, progress)
+    search.keep_stiff(_POLISHED * best.stiffness)
+    search.braces[:] = True
+    search.smallest = _FINEST
+    polished = search.run(evaluations, thin=False)
+    better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
+    return polished if better else replace(best, status="no design with less misfit was found", history=polished.history)
 
 
 class _Search:
@@ -137,17 +183,37 @@ class _Search:
         self.history = [self._record(self.point, True)]
         self.status = "the number of evaluations was reached"
         self.most = 0
+        self.least = 0.0
+        self.smallest = _SMALLEST
+        self._modelled: TensionModel | None = None
+
+    def stiffness(self) -> float:
+        """Of the softest mode of the start under the first load, N/m."""
+        return float(modes(self.evaluator.assembly(self.point.design), self.point.states[self.base], 1).stiffness[0])
+
+    def keep_stiff(self, least: float) -> None:
+        """Adds the limit on the softest mode, N/m, under each additional load."""
+        additional = [name for name in self.evaluator.used() if name != self.base]
+        if not (least > 0.0 and additional):
+            return
+        self.least = least
+        limits = [*self.evaluator.problem.limits, *(AtMost(1.0, Softness(name, least)) for name in additional)]
+        self.evaluator.problem = replace(self.evaluator.problem, limits=limits)
+        self.point = self.evaluator.seed(self.point.design, self.point.states, self.stage)
+        self.accepted, self.history = [self.point], [self._record(self.point, True)]
 
     def run(self, evaluations: int, *, thin: bool) -> Optimum:
         """First the objective alone, then thinning."""
         self.most = evaluations
         self._descend(evaluations)
-        while self.accepted and not self._sound(self.accepted[-1]):
+        while self.accepted:
+            sound = self._sound(self.accepted[-1])
+            if sound is not None:
+                self.accepted[-1] = self.point = sound
+                break
             self.accepted.pop()
-        if self.accepted:
-            self.point = self.accepted[-1]
-            if thin:
-                self._thin(evaluations)
+        if self.accepted and thin:
+            self._thin(evaluations)
         return self._finish()
 
     def _descend(self, evaluations: int) -> None:
@@ -159,7 +225,7 @@ class _Search:
                 if -predicted < _SETTLED * self.point.objective and self.window >= self.tension:
                     self.status = f"the model predicts less than {_SETTLED:.1%} improvement"
                     return
-                if self.window < _SMALLEST * self.tension:
+                if self.window < self.smallest * self.tension:
                     self.status = "the objective has no better design within the smallest window"
                     return
             trial = self._try(model, y)
@@ -173,38 +239,36 @@ class _Search:
             model = self._model()
 
     def _thin(self, evaluations: int) -> None:
-        """Takes away cables that do little for stability, in batches, and lets the others make up for them.
+        """Takes away cables that the shell can spare (thinning.py), in batches, and lets the others make up for them.
 
-        The L1 term empties the cables with the least tension, until the shell with those left is about to buckle under the
-        additional load; but tension says little about what a cable does against buckling. What it does is its part of the stiffness
-        in the softest mode of the tangent there: cables with the least of it are taken away, the others are kept taut, their
-        tensions optimised again. A batch that the shell doesn't bear, or that costs too much of the objective, is halved.
+        Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or that costs too
+        much of the objective, is cut; a single cable that can't go is kept for good.
         """
         budget = _THINNING * self.point.objective
-        batch = max(1, self._taut(self.point) // 10)
+        batch = max(1, self._taut(self.point) // _BATCHES)
         needed = np.zeros(len(self.braces), dtype=bool)
         self.window = max(self.window, 0.1 * self.tension)
         failures = 0
         while failures < _FAILURES and self.evaluator.evaluations < evaluations:
             model = self._model()
-            order = self._least_bracing(model)
-            order = order[~needed[order]]
-            if not len(order):
-                break
-            leaving = order[:batch]
-            y = model.origin.copy()
-            y[leaving] = 0.0
-            self.braces = y[: len(self.braces)] > 0.0
-            trial = self._try(model, y)
+            leaving = self._spared(model, needed, batch)
+            if not len(leaving):
+                self.status += ", and every cable that is left is needed for stability"
+                return
+            self.braces = model.origin[: len(self.braces)] > 0.0
+            self.braces[leaving] = False
+            trial = self._without(model, leaving)
             if trial is not None and self._merit(trial) < 2.0 * budget:
                 trial = self._repair(trial, budget)
-            if trial is None or self._merit(trial) > budget or self._violation(trial) > 0.0 or not self._sound(trial):
+            fits = trial is not None and self._merit(trial) <= budget and self._violation(trial) <= 0.0
+            sound = self._sound(trial) if trial is not None and fits else None
+            if sound is None:
                 self.history.append(self._record(trial or self.point, False))
-                needed[leaving] = batch == 1
-                failures += batch == 1
-                batch = max(1, batch // 3)
+                needed[leaving] = len(leaving) == 1
+                failures += len(leaving) == 1
+                batch = max(1, len(leaving) // 3)
                 continue
-            self._accept(trial)
+            self._accept(sound)
             failures = 0
             batch = int(1.3 * batch) + 1
         self.status += ", and no further cable can be taken away" if failures else ""
@@ -225,19 +289,15 @@ class _Search:
         best, self.point = self.point, before
         return best
 
-    def _least_bracing(self, model: TensionModel) -> Indices:
-        """The taut cables, numbered among those present, from the one that does least in the softest mode."""
-        name = self.evaluator.used()[-1]
-        mode = lowest_mode(model.assembly, self.point.states[name])
-        cables = self.problem.shell.cables(self.point.design)
-        place = self.point.states[name].positions[cables.ends]
-        chord = place[:, 1] - place[:, 0]
-        stretch = np.sum(chord * (mode[cables.ends[:, 1], :3] - mode[cables.ends[:, 0], :3]), axis=1)
-        resists = stretch**2 / np.sum(chord**2, axis=1) / cables.rest_length
-        pull = model.origin[: len(resists)]
-        score = resists / resists.sum() + pull / pull.sum()
-        taut = np.flatnonzero(pull > 0.0)
-        return taut[np.argsort(score[taut], kind="stable")]
+    def _spared(self, model: TensionModel, needed: Flags, most: int) -> Indices:
+        """Taut cables, numbered among those present, that can go at once, from the one with the least use."""
+        state = self.point.states[self.evaluator.used()[-1]]
+        kept = kept_stiffness(model.assembly, state, self.problem.shell.cables(self.point.design))
+        loss = 1.0 - np.diag(kept)
+        pull = model.origin[: len(loss)]
+        score = loss / loss.sum() + pull / pull.sum()
+        free = np.flatnonzero((pull > 0.0) & ~needed)
+        return spared(kept, free[np.argsort(score[free], kind="stable")], most, _KEPT)
 
     def _accept(self, trial: Point) -> None:
         self.point = trial
@@ -245,13 +305,20 @@ class _Search:
         self.accepted.append(self.point)
         self.history.append(self._record(self.point, True))
 
-    def _sound(self, point: Point | None = None) -> bool:
-        """Whether the design bears all loads on the documented path, without its slack cables."""
-        point = point or self.point
+    def _sound(self, point: Point) -> Point | None:
+        """The same design in the states to which the documented path leads, without its slack cables; None where it doesn't bear all loads
+        there or breaks a limit: of two equilibria side by side, a search from design to design may have come to the other one."""
         design = without_slack(self.problem.shell, point.design, point.states[self.base])
         loaded = follow(self.problem.shell, design, self.problem.loads, stay=True)
         self.evaluator.factorisations += sum(each.factorisations for each in loaded.values())
-        return all(each.on_branch for each in loaded.values())
+        if not all(each.on_branch for each in loaded.values()):
+            return None
+        states = {name: loaded[name].equilibrium.state for name in self.evaluator.used()}
+        try:
+            found = self.evaluator.seed(point.design, states, 1.0)
+        except OffBranch:
+            return None
+        return found if self._violation(found) <= max(self._violation(point), 0.0) else None
 
     def _taut(self, point: Point) -> int:
         return int((self._tensions(point) > 0.0).sum())
@@ -260,6 +327,12 @@ class _Search:
         return isinstance(term, CableForces) and term.load == self.base and term.chosen is None
 
     def _model(self) -> TensionModel:
+        """The convex model at the present point, made once for each."""
+        if self._modelled is None or self._modelled.point is not self.point:
+            self._modelled = self._new_model()
+        return self._modelled
+
+    def _new_model(self) -> TensionModel:
         shell, design = self.problem.shell, self.point.design
         longest = (self.evaluator.bounds()[1][: len(shell.cable_lengths)] * shell.cable_lengths)[design.present]
         return tension_model(
@@ -354,6 +427,17 @@ class _Search:
         except OffBranch:
             return None
 
+    def _without(self, model: TensionModel, leaving: Indices) -> Point | None:
+        """The point without some cables, the others at the rest lengths that they have: the shell moves less than at their tensions."""
+        design = self.point.design
+        rest = design.rest_length.copy()
+        rest[np.flatnonzero(design.present)[leaving]] = model.longest[leaving]
+        variables = self.evaluator.variables(replace(design, rest_length=rest))
+        try:
+            return self.evaluator.evaluate(variables, self.point.states, self.stage)
+        except OffBranch:
+            return None
+
     def _merit(self, point: Point) -> float:
         return point.objective + _PENALTY * max(self._violation(point), 0.0)
 
@@ -424,9 +508,7 @@ class _Search:
         return step
 
     def _name(self, term: Term) -> str:
-        kind = {Misfit: "misfit", RmsMisfit: "misfit", CableForce: "cable_force", CableForces: "cable_force"}.get(
-            type(term), "rod_radius"
-        )
+        kind = _NAMES[type(term)]
         return kind if term.load in ("", self.base) else f"{kind}.{term.load}"
 
     def _finish(self) -> Optimum:
@@ -457,6 +539,8 @@ class _Search:
             self.evaluator.rejected,
             self.evaluator.equilibria,
             self.evaluator.factorisations,
+            self.evaluator.wasted,
+            self.least,
         )
 
     def _judge(self, design: Design, loaded: Mapping[str, Loaded]) -> Step:
@@ -469,7 +553,7 @@ class _Search:
 
 def _counted(judge: Evaluator, counts: Evaluator) -> Evaluator:
     judge.evaluations, judge.rejected = counts.evaluations, counts.rejected
-    judge.equilibria, judge.factorisations = counts.equilibria, counts.factorisations
+    judge.equilibria, judge.factorisations, judge.wasted = counts.equilibria, counts.factorisations, counts.wasted
     return judge
 
 

@@ -30,7 +30,8 @@ from shellform.structure.sparse import NotPositiveDefinite
 from shellform.structure.state import State
 
 _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
-_FAR = 20.0  # times the larger of the start's misfit: a trial this far off has left the branch unnoticed
+_LED = 0.5  # of an additional load, its steps from the first case where the state before is no start
+_FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed
 _SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
 
 
@@ -97,7 +98,7 @@ class Evaluator:
         self.problem, self.start = problem, start
         self.shell = problem.shell
         self.weights: Reals = np.ones(len(problem.minimize))
-        self.factorisations = self.equilibria = self.evaluations = self.rejected = 0
+        self.factorisations = self.equilibria = self.evaluations = self.rejected = self.wasted = 0
         self._assembly: Assembly | None = None
         self._present: Flags | None = None
         self._far = np.inf
@@ -119,7 +120,8 @@ class Evaluator:
                 remedy="Choose a denser grid, thicker rods or stiffer cables.",
             )
         state = reached[first].equilibrium.state
-        self._far = _FAR * float(((state.positions - self.shell.target.positions) ** 2).sum())
+        found = [each.equilibrium.state for each in reached.values() if each.on_branch]
+        self._far = _FAR * max(float(((each.positions - self.shell.target.positions) ** 2).sum()) for each in found)
         values = [part.term.measure(self.shell, self.start, state).value[0] for part in self.problem.minimize]
         self.weights = np.array([part.share for part in self.problem.minimize]) / np.maximum(values, 1e-300)
         return reached
@@ -164,13 +166,17 @@ class Evaluator:
     def evaluate(self, variables: Reals, near: Mapping[str, State], stage: float) -> Point:
         """The design at the variables, its equilibria sought from the states `near` them. Raises OffBranch."""
         self.evaluations += 1
+        before = self.factorisations
         design = self.design(variables)
         assembly = self.assembly(design)
         try:
-            states = {name: self._settle(assembly, near[name], self.load(name, stage)) for name in self.used()}
+            states: dict[str, State] = {}
+            for name in self.used():
+                states[name] = self._settled(assembly, near[name], states, self.load(name, stage), stage)
             return self.seed(design, states, stage)
         except OffBranch:
             self.rejected += 1
+            self.wasted += self.factorisations - before
             raise
 
     def assembly(self, design: Design) -> Assembly:
@@ -185,6 +191,26 @@ class Evaluator:
         """The load cases that objective or constraints need."""
         names = {term.load for term in self.problem.terms}
         return [name for name in self.problem.loads if name in names]
+
+    def _settled(
+        self, assembly: Assembly, near: State, known: Mapping[str, State], load: Reals, stage: float
+    ) -> State:
+        """The equilibrium next to `near`, or where that is too far off, the one that the load leads to from the first case's.
+
+        The state of the design before is near in most cases; where it isn't, the load's own path tells whether the design bears it.
+        """
+        try:
+            return self._settle(assembly, near, load)
+        except OffBranch:
+            if not known:
+                raise
+        first, state = next(iter(known.items()))
+        before = self.load(first, stage)
+        loaded = apply_load(assembly, state, before, load, step=_LED, smallest=_LED, stay=True)
+        self._count(loaded.factorisations)
+        if not loaded.on_branch:
+            raise OffBranch("the design doesn't bear the load on its stable branch")
+        return loaded.equilibrium.state
 
     def _settle(self, assembly: Assembly, start: State, load: Reals) -> State:
         try:
@@ -239,7 +265,7 @@ def linearise(
         if name:
             columns = sp.csc_array(by_rest_length(assembly, state, cables) @ spread)
             response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
-            by_state = _on_free(sp.vstack([m.by_position for m in measures]), assembly)
+            by_state = sp.vstack([m.by_freedom for m in measures]).tocsc()[:, assembly.free].toarray()
             total = gradients(response, by_state, partial)
         else:
             total = partial
@@ -264,15 +290,6 @@ def linearise(
         np.vstack([np.zeros((0, size)), *rows]),
         stage,
     )
-
-
-def _on_free(by_position: sp.csr_array, assembly: Assembly) -> Reals:
-    """Rows by node coordinates (g, 3 n) as rows by the free freedoms (g, f)."""
-    freedoms = assembly.free
-    moving = freedoms % 6 < 3
-    result = np.zeros((by_position.shape[0], len(freedoms)))
-    result[:, moving] = by_position.tocsc()[:, 3 * (freedoms[moving] // 6) + freedoms[moving] % 6].toarray()
-    return result
 
 
 def follow(

@@ -73,8 +73,7 @@ class TensionModel:
         """Where the change to y takes the base load's equilibrium, to first order."""
         whole = np.zeros(6 * self.assembly.count)
         whole[self.assembly.free] = self.state_by_y @ (y - self.origin)
-        step = whole.reshape(-1, 6)
-        return moved(self.state, self.assembly.chords.corrected(self.state, step))
+        return moved(self.state, self.assembly.chords.corrected(self.state, whole.reshape(-1, 6)))
 
 
 def tension_model(

@@ -20,11 +20,11 @@ from shellform.structure.state import State
 
 @dataclass(frozen=True)
 class Measure:
-    """`value` (g,); `by_position` (g, 3 n) sparse, by node coordinates at a fixed design; `by_rest_length` (g, c) sparse and
-    `by_radius` (g,) at a fixed state. Cables are all candidates; absent ones have zero derivatives."""
+    """`value` (g,); `by_freedom` (g, 6 n) sparse, by the nodes' translations and spins at a fixed design; `by_rest_length` (g, c) sparse
+    and `by_radius` (g,) at a fixed state. Cables are all candidates; absent ones have zero derivatives."""
 
     value: Reals
-    by_position: sp.csr_array
+    by_freedom: sp.csr_array
     by_rest_length: sp.csr_array
     by_radius: Reals
 
@@ -48,7 +48,8 @@ class Misfit:
     def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
         """One value, m²."""
         away = state.positions - shell.target.positions
-        return _measure(shell, [float((away**2).sum())], by_position=sp.csr_array(2.0 * away.reshape(1, -1)))
+        slope = np.hstack([2.0 * away, np.zeros_like(away)])
+        return _measure(shell, [float((away**2).sum())], by_freedom=sp.csr_array(slope.reshape(1, -1)))
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ class RmsMisfit:
         """One value, m²."""
         whole = Misfit(self.load).measure(shell, design, state)
         count = len(state.positions)
-        return _measure(shell, whole.value / count, by_position=whole.by_position / count)
+        return _measure(shell, whole.value / count, by_freedom=whole.by_freedom / count)
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ class CableForces:
             return measure
         rows = list(self.chosen)
         return Measure(
-            measure.value[rows], measure.by_position[rows], measure.by_rest_length[rows], measure.by_radius[rows]
+            measure.value[rows], measure.by_freedom[rows], measure.by_rest_length[rows], measure.by_radius[rows]
         )
 
 
@@ -93,7 +94,7 @@ class CableForce:
         each = _tensions(shell, design, state)
         return Measure(
             np.array([each.value.sum()]),
-            sp.csr_array(each.by_position.sum(axis=0).reshape(1, -1)),
+            sp.csr_array(each.by_freedom.sum(axis=0).reshape(1, -1)),
             sp.csr_array(each.by_rest_length.sum(axis=0).reshape(1, -1)),
             np.zeros(1),
         )
@@ -143,12 +144,12 @@ class AtMost:
 
 
 def _measure(
-    shell: Gridshell, value: object, *, by_position: sp.csr_array | None = None, by_radius: object = (0.0,)
+    shell: Gridshell, value: object, *, by_freedom: sp.csr_array | None = None, by_radius: object = (0.0,)
 ) -> Measure:
     nodes, cables = len(shell.net.grid.flat), len(shell.cable_ends)
     return Measure(
         np.asarray(value, dtype=float),
-        sp.csr_array((1, 3 * nodes)) if by_position is None else by_position,
+        sp.csr_array((1, 6 * nodes)) if by_freedom is None else by_freedom,
         sp.csr_array((1, cables)),
         np.asarray(by_radius, dtype=float),
     )
@@ -161,9 +162,8 @@ def _tensions(shell: Gridshell, design: Design, state: State) -> Measure:
     value = np.zeros(count)
     value[present] = cables.tension(state)
     rows = np.repeat(present, 6)
-    columns = (3 * cables.ends[:, :, None] + np.arange(3)).reshape(-1)
-    by_position = sp.csr_array(
-        (cables.tension_by_position(state).ravel(), (rows, columns)), shape=(count, 3 * nodes)
+    by_freedom = sp.csr_array(
+        (cables.tension_by_position(state).ravel(), (rows, cables.freedoms().ravel())), shape=(count, 6 * nodes)
     )
     by_rest = sp.csr_array((cables.tension_by_rest_length(state), (present, present)), shape=(count, count))
-    return Measure(value, by_position, by_rest, np.zeros(count))
+    return Measure(value, by_freedom, by_rest, np.zeros(count))

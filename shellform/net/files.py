@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,8 @@ import numpy as np
 
 from shellform.errors import InputError
 from shellform.net.grid import Grid, GridRod
-from shellform.net.net import Net, Quality
+from shellform.net.net import Net
+from shellform.net.quality import MAPS, Quality
 from shellform.structure.state import State
 
 
@@ -22,6 +22,7 @@ def net_document(net: Net) -> dict[str, Any]:
     flat = grid.flat[grid.crossing_nodes].mean(axis=1)
     return {
         "spacing": net.spacing,
+        "spacing_v": net.grid.spacing_v,
         "crossings": [
             {"lattice": lattice, "flat": flat_place, "target": target}
             for lattice, flat_place, target in zip(
@@ -53,14 +54,15 @@ def save_net(path: Path, net: Net) -> None:
         "positions": net.target.positions,
         "quaternions": net.target.quaternions,
         "supports": net.supports,
-        "curvature": net.curvature,
+        **{f"map_{name}": getattr(net.quality, name) for name in MAPS},
         "directions": np.array([rod.direction for rod in grid.rods]),
         "meta": np.array(
             json.dumps(
                 {
                     "spacing": grid.spacing,
+                    "spacing_v": grid.spacing_v,
                     "gap": grid.gap,
-                    "quality": asdict(net.quality),
+                    "quality": net.quality.summary(),
                     "notes": net.notes,
                     "indices": [rod.index for rod in grid.rods],
                 }
@@ -89,10 +91,17 @@ def load_net(path: Path) -> Net:
                 GridRod(str(direction), index, *(pieces[name][k] for name in ("nodes", "arc", "crossings", "at")))
                 for k, (direction, index) in enumerate(zip(data["directions"], meta["indices"], strict=True))
             )
-            grid = Grid(data["flat"], rods, data["lattice"], data["crossing_nodes"], meta["spacing"], meta["gap"])
-            target = State(data["positions"], data["quaternions"])
-            return Net(
-                grid, target, data["supports"], data["curvature"], Quality(**meta["quality"]), tuple(meta["notes"])
+            grid = Grid(
+                data["flat"],
+                rods,
+                data["lattice"],
+                data["crossing_nodes"],
+                meta["spacing"],
+                meta["gap"],
+                meta["spacing_v"],
             )
+            quality = Quality(**meta["quality"], **{name: data[f"map_{name}"] for name in MAPS})
+            target = State(data["positions"], data["quaternions"])
+            return Net(grid, target, data["supports"], quality, tuple(meta["notes"]))
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise InputError(f"is damaged: {error}", where=str(path), remedy="Run again with --fresh.") from error

@@ -1,18 +1,20 @@
 """The flat grid: two layers of straight rods, pinned to each other where they cross.
 
-Crossing (i, j) of the lattice lies at i and j spacings from the origin; rods "u" run along i and share j, rods "v" run along j
-and share i. The u rods lie half a gap below the plane of the grid, the v rods half a gap above it, so that every crossing
+Crossing (i, j) of the lattice lies at i spacings along u and j spacings along v from the origin; rods "u" run along i and share j,
+rods "v" run along j and share i. The u rods lie half a gap below the plane of the grid, the v rods half a gap above it, so that every crossing
 has two nodes, which a short connector joins (section 3).
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.structure.beam import Beams, make_beams
+from shellform.structure.state import State
 
 KINDS = ("rod", "connector")
 
@@ -44,7 +46,8 @@ class GridRod:
 @dataclass(frozen=True)
 class Grid:
     """`flat` (n, 3), m, all nodes in the stress-free state; `rods`; `lattice` (c, 2) places of the crossings and
-    `crossing_nodes` (c, 2) their nodes on the u rod and on the v rod; `spacing` and `gap`, m."""
+    `crossing_nodes` (c, 2) their nodes on the u rod and on the v rod; `spacing` of crossings along u rods and `spacing_v` along v
+    rods (0: the same), `gap`, m."""
 
     flat: Reals
     rods: tuple[GridRod, ...]
@@ -52,12 +55,23 @@ class Grid:
     crossing_nodes: Indices
     spacing: float
     gap: float
+    spacing_v: float = 0.0
 
     def __post_init__(self) -> None:
         put = object.__setattr__
+        put(self, "spacing_v", self.spacing_v or self.spacing)
         put(self, "flat", reals("flat", self.flat, (None, 3)))
         count = len(self.lattice)
         put(self, "crossing_nodes", indices("crossing_nodes", self.crossing_nodes, (count, 2), below=len(self.flat)))
+
+    @property
+    def scale(self) -> float:
+        """The mean spacing, m, by which lengths are measured."""
+        return math.sqrt(self.spacing * self.spacing_v)
+
+    def step(self, direction: str) -> float:
+        """Distance of neighbouring crossings, m, on rods of that direction."""
+        return self.spacing if direction == "u" else self.spacing_v
 
     @property
     def rod_ends(self) -> Indices:
@@ -101,8 +115,8 @@ def grid_beams(
     )
 
 
-def lattice_grid(lattice: Indices, *, spacing: float, gap: float, elements: int) -> Grid:
-    """The grid with crossings at the places `lattice` (c, 2), `elements` elements a segment.
+def lattice_grid(lattice: Indices, *, spacing: tuple[float, float], gap: float, elements: int) -> Grid:
+    """The grid with crossings at the places `lattice` (c, 2), `spacing` m apart along u and v, `elements` elements a segment.
 
     Neighbouring places of one row are joined; a place without neighbour in both directions is left out.
     """
@@ -111,7 +125,7 @@ def lattice_grid(lattice: Indices, *, spacing: float, gap: float, elements: int)
         places -= alone
     ordered = sorted(places)
     number = {place: k for k, place in enumerate(ordered)}
-    flat: list[tuple[float, float, float]] = []
+    flat: list[list[float]] = []
     crossing_nodes = np.full((len(ordered), 2), -1)
     rods = []
     for layer, direction in enumerate("uv"):
@@ -122,10 +136,11 @@ def lattice_grid(lattice: Indices, *, spacing: float, gap: float, elements: int)
             at = np.arange(len(run)) * elements
             crossings = np.array([number[place] for place in run])
             crossing_nodes[crossings, layer] = nodes[at]
-            level = (layer - 0.5) * gap
-            flat += [(s * spacing, share * spacing, level) if layer == 0 else (share * spacing, s * spacing, level) for s in along]
-            rods.append(GridRod(direction, share, nodes, (along - along[0]) * spacing, crossings, at))
-    return Grid(np.array(flat), tuple(rods), np.array(ordered), crossing_nodes, spacing, gap)
+            place = np.full((len(along), 3), (layer - 0.5) * gap)
+            place[:, layer], place[:, 1 - layer] = along * spacing[layer], share * spacing[1 - layer]
+            flat += place.tolist()
+            rods.append(GridRod(direction, share, nodes, (along - along[0]) * spacing[layer], crossings, at))
+    return Grid(np.array(flat), tuple(rods), np.array(ordered), crossing_nodes, spacing[0], gap, spacing[1])
 
 
 def _joined(places: set[tuple[int, int]], place: tuple[int, int], axis: int) -> bool:
@@ -143,3 +158,32 @@ def _runs(places: list[tuple[int, int]], axis: int) -> list[list[tuple[int, int]
         else:
             runs.append([place])
     return runs
+
+
+def crossing_points(grid: Grid, state: State) -> Reals:
+    """Positions (c, 3), m, of the crossings: the middle between the nodes of the two rods."""
+    return np.asarray(state.positions[grid.crossing_nodes].mean(axis=1))
+
+
+def neighbours(grid: Grid) -> tuple[Indices, Reals]:
+    """Pairs (p, 2) of crossings one spacing apart on a rod, and that spacing (p,), m."""
+    pairs, steps = [], []
+    for rod in grid.rods:
+        one = np.diff(rod.marks) < 1.5 * grid.step(rod.direction)
+        pairs.append(np.column_stack([rod.crossings[:-1], rod.crossings[1:]])[one])
+        steps.append(np.diff(rod.marks)[one])
+    return np.vstack(pairs), np.concatenate(steps)
+
+
+def cells(grid: Grid) -> Indices:
+    """Crossings (q, 4) round each complete cell of the lattice: (i, j), (i+1, j), (i+1, j+1), (i, j+1)."""
+    number = {(int(i), int(j)): k for k, (i, j) in enumerate(grid.lattice)}
+    corners = ((0, 0), (1, 0), (1, 1), (0, 1))
+    return np.array(
+        [
+            [number[(i + a, j + b)] for a, b in corners]
+            for i, j in number
+            if all((i + a, j + b) in number for a, b in corners)
+        ],
+        dtype=np.int64,
+    ).reshape(-1, 4)

@@ -44,8 +44,8 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Pulled:
-    """The grid's state on the surface: `curvature` (m, 2), 1/m, of the rod elements at their two ends, `pull` (n,), the
-    spring force on each node in EI/s², and the `factorisations` it took."""
+    """The grid's state on the surface: `curvature` (m, 2, 2), 1/m, at the two ends of each rod element out of and in the surface's
+    tangent plane, `pull` (n,), the spring force on each node in EI/s², and the `factorisations` it took."""
 
     state: State
     curvature: Reals
@@ -93,19 +93,21 @@ def pull(
     *,
     spring_density: Sequence[float] = FROM_COMPASS,
     shear_stiffness: float = SHEAR_STIFFNESS,
+    guided: bool = False,
     progress: Progress | None = None,
     limit: int = 400,
 ) -> Pulled:
     """The state of the grid pulled onto the surface of `finder` from the state `start`.
 
-    `origin` (3,) and `frame` (3, 3) of u, v and normal are where the lattice's origin is to stay. Raises NotConverged.
+    `origin` (3,) and `frame` (3, 3) of u, v and normal are where the lattice's origin is to stay; where the start is `guided` by
+    a curve, the rod through the origin keeps to it instead of a plane. Raises NotConverged.
     """
     beams = fictitious_beams(grid, shear_stiffness)
     state = start
     none = np.zeros((len(grid.flat), 6))
     spent = 0
     loose = np.zeros((len(grid.flat), 6), dtype=bool)
-    tethers = _tethers(grid, origin, frame)
+    tethers = _tethers(grid, origin, frame, start if guided else None)
     springs = None
     for stage, density in enumerate(spring_density):
         springs = sliding_springs(grid, finder, density)
@@ -118,7 +120,7 @@ def pull(
                 none,
                 tolerance=_TOLERANCE if last else _LEADING,
                 limit=limit,
-                reach=_REACH * grid.spacing,
+                reach=_REACH * grid.scale,
                 progress=_named(progress, density),
             )
         except NotConverged as error:
@@ -131,7 +133,7 @@ def pull(
             ) from error
         state, spent = found.state, spent + found.factorisations
     assert springs is not None
-    return Pulled(state, _curvature(grid, beams, state), density / grid.spacing * np.abs(springs.stretch(state)), spent)
+    return Pulled(state, _curvature(grid, beams, state), density / grid.scale * np.abs(springs.stretch(state)), spent)
 
 
 def _named(progress: Progress | None, density: float) -> Callable[[int, float], None] | None:
@@ -142,13 +144,13 @@ def _named(progress: Progress | None, density: float) -> Callable[[int, float], 
 
 def fictitious_beams(grid: Grid, shear_stiffness: float) -> Beams:
     """Rods with EI = s² and connectors that keep the two layers' normals together and resist shear a little."""
-    bending = grid.spacing**2
-    axial = 4.0 * _SLENDERNESS**2 * bending / grid.spacing**2
-    joint = bending * grid.gap / grid.spacing
+    bending = grid.scale**2
+    axial = 4.0 * _SLENDERNESS**2 * bending / grid.scale**2
+    joint = bending * grid.gap / grid.scale
     return grid_beams(
         grid,
         rod=(axial, _TORSION * bending, bending, bending),
-        connector=(axial * grid.gap / grid.spacing, shear_stiffness * joint, _CONNECTOR * joint, _CONNECTOR * joint),
+        connector=(axial * grid.gap / grid.scale, shear_stiffness * joint, _CONNECTOR * joint, _CONNECTOR * joint),
     )
 
 
@@ -160,24 +162,30 @@ def sliding_springs(grid: Grid, finder: Finder, density: float) -> SlidingSpring
         return foot.distance, foot.normal, foot.hessian
 
     count = len(grid.flat)
-    strength = np.full(count, density * grid.spacing**2 / grid.spacing**3)
+    strength = np.full(count, density / grid.scale)
     return SlidingSprings(np.arange(count), strength, grid.layer, distance)
 
 
 def _curvature(grid: Grid, beams: Beams, state: State) -> Reals:
-    """Resultant curvature (m, 2), 1/m, at the two ends of each rod element: M/EI of equation (1)."""
+    """Curvature (m, 2, 2), 1/m, at the two ends of each rod element, out of plane (positive over a crown) and in plane: M/EI of
+    equation (1), the end moments of an evenly bent element being opposite."""
     count = len(grid.rod_ends)
-    moments = beams.local_forces(state)[:count]
-    stiffness = beams.bending_y[:count, None]
-    return np.hypot(moments[:, [2, 5]], moments[:, [3, 6]]) / stiffness
+    moments = beams.local_forces(state)[:count, [[2, 3], [5, 6]]]
+    return np.asarray(moments * [[[1.0, 1.0], [-1.0, -1.0]]] / beams.bending_y[:count, None, None])
 
 
-def _tethers(grid: Grid, origin: Reals, frame: Reals) -> tuple[SlidingSprings, SlidingSprings]:
+def laid(grid: Grid, state: State) -> Pulled:
+    """The grid as it lies, without springs: what the compass method alone gives."""
+    beams = fictitious_beams(grid, SHEAR_STIFFNESS)
+    return Pulled(state, _curvature(grid, beams, state), np.zeros(len(grid.flat)), 0)
+
+
+def _tethers(grid: Grid, origin: Reals, frame: Reals, start: State | None) -> tuple[SlidingSprings, SlidingSprings]:
     """Springs that keep the net from drifting and turning on the surface, where nothing else holds it.
 
     The crossing at the lattice's origin is tied to the plane across u through `origin`; it and the crossings half-way out
     on its u rod are tied to the plane along u. Two planes and a long arm: held at one node, a net that would rather lie at
-    another angle bends its rods sharply there.
+    another angle bends its rods sharply there. Of a given `start`, they keep their distance from the second plane.
     """
 
     def plane(normal: Reals) -> Distance:
@@ -188,8 +196,9 @@ def _tethers(grid: Grid, origin: Reals, frame: Reals) -> tuple[SlidingSprings, S
     places = grid.lattice[along, 0]
     halfway = [int(along[np.argmin(np.abs(places - 0.5 * end))]) for end in (places.min(), places.max())]
     held = np.unique(grid.crossing_nodes[[middle, *halfway], 0])
-    strength = _TETHER * grid.spacing**2 / grid.spacing**3
+    strength = _TETHER / grid.scale
+    level = np.zeros(len(held)) if start is None else (start.positions[held] - origin) @ frame[:, 1]
     return (
         SlidingSprings(grid.crossing_nodes[[middle], 0], np.full(1, strength), np.zeros(1), plane(frame[:, 0])),
-        SlidingSprings(held, np.full(len(held), strength), np.zeros(len(held)), plane(frame[:, 1])),
+        SlidingSprings(held, np.full(len(held), strength), level, plane(frame[:, 1])),
     )

@@ -1,12 +1,14 @@
-"""Trimming the pulled grid at the surface's edge.
+"""Trimming the pulled grid at the surface's edge, at the ground and at a curve.
 
-Each rod is cut where it passes over the edge; its parts on the surface become rods whose ends are supports. A joint nearer to
-the edge than a set fraction of the spacing is left out, so that no end piece is so short that its support and the joint fight;
-a rod on which fewer than two joints remain is left out too, with its joints.
+Each rod is cut where it leaves what is to be built; its parts inside become rods whose ends are supports. The cuts are found on the
+bent rod by the Illinois method, so that supports lie on the edge. A joint nearer to an end than a set fraction of the spacing is left
+out, so that no end piece is so short that its support and the joint fight; a rod on which fewer than two joints remain is left out
+too, with its joints.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,6 +24,8 @@ from shellform.structure.state import State
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
 _FEWEST = 2  # joints on a rod
+_CUT = 1e-9  # of the spacing: how near to the edge rods are cut
+_CUTTINGS = 30  # steps of the Illinois method
 
 
 class Uncovered(Exception):
@@ -61,39 +65,110 @@ class Trimmed:
     notes: tuple[str, ...]
 
 
-def trim(grid: Grid, state: State, finder: Finder, *, merge: float) -> Trimmed:
-    """The part of the pulled `grid` on the surface; joints nearer to the edge than `merge` spacings are left out.
+@dataclass(frozen=True)
+class Limits:
+    """Where rods end besides the surface's edge: the `ground`, m, below which nothing is built, and the corners of a closed curve
+    in `plan` (k, 2), m, outside which nothing is."""
+
+    ground: float | None = None
+    plan: Reals | None = None
+
+    def past(self, finder: Finder, points: Reals) -> Reals:
+        """How far (k,), m, points on the net lie past the nearest limit; negative inside."""
+        result = finder.past_edge(finder.foot(points))
+        if self.ground is not None:
+            result = np.maximum(result, self.ground - points[:, 2])
+        if self.plan is not None:
+            result = np.maximum(result, _outside(self.plan, points[:, :2]))
+        return np.asarray(result)
+
+
+def _outside(plan: Reals, points: Reals) -> Reals:
+    """Signed distance (k,), m, of plan points from a closed polygon, positive outside."""
+    start, stop = plan, np.roll(plan, -1, axis=0)
+    best, inside = np.full(len(points), np.inf), np.zeros(len(points), dtype=bool)
+    for a, b in zip(start, stop, strict=True):
+        side = b - a
+        share = np.clip((points - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * side, axis=1))
+        if a[1] != b[1]:
+            at = a[0] + (points[:, 1] - a[1]) * side[0] / side[1]
+            inside ^= ((a[1] > points[:, 1]) != (b[1] > points[:, 1])) & (points[:, 0] < at)
+    return np.where(inside, -best, best)
+
+
+def trim(grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limits) -> Trimmed:
+    """The part of the pulled `grid` inside the surface's edge and the `limits`; joints nearer to them than `merge` spacings are
+    left out.
 
     Raises Uncovered where the grid isn't large enough, InputError where nothing useful remains.
     """
-    overshoot = finder.past_edge(finder.foot(state.positions))
-    pieces = [piece for rod in grid.rods for piece in _pieces(rod, overshoot)]
+    past = limits.past(finder, state.positions)
+    pieces = _cut(grid, state, past, lambda points: limits.past(finder, points))
     bare = sum(piece.start < 0.0 or piece.end < 0.0 for piece in pieces)
     if bare:
         raise Uncovered(bare)
-    kept, notes = _keep(grid, pieces, merge * grid.spacing)
+    kept, notes = _keep(grid, pieces, merge)
     return _rebuild(grid, state, kept, notes)
 
 
-def _pieces(rod: GridRod, overshoot: Reals) -> list[_Piece]:
-    """Runs of nodes on the surface. An end where the rod doesn't reach the edge gets the arc length -1."""
-    past = overshoot[rod.nodes]
-    inside = np.concatenate([[False], past < 0.0, [False]])
-    starts, stops = np.flatnonzero(inside[1:] & ~inside[:-1]), np.flatnonzero(~inside[1:] & inside[:-1]) - 1
-
-    def cut(within: int, beyond: int) -> float:
-        if not 0 <= beyond < len(past):
-            return -1.0
-        share = past[within] / (past[within] - past[beyond])
-        return float(rod.arc[within] + share * (rod.arc[beyond] - rod.arc[within]))
-
+def _cut(grid: Grid, state: State, past: Reals, measure: Callable[[Reals], Reals]) -> list[_Piece]:
+    """Runs of nodes inside. An end where the rod doesn't reach a limit gets the arc length -1."""
+    runs: list[tuple[GridRod, int, int]] = []
+    for rod in grid.rods:
+        inside = np.concatenate([[False], past[rod.nodes] < 0.0, [False]])
+        starts, stops = np.flatnonzero(inside[1:] & ~inside[:-1]), np.flatnonzero(~inside[1:] & inside[:-1]) - 1
+        runs += [(rod, first, last) for first, last in zip(starts.tolist(), stops.tolist(), strict=True)]
+    crossings = [  # rod, the node within and the node beyond
+        (rod, within, beyond)
+        for rod, first, last in runs
+        for within, beyond in ((first, first - 1), (last, last + 1))
+        if 0 <= beyond < len(rod.nodes)
+    ]
+    arcs = iter(_where_zero(state, crossings, past, measure, _CUT * grid.scale))
     return [
-        _Piece(rod, first, last, cut(first, first - 1), cut(last, last + 1))
-        for first, last in zip(starts.tolist(), stops.tolist(), strict=True)
+        _Piece(
+            rod,
+            first,
+            last,
+            next(arcs) if first > 0 else -1.0,
+            next(arcs) if last + 1 < len(rod.nodes) else -1.0,
+        )
+        for rod, first, last in runs
     ]
 
 
-def _keep(grid: Grid, pieces: list[_Piece], nearest: float) -> tuple[list[tuple[_Piece, list[int]]], list[str]]:
+def _where_zero(
+    state: State,
+    crossings: list[tuple[GridRod, int, int]],
+    past: Reals,
+    measure: Callable[[Reals], Reals],
+    close: float,
+) -> list[float]:
+    """Arc lengths at which bent rods pass from inside to past the limit, all of them at once."""
+    if not crossings:
+        return []
+    a = np.array([rod.arc[within] for rod, within, _ in crossings])
+    b = np.array([rod.arc[beyond] for rod, _, beyond in crossings])
+    f = np.array([past[rod.nodes[within]] for rod, within, _ in crossings])
+    g = np.array([past[rod.nodes[beyond]] for rod, _, beyond in crossings])
+    side = np.zeros(len(a))
+    for _ in range(_CUTTINGS):
+        arc = (a * g - b * f) / (g - f)
+        points = np.array([_curved(rod, state, s) for (rod, _, _), s in zip(crossings, arc, strict=True)])
+        value = measure(points)
+        if np.abs(value).max() < close:
+            break
+        low = value < 0.0
+        # The end that stays counts half from the second time on (Dowell and Jarratt 1971).
+        f = np.where(low, value, np.where(side > 0, 0.5 * f, f))
+        g = np.where(low, np.where(side < 0, 0.5 * g, g), value)
+        a, b = np.where(low, arc, a), np.where(low, b, arc)
+        side = np.where(low, -1.0, 1.0)
+    return [float(s) for s in arc]
+
+
+def _keep(grid: Grid, pieces: list[_Piece], merge: float) -> tuple[list[tuple[_Piece, list[int]]], list[str]]:
     """The pieces that remain, each with its joints, and what is to be said about the others."""
     joints = [dict(piece.joints()) for piece in pieces]
     on: dict[int, int] = {}
@@ -105,7 +180,7 @@ def _keep(grid: Grid, pieces: list[_Piece], nearest: float) -> tuple[list[tuple[
         crossing
         for piece, each in zip(pieces, joints, strict=True)
         for crossing, arc in each.items()
-        if min(arc - piece.start, piece.end - arc) < nearest
+        if min(arc - piece.start, piece.end - arc) < merge * grid.step(piece.rod.direction)
     }
     remaining -= close
     while True:
@@ -129,7 +204,7 @@ def _keep(grid: Grid, pieces: list[_Piece], nearest: float) -> tuple[list[tuple[
     ]
     notes = []
     if close:
-        notes.append(f"{len(close)} joints nearer to the edge than {nearest:.3g} m were left out")
+        notes.append(f"{len(close)} joints nearer to the edge than {merge * grid.scale:.3g} m were left out")
     if len(kept) < len(pieces):
         notes.append(f"{len(pieces) - len(kept)} rods with fewer than {_FEWEST} joints were left out")
     return kept, notes
@@ -186,7 +261,7 @@ def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], not
             nodes[number[crossing], layer] = numbers[k]
         along = np.array([number[c] for c in joints])
         rods.append(GridRod(rod.direction, rod.index, numbers, arcs - arcs[0], along, at))
-    trimmed = Grid(np.array(flat), tuple(rods), grid.lattice[crossings], nodes, grid.spacing, grid.gap)
+    trimmed = Grid(np.array(flat), tuple(rods), grid.lattice[crossings], nodes, grid.spacing, grid.gap, grid.spacing_v)
     return Trimmed(
         trimmed, State(np.array(positions), np.array(turns)), np.array(supports), np.array(origin), tuple(notes)
     )

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 
 from shellform.arrays import Flags, Indices, Reals
+from shellform.compiled import njit
 from shellform.structure.beam import Beams
 from shellform.structure.chords import ChordKeeper
 from shellform.structure.parts import Part
@@ -61,7 +61,7 @@ class Assembly:
         self.reach: Reals = np.repeat(1.0 / self.arms[:, None], 6, axis=1)
         self.reach[:, :3] = 1.0
         self.reach = self.reach.ravel()
-        self.matrix, self._starts, self._sources = _pattern(number, freedoms)
+        self.matrix, self._sources = _pattern(number, freedoms)
         ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
         self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
         self._entries = np.empty(int(ends[-1]))
@@ -103,7 +103,7 @@ class Assembly:
         values = None
         if tangent:
             values = np.empty(len(self.matrix.indices))
-            share(_gather, len(values), self._starts, self._sources, self._entries, values)
+            share(_gather, len(values), *self._sources, self._entries, values)
         self.clock["assembly"] += time.perf_counter() - began
         return Balance(energy, force.reshape(-1, 6), values, largest)
 
@@ -137,50 +137,85 @@ def _arms(count: int, beams: Sequence[Beams]) -> Reals:
     return np.where(number > 0.0, total / np.maximum(number, 1.0), 1.0)
 
 
-def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, Indices, Indices]:
+def _pattern(number: Indices, freedoms: Sequence[Indices]) -> tuple[Symmetric, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """The common lower pattern, and which packed entries of all elements, one after the other, add up to each of its values:
-    `sources[starts[v] : starts[v + 1]]` for value v."""
+    `first` has one for each value, and `sources` what else adds to the values at `places`, which ascend."""
     size = int(number.max(initial=-1)) + 1
-    rows, columns = [], []
+    count = sum(len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms)
+    # Half the width is half the memory that an assembly has to read.
+    width = np.int32 if count < np.iinfo(np.int32).max else np.int64
+    row, column = np.empty(count, dtype=width), np.empty(count, dtype=width)
+    begin = 0
     for each in freedoms:
-        row, column = np.tril_indices(each.shape[1])
-        mapped = number[each].astype(np.int32)
-        lower, upper = np.maximum(mapped[:, row], mapped[:, column]), np.minimum(mapped[:, row], mapped[:, column])
-        rows.append(lower.ravel())
-        columns.append(upper.ravel())
-    row, column = (np.concatenate([*each, np.zeros(0, dtype=np.int32)]) for each in (rows, columns))
-    order = _counted(column, _counted(row, np.arange(len(row)), size), size)
-    order = order[column[order] >= 0]
-    row, column = row[order], column[order]
-    new = np.ones(len(order), dtype=bool)
-    new[1:] = (row[1:] != row[:-1]) | (column[1:] != column[:-1])
-    starts = np.append(np.flatnonzero(new), len(order))
-    indptr = np.searchsorted(column[new], np.arange(size + 1))
-    return Symmetric(indptr, row[new].astype(np.int64)), starts, order
+        begin = _entries(number, each, begin, row, column)
+    order = np.flatnonzero(column >= 0).astype(width)
+    order = _counted(column, _counted(row, order, size), size)
+    indptr, indices, *sources = _merged(row, column, order, size)
+    return Symmetric(indptr, indices), (sources[0], sources[1], sources[2])
+
+
+@njit(cache=True)
+def _entries(number, freedoms, begin, row, column):  # type: ignore[no-untyped-def]
+    """Fills rows and columns of the packed entries of all elements from place `begin` on; where a freedom is held the column is -1."""
+    at = begin
+    for e in range(freedoms.shape[0]):
+        for i in range(freedoms.shape[1]):
+            for j in range(i + 1):
+                a, b = number[freedoms[e, i]], number[freedoms[e, j]]
+                row[at], column[at] = max(a, b), min(a, b)
+                at += 1
+    return at
 
 
 @njit(cache=True)
 def _counted(keys, order, size):  # type: ignore[no-untyped-def]
-    """`order` sorted by keys[order], which run from -1 to size - 1; equal ones stay in order (counting sort)."""
-    place = np.zeros(size + 2, dtype=np.int64)
+    """`order` sorted by keys[order], which run from 0 to size - 1; equal ones stay in order (counting sort)."""
+    place = np.zeros(size + 1, dtype=np.int64)
     for k in order:
-        place[keys[k] + 2] += 1
-    for k in range(1, size + 2):
+        place[keys[k] + 1] += 1
+    for k in range(1, size + 1):
         place[k] += place[k - 1]
     result = np.empty_like(order)
     for k in order:
-        result[place[keys[k] + 1]] = k
-        place[keys[k] + 1] += 1
+        result[place[keys[k]]] = k
+        place[keys[k]] += 1
     return result
 
 
+@njit(cache=True)
+def _merged(row, column, order, size):  # type: ignore[no-untyped-def]
+    """The pattern, column by column, of sorted entries with repetitions, and first, places and sources of `_pattern`."""
+    new = np.empty(len(order), dtype=np.bool_)
+    last_row, last_column, count = -1, -1, 0
+    for k in range(len(order)):
+        r, c = row[order[k]], column[order[k]]
+        new[k] = r != last_row or c != last_column
+        last_row, last_column = r, c
+        count += new[k]
+    indptr, indices = np.zeros(size + 1, dtype=np.int64), np.empty(count, dtype=np.int64)
+    first, places, sources = np.empty(count, order.dtype), np.empty(len(order) - count, order.dtype), np.empty(len(order) - count, order.dtype)
+    value, extra = -1, 0
+    for k in range(len(order)):
+        if new[k]:
+            value += 1
+            indices[value] = row[order[k]]
+            indptr[column[order[k]] + 1] += 1
+            first[value] = order[k]
+        else:
+            places[extra], sources[extra] = value, order[k]
+            extra += 1
+    for c in range(size):
+        indptr[c + 1] += indptr[c]
+    return indptr, indices, first, places, sources
+
+
 @njit(cache=True, nogil=True)
-def _gather(start, stop, starts, sources, entries, values):  # type: ignore[no-untyped-def]
+def _gather(start, stop, first, places, sources, entries, values):  # type: ignore[no-untyped-def]
+    """The first entry of each value, then what adds to it: two loops without a branch that a processor could guess wrong."""
     for v in range(start, stop):
-        total = 0.0
-        for k in range(starts[v], starts[v + 1]):
-            total += entries[sources[k]]
-        values[v] = total
+        values[v] = entries[first[v]]
+    for k in range(np.searchsorted(places, start), np.searchsorted(places, stop)):
+        values[places[k]] += entries[sources[k]]
 
 
 @njit(cache=True)

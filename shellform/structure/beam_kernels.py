@@ -14,12 +14,12 @@ the lever arms of g, is written out with its symmetric part. Rotations don't com
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from shellform.compiled import njit
 from shellform.structure.rotation import matrix
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
+@njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract"})
 def evaluate(  # type: ignore[no-untyped-def]
     start,
     stop,
@@ -35,26 +35,30 @@ def evaluate(  # type: ignore[no-untyped-def]
     local_force,
     local_deformation,
 ):
-    """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled where they have rows."""
-    E = np.empty((3, 3))
-    A = np.empty((3, 3))
-    B = np.empty((3, 3))
-    Q = np.empty((3, 3))  # of a node, then of a quaternion's matrix
-    h = np.empty((6, 3))  # gradients of s_k by the spin of their end, E fixed
-    c = np.empty(6)
-    theta = np.empty(6)
-    sine, cosine = np.empty(6), np.empty(6)
-    moment = np.empty(6)
-    g = np.empty((2, 3))
-    Ma = np.empty((3, 3))
-    Mb = np.empty((3, 3))
+    """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled where they have rows.
+
+    Positions and quaternions may be complex, for derivatives by complex steps (softening.py).
+    """
+    dtype = positions.dtype
+    E = np.empty((3, 3), dtype)
+    A = np.empty((3, 3), dtype)
+    B = np.empty((3, 3), dtype)
+    Q = np.empty((3, 3), dtype)  # of a node, then of a quaternion's matrix
+    h = np.empty((6, 3), dtype)  # gradients of s_k by the spin of their end, E fixed
+    c = np.empty(6, dtype)
+    theta = np.empty(6, dtype)
+    sine, cosine = np.empty(6, dtype), np.empty(6, dtype)
+    moment = np.empty(6, dtype)
+    g = np.empty((2, 3), dtype)
+    Ma = np.empty((3, 3), dtype)
+    Mb = np.empty((3, 3), dtype)
     # Derivatives of the moments by the local rotations: at the same end (a, b), at the other end.
-    near_a, near_b, far = np.empty(3), np.empty(3), np.empty(3)
-    P = np.empty((6, 6))
-    R = np.empty((3, 6))
-    S = np.empty((3, 3))
-    alpha = np.zeros(6)
-    K = np.empty((9, 9))
+    near_a, near_b, far = np.empty(3, dtype), np.empty(3, dtype), np.empty(3, dtype)
+    P = np.empty((6, 6), dtype)
+    R = np.empty((3, 6), dtype)
+    S = np.empty((3, 3), dtype)
+    alpha = np.zeros(6, dtype)
+    K = np.empty((9, 9), dtype)
     for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
         l0 = rest_length[e]
@@ -151,14 +155,13 @@ def evaluate(  # type: ignore[no-untyped-def]
         # P: the quadratic form of the two ends' spins with the element triad at rest, from the derivatives of the moments by
         # the local rotations, the arcsine's own curvature with them, and from the triads' moments' own turning M.
         for i in range(3):
+            a0, a1, a2 = near_a[0] * h[0, i], near_a[1] * h[1, i], near_a[2] * h[2, i]
+            b0, b1, b2 = near_b[0] * h[3, i], near_b[1] * h[4, i], near_b[2] * h[5, i]
+            f0, f1, f2 = far[0] * h[0, i], far[1] * h[1, i], far[2] * h[2, i]
             for j in range(3):
-                aa = bb = ab = 0.0
-                for k in range(3):
-                    aa += near_a[k] * h[k, i] * h[k, j]
-                    bb += near_b[k] * h[k + 3, i] * h[k + 3, j]
-                    ab += far[k] * h[k, i] * h[k + 3, j]
-                P[i, j] = aa
-                P[3 + i, 3 + j] = bb
+                P[i, j] = a0 * h[0, j] + a1 * h[1, j] + a2 * h[2, j]
+                P[3 + i, 3 + j] = b0 * h[3, j] + b1 * h[4, j] + b2 * h[5, j]
+                ab = f0 * h[3, j] + f1 * h[4, j] + f2 * h[5, j]
                 P[i, 3 + j] = ab
                 P[3 + j, i] = ab
         # R, S: how spins of the element triad (phi, the same at both ends) couple with the ends' spins and with themselves.
@@ -232,44 +235,56 @@ def evaluate(  # type: ignore[no-untyped-def]
         _pack(E, K, blocks[e])
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})
 def _pack(E, K, out):  # type: ignore[no-untyped-def]
-    """The symmetric matrix with lower triangle K (9, 9), element axes, as packed lower triangle (78,) of 12 freedoms, global axes."""
-    X = np.empty((3, 3))
-    Y = np.empty((3, 3))
-    for p in range(3):
-        for q in range(p + 1):
-            for i in range(3):
-                for j in range(3):
-                    X[i, j] = K[3 * p + i, 3 * q + j] if p > q or i >= j else K[3 * p + j, 3 * q + i]
-            for i in range(3):
-                for j in range(3):
-                    Y[i, j] = X[i, 0] * E[j, 0] + X[i, 1] * E[j, 1] + X[i, 2] * E[j, 2]
-            for i in range(3):
-                for j in range(3):
-                    X[i, j] = E[i, 0] * Y[0, j] + E[i, 1] * Y[1, j] + E[i, 2] * Y[2, j]
-            # Rows and columns of x_a are minus those of d, those of x_b are d itself.
-            if p == 0:
-                for i in range(3):
-                    for j in range(i + 1):
-                        out[_row(i) + j] = X[i, j]
-                        out[_row(6 + i) + 6 + j] = X[i, j]
-                    for j in range(3):
-                        out[_row(6 + i) + j] = -X[i, j]
-            elif q == 0:
-                own = 3 if p == 1 else 9
-                for i in range(3):
-                    for j in range(3):
-                        out[_row(own + i) + j] = -X[i, j]
-                        if p == 1:
-                            out[_row(6 + j) + own + i] = X[i, j]
-                        else:
-                            out[_row(own + i) + 6 + j] = X[i, j]
-            else:
-                r, c = (3 if p == 1 else 9), (3 if q == 1 else 9)
-                for i in range(3):
-                    for j in range(3 if p > q else i + 1):
-                        out[_row(r + i) + c + j] = X[i, j]
+    """The symmetric matrix with lower triangle K (9, 9), element axes, as packed lower triangle (78,) of 12 freedoms, global axes.
+
+    The six blocks of three rows and columns are written out, so that the compiler knows every place.
+    """
+    X = np.empty((3, 3), E.dtype)
+    for p in (0, 3, 6):
+        K[p, p + 1], K[p, p + 2], K[p + 1, p + 2] = K[p + 1, p], K[p + 2, p], K[p + 2, p + 1]
+    # Rows and columns of x_a are minus those of d, those of x_b are d itself.
+    _turn(E, K, 0, 0, X)
+    for i in range(3):
+        for j in range(i + 1):
+            out[_row(i) + j] = X[i, j]
+            out[_row(6 + i) + 6 + j] = X[i, j]
+        for j in range(3):
+            out[_row(6 + i) + j] = -X[i, j]
+    _turn(E, K, 3, 0, X)
+    for i in range(3):
+        for j in range(3):
+            out[_row(3 + i) + j] = -X[i, j]
+            out[_row(6 + j) + 3 + i] = X[i, j]
+    _turn(E, K, 6, 0, X)
+    for i in range(3):
+        for j in range(3):
+            out[_row(9 + i) + j] = -X[i, j]
+            out[_row(9 + i) + 6 + j] = X[i, j]
+    _turn(E, K, 3, 3, X)
+    for i in range(3):
+        for j in range(i + 1):
+            out[_row(3 + i) + 3 + j] = X[i, j]
+    _turn(E, K, 6, 3, X)
+    for i in range(3):
+        for j in range(3):
+            out[_row(9 + i) + 3 + j] = X[i, j]
+    _turn(E, K, 6, 6, X)
+    for i in range(3):
+        for j in range(i + 1):
+            out[_row(9 + i) + 9 + j] = X[i, j]
+
+
+@njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})
+def _turn(E, K, row, column, X):  # type: ignore[no-untyped-def]
+    """X = E B E' for the block B (3, 3) of K that begins at the row and the column."""
+    for j in range(3):
+        y0 = K[row, column] * E[j, 0] + K[row, column + 1] * E[j, 1] + K[row, column + 2] * E[j, 2]
+        y1 = K[row + 1, column] * E[j, 0] + K[row + 1, column + 1] * E[j, 1] + K[row + 1, column + 2] * E[j, 2]
+        y2 = K[row + 2, column] * E[j, 0] + K[row + 2, column + 1] * E[j, 1] + K[row + 2, column + 2] * E[j, 2]
+        for i in range(3):
+            X[i, j] = E[i, 0] * y0 + E[i, 1] * y1 + E[i, 2] * y2
 
 
 @njit(cache=True, inline="always")
@@ -281,9 +296,10 @@ def _row(r):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy", nogil=True)
 def local_by_freedom(start, stop, positions, quaternions, ends, frames, rest_length, stiffness, result):  # type: ignore[no-untyped-def]
     """The gradients of (12), h_k on the own spin less G' h_k, times the local stiffness (18), in global axes."""
-    E, A, B, Q = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    rate = np.zeros((7, 9))
-    turned = np.empty(9)
+    dtype = positions.dtype
+    E, A, B, Q = np.empty((3, 3), dtype), np.empty((3, 3), dtype), np.empty((3, 3), dtype), np.empty((3, 3), dtype)
+    rate = np.zeros((7, 9), dtype)
+    turned = np.empty(9, dtype)
     for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
         l = _triads(positions, quaternions, frames[e], a, b, E, A, B, Q)
@@ -334,7 +350,7 @@ def local_by_freedom(start, stop, positions, quaternions, ends, frames, rest_len
                 result[e, k, 9 + i] = E[i, 0] * turned[6] + E[i, 1] * turned[7] + E[i, 2] * turned[8]
 
 
-@njit(cache=True, error_model="numpy", inline="always")
+@njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})
 def _triads(positions, quaternions, frame, a, b, E, A, B, Q):  # type: ignore[no-untyped-def]
     """Fills the element triad E in global axes and the ends' triads A and B in element axes; returns the length."""
     dx = positions[b, 0] - positions[a, 0]

@@ -13,10 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, indices, reals
+from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure.parts import Evaluation
 from shellform.structure.state import State

@@ -18,6 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Indices, Reals
+from shellform.compiled import njit
 from shellform.structure.beam import Beams
 from shellform.structure.sparse import Factor, Symmetric
 from shellform.structure.state import State
@@ -32,13 +33,12 @@ class ChordKeeper:
         self.ends = np.vstack([part.ends for part in beams]) if beams else np.zeros((0, 2), dtype=np.int64)
         if not len(self.ends):
             return
-        weight = np.concatenate([part.axial / part.rest_length for part in beams])
+        weight = self.weight = np.concatenate([part.axial / part.rest_length for part in beams])
         rows = np.arange(len(self.ends))
         incidence = sp.coo_array(
             (np.repeat([-1.0, 1.0], len(rows)), (np.tile(rows, 2), self.ends.T.ravel())), shape=(len(rows), count)
         ).tocsr()
-        self.weighted = sp.csr_array(incidence.T.tocsr() * weight)
-        laplacian = sp.csc_array(self.weighted @ incidence)
+        laplacian = sp.csc_array(sp.csr_array(incidence.T.tocsr() * weight) @ incidence)
         # Axes with the same supports share a factor; with pinned supports all three do.
         nodes_of = [free[free % 6 == axis] // 6 for axis in range(3)]
         together: list[list[int]] = []
@@ -50,24 +50,42 @@ class ChordKeeper:
             nodes = nodes_of[group[0]]
             block = sp.csc_array(sp.tril(laplacian[nodes][:, nodes] + _ANCHOR * weight.max() * sp.eye_array(len(nodes))))
             block.sort_indices()
-            family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64), often_solved=True)
-            self.axes.append((nodes, np.array(group), family.factor(block.data)))
+            family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64))
+            self.axes.append((nodes, np.array(group), family.factor_thin(block.data)))
 
     def corrected(self, state: State, step: Reals) -> Reals:
         """The step (n, 6) with its translations corrected."""
         if not len(self.ends):
             return step
-        a, b = self.ends.T
-        chord = state.positions[b] - state.positions[a]
-        length = np.linalg.norm(chord, axis=1, keepdims=True)
-        along = chord / length
-        change = step[b, :3] - step[a, :3]
-        axial = np.sum(along * change, axis=1, keepdims=True)
-        lateral = (change - axial * along) / length
-        turn = np.linalg.norm(lateral, axis=1, keepdims=True)
-        turned = (length + axial) * (np.cos(turn) * along + np.sinc(turn / np.pi) * lateral)
-        right = self.weighted @ (turned - chord - change)
+        right = np.zeros((len(step), 3))
+        _pull(state.positions, step, self.ends, self.weight, right)
         result = step.copy()
         for nodes, group, factor in self.axes:
             result[np.ix_(nodes, group)] += factor.solve(right[np.ix_(nodes, group)])
         return result
+
+
+@njit(cache=True, error_model="numpy")
+def _pull(positions, step, ends, weight, right):  # type: ignore[no-untyped-def]
+    """Adds B' w (d_new - d - Dd) to `right` (n, 3)."""
+    for e in range(len(ends)):
+        a, b = ends[e, 0], ends[e, 1]
+        dx, dy, dz = positions[b, 0] - positions[a, 0], positions[b, 1] - positions[a, 1], positions[b, 2] - positions[a, 2]
+        cx, cy, cz = step[b, 0] - step[a, 0], step[b, 1] - step[a, 1], step[b, 2] - step[a, 2]
+        l = np.sqrt(dx * dx + dy * dy + dz * dz)
+        ex, ey, ez = dx / l, dy / l, dz / l
+        s = ex * cx + ey * cy + ez * cz
+        # t n, and the turn t
+        x, y, z = (cx - s * ex) / l, (cy - s * ey) / l, (cz - s * ez) / l
+        t = np.sqrt(x * x + y * y + z * z)
+        along = (l + s) * np.cos(t)
+        across = (l + s) * (np.sin(t) / t if t > 0.0 else 1.0)
+        x = weight[e] * (along * ex + across * x - dx - cx)
+        y = weight[e] * (along * ey + across * y - dy - cy)
+        z = weight[e] * (along * ez + across * z - dz - cz)
+        right[b, 0] += x
+        right[b, 1] += y
+        right[b, 2] += z
+        right[a, 0] -= x
+        right[a, 1] -= y
+        right[a, 2] -= z

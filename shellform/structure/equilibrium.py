@@ -182,7 +182,8 @@ class _Walk:
             direction = self.turning.solve(factor, self.now, unbalanced)
             clock["factorisation"] += then - began
             clock["solve"] += time.perf_counter() - then
-            if self._advance(direction, float(unbalanced @ direction)):
+            # Not unbalanced @ direction: BLAS would wake a second thread for one sum, and wait for it where the core is taken.
+            if self._advance(direction, float(np.einsum("i,i", unbalanced, direction))):
                 return
             self._raise_mass()
 
@@ -256,7 +257,7 @@ class _Walk:
             whole_step = self.assembly.chords.corrected(self.state, share * step)
             trial = moved(self.state, whole_step)
             then = self.assembly.evaluate(trial)
-            rise = then.energy - self.now.energy - float((self.load * whole_step).sum())
+            rise = then.energy - self.now.energy - float(np.einsum("ij,ij", self.load, whole_step))
             rounding = 1e-12 * (abs(then.energy) + abs(self.now.energy))
             residual = self.measure.residual(then, self.load)
             lower = rise <= -_SUFFICIENT * share * downhill
@@ -274,7 +275,7 @@ class _Walk:
 
     def _lower_mass(self) -> None:
         self.mass *= _DECAY
-        if self.now.tangent is not None:
+        if self.mass > 0.0 and self.now.tangent is not None:
             diagonal = np.abs(self.now.tangent[self.assembly.matrix.diagonal])
             if self.mass < 1e-10 * float(diagonal.mean()):
                 self.mass = 0.0

@@ -60,10 +60,11 @@ class Factoriser:
     """Symbolic analysis, done once, and numeric factors of symmetric matrices of one pattern.
 
     `indptr` (n + 1,), `indices` (nnz,): the lower triangle by columns, the diagonal first in each. Cholesky factors, or with
-    `definite` false Bunch and Kaufman's L D L' with pivots of one and two rows.
+    `definite` false Bunch and Kaufman's L D L' with pivots of one and two rows, or with freedoms `kept` (k,), ascending, the
+    elimination of all others.
     """
 
-    def __init__(self, indptr: Indices, indices: Indices, *, definite: bool = True) -> None:
+    def __init__(self, indptr: Indices, indices: Indices, *, definite: bool = True, kept: Indices | None = None) -> None:
         self.size = len(indptr) - 1
         self._kind = _POSITIVE_DEFINITE if definite else _INDEFINITE
         # The lower triangle by columns is the upper one by rows, which is what PARDISO reads.
@@ -79,6 +80,13 @@ class Factoriser:
         if not definite:
             put[9] = 12  # iparm(10): pivots below 1e-12 of the largest entry are lifted to it
             put[20] = 1  # iparm(21): Bunch and Kaufman's pivots
+        self._kept = np.zeros(1, dtype=np.int32)
+        self._complement = np.zeros((0, 0))
+        if kept is not None:
+            put[35] = 1  # iparm(36): the Schur complement of what the list of freedoms marks
+            self._kept = np.zeros(self.size, dtype=np.int32)
+            self._kept[kept] = 1
+            self._complement = np.zeros((len(kept), len(kept)))
         self._none = np.zeros(1)
         self._values = self._none
         self._analysed = False
@@ -91,6 +99,24 @@ class Factoriser:
             self._call(_ANALYSE, 1, self._none, self._none)
             self._analysed = True
         self._call(_FACTOR, 1, self._none, self._none)
+
+    def solve_kept(self, values: Reals, right: Reals) -> Reals:
+        """The solution (k, s) on the kept freedoms for the matrix with lower `values` (nnz,) and `right` (k, s) on them, zero elsewhere:
+        a dense Cholesky solution with the Schur complement. Raises NotDefinite, MemoryError."""
+        self._values = np.ascontiguousarray(values)
+        if not self._analysed:
+            self._call(_ANALYSE, 1, self._none, self._complement)
+            self._analysed = True
+        self._call(_FACTOR, 1, self._none, self._complement)
+        solution = np.array(right, dtype=float, order="F")
+        size, sides, failed = ctypes.c_int(len(right)), ctypes.c_int(right.shape[1]), ctypes.c_int(0)
+        ref, mkl = ctypes.byref, library()
+        before = mkl.MKL_Set_Num_Threads_Local(1)
+        mkl.dposv(ctypes.c_char_p(b"L"), ref(size), ref(sides), _at(self._complement), ref(size), _at(solution), ref(size), ref(failed))
+        mkl.MKL_Set_Num_Threads_Local(before)
+        if failed.value:
+            raise NotDefinite
+        return solution
 
     @property
     def negative(self) -> int:
@@ -115,6 +141,7 @@ class Factoriser:
             self._values,
             self._rows,
             self._columns,
+            self._kept,
             count,
             right,
             solution,
@@ -136,18 +163,19 @@ def _pardiso(
     values: Reals,
     rows: _Integers,
     columns: _Integers,
+    kept: _Integers,
     count: int,
     right: Reals,
     solution: Reals,
 ) -> int:
     one, quiet = ctypes.c_int(1), ctypes.c_int(0)
     step, order, sides, error = ctypes.c_int(phase), ctypes.c_int(size), ctypes.c_int(count), ctypes.c_int(0)
-    ref, unused = ctypes.byref, ctypes.c_int(0)
+    ref = ctypes.byref
     mkl = library()
     many = size > _TWO_THREADS_FROM or (phase == _SOLVE and count >= _MANY)
     before = mkl.MKL_Set_Num_Threads_Local(min(2, cores()) if many else 1)
     mkl.PARDISO(
-        _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values), _at(rows), _at(columns), ref(unused),
+        _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values), _at(rows), _at(columns), _at(kept),
         ref(sides), _at(settings), ref(quiet), _at(right), _at(solution), ref(error),
     )  # fmt: skip
     mkl.MKL_Set_Num_Threads_Local(before)
@@ -162,4 +190,4 @@ def _release(kind: int, handle: _Integers, settings: _Integers, size: int) -> No
     if handle.any():
         none = np.zeros(1)
         empty = np.zeros(1, dtype=np.int32)
-        _pardiso(_RELEASE, kind, handle, settings, size, none, empty, empty, 1, none, none)
+        _pardiso(_RELEASE, kind, handle, settings, size, none, empty, empty, empty, 1, none, none)

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from shellform.arrays import Reals
+from shellform.compiled import njit
 from shellform.structure.assembly import Assembly, Balance
 from shellform.structure.sparse import Factor
 from shellform.structure.state import State
@@ -23,16 +24,14 @@ class Measure:
     def __init__(self, assembly: Assembly) -> None:
         self.free = assembly.free
         self.arms = assembly.arms
-        self._turns = self.free % 6 >= 3
-        self._arms_of_turns = self.arms[self.free[self._turns] // 6]
+        self._reach = assembly.reach
+        turns = self.free % 6 >= 3
         self.mass_shape = np.ones(len(self.free))
-        self.mass_shape[self._turns] = self._arms_of_turns**2
+        self.mass_shape[turns] = self.arms[self.free[turns] // 6] ** 2
 
     def residual(self, balance: Balance, load: Reals) -> float:
         """Largest unbalanced force over the scale under the dead `load` (n, 6); infinite where a force isn't finite."""
-        unbalanced = (load - balance.force).ravel()[self.free]
-        unbalanced[self._turns] /= self._arms_of_turns
-        largest = float(np.abs(unbalanced).max(initial=0.0))
+        largest = float(_largest_difference(load.ravel(), balance.force.ravel(), self.free, self._reach))
         if not np.isfinite(largest):
             return float("inf")
         scale = self.scale(balance, load)
@@ -40,8 +39,7 @@ class Measure:
 
     def scale(self, balance: Balance, load: Reals) -> float:
         """The largest applied or internal force, N."""
-        applied = np.abs(load)
-        return max(float(applied[:, :3].max()), balance.largest, float((applied[:, 3:] / self.arms[:, None]).max()))
+        return max(float(_largest(load.ravel(), self._reach)), balance.largest)
 
     def rounding(self, balance: Balance, state: State, load: Reals) -> float:
         """The residual that rounding of the coordinates alone leaves: stiff short elements answer to the last bit."""
@@ -59,9 +57,37 @@ def held(assembly: Assembly, balance: Balance) -> Reals:
     below what rounding leaves of the softest mode that matters.
     """
     assert balance.tangent is not None
-    values = balance.tangent.copy()
-    values[assembly.turns] += _SPIN * np.abs(values[assembly.turns])
-    return values
+    return np.asarray(_stiffened(balance.tangent, assembly.turns, _SPIN))
+
+
+@njit(cache=True)
+def _stiffened(values, places, share):  # type: ignore[no-untyped-def]
+    """A copy of the values, those at `places` larger by a share of their size."""
+    result = values.copy()
+    for place in places:
+        result[place] += share * abs(result[place])
+    return result
+
+
+@njit(cache=True)
+def _largest_difference(load, force, free, reach):  # type: ignore[no-untyped-def]
+    """The largest |load - force| on the free freedoms, each times its reach; infinite where one isn't finite."""
+    largest = 0.0
+    for freedom in free:
+        size = abs(load[freedom] - force[freedom]) * reach[freedom]
+        if not np.isfinite(size):
+            return np.inf
+        largest = max(largest, size)
+    return largest
+
+
+@njit(cache=True)
+def _largest(load, reach):  # type: ignore[no-untyped-def]
+    """The largest |load|, each times its reach."""
+    largest = 0.0
+    for freedom in range(len(load)):
+        largest = max(largest, abs(load[freedom]) * reach[freedom])
+    return largest
 
 
 class Turning:

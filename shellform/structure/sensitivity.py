@@ -9,7 +9,8 @@ For a measure g(x, s) there are two ways to its derivative: direct, solving for 
     dg/ds = ∂g/∂s - y' df/ds,   K y = (∂g/∂x)',
 
 solving once for every measure. Both are exact, K being symmetric in an equilibrium without applied moments; `gradients`
-counts the solves and takes the cheaper way. The right-hand sides go to the solver as one block, with one factor for all.
+counts the solves and takes the cheaper way. The right-hand sides go to the solver as one block, with one factor for all. Where
+the measures are as local as the variables (tensions by rest lengths), `direct` condenses K to the few freedoms that they touch.
 
 A design variable is a column of df/ds: `by_rest_length` for cables, `by_stiffness` for whatever the beams' stiffness depends on (a rod's
 radius or another size, a connector's EA, GJ or EI), `by_load` for the load factor. A measure is a row of ∂g/∂x: `tension_rows`,
@@ -24,24 +25,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.structure.assembly import Assembly
 from shellform.structure.beam import Beams
 from shellform.structure.cable import Cables
 from shellform.structure.results import end_stress_by_force
 from shellform.structure.sections import Section
-from shellform.structure.sparse import Factor
+from shellform.structure.sparse import Factor, Symmetric
 from shellform.structure.state import State, moved
+
+_MOST = 4000  # freedoms to which K is condensed: a dense matrix of 128 MB
+_FEW = 3  # freedoms that a design variable and the measures touch, for each variable: two nodes' translations shared by several cables
 
 
 @dataclass(frozen=True)
 class Response:
     """An equilibrium ready for sensitivities: `factor` of the tangent at `state`, and `force_by_design` (f, s), the derivative
-    of the unbalanced internal forces on the free freedoms by the design variables."""
+    of the unbalanced internal forces on the free freedoms by the design variables; `family` and `tangent` (nnz,) are what was factorised."""
 
     state: State
     factor: Factor
     force_by_design: sp.csc_array
+    family: Symmetric
+    tangent: Reals
 
 
 def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Response:
@@ -49,7 +55,10 @@ def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Respons
 
     Raises NotPositiveDefinite where the state isn't stable.
     """
-    return Response(state, assembly.factor(state), sp.csc_array(sp.hstack(columns, format="csc")))
+    tangent = assembly.evaluate(state).tangent
+    assert tangent is not None
+    together = sp.csc_array(sp.hstack(columns, format="csc"))
+    return Response(state, assembly.matrix.factor(tangent), together, assembly.matrix, tangent)
 
 
 def by_rest_length(assembly: Assembly, state: State, cables: Cables) -> sp.csc_array:
@@ -99,6 +108,30 @@ def stress_rows(assembly: Assembly, state: State, beams: Beams, sections: Mappin
     return _rows(assembly, beams.freedoms()[:, None, :], by_force @ beams.local_forces_by_freedom(state))
 
 
+def reaction_rows(assembly: Assembly, state: State, freedoms: Indices) -> sp.csr_array:
+    """Derivative (k, f), N/m and N/rad, of the internal forces at held `freedoms` (k,) by the free ones: of the reactions, the load given."""
+    wanted = np.full(6 * assembly.count, -1)
+    wanted[freedoms] = np.arange(len(freedoms))
+    number = _numbers(assembly)
+    result = sp.csr_array((len(freedoms), len(assembly.free)))
+    for part in assembly.parts:
+        own = part.freedoms()
+        size = own.shape[1] if own.ndim == 2 else 0
+        touched = np.flatnonzero((wanted[own] >= 0).any(axis=1)) if size else np.zeros(0, dtype=np.int64)
+        if not len(touched):
+            continue
+        packed = part.evaluate(state, tangent=True).tangent
+        assert packed is not None
+        lower = np.tril_indices(size)
+        full = np.zeros((len(touched), size, size))
+        full[:, lower[0], lower[1]] = full[:, lower[1], lower[0]] = packed[touched]
+        rows = np.broadcast_to(wanted[own[touched]][:, :, None], full.shape)
+        columns = np.broadcast_to(number[own[touched]][:, None, :], full.shape)
+        kept = (rows >= 0) & (columns >= 0)
+        result = result + sp.csr_array((full[kept], (rows[kept], columns[kept])), shape=result.shape)
+    return result
+
+
 def gradients(response: Response, by_state: Reals, by_design: Reals) -> Reals:
     """Total derivatives (g, s) of g measures, from their partial ones by the free freedoms (g, f) and by the design (g, s)."""
     if by_state.shape[0] == 0:
@@ -115,8 +148,25 @@ def adjoint(response: Response, by_state: Reals | sp.csr_array) -> Reals:
 
 
 def direct(response: Response, by_state: Reals | sp.csr_array) -> Reals:
-    """∂g/∂x dx/ds (g, s), one solve for each design variable."""
+    """∂g/∂x dx/ds (g, s), one solve for each design variable, or through the few freedoms that both touch."""
+    if sp.issparse(by_state):
+        kept = _touched(response, sp.csr_array(by_state))
+        if len(kept) <= min(_FEW * response.force_by_design.shape[1], _MOST):
+            moves = response.family.solve_kept(response.tangent, kept, response.force_by_design[kept].toarray())
+            if moves is not None:
+                return np.asarray(-(by_state[:, kept] @ moves))
     return np.asarray(by_state @ state_by_design(response))
+
+
+def _touched(response: Response, by_state: sp.csr_array) -> np.ndarray:
+    """The freedoms, ascending, that the design's forces act on or that the measures read.
+
+    dx/ds is wanted there only, and K condensed to them says as much of it as K: the solves are dense ones of their number.
+    """
+    marked = np.zeros(by_state.shape[1], dtype=bool)
+    marked[response.force_by_design.indices] = True
+    marked[by_state.indices] = True
+    return np.flatnonzero(marked)
 
 
 def state_by_design(response: Response) -> Reals:

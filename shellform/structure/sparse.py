@@ -16,6 +16,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from shellform.arrays import Indices, Reals
+from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure import pardiso
 
@@ -67,19 +68,17 @@ class Indefinite(Factor, Protocol):
 
 
 class Symmetric:
-    """A family of symmetric matrices with one pattern: lower triangle in CSC form, `indptr` (n + 1,), `indices` (nnz,).
+    """A family of symmetric matrices with one pattern: lower triangle in CSC form, `indptr` (n + 1,), `indices` (nnz,)."""
 
-    `often_solved`: one factor serves many solves, in which CHOLMOD is quicker than the quicker factoriser.
-    """
-
-    def __init__(self, indptr: Indices, indices: Indices, *, often_solved: bool = False) -> None:
+    def __init__(self, indptr: Indices, indices: Indices) -> None:
         self.size = len(indptr) - 1
         self.indptr, self.indices = indptr, indices
         self.columns = np.repeat(np.arange(self.size), np.diff(indptr))
         self.diagonal = indptr[:-1]  # the first stored entry of each column of a lower triangle
-        self._backend = "cholmod" if often_solved and cholmod is not None else backend()
+        self._backend = backend()
         self._pardiso: pardiso.Factoriser | None = None
         self._bunch_kaufman: pardiso.Factoriser | None = None
+        self._condensed: tuple[Indices, pardiso.Factoriser] | None = None
         self._symbolic: Any = None
         self._matrix: Any = None
         self._generation = 0
@@ -118,6 +117,34 @@ class Symmetric:
         except pardiso.NotDefinite as error:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
         return _Pardiso(self, self._pardiso, self._generation)
+
+    def solve_kept(self, values: Reals, kept: Indices, right: Reals) -> Reals | None:
+        """The solution (k, s) on the freedoms `kept` (k,), ascending, for right-hand sides (k, s) on them that are zero elsewhere.
+
+        All others are eliminated, which costs as much as a factorisation. Earlier factors go on serving. None where the solver
+        can't do it. Raises NotPositiveDefinite.
+        """
+        if self._backend != "mkl":
+            return None
+        if self._condensed is None or not np.array_equal(self._condensed[0], kept):
+            self._condensed = kept, pardiso.Factoriser(self.indptr, self.indices, kept=kept)
+        try:
+            return self._condensed[1].solve_kept(values, right)
+        except pardiso.NotDefinite as error:
+            raise NotPositiveDefinite("the matrix is not positive definite") from error
+
+    def factor_thin(self, values: Reals) -> Factor:
+        """L D L' of a matrix whose factor has a few entries a column, as the graph of a gridshell's beams: the compiled
+        solve takes a sixth of the time that CHOLMOD's blocks do. It serves for good. Raises NotPositiveDefinite."""
+        if cholmod is None:
+            return _SuperLU(self.full(values))
+        symbolic, pivots = self._indefinite(values)
+        if not (pivots > 0.0).all():
+            raise NotPositiveDefinite("the matrix is not positive definite")
+        order = matrix(np.arange(float(self.size)))
+        cholmod.solve(symbolic, order, sys=7)
+        starts, rows, entries = (np.array(each)[:, 0] for each in cholmod.getfactor(symbolic).CCS)
+        return _Thin(np.array(order)[:, 0].astype(np.int64), starts, rows, entries)
 
     def factor_indefinite(self, values: Reals) -> Indefinite:
         """L D L' of a matrix that needn't be positive definite, with its number of negative eigenvalues (Sylvester's law).
@@ -219,6 +246,45 @@ class _Indefinite:
         cholmod.solve(self.factor, solution)
         result = np.array(solution)
         return result[:, 0] if right.ndim == 1 else result
+
+
+@dataclass(frozen=True)
+class _Thin:
+    """P A P' = L D L': `order` of the rows, L by columns with D on its diagonal, which comes first."""
+
+    order: Indices
+    starts: Indices
+    rows: Indices
+    entries: Reals
+
+    def solve(self, right: Reals) -> Reals:
+        columns = right[:, None] if right.ndim == 1 else right
+        solution = np.asarray(_solve(self.order, self.starts, self.rows, self.entries, np.ascontiguousarray(columns)))
+        return solution[:, 0] if right.ndim == 1 else solution
+
+
+@njit(cache=True)
+def _solve(order, starts, rows, entries, right):  # type: ignore[no-untyped-def]
+    size, sides = right.shape
+    x = np.empty((size, sides))
+    for i in range(size):
+        for c in range(sides):
+            x[i, c] = right[order[i], c]
+    for j in range(size):
+        for k in range(starts[j] + 1, starts[j + 1]):
+            for c in range(sides):
+                x[rows[k], c] -= entries[k] * x[j, c]
+    for j in range(size - 1, -1, -1):
+        for c in range(sides):
+            x[j, c] /= entries[starts[j]]
+        for k in range(starts[j] + 1, starts[j + 1]):
+            for c in range(sides):
+                x[j, c] -= entries[k] * x[rows[k], c]
+    result = np.empty((size, sides))
+    for i in range(size):
+        for c in range(sides):
+            result[order[i], c] = x[i, c]
+    return result
 
 
 class _SuperLU:

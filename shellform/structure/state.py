@@ -43,5 +43,4 @@ def from_vectors(positions: ArrayLike, rotations: ArrayLike) -> State:
 
 def moved(state: State, step: Reals) -> State:
     """The state after `step` (n, 6): translations, m, and spins about global axes, rad (equation 9)."""
-    turned = rotation.product(rotation.from_vectors(step[:, 3:]), state.quaternions)
-    return State(state.positions + step[:, :3], turned)
+    return State(state.positions + step[:, :3], rotation.turned(step[:, 3:], state.quaternions))

@@ -7,25 +7,31 @@ import os
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import tomli_w
 from pydantic import (
     BaseModel,
     ConfigDict,
+    Discriminator,
     Field,
     PositiveFloat,
     PositiveInt,
+    Tag,
     ValidationError,
     model_validator,
 )
 
 import shellform
+from shellform.design.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.errors import InputError
 
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+_Polygon = list[tuple[float, float]]
 
 
 class SurfaceEntry(_Section):
@@ -48,22 +54,57 @@ class NetEntry(_Section):
     """The Chebyshev net."""
 
     spacing: PositiveFloat = Field(description="between rods, m")
-    angle: float = Field(0.0, description="of the u rods against the x axis in plan, degrees")
+    spacing_v: PositiveFloat | None = Field(None, description="along the v rods; left out: as along u, m")
+    angle: float | Literal["auto"] = Field(0.0, description="of u rods against the x axis, degrees; auto: with least bending")
     offset: tuple[float, float] = Field((0.0, 0.0), description="of the net's origin from the middle, in spacings")
     elements: PositiveInt = Field(4, description="beam elements a segment")
+    guides: list[list[tuple[float, float]]] | None = Field(None, description="two plan curves in place of angle and offset, m")
+    method: Literal["pull", "compass"] = Field("pull", description="compass: the compass net as it is, unrelaxed")
     start: Literal["compass", "flat"] = Field("compass", description="from where the grid is pulled")
     spring_density: list[PositiveFloat] | None = Field(None, description="fictitious springs, rising, EI/s³")
     shear_stiffness: PositiveFloat = Field(0.1, description="fictitious, of a joint in the grid's plane, EI/s a radian")
     merge: float = Field(0.2, gt=0.0, lt=0.5, description="joints nearer to the edge, in spacings, are left out")
+    ground: float | None = Field(None, description="height at which rods end, m")
+    outline: list[tuple[float, float]] | None = Field(None, description="closed plan curve at which rods end, m")
+
+    @model_validator(mode="after")
+    def _guided(self) -> NetEntry:
+        if self.guides is not None and (len(self.guides) != 2 or min(len(each) for each in self.guides) < 2):
+            raise ValueError("guides must be two curves of at least two points each")
+        if self.guides is not None and self.angle == "auto":
+            raise ValueError("guides leave no angle to search for")
+        return self
 
 
-class RodEntry(_Section):
-    """Round rods."""
+class OwnRodEntry(_Section):
+    """Rods of given sizes: round, tubes or laths."""
 
     young: PositiveFloat = Field(description="Young's modulus, Pa")
     poisson: float = Field(0.3, ge=0.0, lt=0.5, description="Poisson's ratio, for the shear modulus")
+    shear: PositiveFloat | None = Field(None, description="shear modulus, Pa, in place of poisson")
     strength: PositiveFloat = Field(description="flexural strength, Pa")
-    radius: PositiveFloat | None = Field(None, description="m; left out: the largest that the net allows")
+    density: float = Field(0.0, ge=0.0, description="kg/m³, for the rods' own weight")
+    radius: PositiveFloat | None = Field(None, description="of round rods and tubes, m; left out: the largest that the net allows")
+    wall: PositiveFloat | None = Field(None, description="of tubes, m")
+    width: PositiveFloat | None = Field(None, description="of laths in the surface, m")
+    height: PositiveFloat | None = Field(None, description="of laths across the surface, m")
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> OwnRodEntry:
+        if self.wall is not None and (self.radius is None or self.wall >= self.radius):
+            raise ValueError("a tube's wall needs a radius larger than it")
+        if (self.width is None) != (self.height is None):
+            raise ValueError("a lath needs both width and height")
+        if self.width is not None and self.radius is not None:
+            raise ValueError("a rod has either a radius or a width and a height")
+        return self
+
+
+class StockRodEntry(_Section):
+    """Rods from a catalogue."""
+
+    catalogue: str = Field(description="a shipped catalogue's name, or a TOML file relative to the case file")
+    section: str | None = Field(None, description='like "10 mm", "42 x 3.5 mm"; left out: the stiffest that the net allows')
 
 
 class JointEntry(_Section):
@@ -89,7 +130,61 @@ class LoadEntry(_Section):
     force: PositiveFloat = Field(description="on each loaded crossing, N")
     every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
     additional: float = Field(1.2, ge=1.0, description="factor of the additional load case")
-    openings: list[list[tuple[float, float]]] = Field([], description="plan polygons without load, m")
+    openings: list[_Polygon] = Field([], description="plan polygons without load, m")
+
+
+class LoadCaseEntry(_Section):
+    """A named load case: factors times parts. The cases "design" and "additional" must be there."""
+
+    name: str = Field(pattern=r"^\w[\w .-]*$", description="of the case, and of its files")
+    factors: dict[str, float] = Field({}, description="part = factor")
+    stages: list[str] = Field([], description='parts added one after the other in the cases "NAME 1", "NAME 2", …')
+
+
+class PointsEntry(_Section):
+    """Point loads on crossings."""
+
+    kind: Literal["points"]
+    force: PositiveFloat = Field(description="on each loaded crossing, N")
+    every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
+    openings: list[_Polygon] = Field([], description="plan polygons without load, m")
+    inside: list[_Polygon] = Field([], description="plan polygons with load, m; left out: everywhere")
+
+
+class _SpreadEntry(_Section):
+    openings: list[_Polygon] = Field([], description="plan polygons where there is none, m")
+    inside: list[_Polygon] = Field([], description="plan polygons where there is some, m; left out: everywhere")
+    half: float | None = Field(None, description="only the half towards this direction in plan, degrees from x")
+    strip: tuple[float, float, float] | None = Field(None, description="only between two places along a direction: degrees, m, m")
+    ring: tuple[float, float] | None = Field(None, description="only between two levels, m")
+
+
+class ConcreteEntry(_SpreadEntry):
+    """Wet concrete on its true area."""
+
+    kind: Literal["concrete"]
+    thickness: PositiveFloat = Field(description="across the surface, m")
+    density: PositiveFloat = Field(2500.0, description="kg/m³")
+
+
+class SheetEntry(_SpreadEntry):
+    """A membrane or reinforcement on its true area."""
+
+    kind: Literal["membrane", "reinforcement"]
+    mass: PositiveFloat = Field(description="kg/m²")
+
+
+class RodsWeightEntry(_Section):
+    """The rods' own weight."""
+
+    kind: Literal["rods"]
+
+
+class JointsWeightEntry(_Section):
+    """The joints' own weight."""
+
+    kind: Literal["joints"]
+    mass: PositiveFloat = Field(description="of each, kg")
 
 
 class OptimiseEntry(_Section):
@@ -103,6 +198,10 @@ class OptimiseEntry(_Section):
     radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
     misfit_rms_additional: PositiveFloat = Field(description="constraint (6) as root mean square distance a node, m")
     evaluations: PositiveInt = Field(100, description="design evaluations at the most")
+    stiffness_min: float = Field(
+        0.08, ge=0.0, lt=1.0, description="of the softest mode under additional loads, over the start's under the design load"
+    )
+    polish: int = Field(20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none")
 
     @model_validator(mode="after")
     def _whole(self) -> OptimiseEntry:
@@ -124,10 +223,20 @@ class Case(_Section):
     title: str = ""
     surface: SurfaceEntry
     net: NetEntry
-    rod: RodEntry
+    rod: Annotated[
+        Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
+        Discriminator(lambda entry: "stock" if _has(entry, "catalogue") else "own"),
+    ]
     joint: JointEntry
     cable: CableEntry
-    load: LoadEntry
+    load: Annotated[
+        Annotated[LoadEntry, Tag("table")] | Annotated[list[LoadCaseEntry], Tag("cases")],
+        Discriminator(lambda entry: "cases" if isinstance(entry, list) else "table"),
+    ]
+    part: dict[
+        str,
+        Annotated[PointsEntry | ConcreteEntry | SheetEntry | RodsWeightEntry | JointsWeightEntry, Field(discriminator="kind")],
+    ] = Field({}, description="parts of the load cases, by name")
     optimise: OptimiseEntry
     figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=0.010))
 
@@ -137,11 +246,32 @@ class Case(_Section):
             raise ValueError(f"joint.gap ({self.joint.gap:g} m) must be well below net.spacing ({self.net.spacing:g} m)")
         return self
 
+    @model_validator(mode="after")
+    def _known_parts(self) -> Case:
+        if isinstance(self.load, LoadEntry):
+            if self.part:
+                raise ValueError("the parts of [part] need load cases, each a [[load]] with a name and factors")
+            return self
+        names = [each.name for each in self.load]
+        for needed in ("design", "additional"):
+            if names.count(needed) != 1:
+                raise ValueError(f"there must be one [[load]] with the name {needed!r}")
+        for each in self.load:
+            if names.count(each.name) > 1 or each.name == "none":
+                raise ValueError(f"the load's name {each.name!r} is taken")
+            if each.stages and each.name in ("design", "additional"):
+                raise ValueError(f"the load {each.name!r} is one case and can't have stages")
+            for part in [*each.factors, *each.stages]:
+                if part not in self.part:
+                    known = ", ".join(self.part) or "none: add tables [part.NAME]"
+                    raise ValueError(f"the load {each.name!r} names a part {part!r} that isn't there; known are {known}")
+        return self
+
 
 def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     """The case in a TOML file, with `settings` like "net.spacing=0.06" in place of its entries.
 
-    Its surface's path is made absolute. Raises InputError naming every entry that is wrong.
+    The paths of its surface and catalogue are made absolute. Raises InputError naming every entry that is wrong.
     """
     file = Path(path)
     try:
@@ -157,7 +287,16 @@ def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
     except ValidationError as error:
         raise InputError("; ".join(_told(each) for each in error.errors()), where=str(file)) from error
     place = (file.parent / case.surface.file).resolve()
-    return case.model_copy(update={"surface": case.surface.model_copy(update={"file": str(place)})})
+    found: dict[str, Any] = {"surface": case.surface.model_copy(update={"file": str(place)})}
+    if isinstance(case.rod, StockRodEntry):
+        source = case.rod.catalogue
+        if source not in shipped_catalogues():
+            source = str((file.parent / source).resolve())
+        stock = read_catalogue(source)
+        if case.rod.section is not None:
+            named(stock, case.rod.section)
+        found["rod"] = case.rod.model_copy(update={"catalogue": source})
+    return case.model_copy(update=found)
 
 
 def dump_case(case: Case) -> str:
@@ -200,22 +339,58 @@ def _set(data: dict[str, Any], setting: str) -> None:
 
 def _told(error: Any) -> str:
     """One validation error in words: the entry, what is wrong, the value, and the nearest known name."""
-    place = [str(part) for part in error["loc"]]
-    entry = ".".join(place) or "case"
     kind = error["type"]
+    entry, model = _entry(error["loc"])
     if kind == "extra_forbidden":
-        model: Any = Case
-        for part in place[:-1]:
-            model = model.model_fields[part].annotation
-        near = difflib.get_close_matches(place[-1], model.model_fields, n=1, cutoff=0.5)
+        near = difflib.get_close_matches(str(error["loc"][-1]), model.model_fields, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(model.model_fields)}"
         return f"{entry} is no known entry; {hint}"
+    if kind == "union_tag_invalid":
+        return f"{entry}.kind: must be one of {error['ctx']['expected_tags']} (found {error['ctx']['tag']!r})"
+    if kind == "union_tag_not_found":
+        return f"{entry}.kind is missing"
     if kind == "missing":
         return f"{entry} is missing"
     message = str(error["msg"]).removeprefix("Value error, ")
     message = message[:1].lower() + message[1:]
     value = "" if kind == "value_error" else f" (found {error['input']!r})"
     return f"{entry}: {message}{value}"
+
+
+def _entry(place: Sequence[int | str]) -> tuple[str, Any]:
+    """The name of an entry as the file has it, and the section in which it stands; where an entry may be of several kinds, the
+    place that pydantic gives names the kind too."""
+    names: list[str] = []
+    kind: Any = Case
+    section: Any = Case
+    for part in place:
+        plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+        told = {tag: each for each in get_args(plain) for tag in _tags(each)}
+        if part in told:
+            kind = told[part]
+            continue
+        names.append(str(part))
+        if get_origin(plain) in (list, dict):
+            kind = get_args(plain)[-1]
+        elif isinstance(plain, type) and issubclass(plain, BaseModel):
+            section = plain
+            field = plain.model_fields.get(str(part))
+            kind = Any if field is None else field.annotation
+        else:
+            kind = Any
+    return ".".join(names) or "case", section
+
+
+def _tags(choice: Any) -> list[str]:
+    """The names by which pydantic tells a choice of a union apart."""
+    own = [each.tag for each in get_args(choice)[1:] if isinstance(each, Tag)]
+    if isinstance(choice, type) and issubclass(choice, BaseModel) and "kind" in choice.model_fields:
+        own += get_args(choice.model_fields["kind"].annotation)
+    return own
+
+
+def _has(entry: Any, name: str) -> bool:
+    return name in entry if isinstance(entry, dict) else hasattr(entry, name)
 
 
 def write_text(path: Path, text: str) -> None:

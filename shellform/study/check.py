@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from pydantic import ValidationError
 
 from shellform.errors import InputError
-from shellform.net.chebyshev import pull_net
 from shellform.net.files import net_document, save_net
+from shellform.net.orient import oriented_net
 from shellform.study.case import SurfaceEntry, load_case, write_text
 from shellform.study.run import Report, net_summary, surface_of, surface_summary, told_size
+from shellform.study.shell import rod_material
 from shellform.surface.reading import FORMATS, kind_of
 from shellform.surface.target import largest_curvature
 
@@ -47,7 +48,8 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
         spacing = case.net.spacing
         told["crossings to expect"] = f"about {surface.area / spacing**2:.0f} at {spacing:g} m"
         told["freedoms to expect"] = f"about {48 * surface.area / spacing**2:.0f}"
-        largest = case.rod.strength / (case.rod.young * bent) if bent > 0.0 else float("inf")
+        material = rod_material(case.rod)
+        largest = material.strength / (material.young * bent) if bent > 0.0 else float("inf")
         told["largest rod radius"] = f"at least {largest:.3g} m (equation 1, at the surface's largest curvature)"
     else:
         told["largest rod radius"] = f"{6.4e-3 / bent:.3g} m in GFRP (strength/E = 255 MPa/40 GPa)" if bent > 0.0 else "any"
@@ -82,25 +84,20 @@ def net_alone(
     options: Mapping[str, Any],
     *,
     spacing: float,
-    angle: float,
+    angle: str,
     gap: float | None,
     allow_scripts: bool,
     report: Report,
 ) -> dict[str, Any]:
     """Writes net.json, net.npz and summary.json of the net on a surface file; returns the surface's size and the net's summary.
 
-    `options` are the entries of [surface] in a case.
+    `options` are the entries of [surface] in a case; `angle` degrees or "auto".
     """
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
     report("surface", f"size {told_size(surface)}")
-    net = pull_net(
-        surface,
-        spacing=spacing,
-        gap=gap or _GAP * spacing,
-        angle=np.deg2rad(angle),
-        progress=lambda what, residual: report("net", f"{what}, residual {residual:.1e}"),
-    )
-    told = net_summary(net)
+    settings = {"spacing": spacing, "gap": gap or _GAP * spacing}
+    net, found, offset = oriented_net(surface, settings, angle=_angle(angle), progress=lambda text: report("net", text))
+    told = net_summary(net) | {"angle": found, "offset": list(offset)}
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -110,3 +107,13 @@ def net_alone(
     document = {"format": "shellform-summary", "version": 1, "surface": surface_summary(surface, str(file)), "net": told}
     write_text(folder / "summary.json", json.dumps(document, indent=1))
     return {"size": told_size(surface), **told}
+
+
+def _angle(text: str) -> float | Literal["auto"]:
+    """An angle, rad, from degrees or the word auto."""
+    if text == "auto":
+        return "auto"
+    try:
+        return float(np.deg2rad(float(text)))
+    except ValueError as error:
+        raise InputError("must be degrees or auto", where="--angle", value=text) from error

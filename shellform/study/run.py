@@ -14,7 +14,7 @@ import json
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +22,25 @@ import numpy as np
 
 import shellform
 from shellform.arrays import Reals
-from shellform.design.gridshell import Cable, Design, Gridshell, Joint, Rod, brace
+from shellform.design.gridshell import Design, Gridshell
 from shellform.design.problem import Problem, deviations, follow
 from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share
 from shellform.errors import InputError, NotConverged
-from shellform.net.chebyshev import pull_net
 from shellform.net.files import load_net, net_document, save_net
 from shellform.net.net import Net
+from shellform.net.orient import oriented_net
 from shellform.structure.equilibrium import Equilibrium
 from shellform.structure.loading import Loaded
 from shellform.structure.model import Model, write_model
 from shellform.structure.state import State
-from shellform.study.case import Case, SurfaceEntry, check_script, dump_case, write_text
+from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
+from shellform.study.shell import catalogue_bytes, gridshell, rod_bounds, rod_limits
 from shellform.surface.target import Surface
 
 STAGES = ("surface", "net", "initial", "optimise", "figures")
-DESIGNS = ("unbraced", "initial", "unloaded", "optimised")
-LOADS = ("none", "design", "additional")
+DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "polished")
+
+_MARKED = 0.2  # of the largest load on a node: smaller ones, such as of the rods' own weight, would hide the shell behind arrows
 
 Report = Callable[[str, str], None]
 """Called with the stage and a line of progress."""
@@ -165,13 +167,14 @@ def _keys(case: Case, file: Path) -> dict[str, str]:
     needs = {
         "surface": ["surface"],
         "net": ["net", "joint"],
-        "initial": ["rod", "cable", "load"],
+        "initial": ["rod", "cable", "load", "part"],
         "optimise": ["optimise"],
         "figures": ["figures", "title"],
     }
     digest = hashlib.sha256(shellform.__version__.encode() + file.read_bytes())
     keys = {}
     for stage in STAGES:
+        digest.update(catalogue_bytes(case) if stage == "initial" else b"")
         digest.update(json.dumps({name: entries[name] for name in needs[stage]}, sort_keys=True).encode())
         keys[stage] = digest.hexdigest()
     return keys
@@ -192,24 +195,28 @@ def _net(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: b
     if keep:
         return load_net(job.path("net.npz"))
     entry = job.case.net
-    net = pull_net(
+    net, angle, offset = oriented_net(
         results["surface"],
-        spacing=entry.spacing,
-        gap=job.case.joint.gap,
-        angle=np.deg2rad(entry.angle),
+        net_settings(entry, job.case.joint.gap),
+        angle=entry.angle if entry.angle == "auto" else float(np.deg2rad(entry.angle)),
         offset=entry.offset,
-        elements=entry.elements,
-        start=entry.start,
-        spring_density=entry.spring_density,
-        shear_stiffness=entry.shear_stiffness,
-        merge=entry.merge,
-        progress=lambda what, residual: job.report("net", f"{what}, residual {residual:.1e}"),
+        progress=lambda text: job.report("net", text),
     )
     save_net(job.path("net.npz"), net)
     write_text(job.path("net.json"), json.dumps(net_document(net)))
-    rod = job.case.rod
-    summary["net"] = net_summary(net) | {"rod_radius_max": net.max_radius(young=rod.young, strength=rod.strength)}
+    summary["net"] = {
+        **net_summary(net),
+        **rod_limits(job.case.rod, net),
+        "angle": angle,
+        "offset": list(offset),
+    }
     return net
+
+
+def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
+    """The settings of pull_net in a case but for angle and offset."""
+    names = ("spacing", "spacing_v", "guides", "elements", "method", "start", "spring_density", "shear_stiffness", "merge", "ground")
+    return {name: getattr(entry, name) for name in names} | {"outline": entry.outline, "gap": gap}
 
 
 def net_summary(net: Net) -> dict[str, Any]:
@@ -219,7 +226,8 @@ def net_summary(net: Net) -> dict[str, Any]:
         "crossings": len(net.grid.lattice),
         "rods": len(net.grid.rods),
         "supports": len(net.supports),
-        **asdict(net.quality),
+        "spacing_v": net.grid.spacing_v,
+        **net.quality.summary(),
         "notes": list(net.notes),
     }
 
@@ -227,6 +235,7 @@ def net_summary(net: Net) -> dict[str, Any]:
 def _initial(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> dict[str, Any]:
     case = job.case
     shell, loads = gridshell(case, results["net"], results["surface"])
+    summary["net"] |= rod_limits(case.rod, shell.net)
     found: dict[str, Any] = {"shell": shell, "loads": loads}
     if keep:
         return found
@@ -253,21 +262,6 @@ def _initial(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
     return found
 
 
-def gridshell(case: Case, net: Net, surface: Surface) -> tuple[Gridshell, dict[str, Reals]]:
-    """The case's gridshell and its load cases "none", "design" and "additional"."""
-    bearable = net.max_radius(young=case.rod.young, strength=case.rod.strength)
-    rod = Rod.round(
-        young=case.rod.young,
-        radius=case.rod.radius or bearable,
-        poisson=case.rod.poisson,
-        strength=case.rod.strength,
-    )
-    joint = Joint(case.joint.axial, case.joint.torsion, case.joint.bending, case.joint.gap)
-    shell = brace(net, rod, joint, Cable(case.cable.stiffness), below=surface)
-    load = shell.point_load(case.load.force, every=case.load.every, openings=case.load.openings)
-    return shell, {"none": np.zeros_like(load), "design": load, "additional": case.load.additional * load}
-
-
 def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
     if keep:
         return
@@ -281,7 +275,7 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         (entry.cable_force, CableForce("design")),
         (entry.rod_radius, RodRadius()),
     ]
-    bounds = (entry.radius_min or 0.5 * start.radius, summary["net"]["rod_radius_max"])
+    others = [name for name in loads if name not in ("none", "design")]
 
     def watch(step: mma.Step) -> None:
         said = "" if step.accepted else ", rejected"
@@ -293,15 +287,22 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
 
     problem = Problem(
         shell,
-        {name: loads[name] for name in ("design", "additional")},
+        {name: loads[name] for name in ("design", *others)},
         [Share(share, term) for share, term in shares if share > 0.0],
-        [AtMost(cable.force_max, CableForces("design")), AtMost(entry.misfit_rms_additional, RmsMisfit("additional"))],
+        [
+            AtMost(cable.force_max, CableForces("design")),
+            *(AtMost(entry.misfit_rms_additional, RmsMisfit(name)) for name in others),
+        ],
         entry.rest_length_min,
         entry.rest_length_max,
-        bounds,
+        rod_bounds(job.case, shell),
     )
-    best = mma.optimize(problem, start, evaluations=entry.evaluations, progress=watch)
+    best = mma.optimize(problem, start, evaluations=entry.evaluations, stiffness=entry.stiffness_min, progress=watch)
     _keep_design(job, shell, "optimised", best.design, _follow(shell, best.design, loads), loads, summary)
+    if entry.polish:
+        job.report("optimise", "polishing the cables that are left")
+        polished = mma.polish(best, evaluations=entry.polish)
+        _keep_design(job, shell, "polished", polished.design, _follow(shell, polished.design, loads), loads, summary)
     job.report("optimise", "the design without regard to the loads")
     unloaded = mma.optimize(
         Problem(
@@ -325,6 +326,8 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         "rejected": best.rejected,
         "equilibria": best.equilibria,
         "factorisations": best.factorisations,
+        "factorisations_rejected": best.wasted,
+        "stiffness_min": best.stiffness,
         "status": best.status,
         "constraints": dict(best.constraints),
     }
@@ -385,17 +388,17 @@ def draw_run(
     ready = [name for name in DESIGNS if (folder / f"designs/{name}.npz").is_file()]
     if not ready:
         raise InputError("the run has no designs yet", where=str(folder), remedy="Run shellform design on it first.")
-    for what, name, known in [("--design", design, ready), ("--load", load, list(LOADS))]:
-        if name is not None and name not in known:
-            raise InputError("isn't there", where=what, value=name, remedy=f"Known: {', '.join(known)}.")
     net = load_net(folder / "net.npz")
-    scale = limit or case.figures.limit
-    designs = [design] if design else ready
-    loads = [load] if load else list(LOADS)
-    rows, files = [], []
     with np.load(folder / "surface.npz", allow_pickle=False) as data:
         surface = Surface(data["vertices"], data["triangles"], data["normals"])
     shell, cases = gridshell(case, net, surface)
+    for what, name, known in [("--design", design, ready), ("--load", load, list(cases))]:
+        if name is not None and name not in known:
+            raise InputError("isn't there", where=what, value=name, remedy=f"Known: {', '.join(known)}.")
+    scale = limit or case.figures.limit
+    designs = [design] if design else ready
+    loads = [load] if load else list(cases)
+    rows, files = [], []
     for name in designs:
         with np.load(folder / f"designs/{name}.npz", allow_pickle=False) as data:
             made = Design(data["rest_length"], data["present"], float(data["radius"]))
@@ -418,6 +421,7 @@ def draw_run(
 
 def _panel(render: Any, shell: Gridshell, title: str, design: Design, state: State, load: Reals) -> Any:
     cables = shell.cables(design)
+    weight = np.linalg.norm(load[:, :3], axis=1)
     return render.Panel(
         title,
         state.positions,
@@ -426,7 +430,7 @@ def _panel(render: Any, shell: Gridshell, title: str, design: Design, state: Sta
         cables.ends,
         cables.tension(state),
         shell.net.supports,
-        np.flatnonzero(load.any(axis=1)),
+        np.flatnonzero(weight > _MARKED * weight.max()),
         design.radius,
     )
 
@@ -454,9 +458,9 @@ def _keep_design(
     """Writes a design's model file, states and summary."""
     supports = tuple(int(node) for node in shell.net.supports)
     network = shell.network(design)
-    model = Model(network, {each: loads[each] for each in LOADS if loads[each].any()}, shell.target, supports)
+    model = Model(network, {each: loads[each] for each in loads if loads[each].any()}, shell.target, supports)
     write_model(job.path(f"designs/{name}.json"), model)
-    states = {each: loaded[each].equilibrium.state for each in LOADS}
+    states = {each: loaded[each].equilibrium.state for each in loads}
     _save_arrays(
         job.path(f"designs/{name}.npz"),
         rest_length=design.rest_length,
@@ -474,14 +478,14 @@ def _keep_design(
         "cable_force_max": float(pull.max(initial=0.0)),
         "loads": {
             each: {
-                "factor": {"none": 0.0, "design": 1.0, "additional": job.case.load.additional}[each],
+                "factor": round(float(loads[each][:, 2].sum() / loads["design"][:, 2].sum()), 12) + 0.0,  # no -0
                 **_deviation(shell, states[each]),
                 "stable": loaded[each].equilibrium.stable,
                 "on_branch": loaded[each].on_branch,
                 "residual": loaded[each].equilibrium.residual,
                 "rod_utilisation_max": utilisation(shell, design, states[each]),
             }
-            for each in LOADS
+            for each in loads
         },
     }
     _write_states(job, shell, name, design, states, loads)
@@ -518,13 +522,10 @@ def _deviation(shell: Gridshell, state: State) -> dict[str, float]:
 
 
 def utilisation(shell: Gridshell, design: Design, state: State) -> float:
-    """The largest bending stress of the rods over their flexural strength: M r / I over f_f (equation 1)."""
-    beams = shell.beams(design.radius)
-    rods = beams.kind == 0
-    moments = beams.local_forces(state)[rods]
-    largest = float(np.hypot(moments[:, [2, 5]], moments[:, [3, 6]]).max())
-    inertia = 0.25 * np.pi * design.radius**4
-    return largest * design.radius / inertia / shell.rod.strength
+    """The largest bending stress of the rods over their flexural strength: M r / I over f_f for round ones (1)."""
+    section = shell.rod.resized(design.radius).section
+    forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
+    return float(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]).max()) / section.material.strength
 
 
 def _save_arrays(path: Path, **arrays: Any) -> None:

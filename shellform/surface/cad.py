@@ -1,12 +1,13 @@
 """Surfaces built or imported in gmsh, through occ.py.
 
 A builder script is a Python file with one function `build(gmsh, *, name=default, ...)`, whose keyword arguments are the shell's
-named dimensions, m, and which makes the geometry in the current model. Where it has a second function
-`form(points, triangles, edge, *, ...)` with the same dimensions, the mesh of what was built is a plan, and `form` returns where
-its `points` (v, 3) go; `edge` (v,) tells which lie on its boundary. So a form-found shell is meshed before it is found.
+named dimensions, m, and which makes the geometry in the current model. Where it has a second function `form(points, triangles,
+edge, *, ...)` with the same dimensions, the mesh of what was built is a plan, and `form` returns where its `points` (v, 3) go;
+`edge` (v,) tells which lie on its boundary. So a form-found shell is meshed before it is found.
 
-CAD files (STEP, IGES, BREP) come through gmsh's OpenCASCADE, which converts the unit that STEP and IGES files state to metres; a BREP
-file has none. OpenCASCADE remembers the last unit asked for beyond gmsh's session, so that every session asks for metres anew.
+CAD files (STEP, IGES, BREP) come through gmsh's OpenCASCADE, which converts the unit that STEP and IGES files state to metres;
+a BREP file has none. OpenCASCADE remembers the last unit asked for beyond gmsh's session, so that every session asks for metres
+anew.
 
 Vertex normals are the CAD surface's own, summed over the faces that meet at a vertex; across a fold they are its bisector.
 """
@@ -85,8 +86,8 @@ def read_cad(
 ) -> Draft:
     """The faces of a "step", "iges" or "brep" file, in m, meshed at about `size`, m (a sixtieth of its plan if left out).
 
-    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis, and stays so; of a solid
-    its "upper" or "lower" `face` is taken. Raises InputError for unreadable files, and for solids without a `face`.
+    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis, and stays so; of a
+    solid its "upper" or "lower" `face` is taken. Raises InputError for unreadable files, and for solids without a `face`.
     """
     if kind != "brep" and unit is not None:
         raise InputError(
@@ -116,10 +117,11 @@ def mesh_patches(patches: Sequence[Patch], *, size: float | None, up: str, face:
 
 
 def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[Reals, Indices]:
-    """Points (k, 2) inside the first of the closed `outlines` (n, 2), m, and outside the others, and triangles (t, 3), counterclockwise.
+    """Points (k, 2) inside the first of the closed `outlines` (n, 2), m, and outside the others, and triangles (t, 3),
+    counterclockwise.
 
-    The triangles number the outlines' points first, one outline after the other, then these. Edges are about `size`, m, long (left out:
-    as those of the outline nearby). Raises InputError where outlines cross.
+    The triangles number the outlines' points first, one outline after the other, then these. Edges are about `size`, m, long
+    (left out: as those of the outline nearby). Raises InputError where outlines cross.
     """
     with session(), errors(Path("plan"), "its outline can't be meshed", "Check that it doesn't cross itself."):
         geo = gmsh.model.geo
@@ -213,10 +215,11 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
 
 
 def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) -> float:
-    """Writes a B-spline surface through a surface's edge and vertices, by the path's ending as `write_cad`, and returns how far it is off, m.
+    """Writes a B-spline surface through a surface's edge and vertices, by the path's ending as `write_cad`, and returns how far
+    it is off, m.
 
-    Raises InputError for other endings and for surfaces with openings, which one B-spline can't have, and NotConverged where the
-    vertices are further off than `within` of the size.
+    Raises InputError for other endings and for surfaces with openings, which one B-spline can't have, and NotConverged where
+    the vertices are further off than `within` of the size.
     """
     file = Path(path)
     kind = FORMATS.get(file.suffix.lower())

@@ -1,8 +1,8 @@
 """COMPAS meshes in JSON, as RHINOVault's successors and other COMPAS programs write them.
 
-A file is one mesh, or a session with a scene of several; each is found by its `vertex` and `face` tables, in the layouts of COMPAS 1
-(`dva`, faces as lists) and 2 (`default_vertex_attributes`, `facedata`). Of a RHINOVault session the `ThrustDiagram` is the shell; its
-faces marked as without load are openings.
+A file is one mesh, or a session with a scene of several; each is found by its `vertex` and `face` tables, in the layouts of
+COMPAS 1 (`dva`, faces as lists) and 2 (`default_vertex_attributes`, `facedata`). Of a RHINOVault session the `ThrustDiagram` is
+the shell; its faces marked as without load are openings.
 """
 
 from __future__ import annotations
@@ -28,13 +28,17 @@ def read_compas(file: Path, choice: Choice) -> Draft:
         raise InputError(f"isn't whole JSON: {error}", where=str(file), remedy="Save it anew.") from error
     found = list(_meshes(data, ""))
     if not found:
-        raise InputError("holds no COMPAS mesh", where=str(file), remedy="Save a compas.datastructures.Mesh, or a RHINOVault session.")
+        raise InputError(
+            "holds no COMPAS mesh", where=str(file), remedy="Save a compas.datastructures.Mesh, or a RHINOVault session."
+        )
     named = [(name, table) for name, table in found if name == _SHELL]
     if not choice.name and not choice.layer and named:
         found = named[-1:]
     elif not choice.name and len(found) > 1:
         raise InputError(
-            f"holds {len(found)} meshes", where=str(file), remedy=f"Choose by surface.object (--object) among {', '.join(n for n, _ in found)}."
+            f"holds {len(found)} meshes",
+            where=str(file),
+            remedy=f"Choose by surface.object (--object) among {', '.join(n for n, _ in found)}.",
         )
     parts, openings = [], 0
     for name, table in found:

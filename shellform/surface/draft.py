@@ -58,7 +58,10 @@ def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flag
             told = ", ".join(f"{name!r}" + (f" ({n})" if n > 1 else "") for name, n in known.most_common(_NAMES_TOLD))
             more = f" and {len(known) - _NAMES_TOLD} more" if len(known) > _NAMES_TOLD else ""
             raise InputError(
-                f"{where} has no such surface", where=entry, value=wanted, remedy=f"There are {told}{more}." if told else "None has a name."
+                f"{where} has no such surface",
+                where=entry,
+                value=wanted,
+                remedy=f"There are {told}{more}." if told else "None has a name.",
             )
     return kept
 
@@ -72,14 +75,18 @@ def joined(parts: Sequence[Part], choice: Choice, where: str) -> Draft:
     """All chosen parts as one mesh of triangles. Raises InputError where there is no face."""
     if not any(len(block) for part in parts for block in part.faces):
         raise InputError("holds no faces, only points or lines", where=where, remedy="Export the surface, or a mesh of it.")
-    kept = [part for part, meant in zip(parts, among([(p.layer, p.name) for p in parts], choice, where), strict=True) if meant]
+    kept = [
+        part for part, meant in zip(parts, among([(p.layer, p.name) for p in parts], choice, where), strict=True) if meant
+    ]
     points, triangles, count = [], [], 0
     for part in kept:
         check_points(part.points, where)
         for block in part.faces:
             if len(block) and not (block.min() >= 0 and block.max() < len(part.points)):
                 raise InputError(
-                    f"a face names vertex {int(block.max())} of {len(part.points)}", where=where, remedy="Export the mesh anew."
+                    f"a face names vertex {int(block.max())} of {len(part.points)}",
+                    where=where,
+                    remedy="Export the mesh anew.",
                 )
             triangles.append(triangulated(part.points, block) + count)
         points.append(part.points)
@@ -105,7 +112,9 @@ def check_points(points: Reals, where: str) -> None:
 
 
 def triangulated(points: Reals, faces: Indices) -> Indices:
-    """Triangles (t, 3) of polygons (f, k), no vertex moved: quadrilaterals along the diagonal that folds less, others by cutting ears."""
+    """Triangles (t, 3) of polygons (f, k), no vertex moved: quadrilaterals along the diagonal that folds less, others by
+    cutting ears.
+    """
     if faces.shape[1] < 3:
         return np.zeros((0, 3), dtype=np.int64)
     if faces.shape[1] == 3:

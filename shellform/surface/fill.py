@@ -1,9 +1,10 @@
-"""Openings closed, as the paper closes those of its shell (section 4.1, figure 5), so that the gridshell can stand on the ground all round.
+"""Openings closed, as the paper closes those of its shell (section 4.1, figure 5), so that the gridshell can stand on the
+ground all round.
 
-A hole is closed over the plane square to the mean normal round it; an open stretch of the outer edge, between two places where it stands
-on the ground, goes on outwards and down to a footprint on the ground. In both cases the fill has the least bending (plate.py) of all
-that continue the surface with its slope. The footprint lies where the fill descends at 45° on average, or at the slope the surface
-already has at its edge where that is steeper.
+A hole is closed over the plane square to the mean normal round it; an open stretch of the outer edge, between two places where
+it stands on the ground, goes on outwards and down to a footprint on the ground. In both cases the fill has the least bending
+(plate.py) of all that continue the surface with its slope. The footprint lies where the fill descends at 45° on average, or at
+the slope the surface already has at its edge where that is steeper.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ _SHORT = 0.5  # of an edge: footprints nearer than that to the edge are left out
 def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) -> Draft:
     """The draft, z up and mended, with its "holes", its open "edges", or "all" closed; its own vertices come first and don't move.
 
-    Edges come down to the `ground`, m (left out: the edge's lowest point). Raises InputError where there is nothing to close or no
-    smooth way to.
+    Edges come down to the `ground`, m (left out: the edge's lowest point). Raises InputError where there is nothing to close or
+    no smooth way to.
     """
     if what not in ("holes", "edges", "all"):
         raise InputError("must be holes, edges or all", where="surface.fill", value=what)
@@ -53,7 +54,9 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
         closed = _with_fill(closed, *_footed(draft.points, normals, arch, level, where))
     notes = []
     if what != "edges":
-        notes.append(f"{len(holes)} holes were closed" + (f", {standing} that stand on the ground were not" if standing else ""))
+        notes.append(
+            f"{len(holes)} holes were closed" + (f", {standing} that stand on the ground were not" if standing else "")
+        )
     if what != "holes":
         notes.append(f"{len(arches)} open stretches of the edge were brought down to the ground at {level:.4g} m")
     for note in notes:
@@ -125,7 +128,9 @@ def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: s
     chord = place[-1, :2] - place[0, :2]
     span = float(np.linalg.norm(chord))
     if span <= 0.0:
-        raise InputError("an open stretch of its edge starts and ends at one place", where=where, remedy="Close it in its own program.")
+        raise InputError(
+            "an open stretch of its edge starts and ends at one place", where=where, remedy="Close it in its own program."
+        )
     outwards = np.array([chord[1], -chord[0]]) / span
     inner = normals[arch[1:-1]]  # at a foot two slopes meet, so only the arch between them counts
     slope = _gradients(np.vstack([inner[:1], inner, inner[-1:]]), place, where)
@@ -136,7 +141,9 @@ def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: s
     step = float(np.linalg.norm(np.diff(place, axis=0), axis=1).mean())
     far = np.flatnonzero(away > _SHORT * step)
     if not len(far):
-        raise InputError("an open stretch of its edge is lower than its mesh is fine", where=where, remedy="Refine the mesh.")
+        raise InputError(
+            "an open stretch of its edge is lower than its mesh is fine", where=where, remedy="Refine the mesh."
+        )
     foot = _evenly(np.vstack([place[-1, :2], (place[far, :2] + away[far, None] * outwards)[::-1], place[0, :2]]), step)[1:-1]
     rim = arch[::-1]
     outline = np.vstack([place[::-1, :2], foot[::-1]])
@@ -173,11 +180,15 @@ def _meshed(outline: Reals, where: str) -> tuple[Reals, Indices]:
         return cad.mesh_plan([outline])
     except InputError as error:
         raise InputError(
-            f"an opening can't be closed over its plan: {error.what}", where=where, remedy="Close it in the shell's own program."
+            f"an opening can't be closed over its plan: {error.what}",
+            where=where,
+            remedy="Close it in the shell's own program.",
         ) from error
 
 
-def _least_bent(plan: Reals, triangles: Indices, known: Reals, rim: Indices, slope: Reals, *, closed: bool) -> tuple[Reals, Reals]:
+def _least_bent(
+    plan: Reals, triangles: Indices, known: Reals, rim: Indices, slope: Reals, *, closed: bool
+) -> tuple[Reals, Reals]:
     edges = np.column_stack([rim, np.roll(rim, -1)])
     if not closed:
         edges = edges[:-1]

@@ -31,7 +31,8 @@ KINDS = tuple(_LIBRARIES)
 
 
 def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest: float = _LONGEST) -> Draft:
-    """What the reader of `kind` makes of a file. Raises InputError for what it refuses, and where it crashes, hangs or fills the memory.
+    """What the reader of `kind` makes of a file. Raises InputError for what it refuses, and where it crashes, hangs or fills
+    the memory.
 
     `settings` are `unit`, `size`, `up`, `layer`, `name` and `face`, as `read_surface` has them.
     """
@@ -82,7 +83,9 @@ def _serve() -> None:
         if draft.normals is not None:
             arrays["normals"] = draft.normals
     except InputError as error:
-        value = error.value if isinstance(error.value, str | int | float) else None if error.value is None else repr(error.value)
+        value = (
+            error.value if isinstance(error.value, str | int | float) else None if error.value is None else repr(error.value)
+        )
         told = {"refused": {"what": error.what, "where": error.where, "value": value, "remedy": error.remedy}}
     except MemoryError:
         what = "needs more memory to read than this machine has"
@@ -95,7 +98,9 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
     if _LIBRARIES[kind] == "gmsh":
         from shellform.surface import cad
 
-        return cad.read_cad(file, kind, unit=settings["unit"], size=settings["size"], up=settings["up"], face=settings["face"])
+        return cad.read_cad(
+            file, kind, unit=settings["unit"], size=settings["size"], up=settings["up"], face=settings["face"]
+        )
     if kind == "3dm":
         from shellform.surface import rhino
 

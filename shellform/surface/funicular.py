@@ -1,13 +1,13 @@
 """Funicular shapes by the force density method (Schek 1974).
 
-A network whose branches carry forces proportional to their lengths, n = q l with force densities q, N/m, is in equilibrium under
-nodal loads p where
+A network whose branches carry forces proportional to their lengths, n = q l with force densities q, N/m, is in equilibrium
+under nodal loads p where
 
     C' diag(q) C x = p
 
-for each coordinate x, C being the branch-node matrix: one sparse symmetric system, definite where the network has one shape. Positive
-q is tension; a thrust shell is the same with the loads turned round, so a shell under its weight is the hanging net under loads p
-pointing up.
+for each coordinate x, C being the branch-node matrix: one sparse symmetric system, definite where the network has one shape.
+Positive q is tension; a thrust shell is the same with the loads turned round, so a shell under its weight is the hanging net
+under loads p pointing up.
 """
 
 from __future__ import annotations
@@ -35,14 +35,12 @@ _NEAREST = 1e-9  # weight of being uniform in a fit, of the mean diagonal
 _SINGULAR = 1e-12  # of the diagonal: a pivot below that is rounding
 
 
-def force_density(
-    nodes: ArrayLike, edges: ArrayLike, densities: ArrayLike, loads: ArrayLike, fixed: ArrayLike
-) -> Reals:
+def force_density(nodes: ArrayLike, edges: ArrayLike, densities: ArrayLike, loads: ArrayLike, fixed: ArrayLike) -> Reals:
     """Node positions (n, 3), m, in equilibrium.
 
-    `nodes` (n, 3), m, give the places of the `fixed` (n,) ones; `edges` (m, 2) carry force `densities` (m,), N/m, tension positive, and
-    `loads` (n, 3), N, act on the nodes, along the axes' directions. Raises InputError where the free nodes aren't held, or where tension
-    and compression together leave no definite shape.
+    `nodes` (n, 3), m, give the places of the `fixed` (n,) ones; `edges` (m, 2) carry force `densities` (m,), N/m, tension
+    positive, and `loads` (n, 3), N, act on the nodes, along the axes' directions. Raises InputError where the free nodes aren't
+    held, or where tension and compression together leave no definite shape.
     """
     place = reals("nodes", nodes, (None, 3))
     ends = indices("edges", edges, (None, 2), below=len(place))
@@ -68,17 +66,19 @@ def thrust_heights(
 ) -> Reals:
     """Heights (v,), m, of the shell over a triangulated `plan` (v, 2), m, that bears a uniform weight by thrust alone.
 
-    Its `fixed` (v,) vertices stay at height 0 and its highest point is at `rise`, m, above them. The `load` is uniform per area of the
-    surface, which is found by iteration, or of the plan. The thrust is the same in all plan directions: the branches' force densities
-    are the cotangent weights of the triangles, with which the plan is in equilibrium with itself whatever the mesh; the rise sets their
-    scale. Raises InputError where nothing is free or fixed, and NotConverged.
+    Its `fixed` (v,) vertices stay at height 0 and its highest point is at `rise`, m, above them. The `load` is uniform per area
+    of the surface, which is found by iteration, or of the plan. The thrust is the same in all plan directions: the branches'
+    force densities are the cotangent weights of the triangles, with which the plan is in equilibrium with itself whatever the
+    mesh; the rise sets their scale. Raises InputError where nothing is free or fixed, and NotConverged.
     """
     place = reals("plan", plan, (None, 2))
     faces = indices("triangles", triangles, (None, 3), below=len(place))
     held = flags("fixed", fixed, (len(place),))
     if held.all() or not held.any():
         which = "every" if held.all() else "no"
-        raise InputError(f"{which} vertex is fixed", where="fixed", remedy="Fix the edge, and mesh the plan finer if need be.")
+        raise InputError(
+            f"{which} vertex is fixed", where="fixed", remedy="Fix the edge, and mesh the plan finer if need be."
+        )
     return _raised(place, faces, held, *_isotropic_thrust(place, faces), rise, load)
 
 
@@ -120,11 +120,12 @@ def thrust_shell(
 ) -> Surface:
     """A shell over a plan that bears a uniform weight by thrust alone, meshed at about `size`, m.
 
-    The `outline` (k, 2), m, runs counterclockwise. It stands on the ground from corner i to corner j for each of the `supports` (i, j),
-    numbered from 0, or all along where they are left out. Between supports it is free: an arch along the edge bears the thrust of the
-    shell, and its plan draws inwards by about `sag` of its span; so do the edges of the `openings`, plan polygons, which are rings. The
-    plan's branches have the cotangent weights of its triangles as force densities, the arches those that a cable of that sag has; all
-    coordinates are then in equilibrium. `rise` and `load` as in `thrust_heights`. Raises InputError for plans that carry no shell.
+    The `outline` (k, 2), m, runs counterclockwise. It stands on the ground from corner i to corner j for each of the `supports`
+    (i, j), numbered from 0, or all along where they are left out. Between supports it is free: an arch along the edge bears the
+    thrust of the shell, and its plan draws inwards by about `sag` of its span; so do the edges of the `openings`, plan
+    polygons, which are rings. The plan's branches have the cotangent weights of its triangles as force densities, the arches
+    those that a cable of that sag has; all coordinates are then in equilibrium. `rise` and `load` as in `thrust_heights`.
+    Raises InputError for plans that carry no shell.
     """
     from shellform.surface import cad
     from shellform.surface.target import make_surface
@@ -151,7 +152,12 @@ def thrust_shell(
     drawn = force_density(flat, ends, density, np.zeros_like(flat), held)[:, :2]
     first, second = drawn[faces[:, 1]] - drawn[faces[:, 0]], drawn[faces[:, 2]] - drawn[faces[:, 0]]
     if (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0] <= 0.0).any():
-        raise InputError("the plan folds where its free edges draw in", where="sag", value=sag, remedy="Choose a smaller sag, or longer supports.")
+        raise InputError(
+            "the plan folds where its free edges draw in",
+            where="sag",
+            value=sag,
+            remedy="Choose a smaller sag, or longer supports.",
+        )
     heights = _raised(drawn, faces, held, ends, density, rise, load)
     return make_surface(np.column_stack([drawn, heights]), faces, source="thrust shell")
 
@@ -159,9 +165,9 @@ def thrust_shell(
 def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least: float = 0.05) -> Surface:
     """The thrust shell nearest to a wished-for `surface` under its own uniform weight, with the same plan of branches.
 
-    Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held. The force densities are those
-    that leave the least unbalanced force on the surface as it is, none below `least` of their mean, so that all stays in compression.
-    Raises InputError where nothing is held.
+    Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held. The force densities
+    are those that leave the least unbalanced force on the surface as it is, none below `least` of their mean, so that all stays
+    in compression. Raises InputError where nothing is held.
     """
     from shellform.surface.target import make_surface
 
@@ -171,11 +177,15 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
     edge = np.concatenate(surface.boundary)
     held[edge] = points[edge, 2] < level + 0.01 * (float(points[:, 2].max()) - level)
     if not held.any():
-        raise InputError("nothing of its edge stands on the ground", where="ground", value=ground, remedy="State its height.")
+        raise InputError(
+            "nothing of its edge stands on the ground", where="ground", value=ground, remedy="State its height."
+        )
     edges = np.unique(np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
     weight = np.column_stack([np.zeros((len(points), 2)), -_tributary_areas(points, faces)])
     density = fitted_densities(points, edges, weight, held, least=least)
-    return make_surface(force_density(points, edges, density, weight, held), faces, source=f"thrust shell near {surface.source}")
+    return make_surface(
+        force_density(points, edges, density, weight, held), faces, source=f"thrust shell near {surface.source}"
+    )
 
 
 def fitted_densities(
@@ -183,9 +193,9 @@ def fitted_densities(
 ) -> Reals:
     """Force densities (m,), N/m, all in compression (negative), with which the network as it stands is nearest to equilibrium.
 
-    They minimise the squared unbalanced forces on the free `nodes` (n, 3), m, under `loads` (n, 3), N, with the size of each at least
-    `least` times that of the uniform density that fits best; of many such, those nearest to uniform. Arguments as in `force_density`.
-    Raises InputError where no compression bears the loads better than none.
+    They minimise the squared unbalanced forces on the free `nodes` (n, 3), m, under `loads` (n, 3), N, with the size of each at
+    least `least` times that of the uniform density that fits best; of many such, those nearest to uniform. Arguments as in
+    `force_density`. Raises InputError where no compression bears the loads better than none.
     """
     place = reals("nodes", nodes, (None, 3))
     ends = indices("edges", edges, (None, 2), below=len(place))
@@ -195,13 +205,18 @@ def fitted_densities(
     columns = np.tile(np.arange(len(ends)), 2)
     rows = ends.T.ravel()
     # Compression of size q pushes node a along x_a - x_b and node b the other way: the force on the nodes is B q + p.
-    blocks = [sp.csr_array((np.concatenate([-across[:, k], across[:, k]]), (rows, columns)), shape=(len(place), len(ends))) for k in range(3)]
+    blocks = [
+        sp.csr_array((np.concatenate([-across[:, k], across[:, k]]), (rows, columns)), shape=(len(place), len(ends)))
+        for k in range(3)
+    ]
     push = sp.vstack([block[free] for block in blocks]).tocsc()
     right = -np.concatenate([load[free, k] for k in range(3)])
     even = push.sum(axis=1)
     uniform = float(even @ right / (even @ even)) if even.any() else 0.0
     if not uniform > 0.0:
-        raise InputError("no compression bears the loads", where="loads", remedy="Check that they press on the shell from outside.")
+        raise InputError(
+            "no compression bears the loads", where="loads", remedy="Check that they press on the shell from outside."
+        )
     normal = push.T @ push
     nearest = _NEAREST * float(normal.diagonal().mean())
     matrix = sp.csc_array(normal + nearest * sp.eye_array(len(ends)))
@@ -224,7 +239,11 @@ def _bounded(matrix: sp.csc_array, right: Reals, least: float) -> Reals:
         if float(x @ push) < _SETTLED * scale and np.abs(residual).max() < _SETTLED * np.abs(target).max():
             return x + least
     raise NotConverged(
-        "the force densities don't settle", state=x + least, residual=float(x @ push), iterations=_ROUNDS, remedy="Raise least."
+        "the force densities don't settle",
+        state=x + least,
+        residual=float(x @ push),
+        iterations=_ROUNDS,
+        remedy="Raise least.",
     )
 
 
@@ -260,7 +279,9 @@ def _standing(supports: Sequence[tuple[int, int]], corner: Indices, count: int) 
         length = int((corner[j] - corner[i]) % count)
         held[(corner[i] + np.arange(length + 1)) % count] = True
     if held.sum() < 2:
-        raise InputError("hold the shell in fewer than two points", where="supports", value=list(supports), remedy="Support more.")
+        raise InputError(
+            "hold the shell in fewer than two points", where="supports", value=list(supports), remedy="Support more."
+        )
     return held
 
 
@@ -301,9 +322,7 @@ def _definite(matrix: sp.csr_array) -> SuperLU:
     """The factors of a symmetric positive definite matrix, which has its pivots on the diagonal and all positive."""
     remedy = "Check that every node is tied to a fixed one, and the signs of the force densities."
     try:
-        factors = splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-        )
+        factors = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     except RuntimeError as error:  # exactly singular
         raise InputError("some free nodes hang on nothing", where="densities", remedy=remedy) from error
     pivots = factors.U.diagonal()

@@ -1,7 +1,8 @@
 """GLTF and GLB scenes (Khronos glTF 2.0): their meshes, placed by their nodes.
 
-The format's unit is the metre (many programs write others all the same: state it) and its vertical axis y. Buffers may stand in the GLB, in the text as base64, or in files beside it.
-Compressed meshes (Draco, meshopt) and sparse accessors are refused by name.
+The format's unit is the metre (many programs write others all the same: state it) and its vertical axis y. Buffers may stand in
+the GLB, in the text as base64, or in files beside it. Compressed meshes (Draco, meshopt) and sparse accessors are refused by
+name.
 """
 
 from __future__ import annotations
@@ -31,13 +32,19 @@ def read_gltf(file: Path, choice: Choice) -> Draft:
     try:
         tree, inside = _opened(file)
         scene = _Scene(file, tree, inside)
-        roots = tree["scenes"][tree.get("scene", 0)].get("nodes", []) if tree.get("scenes") else range(len(tree.get("nodes", [])))
+        roots = (
+            tree["scenes"][tree.get("scene", 0)].get("nodes", [])
+            if tree.get("scenes")
+            else range(len(tree.get("nodes", [])))
+        )
         parts = [part for root in roots for part in scene.parts(root, np.eye(4), 0)]
     except InputError:
         raise
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, struct.error, OSError) as error:
         said = f"{type(error).__name__}: {error}"
-        raise InputError(f"can't be read as glTF: {said}", where=str(file), remedy="Export it anew, uncompressed.") from error
+        raise InputError(
+            f"can't be read as glTF: {said}", where=str(file), remedy="Export it anew, uncompressed."
+        ) from error
     draft = joined(parts, choice, str(file))
     return Draft(draft.points, draft.triangles, up="y")
 
@@ -125,7 +132,9 @@ class _Scene:
             else:
                 beside = self._file.parent / uri
                 if not beside.is_file():
-                    raise InputError(f"its buffer {uri} isn't beside it", where=str(self._file), remedy="Copy both, or export a GLB.")
+                    raise InputError(
+                        f"its buffer {uri} isn't beside it", where=str(self._file), remedy="Copy both, or export a GLB."
+                    )
                 self._loaded[index] = beside.read_bytes()
         return self._loaded[index]
 

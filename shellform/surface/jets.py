@@ -9,9 +9,9 @@ rows of them) a quadratic is fitted, else a plane.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from shellform.arrays import Indices, Reals
+from shellform.compiled import njit, prange
 
 _MOST = 96  # neighbours
 _CHUNK = 256  # vertices in a row on one processor

@@ -15,9 +15,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
 
 from shellform.arrays import Flags, Indices, Reals
+from shellform.compiled import njit, prange
 from shellform.surface.extend import extended
 from shellform.surface.patch import controls, edge_cubic, evaluate
 from shellform.surface.target import Surface, across_edges

@@ -1,8 +1,9 @@
 """Mending a draft into one clean skin, each thing that is done told in a sentence.
 
-In this order: vertices at one place are merged, faces that shrink to nothing or are given twice and points of no face dropped; edges of
-neighbouring patches that nearly touch are sewn (seams.py); a piece is chosen; faces are turned alike; slivers are collapsed or flipped;
-of a closed skin the upper or lower face is taken (sides.py); and a vertex at which the edge meets itself is parted.
+In this order: vertices at one place are merged, faces that shrink to nothing or are given twice and points of no face dropped;
+edges of neighbouring patches that nearly touch are sewn (seams.py); a piece is chosen; faces are turned alike; slivers are
+collapsed or flipped; of a closed skin the upper or lower face is taken (sides.py); and a vertex at which the edge meets itself
+is parted.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ _PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move int
 
 
 def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | None = None) -> Draft:
-    """The draft as one connected skin with an edge, faces turned alike. Raises InputError for what can't be mended and lacks a choice."""
+    """The draft as one connected skin with an edge, faces turned alike. Raises InputError for what can't be mended and lacks a
+    choice.
+    """
     extent = np.ptp(draft.points, axis=0) if len(draft.points) else np.zeros(3)
     size = float(extent.max())
     if not size > 0.0:
@@ -115,7 +118,9 @@ def _without_points(draft: Draft) -> Draft:
     a, b, c = draft.triangles.T
     whole = (a != b) & (b != c) & (c != a)
     if not whole.all():
-        draft = noted(replace(draft, triangles=draft.triangles[whole]), f"{int((~whole).sum())} faces without area were dropped")
+        draft = noted(
+            replace(draft, triangles=draft.triangles[whole]), f"{int((~whole).sum())} faces without area were dropped"
+        )
     return without_unused(draft)[0]
 
 
@@ -142,11 +147,15 @@ def _pieces(triangles: Indices) -> tuple[int, Indices]:
 def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
     count, label = _pieces(draft.triangles)
     if piece is not None and not 1 <= piece <= count:
-        raise InputError(f"{where} has no such piece", where="surface.piece", value=piece, remedy=f"There are {count}, 1 the largest.")
+        raise InputError(
+            f"{where} has no such piece", where="surface.piece", value=piece, remedy=f"There are {count}, 1 the largest."
+        )
     if count == 1:
         return draft
     corner = draft.points[draft.triangles]
-    area = np.bincount(label, 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1))
+    area = np.bincount(
+        label, 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    )
     order = np.argsort(-area, kind="stable")
     if piece is None:
         told = ", ".join(f"{area[k]:.3g}" for k in order[:_PIECES_TOLD]) + (" …" if count > _PIECES_TOLD else "")
@@ -185,10 +194,7 @@ def _parted(draft: Draft, size: float) -> Draft:
     one, other = order[:-1][both], order[1:][both]
     straight = edges[one, 0] == edges[other, 0]
     links = np.vstack(
-        [
-            np.column_stack([ends[one, k], np.where(straight, ends[other, k], ends[other, 1 - k])])
-            for k in range(2)
-        ]
+        [np.column_stack([ends[one, k], np.where(straight, ends[other, k], ends[other, 1 - k])]) for k in range(2)]
     )
     graph = sp.csr_array((np.ones(len(links)), links.T), shape=(3 * count, 3 * count))
     fans, fan = connected_components(graph, directed=False)

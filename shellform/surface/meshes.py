@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import meshio
 import numpy as np
 
 from shellform.errors import InputError
 from shellform.surface.draft import Choice, Draft, Part, joined
-from shellform.surface.target import Surface
+
+if TYPE_CHECKING:  # which loads numba, and the reader's process does without
+    from shellform.surface.target import Surface
 
 _WRITTEN = {".stl": "stl", ".obj": "obj", ".ply": "ply", ".off": "off", ".vtk": "vtk", ".vtu": "vtu", ".msh": "gmsh"}
 _CORNERS = {"triangle6": 3, "triangle7": 3, "quad8": 4, "quad9": 4}  # of curved elements, which come first

@@ -92,9 +92,7 @@ def extent() -> Reals:
     return np.asarray(np.ptp(np.vstack(ends), axis=0))
 
 
-def mesh_faces(
-    size: float, where: Path, side: str | None = None, up: str = "z"
-) -> tuple[Reals, Indices, Reals | None]:
+def mesh_faces(size: float, where: Path, side: str | None = None, up: str = "z") -> tuple[Reals, Indices, Reals | None]:
     """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's faces.
 
     Of a solid, only the triangles of its upper or lower `side`.

@@ -17,7 +17,8 @@ distance of a point from its foot has a continuous gradient, the normal.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from shellform.compiled import njit
 
 # Exponents of u, v, w and binomial factors of the twelve control points on the boundary, from corner 0 round to it again.
 _RIM = np.array(

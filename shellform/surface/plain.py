@@ -36,10 +36,7 @@ def read_obj(file: Path, choice: Choice) -> Draft:
         except (ValueError, IndexError) as error:
             raise _bad_line(file, number, line) from error
     place = np.array(points, dtype=float).reshape(-1, 3)
-    parts = [
-        Part(called, layer, place, _blocks(blocks))
-        for (layer, called), blocks in groups.items()
-    ]
+    parts = [Part(called, layer, place, _blocks(blocks)) for (layer, called), blocks in groups.items()]
     return joined(parts, choice, str(file))
 
 

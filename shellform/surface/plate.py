@@ -1,8 +1,8 @@
 """Heights of least bending over a plan, by Morley's triangle (Morley 1968).
 
-The heights w minimise the integral of |D²w|² over the plan, with w given at some vertices and the slope across some edges. Morley's
-element has the heights at the vertices and the slopes θ across the edges as unknowns, and constant second derivatives, which by Gauss'
-theorem are the sum over the triangle's edges e of length l, outward normal n and tangent t
+The heights w minimise the integral of |D²w|² over the plan, with w given at some vertices and the slope across some edges.
+Morley's element has the heights at the vertices and the slopes θ across the edges as unknowns, and constant second derivatives,
+which by Gauss' theorem are the sum over the triangle's edges e of length l, outward normal n and tangent t
 
     D²w = Σ l (θ n + (w_b - w_a)/l t) ⊗ n / A
 
@@ -18,13 +18,11 @@ from scipy.sparse.linalg import spsolve
 from shellform.arrays import Indices, Reals
 
 
-def bent_heights(
-    plan: Reals, triangles: Indices, heights: Reals, edges: Indices, slopes: Reals
-) -> tuple[Reals, Reals]:
+def bent_heights(plan: Reals, triangles: Indices, heights: Reals, edges: Indices, slopes: Reals) -> tuple[Reals, Reals]:
     """Heights (v,), m, and their slopes (v, 2) over the vertices of a `plan` (v, 2), m, triangles (t, 3) turned counterclockwise.
 
-    `heights` (v,) are those given, NaN where free; `slopes` (e,) are those along the right-hand normals of directed `edges` (e, 2)
-    of the boundary, which pass it with the plan on their left; elsewhere the boundary may turn.
+    `heights` (v,) are those given, NaN where free; `slopes` (e,) are those along the right-hand normals of directed `edges` (e,
+    2) of the boundary, which pass it with the plan on their left; elsewhere the boundary may turn.
     """
     count = len(plan)
     directed = np.vstack([triangles[:, [1, 2]], triangles[:, [2, 0]], triangles[:, [0, 1]]])
@@ -34,7 +32,9 @@ def bent_heights(
     length = np.linalg.norm(along, axis=1)
     tangent = along / length[:, None]
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0]])
-    sense = np.where(directed[:, 0] == pairs[number, 0], 1.0, -1.0)  # θ of an edge is along the normal of its sorted direction
+    sense = np.where(
+        directed[:, 0] == pairs[number, 0], 1.0, -1.0
+    )  # θ of an edge is along the normal of its sorted direction
     first, second = plan[triangles[:, 1]] - plan[triangles[:, 0]], plan[triangles[:, 2]] - plan[triangles[:, 0]]
     area = 0.5 * (first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
     owner = np.tile(np.arange(len(triangles)), 3)

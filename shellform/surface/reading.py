@@ -1,7 +1,8 @@
-"""Any surface file to a Surface: the reader chosen by the file's ending and its content, then mended, one piece, one side, closed.
+"""Any surface file to a Surface: the reader chosen by the file's ending and its content, then mended, one piece, one side,
+closed.
 
-A file's first bytes say what it is in all formats but BREP's and OBJ's, whose lines do. Where ending and content disagree the file is
-refused; where the ending is unknown, the content decides.
+A file's first bytes say what it is in all formats but BREP's and OBJ's, whose lines do. Where ending and content disagree the
+file is refused; where the ending is unknown, the content decides.
 """
 
 from __future__ import annotations
@@ -30,7 +31,13 @@ FORMATS = {
 }  # fmt: skip
 MOST_BYTES = 512 * 1024**2
 _HEAD = 65536
-_OWN = {"obj": plain.read_obj, "off": plain.read_off, "stl": plain.read_stl, "gltf": gltf.read_gltf, "compas": compas.read_compas}
+_OWN = {
+    "obj": plain.read_obj,
+    "off": plain.read_off,
+    "stl": plain.read_stl,
+    "gltf": gltf.read_gltf,
+    "compas": compas.read_compas,
+}
 _OTHERS = {  # the first bytes of what people also send
     b"PK\x03\x04": "a zip archive (3MF, IFCZIP and others)",
     b"\x1f\x8b": "compressed with gzip",
@@ -56,10 +63,11 @@ def read_surface(
 ) -> Surface:
     """The surface in a file, in metres, z up.
 
-    `unit` of files that state none ("m" if left out); `up`, the file's vertical axis, "y" or "z" (left out: the format's); `size`, m, of
-    the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a closed solid its "upper" or "lower" `face`; of several
-    separate pieces the `piece` with that number, 1 being the largest; `fill` "holes", "edges" or "all" closes openings (fill.py), edges
-    down to the `ground`, m (left out: the edge's lowest point). `mended` of the result tells what was done. Raises InputError.
+    `unit` of files that state none ("m" if left out); `up`, the file's vertical axis, "y" or "z" (left out: the format's);
+    `size`, m, of the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a closed solid its "upper" or "lower"
+    `face`; of several separate pieces the `piece` with that number, 1 being the largest; `fill` "holes", "edges" or "all"
+    closes openings (fill.py), edges down to the `ground`, m (left out: the edge's lowest point). `mended` of the result tells
+    what was done. Raises InputError.
     """
     file = Path(path)
     kind = kind_of(file)

@@ -1,8 +1,9 @@
 """Rhino's 3DM files; the door to rhino3dm.
 
-The unit is the file's. Meshes are taken as they are; NURBS surfaces, extrusions and the trimmed faces of breps are rebuilt in gmsh's
-OpenCASCADE from their control points and edges, and meshed there with exact normals; SubDs are subdivided. Blocks are placed by their
-instances. Hidden objects and layers count, since what is hidden on one screen is the surface on another: choose by layer or name.
+The unit is the file's. Meshes are taken as they are; NURBS surfaces, extrusions and the trimmed faces of breps are rebuilt in
+gmsh's OpenCASCADE from their control points and edges, and meshed there with exact normals; SubDs are subdivided. Blocks are
+placed by their instances. Hidden objects and layers count, since what is hidden on one screen is the surface on another: choose
+by layer or name.
 
 rhino3dm leaves out each knot vector's first and last knot, which no curve depends on, and its control points are homogeneous.
 """
@@ -44,8 +45,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Patch:
-    """A NURBS surface: `control` (m, n, 3), m, `weights` (m, n), `knots` along u and v, `degree` along u and v; it is trimmed by `loops` of
-    curves, the outer one first, or whole where there are none."""
+    """A NURBS surface: `control` (m, n, 3), m, `weights` (m, n), `knots` along u and v, `degree` along u and v; it is trimmed
+    by `loops` of curves, the outer one first, or whole where there are none.
+    """
 
     control: Reals
     weights: Reals
@@ -54,22 +56,24 @@ class Patch:
     loops: tuple[tuple[Curve, ...], ...] = ()
 
 
-def read_rhino(
-    file: Path, choice: Choice, *, unit: str | None, size: float | None, up: str, face: str | None
-) -> Draft:
+def read_rhino(file: Path, choice: Choice, *, unit: str | None, size: float | None, up: str, face: str | None) -> Draft:
     """The surfaces and meshes of a 3DM file that `choice` means, in m.
 
-    Surfaces are meshed at about `size`, m, as `cad.read_cad` does. Raises InputError for what can't be read, for a stated `unit` where
-    the file has its own, and where no object is a surface.
+    Surfaces are meshed at about `size`, m, as `cad.read_cad` does. Raises InputError for what can't be read, for a stated
+    `unit` where the file has its own, and where no object is a surface.
     """
     model = rhino3dm.File3dm.Read(str(file))
     if model is None:
-        raise InputError("can't be read as a Rhino file", where=str(file), remedy="Save it anew in Rhino, as version 5 or later.")
+        raise InputError(
+            "can't be read as a Rhino file", where=str(file), remedy="Save it anew in Rhino, as version 5 or later."
+        )
     factor = _factor(model, unit, file)
     found = _numbered([each for each in _objects(model) if _is_surface(each[2])])
     if not found:
         said = ", ".join(sorted({str(each.Geometry.ObjectType).rpartition(".")[2] for each in model.Objects})) or "nothing"
-        raise InputError(f"holds no surface, only {said}", where=str(file), remedy="Save the surface, or a mesh of it, with it.")
+        raise InputError(
+            f"holds no surface, only {said}", where=str(file), remedy="Save the surface, or a mesh of it, with it."
+        )
     kept = among([(layer, name) for layer, name, _ in found], choice, str(file))
     chosen = [each for each, meant in zip(found, kept, strict=True) if meant]
     parts, patches = [], []
@@ -81,7 +85,9 @@ def read_rhino(
     if parts and patches:
         told = ", ".join(f"{name!r} on layer {layer!r}" for layer, name, _ in chosen[:6])
         raise InputError(
-            f"holds both meshes and surfaces: {told}", where=str(file), remedy="Choose by surface.object or surface.layer (--object, --layer)."
+            f"holds both meshes and surfaces: {told}",
+            where=str(file),
+            remedy="Choose by surface.object or surface.layer (--object, --layer).",
         )
     if parts:
         return replace(joined(parts, Choice(), str(file)), metres=1.0, up=up)
@@ -124,7 +130,9 @@ def _objects(model: Any) -> Iterator[tuple[str, str, Any]]:
             yield from _placed(each, [], members, blocks, layers)
 
 
-def _placed(each: Any, places: list[Any], members: dict[str, Any], blocks: dict[str, list[str]], layers: dict[int, str]) -> Iterator[Any]:
+def _placed(
+    each: Any, places: list[Any], members: dict[str, Any], blocks: dict[str, list[str]], layers: dict[int, str]
+) -> Iterator[Any]:
     shape = each.Geometry
     if isinstance(shape, rhino3dm.InstanceReference) and len(places) < _DEEPEST:
         for member in blocks.get(str(shape.ParentIdefId), []):
@@ -147,7 +155,9 @@ def _mesh(shape: Any, layer: str, name: str, factor: float) -> Part:
         shape = shape.Duplicate()
         shape.Subdivide(_SUBDIVISIONS)
         shape = rhino3dm.Mesh.CreateFromSubDControlNet(shape, False)
-    points = np.array([(p.X, p.Y, p.Z) for p in (shape.Vertices.Point3dAt(k) for k in range(len(shape.Vertices)))], dtype=float)
+    points = np.array(
+        [(p.X, p.Y, p.Z) for p in (shape.Vertices.Point3dAt(k) for k in range(len(shape.Vertices)))], dtype=float
+    )
     faces = np.array([shape.Faces[k] for k in range(shape.Faces.Count)], dtype=np.int64).reshape(-1, 4)
     triangle = faces[:, 2] == faces[:, 3]
     return Part(name, layer, factor * points.reshape(-1, 3), (faces[triangle, :3], faces[~triangle]))
@@ -163,7 +173,9 @@ def _patches(shape: Any, factor: float, file: Path) -> Iterator[Patch]:
         face = shape.Faces[number]
         surface = face.UnderlyingSurface()
         if surface is None:
-            raise InputError(f"its face {number + 1} has no surface", where=str(file), remedy="Check it in Rhino (SelBadObjects).")
+            raise InputError(
+                f"its face {number + 1} has no surface", where=str(file), remedy="Check it in Rhino (SelBadObjects)."
+            )
         loops = [(loop.LoopType, _edges(shape, loop)) for loop in (face.Loops[k] for k in range(len(face.Loops)))]
         if len(loops) == 1 and _along_edge(surface, loops[0][1]):
             yield _patch(surface, (), factor)
@@ -181,7 +193,9 @@ def _edges(brep: Any, loop: Any) -> list[Any]:
 def _curve(edge: Any, factor: float) -> Curve:
     nurbs = edge.ToNurbsCurve()
     points = np.array([(p.X, p.Y, p.Z, p.W) for p in (nurbs.Points[k] for k in range(len(nurbs.Points)))])
-    return Curve(factor * points[:, :3] / points[:, 3:], points[:, 3], _full([k for k in nurbs.Knots], nurbs.Degree), nurbs.Degree)
+    return Curve(
+        factor * points[:, :3] / points[:, 3:], points[:, 3], _full([k for k in nurbs.Knots], nurbs.Degree), nurbs.Degree
+    )
 
 
 def _patch(surface: Any, loops: Sequence[tuple[Curve, ...]], factor: float) -> Patch:
@@ -205,7 +219,9 @@ def _along_edge(surface: Any, edges: Sequence[Any]) -> bool:
     """Whether a trimming loop runs along the untrimmed surface's own edge."""
     (u0, u1), (v0, v1) = ((d.T0, d.T1) for d in (surface.Domain(0), surface.Domain(1)))
     t = np.linspace(0.0, 1.0, _SAMPLES)
-    sides = [[(u0 + (u1 - u0) * s, v) for s in t] for v in (v0, v1)] + [[(u, v0 + (v1 - v0) * s) for s in t] for u in (u0, u1)]
+    sides = [[(u0 + (u1 - u0) * s, v) for s in t] for v in (v0, v1)] + [
+        [(u, v0 + (v1 - v0) * s) for s in t] for u in (u0, u1)
+    ]
     rim = np.array([[(p.X, p.Y, p.Z) for p in (surface.PointAt(u, v) for u, v in side)] for side in sides])
     begin, along = rim[:, :-1].reshape(-1, 3), np.diff(rim, axis=1).reshape(-1, 3)
     for edge in edges:

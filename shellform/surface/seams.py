@@ -1,11 +1,11 @@
 """Seams between patches, and slivers.
 
-Sewing: the edges of two patches that run along each other are joined where they are nearer than a tenth of their mean edge length and
-a thousandth of the size. Vertices that face each other become one in the middle; a vertex that faces the inside of an edge
-(a T-junction) is taken into it, by cutting the triangle there.
+Sewing: the edges of two patches that run along each other are joined where they are nearer than a tenth of their mean edge
+length and a thousandth of the size. Vertices that face each other become one in the middle; a vertex that faces the inside of
+an edge (a T-junction) is taken into it, by cutting the triangle there.
 
-Slivers, triangles a hundred times as long as high, have no usable normal: one with a short side loses it, one without gives its long
-side to its neighbour, or goes where that lies on the edge.
+Slivers, triangles a hundred times as long as high, have no usable normal: one with a short side loses it, one without gives its
+long side to its neighbour, or goes where that lies on the edge.
 """
 
 from __future__ import annotations
@@ -88,7 +88,9 @@ def _edges_cut(draft: Draft, reach: float) -> tuple[Draft, int, float]:
     begin, along = draft.points[rim[:, 0]], draft.points[rim[:, 1]] - draft.points[rim[:, 0]]
     length = np.linalg.norm(along, axis=1)
     near = cKDTree(draft.points[border]).query_ball_point(begin + 0.5 * along, 0.5 * length + reach)
-    owner = {(int(a), int(b)): t for t, face in enumerate(draft.triangles.tolist()) for a, b in zip(face, face[1:] + face[:1], strict=True)} if any(len(each) > 2 for each in near) else {}
+    if not any(len(each) > 2 for each in near):
+        return draft, 0, 0.0
+    owner = {(a, b): t for t, (i, j, k) in enumerate(draft.triangles.tolist()) for a, b in ((i, j), (j, k), (k, i))}
     cuts: dict[int, tuple[int, int, list[tuple[float, int]]]] = {}
     moved, count = 0.0, 0
     for k, candidates in enumerate(near):
@@ -128,7 +130,8 @@ def without_slivers(draft: Draft) -> Draft:
         collapsed, flipped, dropped = collapsed + counts[0], flipped + counts[1], dropped + counts[2]
         if not any(counts):
             break
-    told = [f"{collapsed} collapsed"] * bool(collapsed) + [f"{flipped} flipped"] * bool(flipped) + [f"{dropped} dropped at the edge"] * bool(dropped)
+    done = [(collapsed, "collapsed"), (flipped, "flipped"), (dropped, "dropped at the edge")]
+    told = [f"{count} {what}" for count, what in done if count]
     return replace(draft, notes=(*draft.notes, f"slivers: {', '.join(told)}")) if told else draft
 
 

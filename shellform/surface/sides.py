@@ -42,13 +42,17 @@ def side_of(points: Reals, triangles: Indices, face: str, where: str) -> Flags:
     pointing = float(size[kept & (up * area[:, 2] > 0.0)].sum())
     if best <= 0.0 or kept.all() or pointing < _BOTH * float(size[kept].sum()):
         raise InputError(
-            f"its {face} face isn't set off from the rest by an edge", where=where, remedy=f"Export the {face} face alone, as a surface."
+            f"its {face} face isn't set off from the rest by an edge",
+            where=where,
+            remedy=f"Export the {face} face alone, as a surface.",
         )
     return kept
 
 
 def shared_edges(triangles: Indices) -> tuple[Indices, Indices, Flags]:
-    """The triangles on the two sides of each edge that two share, (e,) and (e,), and whether both pass it in the same direction (e,)."""
+    """The triangles on the two sides of each edge that two share, (e,) and (e,), and whether both pass it in the same direction
+    (e,).
+    """
     edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     owner = np.tile(np.arange(len(triangles)), 3)
     low, high = edges.min(axis=1), edges.max(axis=1)

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Indices, Reals, indices, reals
+from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.surface.jets import jets
 

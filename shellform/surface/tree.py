@@ -9,9 +9,9 @@ with the lowest number counts, whatever the order of the queries.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
 
 from shellform.arrays import Indices, Reals
+from shellform.compiled import njit, prange
 
 _LEAF = 4  # triangles in a leaf
 FEW = 1000  # queries, which are sooner answered than divided among processors

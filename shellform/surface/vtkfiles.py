@@ -30,7 +30,9 @@ def read_vtk(file: Path, choice: Choice, kind: str) -> Draft:
     reader.Update()
     data = reader.GetOutput()
     if said or data is None or reader.GetErrorCode():
-        raise InputError(f"can't be read as {kind.upper()}", where=str(file), remedy="Check that it is whole, or write it anew.")
+        raise InputError(
+            f"can't be read as {kind.upper()}", where=str(file), remedy="Check that it is whole, or write it anew."
+        )
     if not hasattr(data, "GetPoints") or data.GetPoints() is None:
         raise InputError("holds no points", where=str(file), remedy="Export the surface as triangles or polygons.")
     from vtkmodules.util.numpy_support import vtk_to_numpy

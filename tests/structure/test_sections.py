@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
+from shellform.structure import sparse
 from shellform.structure.beam import make_beams
 from shellform.structure.cable import make_cables
 from shellform.structure.equilibrium import find_equilibrium
@@ -31,6 +32,7 @@ from shellform.structure.sensitivity import (
     gradients,
     predicted,
     respond,
+    state_by_design,
     stiffness_rate,
     stress_rows,
     tension_rows,
@@ -272,3 +274,16 @@ def test_stress_and_utilisation_follow_the_section_of_each_kind():
     used = utilisation(network.beams, forces, {"rod": section})
     assert used[0] == pytest.approx(found[0].max() / 255e6)
     assert np.isnan(used[4])
+
+
+@pytest.mark.parametrize("solver", sparse.installed())
+def test_tensions_by_rest_lengths_through_the_freedoms_they_touch_are_those_of_the_whole_solution(solver, monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", solver)
+    network, load, _ = frame()
+    state, assembly = solved(network, load), assemble(network)
+    response = respond(assembly, state, by_rest_length(assembly, state, network.cables))
+    picked = tension_rows(assembly, state, network.cables)
+    whole = picked @ state_by_design(response)
+    for _ in range(2):  # the second time with the same freedoms
+        np.testing.assert_allclose(direct(response, picked), whole, rtol=1e-9, atol=1e-10 * np.abs(whole).max())
+    np.testing.assert_allclose(direct(response, picked.toarray()), whole, rtol=1e-12)

@@ -140,3 +140,38 @@ def test_what_nothing_restrains_is_refused_by_name():
     fixed = np.vstack([network.fixed, np.zeros((1, 6), dtype=bool)])
     with pytest.raises(InputError, match=r"nodes\[3\].*no element"):
         assemble(Network(lonely, network.beams, network.cables, fixed, np.zeros((4, 6))))
+
+
+@pytest.mark.parametrize("library", [True, False])
+def test_a_thin_factor_solves_as_the_whole_matrix_does_and_refuses_what_is_not_definite(library, monkeypatch):
+    if not library:
+        monkeypatch.setattr(sparse, "cholmod", None)
+    count = 40
+    rng = np.random.default_rng(1)
+    chain = sp.diags_array([np.full(count, 2.1), -np.ones(count - 1)], offsets=[0, -1], shape=(count, count)).tolil()
+    chain[30, 3] = -0.05
+    lower = sp.csc_array(chain)
+    lower.sort_indices()
+    symmetric = sparse.Symmetric(lower.indptr.astype(np.int64), lower.indices.astype(np.int64))
+    factor = symmetric.factor_thin(lower.data)
+    right = rng.normal(size=(count, 3))
+    symmetric.factor_thin(2.0 * lower.data)  # the first one still serves
+    assert np.allclose(symmetric.full(lower.data) @ factor.solve(right), right, atol=1e-12)
+    assert np.allclose(factor.solve(right[:, 0]), factor.solve(right)[:, 0], atol=1e-14)
+    with pytest.raises(sparse.NotPositiveDefinite):
+        symmetric.factor_thin(np.where(lower.data > 1.0, 0.5, lower.data))
+
+
+@pytest.mark.skipif("mkl" not in sparse.installed(), reason="only PARDISO condenses")
+def test_what_is_solved_on_kept_freedoms_is_the_whole_solution_there_and_needs_a_definite_matrix(monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", "mkl")
+    symmetric, values = family(random_matrix(30.0))
+    kept = np.array([2, 5, 11])
+    right = np.zeros((symmetric.size, 2))
+    right[kept] = [[1.0, 0.0], [0.0, 2.0], [-1.0, 1.0]]
+    whole = symmetric.factor(values)
+    found = symmetric.solve_kept(values, kept, right[kept])
+    assert np.allclose(found, whole.solve(right)[kept], rtol=1e-10)  # the factor still serves
+    for broken in (-values, np.where(np.arange(len(values)) == symmetric.diagonal[5], -1e6, values)):  # among the others, and on the kept
+        with pytest.raises(sparse.NotPositiveDefinite):
+            symmetric.solve_kept(broken, kept, right[kept])

@@ -161,12 +161,12 @@ def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
 
 def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
     run = tmp_path / "run"
-    arguments = ["design", "scripts/scale_model.toml", "--output", run, "--set", "optimise.evaluations=5"]
+    arguments = ["design", "scripts/scale_model.toml", "--output", run, "--set", "optimise.evaluations=5", "--set", "optimise.polish=3"]
     result = shellform(*arguments)
     assert result.returncode == 0, result.stderr
     summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
     designs = summary["designs"]
-    assert set(designs) == {"unbraced", "initial", "unloaded", "optimised"}
+    assert set(designs) == {"unbraced", "initial", "unloaded", "optimised", "polished"}
     assert summary["optimisation"]["objective_end"] < 0.5
     assert max(summary["optimisation"]["constraints"].values()) <= 1e-3
     optimised = designs["optimised"]["loads"]

@@ -1,4 +1,6 @@
-"""Files as designers bring them, written by other programs and libraries than shellform: in mm, cm, feet and m, y up and z up, clean and dirty."""
+"""Files as designers bring them, written by other programs and libraries than shellform: in mm, cm, feet and m, y up and z up,
+clean and dirty.
+"""
 
 import json
 from collections.abc import Callable
@@ -59,7 +61,11 @@ def nurbs_in_centimetres(folder):
     rise = np.array([0.0, 0.8, 1.0, 0.8, 0.0])
     for i in range(5):
         for j in range(5):
-            place = (300.0 * (i - 2) + 20.0 * (j - 2), 250.0 * (j - 2), 400.0 * (0.5 * rise[i] + 0.5 * rise[j] - 0.15 * (i == 4)))
+            place = (
+                300.0 * (i - 2) + 20.0 * (j - 2),
+                250.0 * (j - 2),
+                400.0 * (0.5 * rise[i] + 0.5 * rise[j] - 0.15 * (i == 4)),
+            )
             surface.Points[i, j] = rhino3dm.Point4d(*place, 1.0)
     for knots in (surface.KnotsU, surface.KnotsV):
         for k, value in enumerate((0.0, 0.0, 0.0, 0.5, 1.0, 1.0, 1.0)):
@@ -152,6 +158,7 @@ def off_in_millimetres(folder):
 
 def two_patches_obj(folder):
     """Two patches of one paraboloid in centimetres, meshed apart, with a gap of half a millimetre and T-junctions."""
+
     def patch(x0, x1, columns, rows):
         x, y = np.meshgrid(np.linspace(x0, x1, columns + 1), np.linspace(-300, 300, rows + 1), indexing="ij")
         points = np.column_stack([x.ravel(), y.ravel(), 200 - (x.ravel() / 40) ** 2 - (y.ravel() / 30) ** 2])

@@ -1,4 +1,6 @@
-"""One shell, a saddle-free cap over an oblong plan, as meshes for tests, and files of it written in other ways than shellform's own."""
+"""One shell, a saddle-free cap over an oblong plan, as meshes for tests, and files of it written in other ways than shellform's
+own.
+"""
 
 import base64
 import json
@@ -25,13 +27,19 @@ def y_up(points):
 
 
 def write_obj(file, points, faces, head=""):
-    lines = [head, *(f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()), *("f " + " ".join(str(k + 1) for k in face) for face in faces.tolist())]
+    lines = [
+        head,
+        *(f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()),
+        *("f " + " ".join(str(k + 1) for k in face) for face in faces.tolist()),
+    ]
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return file
 
 
 def write_off(file, points, faces):
-    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in points.tolist()] + [f"{len(f)} " + " ".join(map(str, f)) for f in faces.tolist()]
+    rows = [f"{x!r} {y!r} {z!r}" for x, y, z in points.tolist()] + [
+        f"{len(f)} " + " ".join(map(str, f)) for f in faces.tolist()
+    ]
     file.write_text("\n".join(["OFF", f"# a comment\n{len(points)} {len(faces)} 0", *rows]) + "\n", encoding="utf-8")
     return file
 
@@ -39,7 +47,12 @@ def write_off(file, points, faces):
 def write_stl(file, points, triangles, text=False):
     corner = points[triangles]
     if text:
-        facets = ["facet normal 0 0 1\nouter loop\n" + "\n".join(f"vertex {a!r} {b!r} {c!r}" for a, b, c in t.tolist()) + "\nendloop\nendfacet" for t in corner]
+        facets = [
+            "facet normal 0 0 1\nouter loop\n"
+            + "\n".join(f"vertex {a!r} {b!r} {c!r}" for a, b, c in t.tolist())
+            + "\nendloop\nendfacet"
+            for t in corner
+        ]
         file.write_text("solid shell\n" + "\n".join(facets) + "\nendsolid shell\n", encoding="utf-8")
         return file
     facets = np.zeros(len(triangles), np.dtype([("n", "<f4", 3), ("c", "<f4", (3, 3)), ("x", "<u2")]))
@@ -55,7 +68,10 @@ def write_gltf(file, points, triangles, translation=(0.0, 0.0, 0.0)):
         "asset": {"version": "2.0"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
-        "nodes": [{"name": "root", "children": [1], "rotation": [0, 2**-0.5, 0, 2**-0.5]}, {"name": "shell", "mesh": 0, "translation": list(translation)}],
+        "nodes": [
+            {"name": "root", "children": [1], "rotation": [0, 2**-0.5, 0, 2**-0.5]},
+            {"name": "shell", "mesh": 0, "translation": list(translation)},
+        ],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
         "accessors": [
             {"bufferView": 0, "componentType": 5126, "count": len(points), "type": "VEC3"},

@@ -1,4 +1,6 @@
-"""What no shell can be read from is refused with a message that says what is wrong and what to do; foreign readers can't take us down."""
+"""What no shell can be read from is refused with a message that says what is wrong and what to do; foreign readers can't take
+us down.
+"""
 
 import json
 import os
@@ -238,7 +240,11 @@ def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(tmp_
         foreign.read_foreign(file, "ply", SETTINGS, longest=2.0)
     for word in [str(file), *words]:
         assert word in str(caught.value)
-    assert "Open it in the program" in caught.value.remedy or "Check that" in caught.value.remedy or "coarser" in caught.value.remedy
+    assert (
+        "Open it in the program" in caught.value.remedy
+        or "Check that" in caught.value.remedy
+        or "coarser" in caught.value.remedy
+    )
 
 
 def test_a_refusal_in_the_reader_s_process_comes_back_whole():
@@ -249,6 +255,10 @@ def test_a_refusal_in_the_reader_s_process_comes_back_whole():
 
 def test_wrong_settings_are_refused_before_the_file_is_read(tmp_path):
     file = write_obj(tmp_path / "a.obj", POINTS, QUADS)
-    for choice, word in [({"unit": "furlong"}, "surface.unit"), ({"up": "x"}, "surface.up"), ({"fill": "some"}, "surface.fill")]:
+    for choice, word in [
+        ({"unit": "furlong"}, "surface.unit"),
+        ({"up": "x"}, "surface.up"),
+        ({"fill": "some"}, "surface.fill"),
+    ]:
         with pytest.raises(InputError, match=word.replace(".", r"\.")):
             read_surface(file, **choice)

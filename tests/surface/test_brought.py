@@ -1,4 +1,6 @@
-"""Files as designers bring them go to a net unattended, by the functions of the command line; what they must say of themselves they say."""
+"""Files as designers bring them go to a net unattended, by the functions of the command line; what they must say of themselves
+they say.
+"""
 
 import json
 

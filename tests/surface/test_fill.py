@@ -76,7 +76,10 @@ def pierced(step, centre=(0.5, 0.3), radius=0.5):
     """A cap of the sphere of radius 3 with a round hole."""
     turn = np.linspace(0, 2 * np.pi, round(2 * np.pi * 2 / step), endpoint=False)
     hole = np.linspace(0, 2 * np.pi, max(8, round(2 * np.pi * radius / step)), endpoint=False)
-    outlines = [2 * np.column_stack([np.cos(turn), np.sin(turn)]), np.array(centre) + radius * np.column_stack([np.cos(hole), np.sin(hole)])]
+    outlines = [
+        2 * np.column_stack([np.cos(turn), np.sin(turn)]),
+        np.array(centre) + radius * np.column_stack([np.cos(hole), np.sin(hole)]),
+    ]
     inside, faces = cad.mesh_plan(outlines, size=step)
     plan = np.vstack([*outlines, inside])
     return Draft(np.column_stack([plan, np.sqrt(9 - (plan**2).sum(axis=1))]), faces)
@@ -98,7 +101,11 @@ def folds(draft, closed):
     corner = closed.points[closed.triangles]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    own = {tuple(sorted(edge)): t for t, face in enumerate(draft.triangles.tolist()) for edge in zip(face, [*face[1:], face[0]], strict=True)}
+    own = {
+        tuple(sorted(edge)): t
+        for t, face in enumerate(draft.triangles.tolist())
+        for edge in zip(face, [*face[1:], face[0]], strict=True)
+    }
     worst = 0.0
     for t, face in enumerate(closed.triangles.tolist()[len(draft.triangles) :], len(draft.triangles)):
         for edge in zip(face, [*face[1:], face[0]], strict=True):

@@ -11,7 +11,7 @@ import pyvista
 import rhino3dm
 
 from shellform.errors import InputError
-from shellform.surface import cad
+from shellform.surface import cad, rhino
 from shellform.surface.meshes import write_mesh
 from shellform.surface.reading import read_surface
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
@@ -100,7 +100,10 @@ def test_a_gltf_buffer_may_stand_beside_the_file(tmp_path):
 
 def test_compas_meshes_of_both_versions_are_read(tmp_path):
     new = compas_mesh(POINTS, QUADS)
-    old = {"datatype": "compas.datastructures.Mesh", "value": {**new["data"], "dva": new["data"]["default_vertex_attributes"]}}
+    old = {
+        "datatype": "compas.datastructures.Mesh",
+        "value": {**new["data"], "dva": new["data"]["default_vertex_attributes"]},
+    }
     del old["value"]["default_vertex_attributes"], old["value"]["facedata"], old["value"]["default_face_attributes"]
     for name, tree in [("new.json", new), ("old.json", old), ("bare.json", new["data"])]:
         (tmp_path / name).write_text(json.dumps(tree))
@@ -226,7 +229,9 @@ def test_rhino_s_nurbs_surfaces_keep_their_exact_normals(tmp_path):
 
 def test_rhino_s_rational_surfaces_are_round(tmp_path):
     # The upper half of a sphere's revolution, a brep with poles, on a solid that asks for a face.
-    file = rhino_file(tmp_path / "a.3dm", [(rhino3dm.Extrusion.Create(half_circle(2.0), 5.0, False), "Shell", "barrel")], "Meters")
+    file = rhino_file(
+        tmp_path / "a.3dm", [(rhino3dm.Extrusion.Create(half_circle(2.0), 5.0, False), "Shell", "barrel")], "Meters"
+    )
     surface = read_surface(file, size=0.2)
     np.testing.assert_allclose(np.hypot(surface.vertices[:, 0], surface.vertices[:, 2]), 2.0, atol=1e-9)
     np.testing.assert_allclose(np.sort(surface.size), [2.0, 4.0, 5.0], atol=1e-2)
@@ -259,7 +264,11 @@ def test_rhino_s_patches_that_touch_are_one_surface(tmp_path):
 
 
 def test_layers_and_names_of_a_rhino_file_are_listed_to_choose_from(tmp_path):
-    shapes = [(nurbs_cap(), "Shell", "roof"), (rhino_mesh(POINTS + AWAY, QUADS), "Old", ""), (half_circle(1.0), "Shell", "edge")]
+    shapes = [
+        (nurbs_cap(), "Shell", "roof"),
+        (rhino_mesh(POINTS + AWAY, QUADS), "Old", ""),
+        (half_circle(1.0), "Shell", "edge"),
+    ]
     file = rhino_file(tmp_path / "a.3dm", shapes, "Meters")
     with pytest.raises(InputError, match="both meshes and surfaces: 'roof' on layer 'Shell', 'mesh 1' on layer 'Old'"):
         read_surface(file)
@@ -277,7 +286,9 @@ def test_a_rhino_file_of_curves_holds_no_surface(tmp_path):
 def test_rhino_s_blocks_stand_where_their_instances_are(tmp_path):
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
-    model.InstanceDefinitions.Add("roof", "", "", "", rhino3dm.Point3d(0, 0, 0), (rhino_mesh(POINTS, QUADS),), (rhino3dm.ObjectAttributes(),))
+    model.InstanceDefinitions.Add(
+        "roof", "", "", "", rhino3dm.Point3d(0, 0, 0), (rhino_mesh(POINTS, QUADS),), (rhino3dm.ObjectAttributes(),)
+    )
     block = model.InstanceDefinitions[0]
     model.Objects.AddInstanceObject(rhino3dm.InstanceReference(block.Id, rhino3dm.Transform.Translation(50.0, 0.0, 0.0)))
     model.Write(str(tmp_path / "a.3dm"), 7)
@@ -312,3 +323,34 @@ def test_a_surface_written_as_a_mesh_comes_back(tmp_path, ending):
         write_mesh(tmp_path / "dome.xyz", surface)
     with pytest.raises(InputError, match="can't be written"):
         write_mesh(tmp_path / f"none/dome.{ending}", surface)
+
+
+def ellipse_on_the_cap(share):
+    """Where the paraboloid of `nurbs_cap` is cut level, as a Rhino curve: the ellipse of half axes 3 and 2 times `share`."""
+    circle = rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 1.0).ToNurbsCurve()
+    circle.Transform(rhino3dm.Transform.Scale(rhino3dm.Plane.WorldXY(), 3.0 * share, 2.0 * share, 1.0))
+    circle.Translate(rhino3dm.Vector3d(0, 0, 1.5 * (1 - share**2 / 2)))
+    return circle
+
+
+def test_curved_patches_are_cut_at_their_trims_and_holes():
+    loops = [(rhino._curve(ellipse_on_the_cap(share), 1.0),) for share in (0.8, 0.3)]
+    patch = rhino._patch(nurbs_cap(), loops, 1.0)
+    draft = cad.mesh_patches([patch], size=0.1, up="z", face=None, where=Path("trimmed.3dm"))
+    x, y, z = draft.points.T
+    np.testing.assert_allclose(z, 1.5 * (1 - (x**2 / 9 + y**2 / 4) / 2), atol=1e-5)
+    level = np.sqrt(x**2 / 9 + y**2 / 4)
+    assert level.min() == pytest.approx(0.3, abs=1e-4)
+    assert level.max() == pytest.approx(0.8, abs=1e-4)
+
+
+def test_a_surface_of_revolution_closes_over_its_seam_and_pole(tmp_path):
+    quarter = rhino3dm.Arc(*[rhino3dm.Point3d(*p) for p in [(3, 0, 0), (3 * 0.5**0.5, 0, 3 * 0.5**0.5), (0, 0, 3)]])
+    axis = rhino3dm.Line(rhino3dm.Point3d(0, 0, 0), rhino3dm.Point3d(0, 0, 1))
+    turned = rhino3dm.RevSurface.Create(quarter.ToNurbsCurve(), axis, 0.0, 2 * np.pi)
+    brep = rhino3dm.Brep.CreateFromRevSurface(turned, False, False)
+    surface = read_surface(rhino_file(tmp_path / "a.3dm", [(brep, "Shell", "dome")], "Meters"), size=0.2)
+    assert len(surface.boundary) == 1
+    assert surface.area == pytest.approx(2 * np.pi * 9, rel=5e-3)
+    np.testing.assert_allclose(np.linalg.norm(surface.vertices, axis=1), 3.0, atol=1e-6)
+    np.testing.assert_allclose(surface.normals, surface.vertices / 3.0, atol=1e-3)

@@ -47,7 +47,9 @@ def test_loose_triangles_are_joined_even_where_their_corners_differ_in_the_last_
 
 
 def test_points_of_no_face_and_faces_given_twice_are_dropped():
-    surface = mended(np.vstack([POINTS, [[99.0, 0, 0]]]), np.vstack([TRIANGLES, TRIANGLES[:3, [1, 2, 0]], TRIANGLES[:2, ::-1]]))
+    surface = mended(
+        np.vstack([POINTS, [[99.0, 0, 0]]]), np.vstack([TRIANGLES, TRIANGLES[:3, [1, 2, 0]], TRIANGLES[:2, ::-1]])
+    )
     as_clean(surface)
     told(surface, "1 points of no face", "5 faces given twice")
 
@@ -70,7 +72,13 @@ def test_flipped_faces_are_turned_and_counted():
 def test_a_moebius_strip_has_one_side_only():
     turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     across = np.array([-0.3, 0.3])
-    points = np.array([[(2 + w * np.cos(t / 2)) * np.cos(t), (2 + w * np.cos(t / 2)) * np.sin(t), w * np.sin(t / 2)] for t in turn for w in across])
+    points = np.array(
+        [
+            [(2 + w * np.cos(t / 2)) * np.cos(t), (2 + w * np.cos(t / 2)) * np.sin(t), w * np.sin(t / 2)]
+            for t in turn
+            for w in across
+        ]
+    )
     at = 2 * np.arange(40)
     quads = np.column_stack([at, at + 1, (at + 3) % 80, (at + 2) % 80])
     quads[-1] = [78, 79, 0, 1]
@@ -191,12 +199,19 @@ def test_a_solid_gives_its_upper_or_lower_face_when_asked(inside_out):
 
 def test_a_ball_has_no_edge_that_sets_off_a_face():
     turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 24, endpoint=False), np.linspace(-1.3, 1.3, 13), indexing="ij")
-    rows = np.column_stack([(np.cos(height) * np.cos(turn)).ravel(), (np.cos(height) * np.sin(turn)).ravel(), np.sin(height).ravel()])
+    rows = np.column_stack(
+        [(np.cos(height) * np.cos(turn)).ravel(), (np.cos(height) * np.sin(turn)).ravel(), np.sin(height).ravel()]
+    )
     at = np.arange(24 * 13).reshape(24, 13)
     nxt = np.roll(at, -1, axis=0)
     quads = np.stack([at[:, :-1], nxt[:, :-1], nxt[:, 1:], at[:, 1:]], axis=-1).reshape(-1, 4)
     poles = np.vstack([rows, [[0, 0, -1], [0, 0, 1]]])
-    caps = np.vstack([np.column_stack([nxt[:, 0], at[:, 0], np.full(24, 312)]), np.column_stack([at[:, -1], nxt[:, -1], np.full(24, 313)])])
+    caps = np.vstack(
+        [
+            np.column_stack([nxt[:, 0], at[:, 0], np.full(24, 312)]),
+            np.column_stack([at[:, -1], nxt[:, -1], np.full(24, 313)]),
+        ]
+    )
     with pytest.raises(InputError, match="isn't set off"):
         mended(poles, np.vstack([split(quads), caps]), face="upper")
 

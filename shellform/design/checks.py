@@ -1,0 +1,195 @@
+"""What an engineer limits besides the paper's constraints: stress, the turning of connectors, slack cables, uplift.
+
+Each is the largest of many values, v_k at rod ends, connectors, cables or supports, which has no derivative where two change places. The
+Kreisselmeier-Steinhauser function
+
+    KS(v) = max v + ln(sum exp(q (v_k - max v))) / q
+
+is smooth, never below the largest and at most ln(number)/q above it, so that a limit on it keeps the limit on each; q is
+`SHARPNESS` over the quantity's unit. One value, so one adjoint solve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Reals
+from shellform.design.gridshell import Design, Gridshell
+from shellform.design.terms import Measure
+from shellform.errors import InputError
+from shellform.structure import residual
+from shellform.structure.network import assemble
+from shellform.structure.results import end_stress, end_stress_by_force, twist
+from shellform.structure.sections import stress_by_size
+from shellform.structure.sensitivity import reaction_rows
+from shellform.structure.softening import quadratic, stiffness_by_freedom, stiffness_by_rest_length
+from shellform.structure.stability import modes
+from shellform.structure.state import State
+
+SHARPNESS = 200.0  # per unit: 3000 rod ends that are all used to the full are told 4 % too high, and a single one not at all
+_MODES = 4
+_TURN = 0.1  # rad, the unit of turns
+
+
+@dataclass(frozen=True)
+class RodUtilisation:
+    """The largest fibre stress of the rods, for round ones |N|/A + |M| r/I, at any end, over their strength; erection stress is in it."""
+
+    load: str
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value. Raises InputError where the rods' strength isn't known."""
+        rod = shell.rod
+        if not np.isfinite(rod.strength):
+            raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
+        section = rod.resized(design.radius).section
+        beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
+        chosen = {beams.kinds[0]: section}
+        forces = beams.local_forces(state)
+        own = beams.kind == 0
+        values = end_stress(beams, forces, chosen)[own].ravel() / rod.strength
+        by_force = end_stress_by_force(beams, forces, chosen)[own] / rod.strength
+        rows = (by_force @ beams.local_forces_by_freedom(state)[own]).reshape(len(values), 12)
+        by_radius = (by_force @ rate.local_forces(state)[own][:, :, None])[:, :, 0]
+        for end in range(2):
+            at = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
+            by_radius[:, end] += np.array(section.sizes) / design.radius @ stress_by_size(section, *at) / rod.strength
+        return _largest(shell, 1.0, values, np.repeat(beams.freedoms()[own], 2, axis=0), rows, by_radius.ravel())
+
+
+@dataclass(frozen=True)
+class ConnectorTurn:
+    """The largest turning, rad, of two crossing rods against each other about their connector's axis, from the stress-free grid."""
+
+    load: str
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value, rad."""
+        beams = shell.beams(design.radius)
+        own = beams.kind == 1
+        turn = twist(beams.local_deformations(state))[own]
+        # Mx_a = GJ (theta_a - theta_b) / l0, so that its derivative is that of the twist but for a factor.
+        scale = (-beams.rest_length / beams.torsion)[own]
+        rows = scale[:, None] * beams.local_forces_by_freedom(state)[own, 1]
+        sign = np.where(turn < 0.0, -1.0, 1.0)
+        return _largest(shell, _TURN, np.abs(turn), beams.freedoms()[own], sign[:, None] * rows, np.zeros(len(turn)))
+
+
+@dataclass(frozen=True)
+class Slackness:
+    """2 less the least cable tension over `least`, N: at most 1 where every present cable pulls with `least` or more."""
+
+    load: str
+    least: float
+
+    def __post_init__(self) -> None:
+        if not self.least > 0.0:
+            raise InputError("must be positive", where="slackness.least", value=self.least)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value. A slack cable counts with the tension that it would have if it could push, which tells how slack it is."""
+        cables = shell.cables(design)
+        chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+        length = np.linalg.norm(chord, axis=1)
+        slope = cables.stiffness / cables.rest_length
+        values = 2.0 - slope * (length - cables.rest_length) / self.least
+        toward = (-slope / length / self.least)[:, None] * chord
+        by_rest = cables.stiffness * length / cables.rest_length**2 / self.least
+        return _largest(
+            shell, 1.0, values, cables.freedoms(), np.hstack([-toward, toward]), np.zeros(len(values)), np.flatnonzero(design.present), by_rest
+        )
+
+
+@dataclass(frozen=True)
+class Softness:
+    """2 less the stiffness of the softest mode under the load over `least`, N/m: at most 1 where no mode is softer than `least`.
+
+    Stability ends where that stiffness comes to 0, long before deviations tell of it; a load case at F times the design load that keeps
+    this limit has a critical load factor above F. The softest four modes count, so that they may change places.
+    """
+
+    load: str
+    least: float
+
+    def __post_init__(self) -> None:
+        if not self.least > 0.0:
+            raise InputError("must be positive", where="softness.least", value=self.least)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value."""
+        assembly = assemble(shell.network(design))
+        found = modes(assembly, state, _MODES)
+        mass = residual.Measure(assembly).mass_shape
+        rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
+        rows, by_radius, by_rest = [], [], []
+        for shape in found.shapes:
+            unit = shape / np.sqrt(float(mass @ shape.ravel()[assembly.free] ** 2))
+            rows.append(stiffness_by_freedom(assembly, state, unit))
+            by_radius.append(quadratic(rate, state, unit))
+            by_rest.append(stiffness_by_rest_length(cables, state, unit))
+        values = 2.0 - found.stiffness / self.least
+        weight, value = _smooth(values, SHARPNESS)
+        slope = -(weight @ np.array(rows)) / self.least
+        spread = np.zeros(len(shell.cable_ends))
+        spread[np.flatnonzero(design.present)] = -(weight @ np.array(by_rest)) / self.least
+        return Measure(
+            np.array([value]),
+            sp.csr_array(slope[None]),
+            sp.csr_array(spread[None]),
+            np.array([-float(weight @ np.array(by_radius)) / self.least]),
+        )
+
+
+@dataclass(frozen=True)
+class Uplift:
+    """The largest force, N, with which a support has to hold a rod's end down, plus `offset`, N, which keeps it above 0."""
+
+    load: str
+    force: Reals
+    offset: float = 1.0
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value, N; `force` (n, 6) is the load case, of which supports may bear a part at once."""
+        assembly = assemble(shell.network(design))
+        held = 6 * np.asarray(shell.net.supports) + 2
+        reaction = assembly.evaluate(state, tangent=False).force.ravel()[held] - self.force.ravel()[held]
+        rows = -reaction_rows(assembly, state, held).toarray()
+        freedoms = np.broadcast_to(assembly.free, rows.shape)
+        rate = shell.beams_by_radius(design.radius)
+        change = np.zeros(6 * assembly.count)
+        np.add.at(change, rate.freedoms(), rate.evaluate(state, tangent=False).force)
+        cables = shell.cables(design)
+        if np.isin(cables.ends, shell.net.supports).any():
+            raise InputError("cables that end at supports are not provided for", where="uplift")
+        return _largest(shell, self.offset, self.offset - reaction, freedoms, rows, -change[held])
+
+
+def _largest(
+    shell: Gridshell,
+    unit: float,
+    values: Reals,
+    freedoms: np.ndarray,
+    rows: Reals,
+    by_radius: Reals,
+    cables: np.ndarray | None = None,
+    by_rest_length: Reals | None = None,
+) -> Measure:
+    """KS of `values` (k,) from their derivatives `rows` (k, q) at `freedoms` (k, q), `by_radius` (k,), and each by its own cable's rest length."""
+    weight, value = _smooth(values, SHARPNESS / unit)
+    slope = np.zeros(6 * len(shell.net.grid.flat))
+    np.add.at(slope, freedoms, weight[:, None] * rows)
+    by_rest = np.zeros(len(shell.cable_ends))
+    if cables is not None and by_rest_length is not None:
+        by_rest[cables] = weight * by_rest_length
+    return Measure(np.array([value]), sp.csr_array(slope[None]), sp.csr_array(by_rest[None]), np.array([float(weight @ by_radius)]))
+
+
+def _smooth(values: Reals, sharpness: float) -> tuple[Reals, float]:
+    """Weights (k,), the derivatives of KS by the values, and KS."""
+    top = float(values.max())
+    weight = np.exp(sharpness * (values - top))
+    total = float(weight.sum())
+    return weight / total, top + float(np.log(total)) / sharpness

@@ -1,0 +1,62 @@
+"""Which cables a braced shell can spare.
+
+The L1 term empties the cables with the least tension; but tension says little about what a cable does against buckling. Without the
+cables of a set R the tangent K at a loaded state loses their stiffness, K - B k B', and stays positive definite as long as
+
+    S = I - k^½ B' K⁻¹ B k^½,   rows and columns of R,
+
+does, B being the cables' directions and k = EA/l0. One block solve gives S for all cables; its diagonal is what the structure keeps of its
+stiffness along each cable when that one goes, small numbers belonging to cables that hold the softest mode. Sets are chosen greedily by a
+Cholesky factor of S that grows row by row and may not lose more than a set share.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import solve_triangular
+
+from shellform.arrays import Indices, Reals
+from shellform.structure.assembly import Assembly
+from shellform.structure.cable import Cables
+from shellform.structure.state import State
+
+
+def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
+    """The matrix S (c, c) of the cables at the stable `state`; slack cables have rows of the identity.
+
+    Raises NotPositiveDefinite.
+    """
+    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    stiffness = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
+    unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
+    number = np.full(6 * assembly.count, -1)
+    number[assembly.free] = np.arange(len(assembly.free))
+    rows = number[cables.freedoms()]
+    values, taken = np.hstack([-unit, unit]), rows >= 0
+    columns = np.broadcast_to(np.arange(len(rows))[:, None], rows.shape)
+    pull = sp.csc_array((values[taken], (rows[taken], columns[taken])), shape=(len(assembly.free), len(rows)))
+    solved = assembly.factor(state).solve(np.asfortranarray(pull.toarray()))
+    return np.asarray(np.eye(len(rows)) - pull.T @ solved)
+
+
+def spared(kept: Reals, order: Indices, most: int, least: float) -> Indices:
+    """The first cables of `order`, at most `most`, without all of which every direction keeps a share of at least `least` of its stiffness.
+
+    A cable that would bring it below is passed over. `kept` (c, c) is the matrix S above.
+    """
+    chosen: list[int] = []
+    factor = np.zeros((most, most))
+    for cable in order:
+        count = len(chosen)
+        if count == most:
+            break
+        row = kept[cable, chosen]
+        solved = solve_triangular(factor[:count, :count], row, lower=True) if count else row
+        pivot = kept[cable, cable] - least - float(solved @ solved)
+        if pivot <= 0.0:
+            continue
+        factor[count, :count], factor[count, count] = solved, np.sqrt(pivot)
+        chosen.append(int(cable))
+    return np.array(chosen, dtype=np.int64)

@@ -1,0 +1,176 @@
+"""How good a net is: numbers for the summary, values for maps, and what is refused.
+
+A net is refused where a cell is turned over or folded, where two parts of it lie on one another, and where it stays off the
+surface: too much curvature for the spacing. In each case the refusal says where.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from shellform.arrays import Reals, reals
+from shellform.errors import InputError
+from shellform.net.compass import Finder, gaussian
+from shellform.net.grid import Grid, cells, crossing_points, neighbours
+from shellform.structure.rotation import matrices
+from shellform.structure.state import State
+from shellform.surface.target import Surface
+from shellform.surface.tree import Tree
+
+_FAR = 0.1  # of the spacing: a net farther from the surface is refused
+_OVERLAP = 0.4  # of the spacing: nearer to each other two crossings that aren't neighbours lie on one another
+_BARE = 0.75  # of the spacing: the middle of a cell lies half a spacing from the next rod
+_SAMPLE = 0.25  # of the spacing, between points at which the cover is looked for
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Lengths in m, angles in rad, curvature in 1/m. For the summary:
+
+    `distance_max`, `distance_mean`: of crossings (the middle between their two nodes) from the surface; `spacing_error_max`:
+    largest |chord between neighbouring crossings / spacing - 1|; `shear_angle_min`: smallest angle between the two rods of a
+    crossing; `curvature_max`: largest resultant curvature of a rod, and its parts out of and in the surface's tangent plane; `pull_max`,
+    `pull_mean`: what the springs still pull, in EI/s² of the rods, the paper's measure of how forced the grid is;
+    `uncovered_area`, m², farther from any rod than three quarters of the spacing; `gaussian_curvature`, rad, of the
+    surface added up over the net's cells; `factorisations` that the pulling took.
+
+    For maps: `distance` (c,), signed, and `shear_angle` (c,) of crossings; `spacing_error` (p,), signed, of the pairs of
+    neighbours; `curvature` (m, 2, 2) of rod elements at their two ends, out of and in plane; `pull` (n,) of nodes.
+    """
+
+    distance_max: float
+    distance_mean: float
+    spacing_error_max: float
+    shear_angle_min: float
+    curvature_max: float
+    curvature_out_of_plane_max: float
+    curvature_in_plane_max: float
+    pull_max: float
+    pull_mean: float
+    uncovered_area: float
+    gaussian_curvature: float
+    factorisations: int
+    distance: Reals
+    shear_angle: Reals
+    spacing_error: Reals
+    curvature: Reals
+    pull: Reals
+
+    def __post_init__(self) -> None:
+        for name in MAPS:
+            shape = (None, 2, 2) if name == "curvature" else (None,)
+            object.__setattr__(self, name, reals(name, getattr(self, name), shape))
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers without the maps."""
+        names = [field.name for field in dataclasses.fields(self) if field.name not in MAPS]
+        return {name: getattr(self, name) for name in names}
+
+
+MAPS = ("distance", "shear_angle", "spacing_error", "curvature", "pull")
+
+
+def measure(surface: Surface, finder: Finder, grid: Grid, state: State, curvature: Reals, pull: Reals, spent: int) -> Quality:
+    """The quality of the trimmed grid in its state; `curvature` (m, 2, 2) of its rod elements, `pull` (n,) on its nodes."""
+    points = crossing_points(grid, state)
+    distance = finder.foot(points).distance
+    pairs, steps = neighbours(grid)
+    chord = np.linalg.norm(points[pairs[:, 1]] - points[pairs[:, 0]], axis=1)
+    error = chord / steps - 1.0
+    angle = shear_angles(grid, state)
+    bent = np.abs(curvature)
+    corners = points[cells(grid)]
+    return Quality(
+        distance_max=float(np.abs(distance).max()),
+        distance_mean=float(np.abs(distance).mean()),
+        spacing_error_max=float(np.abs(error).max()),
+        shear_angle_min=float(angle.min(initial=0.5 * math.pi)),
+        curvature_max=float(np.hypot(bent[..., 0], bent[..., 1]).max()),
+        curvature_out_of_plane_max=float(bent[..., 0].max()),
+        curvature_in_plane_max=float(bent[..., 1].max()),
+        pull_max=float(pull.max(initial=0.0)),
+        pull_mean=float(pull.mean()),
+        uncovered_area=uncovered(surface, grid, state),
+        gaussian_curvature=float(gaussian(finder, corners).sum()) if len(corners) else 0.0,
+        factorisations=spent,
+        distance=distance,
+        shear_angle=angle,
+        spacing_error=error,
+        curvature=curvature,
+        pull=pull,
+    )
+
+
+def shear_angles(grid: Grid, state: State) -> Reals:
+    """The angle (c,), rad, at most 90°, between the axes of the two rods of each crossing."""
+    first, second = (matrices(state.quaternions[grid.crossing_nodes[:, layer]])[:, :, layer] for layer in (0, 1))
+    cosine = np.abs(np.sum(first * second, axis=1))
+    return np.asarray(np.arccos(np.clip(cosine, 0.0, 1.0)))
+
+
+def uncovered(surface: Surface, grid: Grid, state: State) -> float:
+    """The surface's area, m², farther from any rod than three quarters of the spacing."""
+    ends = state.positions[grid.rod_ends]
+    rods = Tree(np.stack([ends[:, 0], ends[:, 1], ends[:, 1]], axis=1))
+    corner = surface.vertices[surface.triangles]
+    longest = float(np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max())
+    parts = int(np.clip(np.ceil(longest / (_SAMPLE * grid.scale)), 1, 32))
+    i, j = (each.ravel() for each in np.meshgrid(np.arange(parts), np.arange(parts)))
+    up, down = i + j < parts, i + j < parts - 1
+    shares = np.vstack([np.column_stack([i, j])[up] + 1.0 / 3.0, np.column_stack([i, j])[down] + 2.0 / 3.0]) / parts
+    weights = np.column_stack([1.0 - shares.sum(axis=1), shares])
+    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    bare = 0.0
+    for weight in weights:  # one sample of every triangle at a time keeps memory small
+        away = rods.nearest(np.tensordot(weight, corner, axes=(0, 1)))[2]
+        bare += float(area[away > _BARE * grid.scale].sum()) / len(weights)
+    return bare
+
+
+def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
+    """Raises InputError where cells are turned over or two parts of the net lie on one another."""
+    points = crossing_points(grid, state)
+    quads = cells(grid)
+    corner = points[quads]
+    sides = np.roll(corner, -1, axis=1) - corner
+    normal = finder.foot(corner.mean(axis=1)).normal
+    turned = np.sum(np.cross(np.roll(sides, 1, axis=1), sides) * normal[:, None], axis=2) <= 0.0
+    folded = turned.any(axis=1)
+    if folded.any():
+        middle = corner[np.argmax(folded)].mean(axis=0).round(3).tolist()
+        raise InputError(
+            f"the net folds over itself in {int(folded.sum())} cells, first at {middle}: the surface, whose Gaussian curvature adds up "
+            f"to {float(gaussian(finder, corner).sum()):.2f} there, is curved more than rods at this spacing can follow",
+            where="net.spacing",
+            value=float(grid.spacing),
+            remedy="Choose a smaller spacing, another angle, or a flatter surface.",
+        )
+    close = cKDTree(points).query_pairs(_OVERLAP * min(grid.spacing, grid.spacing_v), output_type="ndarray")
+    apart = np.abs(grid.lattice[close[:, 0]] - grid.lattice[close[:, 1]]).max(axis=1, initial=0) > 1
+    if apart.any():
+        place = points[close[np.argmax(apart), 0]].round(3).tolist()
+        raise InputError(
+            f"two parts of the net lie on one another in {int(apart.sum())} places, first at {place}",
+            where="net.spacing",
+            value=float(grid.spacing),
+            remedy="Choose another angle or offset, or cover the surface by several nets.",
+        )
+
+
+def refuse_distance(quality: Quality, grid: Grid, state: State) -> None:
+    """Raises InputError for a net that stays off its surface."""
+    if quality.distance_max > _FAR * grid.scale:
+        worst = crossing_points(grid, state)[np.argmax(np.abs(quality.distance))].round(3).tolist()
+        raise InputError(
+            f"the net stays {quality.distance_max:.3g} m off the surface at {worst}: "
+            "it is curved more there than a grid of straight rods can follow",
+            where="net.spacing",
+            value=float(grid.spacing),
+            remedy="Choose a smaller spacing, another angle, or a smoother surface.",
+        )

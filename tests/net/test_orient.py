@@ -1,0 +1,44 @@
+"""The search for the net's orientation."""
+
+import math
+
+import pytest
+
+from shellform.errors import InputError
+from shellform.net.orient import best_orientation, oriented_net
+from tests.net.test_closed_forms import roof
+from tests.net.test_settings import ball
+
+
+@pytest.fixture(scope="module")
+def cylinder():
+    return roof(1.0, 0.8, 2.0, n=20)
+
+
+def test_on_a_cylinder_rods_bend_least_at_45_degrees(cylinder):
+    """At the angle a the mean of the squared curvatures is (cos⁴ a + sin⁴ a) / 2, smallest at 45°."""
+    said = []
+    best, tried = best_orientation(cylinder, {"spacing": 0.25, "gap": 0.005}, progress=said.append)
+    assert math.degrees(best.angle) == pytest.approx(45.0, abs=8.0)  # a cut-out of so few rods isn't quite even
+    assert best.cost == min(trial.cost for trial in tried)
+    rolled = 0.5 * 0.25 * 0.25**2  # κ² = 1/4, of the flat grid rolled up; at 0° it would be twice as much
+    assert 0.7 * rolled < best.cost < rolled  # pulled, it gives way in shear to bend still less
+    assert any("compass net 12/12" in line for line in said)
+
+
+def test_two_processes_find_what_one_finds(cylinder):
+    settings = {"spacing": 0.4, "gap": 0.005}
+    net, angle, offset = oriented_net(cylinder, settings, angle="auto", workers=2)
+    best, _ = best_orientation(cylinder, settings)
+    assert (angle, offset) == (best.angle, best.offset)
+    assert net.quality.distance_max < 0.01
+
+
+def test_a_given_angle_is_kept(cylinder):
+    _, angle, offset = oriented_net(cylinder, {"spacing": 0.4, "gap": 0.005}, angle=0.2, offset=(0.5, 0.0))
+    assert (angle, offset) == (0.2, (0.5, 0.0))
+
+
+def test_where_no_angle_gives_a_net_it_is_said_why():
+    with pytest.raises(InputError, match=r"no angle gives a net: .*curved too much"):
+        best_orientation(ball(30), {"spacing": 0.3, "gap": 0.005})

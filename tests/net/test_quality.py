@@ -1,0 +1,111 @@
+"""What is measured of a net, and what is refused."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError
+from shellform.net import quality
+from shellform.net.grid import cells, lattice_grid
+from shellform.structure.rotation import matrices
+from shellform.structure.state import State, at_rest
+from shellform.surface.locate import Locator
+from shellform.surface.target import make_surface
+
+
+@pytest.fixture(scope="module")
+def plane():
+    corners = np.array([[-2.0, -2.0, 0.0], [4.0, -2.0, 0.0], [4.0, 4.0, 0.0], [-2.0, 4.0, 0.0]])
+    return make_surface(corners, [[0, 1, 2], [0, 2, 3]])
+
+
+@pytest.fixture(scope="module")
+def grid():
+    places = np.array([(i, j) for i in range(6) for j in range(6)])
+    return lattice_grid(places, spacing=(0.3, 0.4), gap=0.01, elements=2)
+
+
+def test_a_flat_net_on_a_plane_is_perfect(plane, grid):
+    found = quality.measure(
+        plane, Locator(plane), grid, at_rest(grid.flat), np.zeros((len(grid.rod_ends), 2, 2)), np.zeros(len(grid.flat)), 0
+    )
+    assert found.distance_max < 1e-15
+    assert found.spacing_error_max < 1e-12
+    assert found.shear_angle_min == pytest.approx(0.5 * np.pi)
+    assert found.gaussian_curvature == pytest.approx(0.0, abs=1e-12)
+    bare = plane.area - (1.5 + 2 * 0.26) * (2.0 + 2 * 0.26)
+    assert found.uncovered_area == pytest.approx(bare, rel=0.02)
+    assert "distance" not in found.summary()
+
+
+def test_a_sheared_net_has_its_angle(plane, grid):
+    shear = np.array([[1.0, np.sin(0.4), 0.0], [0.0, np.cos(0.4), 0.0], [0.0, 0.0, 1.0]])
+    turned = at_rest(grid.flat).quaternions.copy()
+    for rod in grid.rods:
+        if rod.direction == "v":
+            turned[rod.nodes] = [np.cos(0.2), 0.0, 0.0, -np.sin(0.2)]
+    state = State(grid.flat @ shear.T, turned)
+    np.testing.assert_allclose(quality.shear_angles(grid, state), 0.5 * np.pi - 0.4)
+    quality.refuse_folds(Locator(plane), grid, state)
+
+
+def test_a_folded_net_is_refused(plane, grid):
+    folded = grid.flat.copy()
+    beyond = folded[:, 0] > 0.65
+    folded[beyond, 0] = 1.2 - folded[beyond, 0]
+    with pytest.raises(InputError, match=r"folds over itself in \d+ cells, first at \[.*adds up"):
+        quality.refuse_folds(Locator(plane), grid, at_rest(folded))
+
+
+def test_a_net_that_lies_on_itself_is_refused(plane):
+    # A ring that closes and goes on: the far columns come to lie on the first ones.
+    places = np.array([(i, j) for i in range(30) for j in range(2)])
+    ring = lattice_grid(places, spacing=(0.3, 0.3), gap=0.01, elements=1)
+    turn, radius = ring.flat[:, 0] / 1.1, 1.1 - ring.flat[:, 1]
+    wound = np.column_stack([radius * np.sin(turn), 1.1 - radius * np.cos(turn), 0.0 * turn])
+    with pytest.raises(InputError, match="lie on one another"):
+        quality.refuse_folds(Locator(plane), ring, at_rest(wound))
+
+
+def test_a_net_off_its_surface_is_refused(plane, grid):
+    raised = grid.flat + np.array([0.0, 0.0, 0.2])
+    found = quality.measure(
+        plane, Locator(plane), grid, at_rest(raised), np.zeros((len(grid.rod_ends), 2, 2)), np.zeros(len(grid.flat)), 0
+    )
+    with pytest.raises(InputError, match=r"0\.2 m off the surface at \["):
+        quality.refuse_distance(found, grid, at_rest(raised))
+    quality.refuse_distance(dataclasses.replace(found, distance_max=0.01), grid, at_rest(raised))
+
+
+def test_the_resultant_curvature_is_made_of_its_two_parts(net):
+    bent = net.quality.curvature
+    assert bent.shape == (len(net.grid.rod_ends), 2, 2)
+    assert net.quality.curvature_out_of_plane_max <= net.quality.curvature_max
+    np.testing.assert_allclose(net.curvature, np.hypot(bent[..., 0], bent[..., 1]))
+
+
+def test_hazzidakis_formula_holds_over_every_rectangle_of_the_net(vault, net):
+    """The Gaussian curvature of a patch of a net adds up to 2π less its four angles (Hazzidakis 1879)."""
+    finder = Locator(vault, reach=0.1)
+    quads = cells(net.grid)
+    corner = net.crossings[quads]
+    inside = quality.gaussian(finder, corner)
+    place = {tuple(p): k for k, p in enumerate(net.grid.lattice.tolist())}
+    of_cell = {tuple(net.grid.lattice[q[0]].tolist()): k for k, q in enumerate(quads)}
+    nodes = net.grid.crossing_nodes
+    tangents = [matrices(net.target.quaternions[nodes[:, layer]])[:, :, layer] for layer in (0, 1)]
+    angle = np.arccos(np.sum(tangents[0] * tangents[1], axis=1))
+    tried = 0
+    for i, j in place:
+        for m, n in ((1, 1), (2, 2), (3, 4), (4, 3), (5, 5)):
+            wanted = [(i + a, j + b) for a in range(m) for b in range(n)]
+            if not all(w in of_cell for w in wanted):
+                continue
+            total = inside[[of_cell[w] for w in wanted]].sum()
+            omega = [angle[place[p]] for p in ((i, j), (i + m, j), (i + m, j + n), (i, j + n))]
+            missing = -omega[0] + omega[1] - omega[2] + omega[3]  # the angles at two corners are π less omega
+            assert missing == pytest.approx(total, abs=0.01 + 0.03 * abs(total))
+            tried += 1
+    assert tried > 100
+

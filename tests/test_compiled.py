@@ -1,0 +1,19 @@
+import os
+import subprocess
+import sys
+
+CODE = """
+import numpy as np
+from shellform.structure.rotation import matrix, turned
+turned(np.zeros((1, 3)), np.eye(4)[:1])
+matrix(np.eye(4)[0], np.empty((3, 3)))
+"""
+
+
+def test_compiling_is_announced_once_and_what_the_cache_holds_is_not_compiled(tmp_path):
+    told = []
+    for _ in range(2):
+        variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+        told.append(subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True, env=variables).stderr)
+    assert told[0].count("compiling its loops") == 1
+    assert told[1] == ""
