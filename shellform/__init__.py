@@ -24,6 +24,7 @@ _HOMES = {
     "shellform.design.catalogue": ("Catalogue", "read_catalogue", "rounded_up", "neighbours"),
     "shellform.design.problem": ("Problem", "follow", "deviations"),
     "shellform.design.terms": ("Share", "AtMost", "Misfit", "RmsMisfit", "CableForce", "CableForces", "RodRadius"),
+    "shellform.design.checks": ("RodUtilisation", "ConnectorTurn", "Slackness", "Softness", "Uplift"),
 }
 _ROOMS = {
     "cad": "shellform.surface.cad",
@@ -37,6 +38,7 @@ _ROOMS = {
     "render": "shellform.output.render",
     "plots": "shellform.output.plots",
     "model": "shellform.structure.model",
+    "analysis": "shellform.structure.analysis",
 }
 _NAMES = {name: home for home, names in _HOMES.items() for name in names}
 

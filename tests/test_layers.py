@@ -12,7 +12,7 @@ DOORS = {
     "meshio": {"surface/meshes.py"},
     "rhino3dm": {"surface/rhino.py"},
     "vtkmodules": {"output/render.py", "surface/vtkfiles.py"},
-    "nlopt": {"design/mma.py"},
+    "nlopt": {"design/convex.py"},
     "pyvista": {"output/render.py"},
     "vtk": {"output/render.py"},
     "matplotlib": {"output/plots.py"},

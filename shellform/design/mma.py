@@ -1,4 +1,4 @@
-"""Optimising a gridshell with the method of moving asymptotes (operation 3; Svanberg 1987, 2002); the door to NLopt.
+"""Optimising a gridshell with the method of moving asymptotes (operation 3; Svanberg 1987, 2002).
 
 MMA replaces the problem by a sequence of convex ones that are solved exactly. Its own separable approximation knows nothing of how
 cables work together, and in the rest lengths it is kinked where a cable goes slack: on a prestressed gridshell its first trials snap
@@ -20,27 +20,24 @@ should not bear all loads there, the last accepted design that does is returned.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.design.checks import ConnectorTurn, RodUtilisation, Slackness, Softness, Uplift
+from shellform.design.convex import minimise
 from shellform.design.gridshell import Design
+from shellform.design.optimum import Optimum, Step
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
 from shellform.design.tensions import TensionModel, tension_model
 from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.design.thinning import kept_stiffness, spared
-from shellform.errors import InputError, NotConverged
+from shellform.errors import NotConverged
 from shellform.structure.loading import Loaded, apply_load
 from shellform.structure.stability import modes
 from shellform.structure.state import State
-
-try:
-    import nlopt
-except ImportError as error:  # pragma: no cover
-    raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
 STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
@@ -73,48 +70,6 @@ _THINNING = 1.5  # of the objective that cables with little use may cost
 _REPAIRS = 2  # steps after each batch
 _BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
 FEASIBLE = 1e-3
-
-
-@dataclass(frozen=True)
-class Step:
-    """One trial in the history: `objective` and its weighted `terms`, `constraints` by name (largest value of each), the `cables` in
-    tension, the `stage` of the additional loads, whether it was `accepted`, and `seconds` since the start."""
-
-    evaluation: int
-    objective: float
-    terms: Mapping[str, float]
-    constraints: Mapping[str, float]
-    cables: int
-    stage: float
-    accepted: bool
-    seconds: float
-
-
-@dataclass(frozen=True)
-class Optimum:
-    """What the optimisation found: the `design` without its slack cables, how it carries each load on the documented path
-    (`loaded`, with "none" first), the `history`, a `status` sentence, the work it took, of which factorisations in rejected trials
-    were `wasted`, and the `stiffness`, N/m, that the softest mode had to keep under the additional loads."""
-
-    problem: Problem
-    design: Design
-    loaded: Mapping[str, Loaded]
-    objective_start: float
-    objective: float
-    constraints: Mapping[str, float]
-    history: Sequence[Step]
-    status: str
-    evaluations: int
-    rejected: int
-    equilibria: int
-    factorisations: int
-    wasted: int
-    stiffness: float
-
-    @property
-    def states(self) -> dict[str, State]:
-        """The equilibrium state by load case."""
-        return {name: loaded.equilibrium.state for name, loaded in self.loaded.items()}
 
 
 Watch = Callable[[Step], None]
@@ -566,60 +521,3 @@ def _split(values: Reals, problem: Problem) -> list[Reals]:
             1 if not isinstance(part.term, CableForces) else len(problem.shell.cable_ends) if chosen is None else len(chosen)
         )
     return np.split(values, np.cumsum(sizes)[:-1]) if sizes else []
-
-
-def minimise(
-    evaluate: Callable[[Reals], tuple[float, Reals, Reals, Reals]],
-    start: Reals,
-    lower: Reals,
-    upper: Reals,
-    *,
-    constraints: int,
-    evaluations: int,
-    tolerance: float = 1e-4,
-) -> tuple[Reals, str]:
-    """NLopt's MMA from `start` (s,) within bounds: the best point and the reason for the stop.
-
-    `evaluate(x)` returns the objective, its gradient (s,), the `constraints` values g <= 0 and their gradients (k, s).
-    """
-    if ((start < lower) | (start > upper)).any():
-        raise InputError("the start lies outside the bounds", where="variables", value=int(np.argmax((start < lower) | (start > upper))))
-    memory: dict[bytes, tuple[float, Reals, Reals, Reals]] = {}
-
-    def at(x: Reals) -> tuple[float, Reals, Reals, Reals]:
-        key = x.tobytes()
-        if key not in memory:
-            memory.clear()  # NLopt asks for objective and constraints at one x, one after the other
-            memory[key] = evaluate(np.array(x))
-        return memory[key]
-
-    def objective(x: Reals, gradient: Reals) -> float:
-        value, slope, _, _ = at(x)
-        if gradient.size:
-            gradient[:] = slope
-        return value
-
-    def limits(result: Reals, x: Reals, gradient: Reals) -> None:
-        _, _, values, slopes = at(x)
-        result[:] = values
-        if gradient.size:
-            gradient[:] = slopes
-
-    optimizer = nlopt.opt(nlopt.LD_MMA, len(start))
-    optimizer.set_min_objective(objective)
-    if constraints:
-        optimizer.add_inequality_mconstraint(limits, np.full(constraints, 1e-8))
-    optimizer.set_lower_bounds(lower)
-    optimizer.set_upper_bounds(upper)
-    optimizer.set_maxeval(evaluations)
-    optimizer.set_ftol_rel(tolerance)
-    best = np.array(optimizer.optimize(start))
-    return best, _REASONS.get(optimizer.last_optimize_result(), "stopped")
-
-
-_REASONS = {
-    nlopt.SUCCESS: "converged",
-    nlopt.FTOL_REACHED: "the objective stopped improving",
-    nlopt.XTOL_REACHED: "the design stopped changing",
-    nlopt.MAXEVAL_REACHED: "the number of evaluations was reached",
-}
