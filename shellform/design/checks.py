@@ -105,8 +105,9 @@ class Slackness:
 
 @dataclass(frozen=True)
 class Softness:
-    """2 less the stiffness of the softest mode under the load over `least`, N/m: at most 1 where no mode is softer than `least`.
+    """2 less the square of the softest mode's stiffness under the load over `least`, N/m: at most 1 where no mode is softer than `least`.
 
+    The square, because that stiffness goes with the root of the distance to a limit point: its square is nearly linear in the design.
     Stability ends where that stiffness comes to 0, long before deviations tell of it; a load case at F times the design load that keeps
     this limit has a critical load factor above F. The softest four modes count, so that they may change places.
     """
@@ -130,8 +131,9 @@ class Softness:
             rows.append(stiffness_by_freedom(assembly, state, unit))
             by_radius.append(quadratic(rate, state, unit))
             by_rest.append(stiffness_by_rest_length(cables, state, unit))
-        values = 2.0 - found.stiffness / self.least
-        weight, value = _smooth(values, SHARPNESS)
+        ratio = found.stiffness / self.least
+        weight, value = _smooth(2.0 - ratio * np.abs(ratio), SHARPNESS)
+        weight = 2.0 * np.abs(ratio) * weight
         slope = -(weight @ np.array(rows)) / self.least
         spread = np.zeros(len(shell.cable_ends))
         spread[np.flatnonzero(design.present)] = -(weight @ np.array(by_rest)) / self.least
