@@ -70,7 +70,7 @@ class Panel:
     `positions` (n, 3), m; rod elements `beams` (m, 2); `deviation` (n,), m, of each node from its target; `cables` (c, 2)
     with their `cable_forces` (c,), N, slack at or below zero; nodes of `supports` (s,) and of loads, `load_points` (k,);
     `rod_radius`, m, drawn thicker where it would be too thin to be seen. `quantity`
-    says what `deviation` measures where it is another length. Raises InputError for wrong shapes and indices.
+    says what `deviation` measures where it is something else, in a `unit` of a name and so much in SI. Raises InputError for wrong shapes and indices.
     """
 
     title: str
@@ -83,6 +83,7 @@ class Panel:
     load_points: Indices
     rod_radius: float
     quantity: str = "deviation from the target"
+    unit: tuple[str, float] = ("mm", 1e-3)
 
     def __post_init__(self) -> None:
         put = functools.partial(object.__setattr__, self)
@@ -214,6 +215,7 @@ class _Scale:
     reach: float  # m, the largest extent, which loads are drawn by
     letters: int  # pixels
     quantity: str  # what the colours measure
+    unit: tuple[str, float]
 
 
 def _draw(
@@ -241,7 +243,7 @@ def _draw(
     further += [] if skin is None else [np.asarray(skin.points, dtype=np.float64)]
     reach = max(max(float(np.ptp(panel.positions, axis=0).max()) for panel in panels), 1e-9)
     force = max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
-    scale = _Scale(limit, force, reach, max(11, round(0.034 * min(height, 0.7 * width))), panels[0].quantity)
+    scale = _Scale(limit, force, reach, max(11, round(0.034 * min(height, 0.7 * width))), panels[0].quantity, panels[0].unit)
     camera = _camera(panels, further, view, size, scale)
 
     if not _window_works():
@@ -298,7 +300,11 @@ def _add(
             tip_length=0.35, tip_radius=0.11, shaft_radius=0.03,
         )  # fmt: skip
         plotter.add_mesh(_copies(panel.positions[panel.load_points], arrow), color=_LOAD, ambient=0.6, diffuse=0.4, render=False)
-    told = f"{panel.quantity.split()[0]}: maximum {1e3 * panel.deviation.max():.1f} mm, mean {1e3 * panel.deviation.mean():.1f} mm"
+    name, unit = panel.unit
+    largest, mean = panel.deviation.max() / unit, panel.deviation.mean() / unit
+    told = f"{panel.quantity.split()[0]}: maximum {largest:.1f} {name}, mean {mean:.1f} {name}"
+    if largest < 1.0:
+        told = f"{panel.quantity.split()[0]}: maximum {largest:.2g} {name}, mean {mean:.2g} {name}"
     line = scale.letters
     _text(plotter, panel.title, line, (0.8 * line, size[1] - 1.7 * line), bold=True)
     _text(plotter, told, round(0.9 * line), (0.8 * line, size[1] - 3.1 * line), colour=_QUIET)
@@ -313,10 +319,11 @@ def _bar(plotter: pv.Plotter, scale: _Scale, size: tuple[int, int], height: int)
     low, high = round(1.9 * line), round(2.8 * line)
     steps = 4
     # letters need a decimal only where the steps do
-    decimals = max(1, int(np.ceil(-np.log10(1e3 * scale.limit / steps) + 0.5)))
+    name, unit = scale.unit
+    decimals = max(1, int(np.ceil(-np.log10(scale.limit / unit / steps) + 0.5)))
     for k in range(steps + 1):
-        value = f"{1e3 * scale.limit * k / steps:.{decimals}f}"
-        label = "0 mm" if k == 0 else f"≥ {value} mm" if k == steps else value
+        value = f"{scale.limit / unit * k / steps:.{decimals}f}"
+        label = f"0 {name}" if k == 0 else f"≥ {value} {name}" if k == steps else value
         _text(plotter, label, line, (left + (right - left) * k / steps, 0.55 * line), justify="center")
     _text(plotter, scale.quantity, line, (0.5 * (left + right), 3.2 * line), justify="center", colour=_QUIET)
     strip = _shot(plotter)[-height:]

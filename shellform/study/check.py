@@ -106,6 +106,12 @@ def net_alone(
     write_text(folder / "net.json", json.dumps(net_document(net)))
     document = {"format": "shellform-summary", "version": 1, "surface": surface_summary(surface, str(file)), "net": told}
     write_text(folder / "summary.json", json.dumps(document, indent=1))
+    try:
+        from shellform.output.nets import draw_net
+
+        draw_net(net, folder / "figures")
+    except InputError as error:  # no OpenGL: everything but the pictures is still made
+        report("figures", f"no pictures: {error}")
     return {"size": told_size(surface), **told}
 
 

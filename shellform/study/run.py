@@ -352,9 +352,11 @@ def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
     if keep:
         return
     from shellform.output import plots
+    from shellform.output.nets import draw_net
 
     try:
         draw_run(job.folder, limit=job.case.figures.limit, report=job.report)
+        draw_net(results["net"], job.path("figures"))
     except InputError as error:  # no OpenGL: everything but the pictures is still made
         job.report("figures", f"no pictures: {error}")
     with job.path("history.csv").open(encoding="utf-8", newline="") as file:

@@ -1,0 +1,22 @@
+"""Maps of nets."""
+
+import matplotlib.image
+import numpy as np
+
+from shellform.output import nets
+
+
+def test_a_net_is_mapped_by_distance_curvature_skewness_and_springs(net, tmp_path):
+    files = nets.draw_net(net, tmp_path)
+    assert [file.name for file in files] == ["net-distance.png", "net-curvature.png", "net-skew.png", "net-springs.png"]
+    pictures = [matplotlib.image.imread(file) for file in files]
+    assert all(np.ptp(picture) > 0.5 for picture in pictures)
+    assert not np.array_equal(pictures[0], pictures[1])
+
+
+def test_values_at_crossings_are_carried_along_the_rods_and_kept_at_them(net):
+    values = np.linspace(1.0, 2.0, len(net.grid.lattice))
+    carried = nets._along_rods(net, values)
+    np.testing.assert_array_equal(carried[net.grid.crossing_nodes[:, 0]], values)
+    np.testing.assert_array_equal(carried[net.grid.crossing_nodes[:, 1]], values)
+    assert 1.0 <= carried.min() <= carried.max() <= 2.0
