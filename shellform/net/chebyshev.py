@@ -26,7 +26,7 @@ from shellform.net.pull import (
     pull,
 )
 from shellform.net.quality import measure, refuse_distance, refuse_folds
-from shellform.net.trim import Limits, Trimmed, Uncovered, trim
+from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
 from shellform.surface.locate import Locator
 from shellform.surface.target import Surface, largest_curvature
 
@@ -81,8 +81,10 @@ def pull_net(
         places, points = covering_lattice(finder, origin, lines, steps, margin=margin * max(steps))
         grid = lattice_grid(places, spacing=steps, gap=gap, elements=elements)
         begin = compass_start(grid, finder, places, points)
+        bare = bare_rods(grid, begin, finder, limits)
+        if bare:  # what the compass net leaves bare, no pulling covers
+            continue
         try:
-            trim(grid, begin, finder, merge=merge, limits=limits)  # what the compass net leaves bare, no pulling covers
             if method == "compass":
                 pulled = laid(grid, begin)
             else:

@@ -112,13 +112,24 @@ def trim(grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limi
     return _rebuild(grid, state, kept, notes)
 
 
-def _cut(grid: Grid, state: State, past: Reals, measure: Callable[[Reals], Reals]) -> list[_Piece]:
-    """Runs of nodes inside. An end where the rod doesn't reach a limit gets the arc length -1."""
+def bare_rods(grid: Grid, state: State, finder: Finder, limits: Limits) -> int:
+    """How many pieces of rods end on the surface, short of any limit."""
+    return sum((first == 0) + (last + 1 == len(rod.nodes)) > 0 for rod, first, last in _runs(grid, limits.past(finder, state.positions)))
+
+
+def _runs(grid: Grid, past: Reals) -> list[tuple[GridRod, int, int]]:
+    """Each run of nodes inside: its rod, first and last place."""
     runs: list[tuple[GridRod, int, int]] = []
     for rod in grid.rods:
         inside = np.concatenate([[False], past[rod.nodes] < 0.0, [False]])
         starts, stops = np.flatnonzero(inside[1:] & ~inside[:-1]), np.flatnonzero(~inside[1:] & inside[:-1]) - 1
         runs += [(rod, first, last) for first, last in zip(starts.tolist(), stops.tolist(), strict=True)]
+    return runs
+
+
+def _cut(grid: Grid, state: State, past: Reals, measure: Callable[[Reals], Reals]) -> list[_Piece]:
+    """Runs of nodes inside. An end where the rod doesn't reach a limit gets the arc length -1."""
+    runs = _runs(grid, past)
     crossings = [  # rod, the node within and the node beyond
         (rod, within, beyond)
         for rod, first, last in runs
@@ -148,24 +159,31 @@ def _where_zero(
     """Arc lengths at which bent rods pass from inside to past the limit, all of them at once."""
     if not crossings:
         return []
-    a = np.array([rod.arc[within] for rod, within, _ in crossings])
-    b = np.array([rod.arc[beyond] for rod, _, beyond in crossings])
-    f = np.array([past[rod.nodes[within]] for rod, within, _ in crossings])
-    g = np.array([past[rod.nodes[beyond]] for rod, _, beyond in crossings])
-    side = np.zeros(len(a))
+    start = np.array([rod.arc[within] for rod, within, _ in crossings])
+    stop = np.array([rod.arc[beyond] for rod, _, beyond in crossings])
+    inner = np.array([rod.nodes[within] for rod, within, _ in crossings])
+    outer = np.array([rod.nodes[beyond] for rod, _, beyond in crossings])
+    axis = np.array([0 if rod.direction == "u" else 1 for rod, _, _ in crossings])
+    a, b = np.zeros(len(start)), np.ones(len(start))
+    f, g = past[inner], past[outer]
+    side = np.zeros(len(start))
+    # The rod runs from its lower to its higher arc length, whichever of the two is inside.
+    back = stop < start
+    first, second = np.where(back, outer, inner), np.where(back, inner, outer)
     for _ in range(_CUTTINGS):
-        arc = (a * g - b * f) / (g - f)
-        points = np.array([_curved(rod, state, s) for (rod, _, _), s in zip(crossings, arc, strict=True)])
-        value = measure(points)
+        share = (a * g - b * f) / (g - f)
+        value = measure(_curved(state, first, second, np.where(back, 1.0 - share, share), axis))
         if np.abs(value).max() < close:
             break
         low = value < 0.0
         # The end that stays counts half from the second time on (Dowell and Jarratt 1971).
-        f = np.where(low, value, np.where(side > 0, 0.5 * f, f))
-        g = np.where(low, np.where(side < 0, 0.5 * g, g), value)
-        a, b = np.where(low, arc, a), np.where(low, b, arc)
+        f, g = (
+            np.where(low, value, np.where(side > 0, 0.5 * f, f)),
+            np.where(low, np.where(side < 0, 0.5 * g, g), value),
+        )
+        a, b = np.where(low, share, a), np.where(low, b, share)
         side = np.where(low, -1.0, 1.0)
-    return [float(s) for s in arc]
+    return [float(s) for s in start + share * (stop - start)]
 
 
 def _keep(grid: Grid, pieces: list[_Piece], merge: float) -> tuple[list[tuple[_Piece, list[int]]], list[str]]:
@@ -236,6 +254,7 @@ def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], not
     turns: list[Reals] = []
     origin: list[int] = []
     rods, supports = [], []
+    count = 0
     for piece, joints in kept:
         rod = piece.rod
         layer = 0 if rod.direction == "u" else 1
@@ -247,11 +266,11 @@ def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], not
         if piece.end - rod.arc[places[-1]] < _SHORTEST_ELEMENT * element and places[-1] not in at_joint:
             places = places[:-1]
         arcs = np.concatenate([[piece.start], rod.arc[places], [piece.end]])
-        first = len(flat)
-        for arc in arcs:
-            flat.append(_between(rod, grid.flat, arc))
-            positions.append(_curved(rod, state, arc))
-            turns.append(_turned(rod, state, arc))
+        first, count = count, count + len(arcs)
+        a, b, share = _locate(rod, arcs)
+        flat.append(_between(grid.flat, a, b, share))
+        positions.append(_curved(state, a, b, share, np.full(len(a), layer)))
+        turns.append(_turned(state, a, b, share))
         origin += [-1, *(int(n) for n in rod.nodes[places]), -1]
         numbers = first + np.arange(len(arcs))
         supports += [first, first + len(arcs) - 1]
@@ -261,39 +280,37 @@ def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], not
             nodes[number[crossing], layer] = numbers[k]
         along = np.array([number[c] for c in joints])
         rods.append(GridRod(rod.direction, rod.index, numbers, arcs - arcs[0], along, at))
-    trimmed = Grid(np.array(flat), tuple(rods), grid.lattice[crossings], nodes, grid.spacing, grid.gap, grid.spacing_v)
+    trimmed = Grid(np.vstack(flat), tuple(rods), grid.lattice[crossings], nodes, grid.spacing, grid.gap, grid.spacing_v)
     return Trimmed(
-        trimmed, State(np.array(positions), np.array(turns)), np.array(supports), np.array(origin), tuple(notes)
+        trimmed, State(np.vstack(positions), np.vstack(turns)), np.array(supports), np.array(origin), tuple(notes)
     )
 
 
-def _locate(rod: GridRod, arc: float) -> tuple[int, int, float]:
-    """The nodes of the element at the arc length, and where on it (0 to 1)."""
-    k = int(np.clip(np.searchsorted(rod.arc, arc, side="right") - 1, 0, len(rod.arc) - 2))
-    return int(rod.nodes[k]), int(rod.nodes[k + 1]), float((arc - rod.arc[k]) / (rod.arc[k + 1] - rod.arc[k]))
+def _locate(rod: GridRod, arcs: Reals) -> tuple[Indices, Indices, Reals]:
+    """The nodes (k,) of the elements at arc lengths (k,), and where on them (0 to 1)."""
+    k = np.clip(np.searchsorted(rod.arc, arcs, side="right") - 1, 0, len(rod.arc) - 2)
+    return rod.nodes[k], rod.nodes[k + 1], (arcs - rod.arc[k]) / (rod.arc[k + 1] - rod.arc[k])
 
 
-def _between(rod: GridRod, points: Reals, arc: float) -> Reals:
-    a, b, share = _locate(rod, arc)
-    return np.asarray((1.0 - share) * points[a] + share * points[b])
+def _between(points: Reals, a: Indices, b: Indices, share: Reals) -> Reals:
+    """Points (k, 3) on the straight lines from nodes a to nodes b."""
+    return np.asarray((1.0 - share[:, None]) * points[a] + share[:, None] * points[b])
 
 
-def _curved(rod: GridRod, state: State, arc: float) -> Reals:
-    """Position (3,) at the arc length: Hermite's cubic between the element's ends, its tangents the rod's axis at the nodes."""
-    a, b, t = _locate(rod, arc)
-    pair = state.positions[[a, b]]
-    if t in (0.0, 1.0):
-        return np.asarray(pair[int(t)])
-    length = float(np.linalg.norm(pair[1] - pair[0]))
-    axis = np.array([1.0, 0.0, 0.0]) if rod.direction == "u" else np.array([0.0, 1.0, 0.0])
-    tangent = length * (matrices(state.quaternions[[a, b]]) @ axis)
-    blend = np.array([(1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t), t * (1 - t) ** 2, t * t * (t - 1)])
-    return np.asarray(blend[:2] @ pair + blend[2:] @ tangent)
+def _curved(state: State, a: Indices, b: Indices, share: Reals, axis: Indices) -> Reals:
+    """Positions (k, 3) on bent elements from nodes a to nodes b: Hermite's cubic between their ends, its tangents the rods' axes
+    there, which are the nodes' x axis (0) or y axis (1)."""
+    p, q, t = state.positions[a], state.positions[b], share[:, None]
+    length = np.linalg.norm(q - p, axis=1, keepdims=True)
+    which = np.arange(len(a))
+    m, n = (length * matrices(state.quaternions[each])[which, :, axis] for each in (a, b))
+    cubic = (1 + 2 * t) * (1 - t) ** 2 * p + t * t * (3 - 2 * t) * q + t * (1 - t) ** 2 * m + t * t * (t - 1) * n
+    return np.asarray(np.where(t == 0.0, p, np.where(t == 1.0, q, cubic)))
 
 
-def _turned(rod: GridRod, state: State, arc: float) -> Reals:
-    """Quaternion (4,) at the arc length, between those of the element's ends."""
-    a, b, t = _locate(rod, arc)
+def _turned(state: State, a: Indices, b: Indices, share: Reals) -> Reals:
+    """Quaternions (k, 4) between those of the elements' ends."""
     first, second = state.quaternions[a], state.quaternions[b]
-    mixed = (1.0 - t) * first + t * (second if first @ second >= 0.0 else -second)
-    return np.asarray(mixed / np.linalg.norm(mixed))
+    near = np.where(np.sum(first * second, axis=1, keepdims=True) >= 0.0, second, -second)
+    mixed = (1.0 - share[:, None]) * first + share[:, None] * near
+    return np.asarray(mixed / np.linalg.norm(mixed, axis=1, keepdims=True))

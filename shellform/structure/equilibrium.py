@@ -44,6 +44,7 @@ _PATIENCE = 3  # steps with mass between two looks for a symmetric path
 _STAGNANT = 0.1  # ratio of two residuals one after the other: a step that brings less than this may be down to rounding
 _HEAVY = 1e6  # times the largest stiffness
 _FAR = 1e6  # m or rad, a step of Newton's iteration that leads nowhere
+_SYMMETRIC_UP_TO = 20_000  # freedoms
 _HALVINGS = 4  # of one step before the mass is raised instead
 
 
@@ -230,8 +231,11 @@ class _Walk:
         """A Newton step where the tangent has negative eigenvalues that the unbalanced forces don't touch.
 
         So it is on an exactly symmetric path past its bifurcation (a strip rolled up in its plane by more moment than
-        it bears sideways): the mass that those modes ask for would only slow down the others.
+        it bears sideways): the mass that those modes ask for would only slow down the others. Exact symmetry is for small models;
+        large ones are spared the factorisation, which isn't blocked and takes a hundred times as long as Cholesky's.
         """
+        if len(self.assembly.free) > _SYMMETRIC_UP_TO:
+            return False
         if self.patience > 0:
             self.patience -= 1
             return False

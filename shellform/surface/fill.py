@@ -4,12 +4,13 @@ ground all round.
 A hole is closed over the plane square to the mean normal round it; an open stretch of the outer edge, between two places where
 it stands on the ground, goes on outwards and down to a footprint on the ground. In both cases the fill has the least bending
 (plate.py) of all that continue the surface with its slope. The footprint lies where the fill descends at 45° on average, or at
-the slope the surface already has at its edge where that is steeper.
+the slope the surface already has at its edge where that is steeper; or further out, where it leaves the feet in line with the
+edge on the ground beyond them.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from shellform.surface.target import make_surface
 _ON_GROUND = 0.02  # of the rise: an edge lower than that stands on the ground
 _DESCENT = 1.0  # mean slope of a fill down to the ground
 _STEEPEST = 3.0
+_FLATTEST = 0.7  # mean slope of a fill whose footprint goes further out
+_WIDEST = np.pi / 4  # angle to its chord at which a footprint leaves a foot
+_BLEND = 0.1  # of the span: how softly a footprint goes over from the one rule to the other
 _UPRIGHT = 0.15  # least vertical part of a normal that a fill can start from
 _SHORT = 0.5  # of an edge: footprints nearer than that to the edge are left out
 
@@ -43,7 +47,7 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
     outer = loops[int(np.argmax(outline))]
     level = float(draft.points[outer, 2].min()) if ground is None else ground
     rise = float(draft.points[:, 2].max()) - level
-    low = draft.points[:, 2] < level + _ON_GROUND * rise
+    low = draft.points[:, 2] <= level + _ON_GROUND * rise
     own, closed = len(draft.points), replace(draft, normals=normals)
     holes = [loop for loop in loops if loop is not outer and not low[loop].any()]
     standing = len(loops) - 1 - len(holes)
@@ -87,8 +91,18 @@ def _upwards(draft: Draft) -> Draft:
     return draft if up >= 0.0 else replace(draft, triangles=draft.triangles[:, ::-1].copy())
 
 
-def _arches(outer: Indices, low: Flags, where: str) -> list[Indices]:
-    """The stretches of the outer edge that don't stand on the ground, each from foot to foot."""
+@dataclass(frozen=True)
+class _Arch:
+    """A stretch of the outer edge that doesn't stand on the ground: its `vertices` from foot to foot, and the ground's vertices
+    `before` and `after` it, which are the feet themselves where the ground is but a point there."""
+
+    vertices: Indices
+    before: int
+    after: int
+
+
+def _arches(outer: Indices, low: Flags, where: str) -> list[_Arch]:
+    """The arches of the outer edge, in its direction."""
     grounded = low[outer]
     if grounded.sum() < 2:
         raise InputError(
@@ -100,7 +114,15 @@ def _arches(outer: Indices, low: Flags, where: str) -> list[Indices]:
     feet = np.flatnonzero(low[turned])
     ends = np.append(feet[1:], len(turned))
     closed = np.append(turned, turned[0])
-    return [closed[a : b + 1] for a, b in zip(feet, ends, strict=True) if b - a > 1]
+    count = len(turned)
+    found = []
+    for a, b in zip(feet, ends, strict=True):
+        if b - a > 1:
+            before, after = turned[a - 1], turned[(b + 1) % count]
+            found.append(
+                _Arch(closed[a : b + 1], int(before if low[before] else closed[a]), int(after if low[after] else closed[b]))
+            )
+    return found
 
 
 def _capped(points: Reals, normals: Reals, loop: Indices, where: str) -> tuple[Indices, Reals, Reals, Indices]:
@@ -122,9 +144,9 @@ def _capped(points: Reals, normals: Reals, loop: Indices, where: str) -> tuple[I
     return rim, np.column_stack([inside, heights[new]]) @ frame, _upright(slopes[new]) @ frame, triangles
 
 
-def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: str) -> tuple[Indices, Reals, Reals, Indices]:
+def _footed(points: Reals, normals: Reals, arch: _Arch, level: float, where: str) -> tuple[Indices, Reals, Reals, Indices]:
     """The same of an arch's fill, which reaches the ground."""
-    place = points[arch]
+    place = points[arch.vertices]
     chord = place[-1, :2] - place[0, :2]
     span = float(np.linalg.norm(chord))
     if span <= 0.0:
@@ -132,12 +154,13 @@ def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: s
             "an open stretch of its edge starts and ends at one place", where=where, remedy="Close it in its own program."
         )
     outwards = np.array([chord[1], -chord[0]]) / span
-    inner = normals[arch[1:-1]]  # at a foot two slopes meet, so only the arch between them counts
+    inner = normals[arch.vertices[1:-1]]  # at a foot two slopes meet, so only the arch between them counts
     slope = _gradients(np.vstack([inner[:1], inner, inner[-1:]]), place, where)
     descent = np.clip(-slope @ outwards, _DESCENT, _STEEPEST)
     for _ in range(3):
         descent[1:-1] = 0.25 * descent[:-2] + 0.5 * descent[1:-1] + 0.25 * descent[2:]
     away = np.maximum(place[:, 2] - level, 0.0) / descent
+    away = _in_line(away, place, points[[arch.before, arch.after], :2], outwards, level)
     step = float(np.linalg.norm(np.diff(place, axis=0), axis=1).mean())
     far = np.flatnonzero(away > _SHORT * step)
     if not len(far):
@@ -145,7 +168,7 @@ def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: s
             "an open stretch of its edge is lower than its mesh is fine", where=where, remedy="Refine the mesh."
         )
     foot = _evenly(np.vstack([place[-1, :2], (place[far, :2] + away[far, None] * outwards)[::-1], place[0, :2]]), step)[1:-1]
-    rim = arch[::-1]
+    rim = arch.vertices[::-1]
     outline = np.vstack([place[::-1, :2], foot[::-1]])
     inside, triangles = _meshed(outline, where)
     plan = np.vstack([outline, inside])
@@ -154,6 +177,35 @@ def _footed(points: Reals, normals: Reals, arch: Indices, level: float, where: s
     known[len(rim) : len(outline)] = level
     heights, slopes = _least_bent(plan, triangles, known, np.arange(len(rim)), slope[::-1], closed=False)
     return rim, np.column_stack([plan, heights])[len(rim) :], _upright(slopes[len(rim) :]), triangles
+
+
+def _in_line(away: Reals, place: Reals, beyond: Reals, outwards: Reals, level: float) -> Reals:
+    """Distances (k,), m, from an arch out to its footprint, at least about those given, such that it leaves the feet in line
+    with the ground `beyond` them (2, 2), as a smooth footprint does; as given where the arch isn't a graph over its chord.
+    """
+    first, last = place[0, :2], place[-1, :2]
+    along = (last - first) / np.linalg.norm(last - first)
+    span = float(np.linalg.norm(last - first))
+    share, rim = (place[:, :2] - first) @ along / span, (place[:, :2] - first) @ outwards
+    if (np.diff(share) <= 0.0).any():
+        return away
+    leave, arrive = _leaving(first - beyond[0], along, outwards), _leaving(last - beyond[1], -along, outwards)
+    curve = span * share * (1.0 - share) * ((1.0 - share) * leave + share * arrive)
+    middle = int(np.argmax(place[:, 2]))
+    most = rim[middle] + (place[middle, 2] - level) / _FLATTEST
+    if curve[middle] > most:
+        curve *= max(most, 0.0) / curve[middle]
+    blend = _BLEND * span * share * (1.0 - share)
+    given = rim + away
+    return np.asarray(np.maximum(0.5 * (given + curve + np.hypot(given - curve, blend)) - rim, 0.0))
+
+
+def _leaving(way: Reals, along: Reals, outwards: Reals) -> float:
+    """The slope over the chord with which an edge on the ground goes on past its foot; none where it would go inwards, or is
+    but a point.
+    """
+    out = float(way @ outwards)
+    return float(np.tan(min(np.arctan2(out, float(way @ along)), _WIDEST))) if out > 0.0 else 0.0
 
 
 def _upright(slopes: Reals) -> Reals:

@@ -23,6 +23,7 @@ from shellform.surface.sides import shared_edges, side_of
 
 _SAME = 1e-8  # of the size: vertices nearer than that are one
 _FLAT = 1e-9  # of the squared size: a surface smaller than that has no area
+_FURTHEST = 1e9  # m from the origin
 _PIECES_TOLD = 5
 _PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move into their faces
 
@@ -31,6 +32,11 @@ def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | No
     """The draft as one connected skin with an edge, faces turned alike. Raises InputError for what can't be mended and lacks a
     choice.
     """
+    largest = float(np.abs(draft.points).max(initial=0.0))
+    if largest > _FURTHEST:
+        raise InputError(
+            f"has coordinates of up to {largest:.3g} m", where=where, remedy="Check its unit, and move it to the origin."
+        )
     extent = np.ptp(draft.points, axis=0) if len(draft.points) else np.zeros(3)
     size = float(extent.max())
     if not size > 0.0:

@@ -31,6 +31,7 @@ FORMATS = {
 }  # fmt: skip
 MOST_BYTES = 512 * 1024**2
 _HEAD = 65536
+_UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
 _OWN = {
     "obj": plain.read_obj,
     "off": plain.read_off,
@@ -98,7 +99,16 @@ def surface_of(
     if fill is not None:
         whole = filled(whole, source, what=fill, ground=ground)
     surface = make_surface(whole.points, whole.triangles, normals=whole.normals, source=source)
-    return Surface(surface.vertices, surface.triangles, surface.normals, source, whole.notes + surface.mended)
+    notes = whole.notes + surface.mended
+    corner = surface.vertices[surface.triangles]
+    plan = 0.5 * abs(float(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].sum()))
+    if plan < _UPRIGHT * surface.area:
+        share = f"{100.0 * plan / surface.area:.0f} %"
+        notes = (
+            *notes,
+            f"it stands upright, with a plan of {share} of its area: check the vertical axis (surface.up, --up)",
+        )
+    return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
 
 
 def kind_of(file: Path) -> str:
@@ -115,8 +125,11 @@ def kind_of(file: Path) -> str:
             remedy="Export a coarser mesh, or the surface alone.",
         )
     told = ENDINGS.get(file.suffix.lower())
-    with file.open("rb") as opened:
-        head = opened.read(_HEAD)
+    try:
+        with file.open("rb") as opened:
+            head = opened.read(_HEAD)
+    except OSError as error:
+        raise InputError(f"can't be read: {error.strerror}", where=str(file), remedy="Check its permissions.") from error
     for first, what in _OTHERS.items():
         if head.startswith(first):
             raise InputError(f"is {what}, which isn't read here", where=str(file), remedy=f"Known: {', '.join(ENDINGS)}.")

@@ -129,6 +129,8 @@ def test_coordinates_that_are_no_numbers_are_named_by_vertex(tmp_path):
             refused(file, "coordinate that is no number")
     write_obj(tmp_path / "a.obj", points, QUADS)
     refused(tmp_path / "a.obj", "vertex 8")
+    write_obj(tmp_path / "a.obj", 1e300 * POINTS, QUADS)
+    refused(tmp_path / "a.obj", "coordinates of up to 3e+300 m")
 
 
 def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
@@ -137,7 +139,7 @@ def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
         (tmp_path / "a.obj").write_text(good + bad + "\n")
         refused(tmp_path / "a.obj", f"line {good.count(chr(10)) + 1}", bad)
     (tmp_path / "a.obj").write_text(good + "f 1 2 999\n")
-    refused(tmp_path / "a.obj", "a face names vertex 998 of 117")
+    refused(tmp_path / "a.obj", "a face names vertex 999, of 117")
     text = write_off(tmp_path / "a.off", POINTS, QUADS).read_text().splitlines()
     (tmp_path / "a.off").write_text("\n".join([*text[:10], "0 0 x", *text[11:]]))
     refused(tmp_path / "a.off", "line 11")
@@ -251,6 +253,22 @@ def test_a_refusal_in_the_reader_s_process_comes_back_whole():
     with pytest.raises(InputError) as caught:
         foreign.read_foreign(DATA / "dome_mm.step", "step", {**SETTINGS, "unit": "mm"})
     assert (caught.value.where, caught.value.value, caught.value.remedy) == ("surface.unit", "mm", "Leave the unit out.")
+
+
+def test_a_file_that_may_not_be_read_is_refused(tmp_path, monkeypatch):
+    file = write_obj(tmp_path / "a.obj", POINTS, QUADS)
+
+    def forbidden(*arguments, **options):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", forbidden)  # the tests may run as root, who may read all
+    refused(file, "can't be read: Permission denied")
+
+
+def test_a_shell_on_its_side_is_told(tmp_path):
+    lying = read_surface(write_obj(tmp_path / "a.obj", POINTS[:, [2, 0, 1]], QUADS))
+    assert any("it stands upright" in note and "--up" in note for note in lying.mended)
+    assert not read_surface(write_obj(tmp_path / "a.obj", POINTS, QUADS)).mended
 
 
 def test_wrong_settings_are_refused_before_the_file_is_read(tmp_path):

@@ -31,7 +31,7 @@ SIZES = {  # m, of each file's shell: from its dimensions in the file's unit and
     "cap, OFF, mm": (7, 6, 1.9),
     "two patches, OBJ, cm": (7, 6, 1.766),
     "solid dome, STEP, mm, y up": (10.392, 10.392, 3),
-    "arched shell, STEP, filled": (10.1, 10.1, 3),
+    "arched shell, STEP, filled": (10.09, 10.09, 2.5),
     "cap, COMPAS JSON, y up": (9, 9, 2),
 }
 
@@ -45,13 +45,8 @@ def test_every_file_brought_is_read_at_its_true_size_in_one_piece(tmp_path, name
     assert told["holes"] == "0"
 
 
-# Measured on 21 November: what the net misses on these, to be taken off as it gets better.
-MISSES = {
-    "RhinoVAULT pillow, JSON": "distance 1.12 % of the spacing",
-    "saddle, VTU with lines": "spacing error 0.56 %",
-    "arched shell, STEP, filled": "spacing error 0.82 %, distance 1.5 % of the spacing",
-    "clipped ellipsoid, VTP": "no equilibrium: normals at an edge of alternately long and short segments jitter by 1.4°",
-}
+# Measured on 21 November: what the net misses, to be taken off as it gets better.
+MISSES = {"clipped ellipsoid, VTP": "distance 1.08 % of the spacing, beside an edge of long and thin triangles"}
 
 
 def marked(name):

@@ -137,6 +137,22 @@ def test_arches_are_brought_down_to_the_ground_without_a_fold():
     assert worst[1] < 0.75 * worst[0] < 20.0
 
 
+def turns(edge):
+    """Angles, degrees, by which a closed line in plan turns at its points."""
+    along = np.roll(edge, -1, axis=0) - edge
+    before = np.roll(along, 1, axis=0)
+    return np.degrees(np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.sum(before * along, axis=1)))
+
+
+def test_the_footprint_turns_little_at_the_feet():
+    draft = arched(0.25)
+    corners = turns(draft.points[loops_of(draft.triangles)[0], :2])
+    closed = filled(draft, "shell", what="edges")
+    footprint = turns(closed.points[loops_of(closed.triangles)[0], :2])
+    assert np.abs(corners).max() > 60.0
+    assert np.abs(footprint).max() < 35.0  # not quite in line, where that would reach too far out for the arch's height
+
+
 def test_the_ground_may_lie_lower_than_the_edge():
     draft = arched(0.5)
     sunk = filled(draft, "shell", what="edges", ground=-0.001)
