@@ -23,12 +23,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from shellform.arrays import Flags, Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.problem import Point
 from shellform.structure.assembly import Assembly
+from shellform.structure.sensitivity import element_columns
 from shellform.structure.state import State, moved
 
 _DEAD = 1e-6  # of the cables' stiffness: a tension below it counts as none
@@ -87,12 +87,7 @@ def tension_model(
     chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
     length = np.linalg.norm(chord, axis=1)
     unit = chord / length[:, None]
-    number = np.full(6 * assembly.count, -1)
-    number[assembly.free] = np.arange(len(assembly.free))
-    rows = number[cables.freedoms()]
-    values, held = np.hstack([-unit, unit]), rows < 0
-    columns = np.broadcast_to(np.arange(count)[:, None], rows.shape)
-    pull = sp.csc_array((values[~held], (rows[~held], columns[~held])), shape=(len(assembly.free), count))
+    pull = element_columns(assembly, cables.freedoms(), np.hstack([-unit, unit]))
 
     right = pull.toarray()
     if frees_radius:

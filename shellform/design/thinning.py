@@ -13,12 +13,12 @@ Cholesky factor of S that grows row by row and may not lose more than a set shar
 from __future__ import annotations
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
 from shellform.arrays import Indices, Reals
 from shellform.structure.assembly import Assembly
 from shellform.structure.cable import Cables
+from shellform.structure.sensitivity import element_columns
 from shellform.structure.state import State
 
 
@@ -31,14 +31,9 @@ def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
     length = np.linalg.norm(chord, axis=1)
     stiffness = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
     unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
-    number = np.full(6 * assembly.count, -1)
-    number[assembly.free] = np.arange(len(assembly.free))
-    rows = number[cables.freedoms()]
-    values, taken = np.hstack([-unit, unit]), rows >= 0
-    columns = np.broadcast_to(np.arange(len(rows))[:, None], rows.shape)
-    pull = sp.csc_array((values[taken], (rows[taken], columns[taken])), shape=(len(assembly.free), len(rows)))
+    pull = element_columns(assembly, cables.freedoms(), np.hstack([-unit, unit]))
     solved = assembly.factor(state).solve(np.asfortranarray(pull.toarray()))
-    return np.asarray(np.eye(len(rows)) - pull.T @ solved)
+    return np.asarray(np.eye(len(unit)) - pull.T @ solved)
 
 
 def spared(kept: Reals, order: Indices, most: int, least: float) -> Indices:

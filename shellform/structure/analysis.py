@@ -39,12 +39,13 @@ Progress = Callable[[float, int], None]
 class Analysis:
     """The last state reached and why it ended there.
 
-    `load` (n, 6) at that state; `converged`; `increments` as the contract has them, each with the `steps` it took; `modes` and `critical`
+    `load` (n, 6) at that state; `reactions` (n, 6), what held freedoms bear there, N and N·m; `converged`; `increments` as the contract has them, each with the `steps` it took; `modes` and `critical`
     where they were asked for; `warnings`, a sentence each.
     """
 
     model: Model
     load: Reals
+    reactions: Reals
     equilibrium: Equilibrium
     converged: bool
     increments: tuple[dict[str, Any], ...]
@@ -105,6 +106,7 @@ def analyse(
     return Analysis(
         model,
         loaded,
+        assembly.evaluate(found.state, tangent=False).force - loaded,
         replace(found, factorisations=walk.spent),
         converged,
         tuple(walk.told),
@@ -242,8 +244,7 @@ def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None)
     """The result document of the contract, and besides it `warnings`, `beam_twists`, `cable_elongations`, `energy_by_kind`, with `sections`
     by kind of beam `stresses` (Pa, at both ends) and `utilisation`, and where asked for `modes` and `critical`."""
     network, found = analysis.model.network, analysis.equilibrium
-    assembly = assemble(network)
-    reaction = assembly.evaluate(found.state, tangent=False).force - analysis.load
+    reaction = analysis.reactions
     names = ("N", "Mx_a", "My_a", "Mz_a", "Mx_b", "My_b", "Mz_b")
     forces = network.beams.local_forces(found.state)
     document = {

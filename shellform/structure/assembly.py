@@ -39,8 +39,8 @@ class Balance:
 
 
 class Assembly:
-    """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in order;
-    `arms` (count,), m: the mean rest length of each node's beams;
+    """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in order,
+    `number` (6 count,) the place of each freedom among them, -1 where it is held or has no stiffness; `arms` (count,), m: the mean rest length of each node's beams;
     `clock` adds up the seconds spent on assembly, factorisation and solve."""
 
     def __init__(self, count: int, parts: Sequence[Part], fixed: Flags) -> None:
@@ -52,8 +52,8 @@ class Assembly:
             active[each.ravel()] = True
         active &= ~fixed.ravel()
         self.free: Indices = np.flatnonzero(active)
-        number = np.full(6 * count, -1, dtype=np.int64)
-        number[self.free] = np.arange(len(self.free))
+        self.number: Indices = np.full(6 * count, -1, dtype=np.int64)
+        self.number[self.free] = np.arange(len(self.free))
         self.clock: dict[str, float] = {"assembly": 0.0, "factorisation": 0.0, "solve": 0.0}
         self._freedoms = freedoms
         self.arms = _arms(count, self.beams)
@@ -61,7 +61,7 @@ class Assembly:
         self.reach: Reals = np.repeat(1.0 / self.arms[:, None], 6, axis=1)
         self.reach[:, :3] = 1.0
         self.reach = self.reach.ravel()
-        self.matrix, self._sources = _pattern(number, freedoms)
+        self.matrix, self._sources = _pattern(self.number, freedoms)
         ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
         self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
         self._entries = np.empty(int(ends[-1]))

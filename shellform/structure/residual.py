@@ -99,9 +99,7 @@ class Turning:
     """
 
     def __init__(self, assembly: Assembly, load: Reals) -> None:
-        number = np.full(6 * assembly.count, -1)
-        number[assembly.free] = np.arange(len(assembly.free))
-        rotations = number.reshape(-1, 6)[:, 3:]
+        rotations = assembly.number.reshape(-1, 6)[:, 3:]
         # With one free rotation there is nothing that it could fail to commute with.
         self.nodes = np.flatnonzero(load[:, 3:].any(axis=1) & ((rotations >= 0).sum(axis=1) > 1))
         self.rows = rotations[self.nodes]

@@ -63,11 +63,15 @@ def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Respons
 
 def by_rest_length(assembly: Assembly, state: State, cables: Cables) -> sp.csc_array:
     """Derivative (f, c), N/m, of the internal forces by the cables' rest lengths (A.23)."""
-    rows = _numbers(assembly)[cables.freedoms()]
+    return element_columns(assembly, cables.freedoms(), cables.force_by_rest_length(state))
+
+
+def element_columns(assembly: Assembly, freedoms: Indices, values: Reals) -> sp.csc_array:
+    """A column (f, m) on the free freedoms for each element, from its `values` (m, k) at its `freedoms` (m, k)."""
+    rows = assembly.number[freedoms]
     taken = rows >= 0
     columns = np.broadcast_to(np.arange(len(rows))[:, None], rows.shape)
-    values = cables.force_by_rest_length(state)[taken]
-    return sp.csc_array((values, (rows[taken], columns[taken])), shape=(len(assembly.free), len(rows)))
+    return sp.csc_array((values[taken], (rows[taken], columns[taken])), shape=(len(assembly.free), len(rows)))
 
 
 def by_stiffness(assembly: Assembly, state: State, *rates: Beams) -> sp.csc_array:
@@ -112,7 +116,7 @@ def reaction_rows(assembly: Assembly, state: State, freedoms: Indices) -> sp.csr
     """Derivative (k, f), N/m and N/rad, of the internal forces at held `freedoms` (k,) by the free ones: of the reactions, the load given."""
     wanted = np.full(6 * assembly.count, -1)
     wanted[freedoms] = np.arange(len(freedoms))
-    number = _numbers(assembly)
+    number = assembly.number
     result = sp.csr_array((len(freedoms), len(assembly.free)))
     for part in assembly.parts:
         own = part.freedoms()
@@ -183,18 +187,11 @@ def predicted(assembly: Assembly, response: Response, change: Reals) -> State:
 
 def _rows(assembly: Assembly, freedoms: np.ndarray, values: Reals) -> sp.csr_array:
     """Rows (m q, f) from values (m, q, k) at freedoms (m, 1, k)."""
-    columns = np.broadcast_to(_numbers(assembly)[freedoms], values.shape)
+    columns = np.broadcast_to(assembly.number[freedoms], values.shape)
     taken = columns >= 0
     rows = np.broadcast_to(np.arange(values.shape[0] * values.shape[1]).reshape(values.shape[:2])[:, :, None], values.shape)
     shape = (values.shape[0] * values.shape[1], len(assembly.free))
     return sp.csr_array((values[taken], (rows[taken], columns[taken])), shape=shape)
-
-
-def _numbers(assembly: Assembly) -> np.ndarray:
-    """Place (6 n,) of each freedom among the free ones, -1 where it is held."""
-    number = np.full(6 * assembly.count, -1)
-    number[assembly.free] = np.arange(len(assembly.free))
-    return number
 
 
 def _dense(matrix: Reals | sp.csc_array) -> Reals:

@@ -34,8 +34,6 @@ from shellform.structure.residual import Measure, held
 from shellform.structure.sparse import NotPositiveDefinite
 from shellform.structure.state import State
 
-_ITERATIONS = 30
-_SETTLED = 1e-4
 _LANCZOS = 200  # restarts; an eigenvalue that stands out takes a few
 _DENSE = 12  # freedoms up to which Lanczos vectors don't fit
 
@@ -134,26 +132,6 @@ def critical_load(
             linearised = linearised_factor(assembly, before[1], found.state, (before[0], point.factor))
         before = (point.factor, found.state)
     return None
-
-
-def lowest_mode(assembly: Assembly, state: State) -> Reals:
-    """The softest mode (n, 6) of the tangent at a stable state in its translations, the largest of which is 1: inverse iteration.
-
-    Raises NotPositiveDefinite where the state isn't stable.
-    """
-    factor = assembly.factor(state)
-    moving = assembly.free % 6 < 3
-    mode = np.where(moving, _start(len(moving)), 0.0)
-    for _ in range(_ITERATIONS):
-        then = factor.solve(np.where(moving, mode, 0.0))
-        then /= np.abs(then[moving]).max()
-        change = min(np.abs(then - mode).max(), np.abs(then + mode).max())
-        mode = then
-        if change < _SETTLED:
-            break
-    result = np.zeros(6 * assembly.count)
-    result[assembly.free] = mode
-    return result.reshape(-1, 6)
 
 
 def _start(size: int) -> Reals:
