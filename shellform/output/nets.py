@@ -22,7 +22,7 @@ def draw_net(net: Net, folder: str | Path) -> list[Path]:
         "distance": ("distance from the surface", ("mm", 1e-3), _along_rods(net, np.abs(quality.distance))),
         "curvature": ("curvature of the rods", ("1/m", 1.0), _at_nodes(net, np.linalg.norm(quality.curvature, axis=2))),
         "skew": ("skewness of the cells", ("°", _DEGREE), _along_rods(net, np.abs(0.5 * np.pi - quality.shear_angle))),
-        "springs": ("springs' forces left", ("EI/s²", 1.0), np.abs(quality.pull)),
+        "springs": ("force left in the springs", ("EI/s²", 1.0), np.abs(quality.pull)),
     }
     files = []
     none = np.zeros((0, 2), dtype=np.int64)

@@ -23,6 +23,7 @@ from shellform.errors import InputError
 
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
 _DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
+_FAR = -1.5  # values further below their limit than this run out of the picture: what is near is what counts
 _FORMATS = (".png", ".svg", ".pdf")
 _WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
 
@@ -101,7 +102,8 @@ def constraint_history(
 ) -> None:
     """Figure 11: value over limit, minus 1, of each constraint at each accepted design; feasible at and below zero.
 
-    Linear, or, where a value exceeds 3, linear between -1 and 1 and logarithmic beyond. `path` as in `objective_history`.
+    Linear, or, where a value exceeds 3, linear between -1 and 1 and logarithmic beyond; what is below -1.5 is out of the picture. `path` as
+    in `objective_history`.
     """
     at, lines = _columns(evaluation, constraints)
     figure, axes = _figure()
@@ -117,7 +119,7 @@ def constraint_history(
         top = 1.5 * highest
     else:
         top = max(1.15 * highest, 0.15)
-    bottom = min(1.1 * lowest, -0.15)
+    bottom = max(min(1.1 * lowest, -0.15), _FAR)
     axes.set_ylim(bottom, top)
     axes.axhspan(0.0, top, color="#f8ddd3", linewidth=0.0, zorder=0)
     axes.axhspan(bottom, 0.0, color="#e4eff6", linewidth=0.0, zorder=0)
