@@ -243,7 +243,7 @@ def render(
     limit: Annotated[float | None, typer.Option(help="End of the colour scale, m.")] = None,
 ) -> None:
     """Draw deviation maps of a run."""
-    from shellform.study.run import draw_run
+    from shellform.study.pictures import draw_run
 
     for file in draw_run(run, load=load, design=design, limit=limit):
         print(file)

@@ -14,7 +14,8 @@ from shellform.errors import InputError
 from shellform.net.files import net_document, save_net
 from shellform.net.orient import oriented_net
 from shellform.study.case import SurfaceEntry, load_case, write_text
-from shellform.study.run import Report, net_summary, surface_of, surface_summary, told_size
+from shellform.study.folder import Report
+from shellform.study.run import net_summary, surface_of, surface_summary, told_size
 from shellform.study.shell import rod_material
 from shellform.surface.reading import FORMATS, kind_of
 from shellform.surface.target import largest_curvature

@@ -1,0 +1,198 @@
+"""The run folder (contracts/run-folder.md): what the stages leave in it, and how it is read back.
+
+Every file is written whole or not at all. `read_run` gives the nouns that pictures, drawings and the page are made from.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.design.gridshell import Design, Gridshell
+from shellform.design.optimum import Step
+from shellform.design.problem import deviations
+from shellform.errors import InputError
+from shellform.net.files import load_net
+from shellform.net.net import Net
+from shellform.structure.loading import Loaded
+from shellform.structure.model import Model, write_model
+from shellform.structure.state import State
+from shellform.study.case import Case, load_case
+from shellform.study.shell import gridshell
+from shellform.surface.target import Surface
+
+DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "polished")
+VERSION = 1  # of summary.json
+
+Report = Callable[[str, str], None]
+"""Called with the stage and a line of progress."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run read back: its `designs` by name, their `states` by design and load case, the `loads` (n, 6) by name, and the `summary`."""
+
+    folder: Path
+    case: Case
+    surface: Surface
+    shell: Gridshell
+    loads: Mapping[str, Reals]
+    designs: Mapping[str, Design]
+    states: Mapping[str, Mapping[str, State]]
+    summary: Mapping[str, Any]
+
+    @property
+    def net(self) -> Net:
+        """The shell's net."""
+        return self.shell.net
+
+    @property
+    def best(self) -> str:
+        """The name of the design to build: the last made of the polished, the optimised and the initial one."""
+        return [name for name in ("initial", "optimised", "polished") if name in self.designs][-1]
+
+
+def read_run(folder: str | Path) -> Run:
+    """A run with at least one design. Raises InputError for another folder, a damaged one, or one of a newer version."""
+    place = Path(folder)
+    if not (place / "case.toml").is_file():
+        raise InputError("is no run folder", where=str(place), remedy="Make one with shellform design.")
+    summary = read_json(place / "summary.json")
+    if summary.get("version", VERSION) > VERSION:
+        raise InputError(
+            "was written by a newer shellform", where=str(place), value=summary["version"], remedy="Install that version."
+        )
+    ready = [name for name in DESIGNS if (place / f"designs/{name}.npz").is_file()]
+    if not ready:
+        raise InputError("the run has no designs yet", where=str(place), remedy="Run shellform design on it first.")
+    case = load_case(place / "case.toml")
+    surface = load_surface(place / "surface.npz")
+    shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
+    designs, states = {}, {}
+    for name in ready:
+        with arrays_of(place / f"designs/{name}.npz") as data:
+            designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
+            states[name] = {each: State(data[f"{each}_positions"], data[f"{each}_quaternions"]) for each in loads}
+    return Run(place, case, surface, shell, loads, designs, states, summary)
+
+
+def save_surface(path: Path, surface: Surface) -> None:
+    """Writes the surface so that `load_surface` gives the same."""
+    save_arrays(path, vertices=surface.vertices, triangles=surface.triangles, normals=surface.normals)
+
+
+def load_surface(path: Path, source: str = "") -> Surface:
+    """A saved surface."""
+    with arrays_of(path) as data:
+        return Surface(data["vertices"], data["triangles"], data["normals"], source)
+
+
+def keep_design(
+    folder: Path,
+    shell: Gridshell,
+    name: str,
+    design: Design,
+    loaded: Mapping[str, Loaded],
+    loads: Mapping[str, Reals],
+) -> dict[str, Any]:
+    """Writes a design's model file and states; returns its part of the summary."""
+    supports = tuple(int(node) for node in shell.net.supports)
+    network = shell.network(design)
+    model = Model(network, {each: loads[each] for each in loads if loads[each].any()}, shell.target, supports)
+    write_model(folder / f"designs/{name}.json", model)
+    states = {each: loaded[each].equilibrium.state for each in loads}
+    save_arrays(
+        folder / f"designs/{name}.npz",
+        rest_length=design.rest_length,
+        present=design.present,
+        radius=np.array(design.radius),
+        **{f"{each}_positions": state.positions for each, state in states.items()},
+        **{f"{each}_quaternions": state.quaternions for each, state in states.items()},
+    )
+    pull = shell.cables(design).tension(states["design"])
+    return {
+        "cables": int(design.present.sum()),
+        "rod_radius": design.radius,
+        "cable_force_sum": float(pull.sum()),
+        "cable_force_max": float(pull.max(initial=0.0)),
+        "loads": {
+            each: {
+                "factor": round(float(loads[each][:, 2].sum() / loads["design"][:, 2].sum()), 12) + 0.0,  # no -0
+                **_deviation(shell, states[each]),
+                "stable": loaded[each].equilibrium.stable,
+                "on_branch": loaded[each].on_branch,
+                "residual": loaded[each].equilibrium.residual,
+                "rod_utilisation_max": utilisation(shell, design, states[each]),
+            }
+            for each in loads
+        },
+    }
+
+
+def history_text(history: Sequence[Step]) -> str:
+    """The content of history.csv."""
+    text = io.StringIO()
+    terms, constraints = list(history[0].terms), list(history[0].constraints)
+    writer = csv.writer(text)
+    head = [f"term.{name}" for name in terms] + [f"constraint.{name}" for name in constraints]
+    writer.writerow(["evaluation", "accepted", "objective", *head, "cables", "stage", "seconds"])
+    for step in history:
+        values = [step.terms[name] for name in terms] + [step.constraints[name] for name in constraints]
+        writer.writerow(
+            [step.evaluation, int(step.accepted), step.objective, *values, step.cables, step.stage, round(step.seconds, 3)]
+        )
+    return text.getvalue()
+
+
+def _deviation(shell: Gridshell, state: State) -> dict[str, float]:
+    away = deviations(shell, state)
+    return {
+        "deviation_max": float(away.max()),
+        "deviation_mean": float(away.mean()),
+        "deviation_rms": float(np.sqrt((away**2).mean())),
+    }
+
+
+def utilisation(shell: Gridshell, design: Design, state: State) -> float:
+    """The largest bending stress of the rods over their flexural strength: M r / I over f_f for round ones (1)."""
+    section = shell.rod.resized(design.radius).section
+    forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
+    return float(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]).max()) / section.material.strength
+
+
+def save_arrays(path: Path, **arrays: Any) -> None:
+    """Writes arrays by name into an .npz file."""
+    partial = path.with_name(f"{path.name}.part.npz")
+    np.savez_compressed(partial, **arrays)
+    os.replace(partial, path)
+
+
+def arrays_of(path: Path) -> Any:
+    """The arrays of an .npz file, as a context manager. Raises InputError where it is missing or damaged."""
+    try:
+        return np.load(path, allow_pickle=False)
+    except (OSError, ValueError, zipfile.BadZipFile) as error:
+        raise InputError(f"is damaged: {error}", where=str(path), remedy="Run again with --fresh.") from error
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The object in a JSON file, empty where there is none. Raises InputError where the file is damaged."""
+    if not path.is_file():
+        return {}
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"is damaged: {error}", where=str(path), remedy="Run again with --fresh.") from error
+    if not isinstance(data, dict):
+        raise InputError("is damaged", where=str(path), remedy="Run again with --fresh.")
+    return data
