@@ -1,10 +1,10 @@
 """One of the paper's two studies of section 4.1 and a table beside what the paper says of it.
 
-    scripts/published_study fixed                      # rods of 2 mm: runs/published_fixed, about 95 s
-    scripts/published_study radius                     # radius free: runs/published_radius, compared with runs/published_fixed if that is there
-    scripts/published_study fixed --run runs/mine      # of a run that is finished already, which is not computed again
+    scripts/published_study fixed                   # rods of 2 mm: runs/published_fixed, about 95 s
+    scripts/published_study radius                  # radius free: runs/published_radius, beside runs/published_fixed if it is there
+    scripts/published_study fixed --run runs/mine   # of a run that is finished already, which is not computed again
 
-The table is published.md and published.csv in the run's folder. Exit status as of shellform: 0 done, 2 input refused, 3 no result.
+The table is published.md and published.csv in the run's folder. Exit status: 0 done, 2 input refused, 3 no result.
 """
 
 from __future__ import annotations
@@ -46,11 +46,17 @@ def write(study: str, done: Path | None, output: Path | None, fixed: Path | None
     """The table of a finished run, or of one that is made now; its files."""
     folder = done or output or ROOT / f"runs/published_{study}"
     if done is None:
-        run_case(load_case(ROOT / "scripts" / CASES[study]), folder, report=lambda stage, text: print(f"{stage:9} {text}", flush=True))
+        run_case(load_case(ROOT / "scripts" / CASES[study]), folder, report=tell)
     run = read_run(folder)
     if published.study_of(run) != study:
-        raise InputError(f"is a run of the study {published.study_of(run)!r}", where=str(folder), remedy=f"Asked for was {study!r}.")
+        other = published.study_of(run)
+        raise InputError(f"is a run of the study {other!r}", where=str(folder), remedy=f"Asked for was {study!r}.")
     return published.write_beside(run, fixed=_fixed(fixed) if study == "radius" else None)
+
+
+def tell(stage: str, text: str) -> None:
+    """A line of progress."""
+    print(f"{stage:9} {text}", flush=True)
 
 
 def _fixed(folder: Path | None) -> Run | None:

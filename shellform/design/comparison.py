@@ -1,18 +1,22 @@
-"""The same design problem for other optimisers: plain functions of its variables, and SciPy's two for smooth constrained problems.
+"""The same design problem for other optimisers: plain functions of its variables, and SciPy's two for smooth constrained
+problems.
 
-What mma.py does with models in the cables' tensions, SciPy's methods do with values and gradients in the rest lengths alone, which tells
-what the models are worth. SLSQP (Kraft 1988) solves a sequence of quadratic problems, each with a line search; trust-constr is an
-interior point method in a trust region (Byrd, Hribar and Nocedal 1999). Both build their curvature from gradients.
+What mma.py does with models in the cables' tensions, SciPy's methods do with values and gradients in the rest lengths alone,
+which tells what the models are worth. SLSQP (Kraft 1988) solves a sequence of quadratic problems, each with a line search;
+trust-constr is an interior point method in a trust region (Byrd, Hribar and Nocedal 1999). Both build their curvature from
+gradients.
 
-A trial design that leaves the stable branch has no objective. Its `value` is infinite, so that a line search or a trust region takes a
-shorter step; its constraints and derivatives, which must be finite, are those of the nearest design on the branch. Trials start from the
-states of the nearest design known; whether SciPy has accepted that one isn't told, but it is on the stable branch.
+A trial design that leaves the stable branch has no objective. Its `value` is infinite, so that a line search or a trust region
+takes a shorter step; its constraints and derivatives, which must be finite, are those of the nearest design on the branch.
+Trials start from the states of the nearest design known; whether SciPy has accepted that one isn't told, but it is on the
+stable branch.
 
 SciPy can't be led to a load by stages: the start must bear all loads.
 
-Measured on a gridshell of 28 candidate cables and 714 freedoms, misfit and cable forces with shares of 0.9 and 0.1 (evaluations to the end):
-mma.optimize 0.4361 (8), SLSQP 0.4360 (119), trust-constr 0.4360 (79); with cable forces limited and the limit active 0.4461 (7), 0.4588 (90),
-0.4457 (26). Where a cable goes slack the objective has a kink in its rest length, at which SLSQP stops early.
+Measured on a gridshell of 28 candidate cables and 714 freedoms, misfit and cable forces with shares of 0.9 and 0.1 (evaluations
+to the end): mma.optimize 0.4361 (8), SLSQP 0.4360 (119), trust-constr 0.4360 (79); with cable forces limited and the limit
+active 0.4461 (7), 0.4588 (90), 0.4457 (26). Where a cable goes slack the objective has a kink in its rest length, at which
+SLSQP stops early.
 """
 
 from __future__ import annotations
@@ -38,8 +42,9 @@ _INSIDE = 1e-6  # of the bounds' distance that an interior point starts away fro
 
 
 class Plain:
-    """A problem as plain functions of its variables (s,): rest lengths over lengths in the target, then the rods' radius over the start's
-    where it is free. `start` (s,); `points`, the designs on the stable branch evaluated last; `history`, all of them."""
+    """A problem as plain functions of its variables (s,): rest lengths over lengths in the target, then the rods' radius over
+    the start's where it is free. `start` (s,); `points`, the designs on the stable branch evaluated last; `history`, all of
+    them."""
 
     def __init__(self, problem: Problem, start: Design) -> None:
         """Loads the start; raises NotConverged where it doesn't bear all loads."""
@@ -48,7 +53,8 @@ class Plain:
         for name in self.evaluator.used():
             if not reached[name].on_branch:
                 raise NotConverged(
-                    f"The initial design doesn't carry the load case {name!r}: it loses stability at {reached[name].share:.2f} of it",
+                    f"The initial design doesn't carry the load case {name!r}: it loses stability at "
+                    f"{reached[name].share:.2f} of it",
                     state=reached[name].equilibrium.state,
                     remedy="Lead it there by stages: mma.optimize.",
                 )
@@ -106,9 +112,10 @@ class Plain:
 
 @dataclass(frozen=True)
 class Compared:
-    """What a SciPy `method` found: the best feasible `design` without its slack cables, or the least infeasible one, and how it carries each
-    load on the documented path (`loaded`, with "none" first); `objective` and largest `violation` where the optimiser had it; `history`
-    (evaluation, objective, violation) of the designs on the branch; the work; `status`, SciPy's sentence or that the evaluations were used up."""
+    """What a SciPy `method` found: the best feasible `design` without its slack cables, or the least infeasible one, and how it
+    carries each load on the documented path (`loaded`, with "none" first); `objective` and largest `violation` where the
+    optimiser had it; `history` (evaluation, objective, violation) of the designs on the branch; the work; `status`, SciPy's
+    sentence or that the evaluations were used up."""
 
     method: str
     design: Design
@@ -131,12 +138,12 @@ def compare(
 ) -> Compared:
     """SciPy's optimum of the problem from the start, within a number of design `evaluations`.
 
-    `tolerance`: of the objective for SLSQP; of the gradient, the trust region and the barrier for trust-constr. For the same problem from
-    mma.optimize give it `stiffness=0`, `thin=False`: both add to the problem. Raises InputError for another method and NotConverged where
-    the start doesn't bear all loads.
+    `tolerance`: of the objective for SLSQP; of the gradient, the trust region and the barrier for trust-constr. For the same
+    problem from mma.optimize give it `stiffness=0`, `thin=False`: both add to the problem. Raises InputError for another method
+    and NotConverged where the start doesn't bear all loads.
     """
     if method not in METHODS:
-        raise InputError("is no method for smooth constrained problems", where="method", value=method, remedy=f"Known: {', '.join(METHODS)}.")
+        raise InputError("is no known method", where="method", value=method, remedy=f"Known: {', '.join(METHODS)}.")
     plain = Plain(problem, start)
 
     def counted(function: Any) -> Any:
@@ -184,7 +191,7 @@ def _minimised(plain: Plain, counted: Any, method: str, evaluations: int, tolera
     """SciPy's run in units of _STEP from the start; its sentence."""
     from scipy.optimize import BFGS, Bounds, NonlinearConstraint, minimize
 
-    # A trial off the branch gives the gradient of the point before once more, at which SciPy's update of the curvature only warns.
+    # A trial off the branch gives the gradient of the point before once more, of which SciPy's update of the curvature warns.
     warnings.filterwarnings("ignore", message="delta_grad == 0.0", category=UserWarning)
     lower, upper = ((bound - plain.start) / _STEP for bound in plain.bounds())
     value, gradient = counted(plain.value), counted(lambda x: _STEP * plain.gradient(x))

@@ -1,8 +1,8 @@
 """A run of one of the paper's two studies (section 4.1), set beside what the paper says of it.
 
-What is published stands in published.toml, each number with its place in the paper. A run gives the same quantities under the same keys;
-the table joins them, and says of each line whether it must agree ("equal": inputs, and relations that hold on any shape), can be compared
-in its order of magnitude only ("order": the paper's surface is not public), or not at all ("none").
+What is published stands in published.toml, each number with its place in the paper. A run gives the same quantities under the
+same keys; the table joins them, and says of each line whether it must agree ("equal": inputs, and relations that hold on any
+shape), can be compared in its order of magnitude only ("order": the paper's surface is not public), or not at all ("none").
 """
 
 from __future__ import annotations
@@ -23,6 +23,10 @@ from shellform.study.folder import Run
 STUDIES = ("fixed", "radius")
 _DATA = Path(__file__).with_name("published.toml")
 _ACTIVE = 0.02  # of a constraint's limit: the paper's 0.0 and -0.01 are active, its -0.05 is not
+_TITLES = {
+    "fixed": "Rods of 2 mm (section 4.1, figures 10 to 14)",
+    "radius": "Rod radius free (section 4.1, figures 15 and 16)",
+}
 _SAYS = {"equal": "=", "order": "~", "none": "–"}
 
 Value = float | str | None
@@ -54,7 +58,8 @@ def study_of(run: Run) -> str:
 
 
 def beside(run: Run, *, fixed: Run | None = None) -> list[Line]:
-    """The lines of the run's study in the paper's order. The study with a free radius is compared with the `fixed` one too, where given.
+    """The lines of the run's study in the paper's order. The study with a free radius is compared with the `fixed` one too,
+    where given.
 
     Raises InputError where the run isn't finished or `fixed` is no run of the fixed radius.
     """
@@ -146,9 +151,9 @@ def table(lines: Sequence[Line]) -> str:
 
 def page(run: Run, lines: Sequence[Line]) -> str:
     """The lines and the run's history as Markdown."""
-    titles = {"fixed": "Rods of 2 mm (section 4.1, figures 10 to 14)", "radius": "Rod radius free (section 4.1, figures 15 and 16)"}
     rows = [
-        f"| {line.quantity} | {_told(line.here)} | {_told(line.paper, digits=4)} | {line.unit} | {_SAYS[line.compare]} | {line.source} | {line.note} |"
+        f"| {line.quantity} | {_told(line.here)} | {_told(line.paper, digits=4)} | {line.unit} | {_SAYS[line.compare]} "
+        f"| {line.source} | {line.note} |"
         for line in lines
     ]
     columns = [name for name in history(run)[0] if name not in ("accepted", "seconds", "stage")]
@@ -158,16 +163,17 @@ def page(run: Run, lines: Sequence[Line]) -> str:
     ]
     return "\n".join(
         [
-            f"# {titles[study_of(run)]}",
+            f"# {_TITLES[study_of(run)]}",
             "",
-            "= must agree; ~ the shape's: orders of magnitude only, since the paper's surface is not public; – can't be compared.",
+            "= must agree; ~ depends on the shape: orders of magnitude only, the paper's surface not being public; – can't be",
+            "compared.",
             "",
             "| quantity | here | paper | unit | | where in the paper | note |",
             "| --- | --- | --- | --- | --- | --- | --- |",
             *rows,
             "",
-            "Accepted designs; the paper draws these curves (figures 10 and 11, 15 and 16), of which its text gives the ends above. Pictures of",
-            "them are figures/objective.png and figures/constraints.png, of the deviations figures/deviations.png.",
+            "Accepted designs. The paper draws these curves (figures 10 and 11, 15 and 16); its text gives their ends above. Here they",
+            "are drawn in figures/objective.png and figures/constraints.png, the deviations in figures/deviations.png.",
             "",
             "| " + " | ".join(columns) + " |",
             "| " + " | ".join("---" for _ in columns) + " |",
@@ -233,8 +239,9 @@ def _relations(designs: Mapping[str, Any], values: Mapping[str, Value]) -> dict[
 
 def _ratios(free: Mapping[str, Value], fixed: Mapping[str, Value]) -> dict[str, Value]:
     """The study with a free radius over the one with a fixed radius."""
-    ratio = {name: _number(free[f"{name}_end"]) / _number(fixed[f"{name}_end"]) for name in ("misfit", "force", "radius", "cables")}
-    lower = all(ratio[name] < 1.0 for name in ("misfit", "force", "cables"))
+    names = ("misfit", "force", "cables", "radius")
+    ratio = {name: _number(free[f"{name}_end"]) / _number(fixed[f"{name}_end"]) for name in names}
+    lower = all(ratio[name] < 1.0 for name in names[:3])
     changes: dict[str, Value] = {f"{name}_change": value for name, value in ratio.items()}
     return {**changes, "all_lower": "yes" if lower else "no"}
 

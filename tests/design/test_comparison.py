@@ -5,7 +5,7 @@ import pytest
 
 import shellform as sf
 from shellform import mma
-from shellform.design.comparison import Plain, compare, violation
+from shellform.design.comparison import METHODS, Plain, compare, violation
 from shellform.errors import InputError, NotConverged
 
 
@@ -28,13 +28,14 @@ def found(asked, evaluations=60):
     """mma.optimize without what it adds to a problem, then SciPy's methods."""
     start = asked.shell.design()
     best = mma.optimize(asked, start, stiffness=0.0, thin=False)
-    return best, *(compare(asked, start, method=method, evaluations=evaluations, tolerance=1e-6) for method in ("trust-constr", "SLSQP"))
+    return best, *(compare(asked, start, method=name, evaluations=evaluations, tolerance=1e-6) for name in METHODS)
 
 
 def test_all_methods_come_to_the_same_optimum_with_trials_off_the_branch_on_their_way(coarse):
-    """4 N on every crossing, half of which the unbraced grid bears: trust-constr 0.2857 in 60 evaluations, 16 of them off
-    the branch, mma.optimize 0.2902 in 13, SLSQP 0.2928 in 60. The optimum lies where the branch ends and where cables go slack, kinks in the
-    rest lengths: SLSQP stops there, and mma.optimize where its smallest window has no better design that stays on the branch."""
+    """4 N on every crossing, half of which the unbraced grid bears: trust-constr 0.2857 in 60 evaluations, 16 of them off the
+    branch, mma.optimize 0.2902 in 13, SLSQP 0.2928 in 60. The optimum lies where the branch ends and where cables go slack,
+    kinks in the rest lengths: SLSQP stops there, and mma.optimize where its smallest window has no better design that stays on
+    the branch."""
     best, interior, quadratic = found(problem(coarse, 4.0))
     least = min(best.objective, interior.objective, quadratic.objective)
     assert best.objective < 1.02 * least
@@ -53,7 +54,8 @@ def test_all_methods_come_to_the_same_optimum_with_trials_off_the_branch_on_thei
 
 
 def test_all_methods_keep_a_limit_that_is_active_at_the_optimum(coarse):
-    """Cable forces of at most 2 N, which the start exceeds by 15 %: 0.4492 in 8 evaluations, trust-constr 0.4498 in 28, SLSQP 0.4592 in 60."""
+    """Cable forces of at most 2 N, which the start exceeds by 15 %: 0.4492 in 8 evaluations, trust-constr 0.4498 in 28, SLSQP
+    0.4592 in 60."""
     best, interior, quadratic = found(problem(coarse, 1.0, sf.AtMost(2.0, sf.CableForces("wet"))))
     least = min(best.objective, interior.objective, quadratic.objective)
     assert best.objective < 1.005 * least
@@ -104,7 +106,7 @@ def test_a_trial_off_the_branch_is_infinite_and_has_the_derivatives_of_the_neare
 
 def test_what_can_t_be_compared_is_refused(coarse):
     asked = problem(coarse, 4.0)
-    with pytest.raises(InputError, match="trust-constr, SLSQP"):
+    with pytest.raises(InputError, match=r"trust-constr, SLSQP"):
         compare(asked, coarse.design(), method="COBYLA")
     with pytest.raises(NotConverged, match=r"'wetter'.*by stages"):
         compare(problem(coarse, 5.0), coarse.design())

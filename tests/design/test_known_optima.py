@@ -1,7 +1,8 @@
 """Designs whose optimum is known in closed form: a bow, and a cable against a spring.
 
-Both are gridshells of one straight rod in the plane x-z. A gridshell's supports are pins; the one thing that these two need besides is a
-support that slides, so that `InPlane` says which freedoms are held and leaves everything else, from `Problem` to `mma.optimize`, as it is.
+Both are gridshells of one straight rod in the plane x-z. A gridshell's supports are pins; the one thing that these two need
+besides is a support that slides, so that `InPlane` says which freedoms are held and leaves everything else, from `Problem` to
+`mma.optimize`, as it is.
 """
 
 import dataclasses
@@ -50,7 +51,8 @@ def line(place):
 
 
 def elastica(alpha, s):
-    """Places (k, 3) and slopes (k,) at arc lengths s of a pinned elastica of length 1 with end slope `alpha` (Love 1927, art. 263)."""
+    """Places (k, 3) and slopes (k,) at arc lengths s of a pinned elastica of length 1 with end slope `alpha` (Love 1927, art.
+    263)."""
     k = np.sin(0.5 * alpha)
     quarter = ellipk(k * k)
     sine, cosine, _, phase = ellipj(quarter * (1.0 - 2.0 * s), k * k)
@@ -77,10 +79,10 @@ def bow(elements):
 
 
 def test_a_bow_gets_the_closed_form_rest_length_for_its_height():
-    """Theory: under the thrust P a pinned rod of length L and bending stiffness EI takes the elastica with k = sin(alpha/2), alpha its end
-    slope: P L²/EI = 4 K(k)², height/L = k/K(k), chord c/L = 2 E(k)/K(k) - 1. The cable along the chord carries P, so that it is
-    l0 = c/(1 + P/EA) long when stress-free. Straight elements are O(h²): the error falls by 4 as they are halved, 80 elements are
-    within 1e-5, and the extrapolation (4 l(h/2) - l(h))/3 leaves what the rod's finite EA and O(h⁴) do."""
+    """Theory: under the thrust P a pinned rod of length L and bending stiffness EI takes the elastica with k = sin(alpha/2),
+    alpha its end slope: P L²/EI = 4 K(k)², height/L = k/K(k), chord c/L = 2 E(k)/K(k) - 1. The cable along the chord carries P,
+    so that it is l0 = c/(1 + P/EA) long when stress-free. Straight elements are O(h²): the error falls by 4 as they are halved,
+    80 elements are within 1e-5, and the extrapolation (4 l(h/2) - l(h))/3 leaves what the rod's finite EA and O(h⁴) do."""
     thrust, chord, height = exact.buckled(brentq(lambda a: exact.buckled(a)[2] - HEIGHT, 0.1, 2.0, xtol=1e-15))
     assert height == pytest.approx(HEIGHT, abs=1e-14)
     wanted = chord / (1.0 + thrust / TIE)
@@ -105,7 +107,8 @@ SPRING, LENGTHENING, EA = 1000.0, 0.02, 187.0  # N/m; m, how much longer the tar
 
 
 def pulled():
-    """A rod from x = 0 to 1, a spring along its axis, and a cable from its end to a pin at 2; the target is longer by LENGTHENING."""
+    """A rod from x = 0 to 1, a spring along its axis, and a cable from its end to a pin at 2; the target is longer by
+    LENGTHENING."""
     flat = line([0.0, 1.0, 2.0])
     radius = 0.01
     rod = sf.Rod.round(young=SPRING / (np.pi * radius**2), radius=radius)
@@ -137,9 +140,10 @@ def least_deadly_share():
 
 @pytest.mark.parametrize("part", [0.3, 0.9, 0.999, 1.001, 1.5])
 def test_a_cable_against_a_spring_dies_at_the_l1_weight_of_theory(part):
-    """Theory: a spring k that a cable stretches by u = N/k, wanted u*, has f = w1 (N/k - u*)² + w2 N, a parabola over N >= 0 with its
-    minimum at N = k u* - k² w2/(2 w1), or at N = 0, without a cable, from w2/w1 = 2 u*/k on: the slope of the misfit at the slack cable.
-    Shares s of the L1 term and 1 - s of the misfit give w2/w1 = s d0²/((1 - s) N0), with misfit d0² and tension N0 of the start."""
+    """Theory: a spring k that a cable stretches by u = N/k, wanted u*, has f = w1 (N/k - u*)² + w2 N, a parabola over N >= 0
+    with its minimum at N = k u* - k² w2/(2 w1), or at N = 0, without a cable, from w2/w1 = 2 u*/k on: the slope of the misfit
+    at the slack cable. Shares s of the L1 term and 1 - s of the misfit give w2/w1 = s d0²/((1 - s) N0), with misfit d0² and
+    tension N0 of the start."""
     deadly, misfit, tension = least_deadly_share()
     share = part * deadly
     best, found = optimum_at(share)

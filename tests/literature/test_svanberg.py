@@ -1,10 +1,12 @@
 """Svanberg's test problems through the door to NLopt's MMA.
 
-[1987] K. Svanberg, The method of moving asymptotes, Int. J. Numer. Methods Eng. 24, 359-373: a cantilever of five boxes, a truss of two bars.
-[2002] K. Svanberg, A class of globally convergent optimization methods based on conservative convex separable approximations, SIAM J. Optim.
-12, 555-573, section 7: two problems with matrices S, P, Q of any size. NLopt's MMA is the method of this paper, so that the iterates of
-1987 are not its own. The optima of 2002 were not to be had in print; a minimum of SciPy's SLSQP and the conditions of Karush, Kuhn and
-Tucker stand in for them.
+[1987] K. Svanberg, The method of moving asymptotes, Int. J. Numer. Methods Eng. 24, 359-373: a cantilever of five boxes, a
+truss of two bars.
+[2002] K. Svanberg, A class of globally convergent optimization methods based on conservative convex separable approximations,
+SIAM J. Optim. 12, 555-573, section 7: two problems with matrices S, P, Q of any size.
+
+NLopt's MMA is the method of 2002, so that the iterates of 1987 are not its own. The optima of 2002 were not to be had in print; a
+minimum of SciPy's SLSQP and the conditions of Karush, Kuhn and Tucker stand in for them.
 """
 
 import numpy as np
