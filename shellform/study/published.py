@@ -69,7 +69,7 @@ def beside(run: Run, *, fixed: Run | None = None) -> list[Line]:
     values = quantities(run)
     if fixed is not None and study == "radius":
         values |= _ratios(values, quantities(fixed))
-    return [
+    lines = [
         Line(
             each["key"],
             each["quantity"],
@@ -83,6 +83,7 @@ def beside(run: Run, *, fixed: Run | None = None) -> list[Line]:
         for each in paper()["values"]
         if each["study"] in (study, "both")
     ]
+    return lines + _beyond(run, values)
 
 
 def quantities(run: Run) -> dict[str, Value]:
@@ -235,6 +236,18 @@ def _relations(designs: Mapping[str, Any], values: Mapping[str, Value]) -> dict[
             away("optimised", load) < away(name, load) for name in braced for load in ("design", "additional")
         )
     return {name: "yes" if value else "no" for name, value in found.items()}
+
+
+def _beyond(run: Run, values: Mapping[str, Value]) -> list[Line]:
+    """The polished design, which the paper doesn't have."""
+    if "polished" not in run.summary["designs"]:
+        return []
+    lines = [("cables_polished", "cables of the polished design", run.summary["designs"]["polished"]["cables"], "")]
+    for load in ("none", "design", "additional"):
+        for word, said in (("max", "largest"), ("mean", "mean")):
+            key = f"deviation.polished.{load}.{word}"
+            lines.append((key, f"{said} deviation, load {load!r}: polished design", values[key], "mm"))
+    return [Line(key, quantity, here, None, unit, "–", "none", "past the paper") for key, quantity, here, unit in lines]
 
 
 def _ratios(free: Mapping[str, Value], fixed: Mapping[str, Value]) -> dict[str, Value]:

@@ -89,6 +89,7 @@ def made(folder, shell, vault, *, radius=False, cables=119, misfit=3e-4):
             "initial": design(290, 5.0, 1.0),
             "unloaded": design(280, 6.0, 0.1),
             "optimised": design(cables, 1.0, 3.0),
+            "polished": design(cables, 0.5, 3.0),
         },
         "optimisation": {
             "objective_end": 0.2,
@@ -140,6 +141,8 @@ def test_a_run_s_numbers_stand_in_the_line_and_unit_of_the_paper_s(tmp_path, she
         assert line[key].here == "yes"
     assert published.quantities(made(tmp_path, shell, vault, cables=150))["half_vanish"] == "no"
     assert line["surface"].here is line["surface"].paper is None
+    assert line["deviation.polished.design.max"].here == pytest.approx(1.5)
+    assert line["deviation.polished.design.max"].paper is None
 
 
 def test_the_free_radius_is_compared_with_the_fixed_one(tmp_path, shell, vault):
