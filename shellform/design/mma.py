@@ -26,11 +26,19 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.design.checks import ConnectorTurn, RodUtilisation, Slackness, Softness, Uplift
+from shellform.design.checks import (
+    ConnectorTurn,
+    LargestCableForce,
+    RodUtilisation,
+    Slackness,
+    Softness,
+    Uplift,
+)
 from shellform.design.convex import minimise
 from shellform.design.gridshell import Design
 from shellform.design.optimum import Optimum, Step
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
+from shellform.design.robust import RobustMisfit
 from shellform.design.tensions import TensionModel, tension_model
 from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.design.thinning import kept_stiffness, spared
@@ -47,7 +55,9 @@ _NAMES: Mapping[type, str] = {
     RmsMisfit: "misfit",
     CableForce: "cable_force",
     CableForces: "cable_force",
+    LargestCableForce: "cable_force",
     RodRadius: "rod_radius",
+    RobustMisfit: "robust_misfit",
     RodUtilisation: "utilisation",
     ConnectorTurn: "connector_turn",
     Slackness: "slackness",
@@ -148,7 +158,8 @@ class _Search:
 
     def keep_stiff(self, least: float) -> None:
         """Adds the limit on the softest mode, N/m, under each additional load."""
-        additional = [name for name in self.evaluator.used() if name != self.base]
+        own = {part.term.load for part in self.problem.limits if isinstance(part.term, Softness)}
+        additional = [name for name in self.evaluator.used() if name not in (self.base, *own) and self.problem.loads[name].any()]
         if not (least > 0.0 and additional):
             return
         self.least = least
