@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -196,14 +196,7 @@ def _surface(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
 def _net(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> Net:
     if keep:
         return load_net(job.path("net.npz"))
-    entry = job.case.net
-    net, angle, offset = oriented_net(
-        results["surface"],
-        net_settings(entry, job.case.joint.gap),
-        angle=entry.angle if entry.angle == "auto" else float(np.deg2rad(entry.angle)),
-        offset=entry.offset,
-        progress=lambda text: job.report("net", text),
-    )
+    net, angle, offset = net_of(job.case, results["surface"], progress=lambda text: job.report("net", text))
     save_net(job.path("net.npz"), net)
     write_text(job.path("net.json"), json.dumps(net_document(net)))
     summary["net"] = {
@@ -213,6 +206,20 @@ def _net(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: b
         "offset": list(offset),
     }
     return net
+
+
+def net_of(
+    case: Case, surface: Surface, *, progress: Callable[[str], None] = lambda text: None
+) -> tuple[Net, float, tuple[float, float]]:
+    """The case's net with its angle, rad, and offset."""
+    entry = case.net
+    return oriented_net(
+        surface,
+        net_settings(entry, case.joint.gap),
+        angle=entry.angle if entry.angle == "auto" else float(np.deg2rad(entry.angle)),
+        offset=entry.offset,
+        progress=progress,
+    )
 
 
 def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
