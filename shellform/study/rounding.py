@@ -172,12 +172,16 @@ def _trial(
     nothing = float("nan")
     if optimum is None:
         return Trial(name, shell, None, nothing, nothing, nothing, 0, nothing, rods_mass(shell), why, up)
-    state = optimum.states[next(iter(problem.loads))]
+    base = next(iter(problem.loads))
+    state = optimum.states[base]
     away = deviations(shell, state)
     objective = sum(
         weight * float(part.term.measure(shell, optimum.design, state).value[0])
         for weight, part in zip(weights, problem.minimize, strict=True)
     )
+    used = _used(shell, optimum.design, state)
+    if used > 1.0:
+        why = "; ".join([*([why] if why else []), f"the rods are used to {used:.0%} of their strength under the {base} load"])
     return Trial(
         name,
         shell,
@@ -186,7 +190,7 @@ def _trial(
         float(away.max()),
         float(away.mean()),
         int(optimum.design.present.sum()),
-        _used(shell, optimum.design, state),
+        used,
         rods_mass(shell),
         why,
         up,

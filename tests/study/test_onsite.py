@@ -4,12 +4,12 @@ import csv
 import json
 import subprocess
 import sys
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-import tomllib
 from scipy.spatial.transform import Rotation
 
 from shellform.errors import InputError
