@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
+from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import tomli_w
@@ -385,6 +386,8 @@ def _entry(place: Sequence[int | str]) -> tuple[str, Any]:
     section: Any = Case
     for part in place:
         plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+        if get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain):  # a table that may be left out
+            plain = next(each for each in get_args(plain) if each is not NoneType)
         told = {tag: each for each in get_args(plain) for tag in _tags(each)}
         if part in told:
             kind = told[part]

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -290,9 +290,9 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
 
     problem = case_problem(job.case, shell, loads, start)
     best = mma.optimize(problem, start, evaluations=entry.evaluations, stiffness=entry.stiffness_min, progress=watch)
+    _forget(job, ("unloaded", "optimised", "rounded", "polished"), summary)
     built = {"optimised": best}
     _keep(job, shell, "optimised", best.design, _follow(shell, best.design, loads), loads, summary)
-    summary.pop("sections", None)
     rounded = _rounded(job, best, start, loads, summary) if problem.frees_radius and entry.rounded else None
     if rounded is not None:
         built["rounded"] = rounded
@@ -370,6 +370,19 @@ def _rounded(job: _Job, best: Optimum, start: Design, loads: Mapping[str, Reals]
     _keep(job, taken.shell, "rounded", design, _follow(taken.shell, design, loads), loads, summary)
     summary["designs"]["rounded"] |= {"section": taken.section, "feasible": not taken.why, "why_not": taken.why, "objective": taken.objective}
     return taken.optimum
+
+
+def _forget(job: _Job, names: Sequence[str], summary: dict[str, Any]) -> None:
+    """Takes designs of an earlier run away, some of which this one may not make."""
+    for name in names:
+        summary["designs"].pop(name, None)
+        for part in (f"designs/{name}.npz", f"designs/{name}.json"):
+            job.path(part).unlink(missing_ok=True)
+        for file in [*job.folder.glob(f"states/{name}-*.vtp"), *job.folder.glob(f"figures/{name}-*.png")]:
+            file.unlink()
+    for key in ("sections", "robust"):
+        summary.pop(key, None)
+        job.path(f"schedules/{key}.csv").unlink(missing_ok=True)
 
 
 def _examine(job: _Job, name: str, found: Optimum, loads: Mapping[str, Reals], summary: dict[str, Any]) -> None:
