@@ -31,6 +31,7 @@ from shellform.structure.stability import modes
 from shellform.structure.state import State
 
 SHARPNESS = 200.0  # per unit: 3000 rod ends that are all used to the full are told 4 % too high, and a single one not at all
+_EASED = 10.0  # the same for slack cables: tensions change by many times their least in a step, so that a sharp maximum would hop from cable to cable
 _MODES = 4
 _TURN = 0.1  # rad, the unit of turns
 
@@ -100,7 +101,8 @@ class LargestCableForce:
 class Slackness:
     """2 less the least cable tension over `least`, N: at most 1 where every present cable pulls with `least` or more.
 
-    Cables longer than `let_out` times their length in the target don't count: those which the optimiser has done without (tensions.py).
+    It is kept with up to ln(number) / 10 of `least` to spare. Cables longer than `let_out` times their length in the target don't count: those which the
+    optimiser has done without (tensions.py).
     """
 
     load: str
@@ -114,7 +116,7 @@ class Slackness:
     def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
         """One value. A slack cable counts with the tension that it would have if it could push, which tells how slack it is."""
         chosen = np.flatnonzero(design.present & (design.rest_length <= self.let_out * shell.cable_lengths))
-        return _of_tensions(shell, design, state, chosen, 1.0, 2.0, -1.0 / self.least)
+        return _of_tensions(shell, design, state, chosen, SHARPNESS / _EASED, 2.0, -1.0 / self.least)
 
 
 @dataclass(frozen=True)

@@ -271,7 +271,7 @@ class Case(_Section):
             if names.count(needed) != 1:
                 raise ValueError(f"there must be one [[load]] with the name {needed!r}")
         for each in self.load:
-            if names.count(each.name) > 1 or each.name in ("none", "critical"):
+            if names.count(each.name) > 1 or each.name == "none" or each.name.startswith("critical "):
                 raise ValueError(f"the load's name {each.name!r} is taken")
             if each.stages and each.name in ("design", "additional"):
                 raise ValueError(f"the load {each.name!r} is one case and can't have stages")

@@ -19,7 +19,8 @@ class LimitsEntry(Section):
     uplift: NonNegativeFloat | None = Field(None, description="force with which a support may have to hold a rod's end down, N")
     slack_min: PositiveFloat | None = Field(None, description="least tension of every cable, N")
     slack_loads: list[str] = Field(["none"], description="load cases in which slack_min holds; none: before any load")
-    critical_factor: float | None = Field(None, gt=1.0, description="of the design load, up to which its path stays stable")
+    critical_factor: float | None = Field(None, gt=1.0, description="of each of critical_loads, up to which its path stays stable")
+    critical_loads: list[str] = Field(["design"], min_length=1, description="load cases that critical_factor holds for")
 
 
 class RobustEntry(Section):

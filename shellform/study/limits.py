@@ -1,13 +1,13 @@
 """From a case to its design problem, the engineer's limits included, and what each design shows of them.
 
 Every limit holds under every load case, and those that matter before concrete comes also without load. The critical load factor F is kept by
-a load case "critical", F times the design load, that every accepted design bears on its stable branch, its softest mode keeping
+a load case "critical NAME", F times the load case, that every accepted design bears on its stable branch, its softest mode keeping
 a share of the initial design's stiffness under the design load (checks.py: Softness): stability doesn't end before F.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -37,8 +37,7 @@ from shellform.study.case import Case
 from shellform.study.entries import RobustEntry
 from shellform.study.shell import rod_bounds
 
-CRITICAL = "critical"  # the load case that stands for the critical load factor
-_SOFTEST = 0.02  # of the initial design's softest mode under the design load, that is left at the critical factor asked for
+_SOFTEST = 0.25  # of the initial design's softest mode under the design load, that is left at the critical factor asked for
 _SOUGHT = 3.0  # critical load factor up to which designs are followed
 
 
@@ -62,11 +61,15 @@ def case_problem(case: Case, shell: Gridshell, loads: Mapping[str, Reals], start
     if case.robust is not None and case.robust.limit is not None and robust is not None:
         limits.append(AtMost(case.robust.limit**2 * len(shell.net.grid.flat), robust))
     used = dict(loads)
-    if case.limits.critical_factor is not None:
-        used[CRITICAL] = case.limits.critical_factor * loads["design"]
-        limits.append(AtMost(1.0, Softness(CRITICAL, _SOFTEST * _stiffness(shell, start, loads["design"]))))
-    # The design load leads; the heaviest case comes last, where thinning looks at what cables do against buckling.
-    order = ["design", "none", *others, CRITICAL]
+    factor, critical = case.limits.critical_factor, []
+    if factor is not None:
+        least = _SOFTEST * _stiffness(shell, start, loads["design"])
+        for each in _known("limits.critical_loads", case.limits.critical_loads, [name for name in loads if name != "none"]):
+            critical.append(f"critical {each}")
+            used[critical[-1]] = factor * loads[each]
+            limits.append(AtMost(1.0, Softness(critical[-1], least)))
+    # The design load leads; its own critical case comes last, where thinning looks at what cables do against buckling.
+    order = ["design", "none", *others, *sorted(critical, key="critical design".__eq__)]
     return Problem(
         shell,
         {name: used[name] for name in order if name in used},
@@ -104,13 +107,16 @@ def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list
     if entry.slack_min is not None:
         longest = case.cable.rest_ratio * case.optimise.rest_length_max
         let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
-        for name in entry.slack_loads:
-            if name not in loads:
-                raise InputError(
-                    "there is no such load case", where="limits.slack_loads", value=name, remedy=f"Known: {', '.join(loads)}."
-                )
+        for name in _known("limits.slack_loads", entry.slack_loads, list(loads)):
             found.append(AtMost(1.0, Slackness(name, entry.slack_min, let_out)))
     return found
+
+
+def _known(where: str, names: Sequence[str], known: Sequence[str]) -> Sequence[str]:
+    for name in names:
+        if name not in known:
+            raise InputError("there is no such load case", where=where, value=name, remedy=f"Known: {', '.join(known)}.")
+    return names
 
 
 def _stiffness(shell: Gridshell, start: Design, load: Reals) -> float:

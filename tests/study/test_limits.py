@@ -30,17 +30,17 @@ def loads(shell):
 
 
 def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loads):
-    case = load_case(CASE, [*LIMITS, 'limits.slack_loads=["none","additional"]', "robust.supports=1e-4", "robust.limit=0.003"])
+    case = load_case(CASE, [*LIMITS, 'limits.critical_loads=["design","additional"]', 'limits.slack_loads=["none","additional"]', "robust.supports=1e-4", "robust.limit=0.003"])
     problem = case_problem(case, shell, loads, shell.design())
-    assert list(problem.loads) == ["design", "none", "additional", "critical"]
-    np.testing.assert_allclose(problem.loads["critical"], 1.25 * loads["design"])
+    assert list(problem.loads) == ["design", "none", "additional", "critical additional", "critical design"]
+    np.testing.assert_allclose(problem.loads["critical design"], 1.25 * loads["design"])
     kinds = [(type(each.term).__name__, each.term.load) for each in problem.limits]
     for kind in ("RodUtilisation", "ConnectorTurn", "Uplift"):
         assert [load for name, load in kinds if name == kind] == ["none", "design", "additional"]
     assert [load for name, load in kinds if name == "Slackness"] == ["none", "additional"]
     assert ("LargestCableForce", "additional") in kinds
-    assert ("Softness", "critical") in kinds
-    assert kinds[-2][0] == "RobustMisfit" or kinds[-1][0] == "RobustMisfit" or ("RobustMisfit", "design") in kinds
+    assert ("Softness", "critical design") in kinds
+    assert ("RobustMisfit", "design") in kinds
     plain = case_problem(load_case(CASE), shell, loads, shell.design())
     assert list(plain.loads) == ["design", "none", "additional"]
     assert len(plain.limits) == 3
@@ -81,6 +81,9 @@ def test_limits_that_can_t_be_are_refused_when_the_problem_is_made(shell, loads)
     case = load_case(CASE, ["limits.slack_min=0.1", 'limits.slack_loads=["storm"]'])
     with pytest.raises(InputError, match=r"limits\.slack_loads.*storm"):
         case_problem(case, shell, loads, shell.design())
+    case = load_case(CASE, ["limits.critical_factor=1.3", 'limits.critical_loads=["none"]'])
+    with pytest.raises(InputError, match=r"limits\.critical_loads.*none"):
+        case_problem(case, shell, loads, shell.design())
     heavy = {name: 5.0 * load for name, load in loads.items()}
     with pytest.raises(NotConverged, match="no critical factor can be kept"):
         case_problem(load_case(CASE, ["limits.critical_factor=1.3"]), shell, heavy, shell.design())
@@ -108,7 +111,7 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
     summary = run_case(case, tmp_path, until="optimise")
     with (tmp_path / "history.csv").open(encoding="utf-8", newline="") as file:
         row = next(csv.DictReader(file))
-    named = ["utilisation.none", "utilisation", "connector_turn.additional", "uplift", "slackness.none", "softness.critical", "cable_force.additional"]
+    named = ["utilisation.none", "utilisation", "connector_turn.additional", "uplift", "slackness.none", "softness.critical design", "cable_force.additional"]
     assert {f"constraint.{name}" for name in named} <= set(row)
     best = summary["designs"]["optimised"]["loads"]
     assert summary["optimisation"]["feasible"]
