@@ -239,7 +239,7 @@ def _lead(text: str) -> tuple[int, int, float]:
 def render(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     load: Annotated[str | None, typer.Option(help="none, design or additional.")] = None,
-    design: Annotated[str | None, typer.Option(help="unbraced, initial, unloaded or optimised.")] = None,
+    design: Annotated[str | None, typer.Option(help="unbraced, initial, unloaded, optimised, rounded or polished.")] = None,
     limit: Annotated[float | None, typer.Option(help="End of the colour scale, m.")] = None,
 ) -> None:
     """Draw deviation maps of a run."""
@@ -399,6 +399,14 @@ def _tell(summary: dict[str, Any]) -> None:
     if "optimisation" in summary:
         told = summary["optimisation"]
         print(f"objective {told['objective_start']:.3g} -> {told['objective_end']:.3g}: {told['status']}")
+        over = [f"{name} by {value:.1%}" for name, value in told["constraints"].items() if value > 1e-3]
+        if over:
+            print(f"limits that are not kept: {', '.join(over)}")
+    for each in summary.get("sections", []):
+        found = f"objective {each['objective']:.3g}, {each['cables']} cables" if each["objective"] is not None else "no design"
+        print(f"{each['section']:>10}  {found}{'' if each['feasible'] else ': ' + each['why_not']}")
+    for sentence in summary.get("robust", {}).get("sentences", []):
+        print(sentence)
 
 
 def _no_number(value: object) -> Any:

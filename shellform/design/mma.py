@@ -323,7 +323,7 @@ class _Search:
         curvature = sum(
             weight * model.misfit_hessian
             for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True)
-            if isinstance(part.term, Misfit) and part.term.load == self.base
+            if isinstance(part.term, (Misfit, RobustMisfit)) and part.term.load == self.base
         )
         slope = self._exact_in_tension(slope, model)
         rows = self.point.constraints_by_variables @ model.variables_by_y
@@ -364,7 +364,7 @@ class _Search:
         for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True):
             if part.term.load != self.base:
                 continue
-            if isinstance(part.term, Misfit):
+            if isinstance(part.term, (Misfit, RobustMisfit)):
                 total += 2.0 * weight * placed
             elif isinstance(part.term, CableForce):
                 total += weight

@@ -41,6 +41,11 @@ class Robustness:
         if self.sample is not None:
             drawn = self.sample.misfits
             enough = len(drawn) > 1
+            if self.sample.lost:
+                found["sentences"].append(
+                    f"{self.sample.lost} of {len(drawn) + self.sample.lost} structures drawn have no equilibrium on the stable branch: the design is too near "
+                    "the end of its path for this scatter. Limit its critical factor, or the robust misfit."
+                )
             found["sample"] = {
                 "count": len(drawn) + self.sample.lost,
                 "lost": self.sample.lost,
