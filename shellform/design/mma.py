@@ -32,6 +32,7 @@ from shellform.design.gridshell import Design
 from shellform.design.guard import guard
 from shellform.design.optimum import Optimum, Step
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
+from shellform.design.robust import RobustMisfit
 from shellform.design.tensions import TensionModel, tension_model
 from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, Share, Term
 from shellform.design.thinning import kept_stiffness, spared
@@ -139,7 +140,8 @@ class _Search:
 
     def keep_stiff(self, least: float) -> None:
         """Adds the limit on the softest mode, N/m, under each additional load."""
-        additional = [name for name in self.evaluator.used() if name != self.base]
+        own = {part.term.load for part in self.problem.limits if isinstance(part.term, Softness)}
+        additional = [name for name in self.evaluator.used() if name not in (self.base, *own) and self.problem.loads[name].any()]
         if not (least > 0.0 and additional):
             return
         self.least = least
@@ -307,7 +309,7 @@ class _Search:
         curvature = sum(
             weight * model.misfit_hessian
             for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True)
-            if isinstance(part.term, Misfit) and part.term.load == self.base
+            if isinstance(part.term, (Misfit, RobustMisfit)) and part.term.load == self.base
         )
         slope = self._exact_in_tension(slope, model)
         rows = self.point.constraints_by_variables @ model.variables_by_y
@@ -374,7 +376,7 @@ class _Search:
         for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True):
             if part.term.load != self.base:
                 continue
-            if isinstance(part.term, Misfit):
+            if isinstance(part.term, (Misfit, RobustMisfit)):
                 total += 2.0 * weight * placed
             elif isinstance(part.term, CableForce):
                 total += weight
@@ -529,7 +531,7 @@ class _Search:
 
 def _name(kind: type) -> str:
     """A term's name in histories: its class' name in small letters, but for those that stand for the same."""
-    short = {"RmsMisfit": "misfit", "CableForces": "cable_force", "RodUtilisation": "utilisation"}
+    short = {"RmsMisfit": "misfit", "CableForces": "cable_force", "LargestCableForce": "cable_force", "RodUtilisation": "utilisation"}
     return short.get(kind.__name__) or "".join(f"_{c.lower()}" if c.isupper() else c for c in kind.__name__).lstrip("_")
 
 
