@@ -18,6 +18,8 @@ DOORS = {
     "matplotlib": {"output/plots.py"},
     "cvxopt": {"structure/sparse.py"},
     "numba": {"compiled.py"},
+    "PIL": {"output/embed.py"},
+    "jinja2": {"output/report.py"},
 }
 NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "dask", "numba", "scipy", "numpy"]
 
