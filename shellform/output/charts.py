@@ -14,7 +14,7 @@ import numpy as np
 
 from shellform.output.verdict import number
 
-_WIDTH, _HEIGHT = 640, 300
+_WIDTH, _HEIGHT = 460, 270
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52, 12, 12, 40
 _COLOURS = 6  # of style.css: --series-1 …
 

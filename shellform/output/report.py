@@ -106,6 +106,9 @@ def _told(entry: Entry, number: int) -> dict[str, Any]:
         "asked": verdict.asked(found, entry.best),
         "answers": verdict.answers(entry.shell, entry.best, entry.designs[entry.best], entry.states[entry.best], entry.summary),
         "designs": [(name, verdict.design_title(name), row) for name, row in rows.items()],
+        "shown_first": sorted(
+            [(name, verdict.design_title(name), row) for name, row in rows.items()], key=lambda each: each[0] != entry.best
+        ),
         "loads": [(name, verdict.load_title(name, _factor(rows, name))) for name in entry.loads],
         "checks": found,
         "charts": _charts(entry.history),
@@ -154,7 +157,7 @@ def _charts(history: Sequence[Mapping[str, str]]) -> list[charts.Chart]:
     limits = {verdict.constraint_title(name[11:])[11:]: column(name) for name in rows[0] if name.startswith("constraint.")}
     found = [charts.line_chart("Objective and its terms", at, terms)]
     if limits:
-        found.append(charts.line_chart("Constraints: value over limit, less 1", at, limits, least=-1.5, most=3.0, limit=0.0))
+        found.append(charts.line_chart("Constraints: value over limit, less 1 (cut at −1.5 and 1)", at, limits, least=-1.5, most=1.0, limit=0.0))
     found.append(charts.line_chart("Cables in tension", at, {"cables": column("cables")}))
     return found
 
@@ -200,7 +203,7 @@ def _drawn(entry: Entry) -> dict[str, Any]:
         "supports": shell.net.supports.tolist(),
         "rods": [
             {
-                "name": f"{rod.direction} {rod.index}",
+                "name": f"{rod.direction} {rod.index}".replace("-", "−"),
                 "nodes": rod.nodes.tolist(),
                 "length": round(1e3 * rod.length, 3),
                 "crossings": len(rod.crossings),

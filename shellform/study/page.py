@@ -15,10 +15,12 @@ from shellform.output.report import GENERATOR, Entry, html
 from shellform.output.verdict import Bounds
 from shellform.study.case import write_text
 from shellform.study.folder import Report, Run, read_json, read_run
+from shellform.study.run import stage_keys
 
 FILE = "report.html"
 _BUDGET = 9_000_000  # bytes of pictures in a page, before they become text, which adds a third
 _PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "mkl", "gmsh", "nlopt", "pyvista")
+_DRAWN = ("objective", "constraints")
 _HEAD = 2000  # characters in which a page of ours names its maker
 
 
@@ -52,14 +54,16 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
     known = [name for name in run.designs if name in told]
     if not known:
         raise InputError("the run's summary tells of no design", where=str(run.folder), remedy="Run shellform design on it again.")
-    done = read_json(run.folder / "stages.json")
-    pictures, left = embed(_pictures(run.folder), budget=budget)
+    done = _done(run)
+    pictures, left = embed(_pictures(run), budget=budget)
     notes = [
         f"The design “{name}” is not shown: its stage has not finished. Run shellform design again." for name in run.designs if name not in told
     ]
     if "initial" not in done:
-        notes.append("The stage “initial” has not finished: what is shown may come from before the last change of the case.")
-    if "optimisation" not in run.summary or "optimise" not in done:
+        notes.append("What is shown was computed before the last change of the case, of its surface, or of shellform: run shellform design again.")
+    elif "optimise" not in done and "optimisation" in run.summary:
+        notes.append("The optimised designs were computed before the last change of the case: run shellform design again.")
+    if "optimisation" not in run.summary:
         notes.append("The run is not optimised (yet): run shellform design without --until, and the optimised design is added.")
     if not pictures:
         notes.append("There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them.")
@@ -94,6 +98,14 @@ def versions() -> dict[str, str]:
     return found
 
 
+def _done(run: Run) -> set[str]:
+    """The stages whose results are those of the case as it stands; where its surface is elsewhere, all that were finished."""
+    kept = read_json(run.folder / "stages.json")
+    file = Path(run.case.surface.file)
+    keys = stage_keys(run.case, file) if file.is_file() else kept
+    return {stage for stage, key in kept.items() if keys.get(stage) == key}
+
+
 def _history(file: Path) -> list[dict[str, str]]:
     if not file.is_file():
         return []
@@ -104,11 +116,12 @@ def _history(file: Path) -> list[dict[str, str]]:
         raise InputError(f"is damaged: {error}", where=str(file), remedy="Run again with --fresh.") from error
 
 
-def _pictures(folder: Path) -> list[Path]:
-    """All pictures: the sheet first, then the designs', then the others."""
-    found = [file for file in sorted((folder / "figures").glob("*")) if file.suffix.lower() in KINDS and file.is_file()]
-    first = ("deviations", "polished", "optimised", "initial", "unloaded", "unbraced")
-    return sorted(found, key=lambda file: next((k for k, name in enumerate(first) if file.stem.startswith(name)), len(first)))
+def _pictures(run: Run) -> list[Path]:
+    """All pictures but the histories, which the page draws itself: the sheet first, then the designs' by load, then the others."""
+    names = [f"{design}-{load}" for design in ("polished", "optimised", "initial", "unloaded", "unbraced") for load in run.loads]
+    first = {name: place for place, name in enumerate(["deviations", *names])}
+    found = [file for file in sorted((run.folder / "figures").glob("*")) if file.suffix.lower() in KINDS and file.is_file()]
+    return sorted((file for file in found if file.stem not in _DRAWN), key=lambda file: first.get(file.stem, len(first)))
 
 
 def _refuse_foreign(file: Path) -> None:

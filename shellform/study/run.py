@@ -127,7 +127,7 @@ def run_case(
     if not file.is_file():
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
-    keys = _keys(case, file)
+    keys = stage_keys(case, file)
     done = {} if fresh else read_json(folder / "stages.json")
     results: dict[str, Any] = {}
     began = time.perf_counter()
@@ -162,8 +162,8 @@ def run_case(
     return summary
 
 
-def _keys(case: Case, file: Path) -> dict[str, str]:
-    """A hash for each stage of all that it depends on."""
+def stage_keys(case: Case, file: Path) -> dict[str, str]:
+    """A hash for each stage of all that it depends on; `file` is the surface's."""
     entries = case.model_dump(mode="json")
     needs = {
         "surface": ["surface"],

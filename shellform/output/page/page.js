@@ -18,10 +18,10 @@ class Panel {
       { title: "Rest length [mm]", number: true, value: (row) => row.rest, text: (row) => this.mm(row.rest) },
       { title: "Length [mm]", number: true, value: (row) => row.length, text: (row) => this.mm(row.length) },
       { title: "Force [N]", number: true, value: (row) => row.force, text: (row) => (row.force > 0 ? newtons(row.force) : "slack") },
-      { title: "Largest force of all loads [N]", number: true, value: (row) => row.most, text: (row) => newtons(row.most) },
+      { title: "Largest of all loads [N]", number: true, value: (row) => row.most, text: (row) => newtons(row.most) },
     ], (key) => this.pick({ kind: "cable", index: key }));
     this.rods = new LiveTable(find("[data-table=rods]"), find("[data-search=rods]"), find("[id$=-rods] .count"), [
-      { title: "Rod", value: (row) => row.name, text: (row) => row.name },
+      { title: "Rod", value: (row) => Number(row.name.slice(2).replace("−", "-")) + (row.name[0] === "v" ? 1e6 : 0), text: (row) => row.name },
       { title: "Length [mm]", number: true, value: (row) => row.length, text: (row) => this.mm(row.length) },
       { title: "Crossings", number: true, value: (row) => row.crossings, text: (row) => String(row.crossings) },
       { title: "Off at most [mm]", number: true, value: (row) => row.off, text: (row) => row.off.toFixed(2) },
@@ -66,6 +66,8 @@ class Panel {
     else this.view.look(view);
   }
 
+  joint(k) { return `(${this.run.lattice[k].join(", ").replaceAll("-", "−")})`; }
+
   get design() { return this.run.designs.find((each) => each.name === this.show.design); }
   get state() { return this.design.states[this.show.load]; }
   get load() { return this.run.loads.find((each) => each.name === this.show.load); }
@@ -82,7 +84,7 @@ class Panel {
       this.find(".told").textContent = `${this.design.title} design under ${this.load.title}: ${millimetres(largest(off))} mm off at most, ${millimetres(mean)} in the mean; ${cables}.`;
     }
     for (const words of this.article.querySelectorAll(".which")) words.textContent = `${this.design.title} design under ${this.load.title}`;
-    const all = Object.values(this.design.states), joint = (k) => `(${this.run.lattice[k].join(", ")})`;
+    const all = Object.values(this.design.states), joint = (k) => this.joint(k);
     this.cables.fill(this.design.cables.map((cable, k) => ({
       key: cable, from: joint(this.run.cables.joints[cable][0]), to: joint(this.run.cables.joints[cable][1]), rest: this.design.rest[k],
       length: this.state.length[k], force: this.state.force[k], most: Math.max(...all.map((state) => state.force[k])), faint: this.state.force[k] <= 0,
@@ -128,7 +130,7 @@ class Panel {
   }
 
   cable(index) {
-    const k = this.design.cables.indexOf(index), [from, to] = this.run.cables.joints[index].map((j) => `(${this.run.lattice[j].join(", ")})`);
+    const k = this.design.cables.indexOf(index), [from, to] = this.run.cables.joints[index].map((k) => this.joint(k));
     const words = element("p", `From joint ${from} to ${to}, rest length ${this.mm(this.design.rest[k])} mm.`);
     return [words, this.overLoads(["Length [mm]", "Force [N]"], (state) => [this.mm(state.length[k]), state.force[k] > 0 ? newtons(state.force[k]) : "slack"])];
   }
@@ -198,6 +200,16 @@ for (const button of document.querySelectorAll(".gallery button")) button.addEve
 });
 large.addEventListener("click", (event) => { if (event.target === large) large.close(); });
 
-// Colours of the view follow the page's: dark, light, and paper.
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => panels[open].view?.update());
-for (const name of ["beforeprint", "afterprint"]) addEventListener(name, () => { if (panels[open].view) { panels[open].view.update(); panels[open].view.drawNow(); } });
+// Colours of the view follow the page's: dark, light, and paper. On paper nothing is folded away.
+const repaint = () => { const view = panels[open].view; if (view) { view.update(); view.drawNow(); } };
+for (const media of ["(prefers-color-scheme: dark)", "print"]) matchMedia(media).addEventListener("change", repaint);
+let folded = [];
+addEventListener("beforeprint", () => {
+  folded = [...document.querySelectorAll("details:not([open])")];
+  for (const each of folded) each.open = true;
+  repaint();
+});
+addEventListener("afterprint", () => {
+  for (const each of folded) each.open = false;
+  repaint();
+});

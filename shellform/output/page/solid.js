@@ -5,9 +5,10 @@ const SIDES = 10;
 const STRIDE = 16; // floats a cylinder: a xyz, radius, b xyz, radius, colour at a, colour at b, least radius in pixels, flat colour
 
 const LIGHT = `
+  uniform float rim; // light along the edges, by which dark rods are seen on a dark page
   vec3 lit(vec3 colour, vec3 normal, vec3 toEye) { // from the eye and a little from above, so that colours stay those of the legend
     float facing = abs(dot(normal, toEye));
-    return colour * (0.62 + 0.30 * facing + 0.08 * normal.z) + 0.10 * pow(facing, 24.0);
+    return colour * (0.62 + 0.30 * facing + 0.08 * normal.z) + 0.10 * pow(facing, 24.0) + rim * pow(1.0 - facing, 1.5);
   }`;
 
 const TUBE_VERTEX = `#version 300 es
@@ -65,10 +66,10 @@ const SKIN_FRAGMENT = `#version 300 es
 
 class Solid {
   constructor(canvas) {
-    const gl = canvas.getContext("webgl2", { antialias: true, preserveDrawingBuffer: true });
+    const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, preserveDrawingBuffer: true });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.gl = gl;
-    this.tube = program(gl, TUBE_VERTEX, TUBE_FRAGMENT, ["project", "pixel", "eye"]);
+    this.tube = program(gl, TUBE_VERTEX, TUBE_FRAGMENT, ["project", "pixel", "eye", "rim"]);
     this.skin = program(gl, SKIN_VERTEX, SKIN_FRAGMENT, ["project", "eye", "colour"]);
     const { corners, triangles } = cylinder();
     this.corners = triangles.length;
@@ -108,7 +109,7 @@ class Solid {
     this.skinCount = triangles.length;
   }
 
-  draw(camera, { background, skin }) { // colours as [r, g, b] up to 1; skin null: no surface
+  draw(camera, { background, skin, rim }) { // colours as [r, g, b] up to 1; skin null: no surface
     const gl = this.gl;
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.clearColor(...background, 1);
@@ -117,6 +118,7 @@ class Solid {
     gl.useProgram(this.tube.program);
     gl.uniformMatrix4fv(this.tube.project, false, camera.matrix);
     gl.uniform1f(this.tube.pixel, camera.pixel);
+    gl.uniform1f(this.tube.rim, rim);
     gl.uniform3fv(this.tube.eye, camera.eye);
     gl.bindVertexArray(this.tubes);
     gl.drawElementsInstanced(gl.TRIANGLES, this.corners, gl.UNSIGNED_SHORT, 0, this.count);

@@ -6,10 +6,10 @@ function compare(a, b) {
   return typeof a === "number" && typeof b === "number" ? a - b : String(a).localeCompare(String(b), "en", { numeric: true });
 }
 
-function sortHead(head, act) { // makes a head cell a button; act gets +1 or -1
+function sortHead(head, act) { // lays a button over a head cell, whose words stay words (on paper they are repeated); act gets +1 or -1
   const button = document.createElement("button");
   button.type = "button";
-  button.append(...head.childNodes);
+  button.setAttribute("aria-label", `Sort by ${head.textContent}`);
   head.append(button);
   head.scope = "col";
   button.addEventListener("click", () => {

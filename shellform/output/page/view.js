@@ -65,7 +65,7 @@ class View {
 
   update() { // after any change of what is shown
     const { run, show } = this, rows = [], css = getComputedStyle(this.stage), colour = (name) => rgb(css.getPropertyValue(`--${name}`));
-    this.colours = { background: colour("stage"), skin: colour("skin") };
+    this.colours = { background: colour("stage"), skin: colour("skin"), rim: Number(css.getPropertyValue("--rim")) };
     const [low, mid, high, picked] = ["cable-low", "cable-mid", "cable-high", "picked"].map(colour);
     const thick = Math.max(this.design.radius, 0.0016 * this.reach);
     const add = (a, ra, b, rb, ca, cb, least = 0, plain = 0) => rows.push(...a, ra, ...b, rb, ...ca, ...cb, least, plain);
@@ -121,7 +121,7 @@ class View {
   drawNow() {
     this.waiting = 0;
     this.camera.place(this.canvas.width, this.canvas.height);
-    this.solid.draw(this.camera, { background: this.colours.background, skin: this.show.surface ? this.colours.skin : null });
+    this.solid.draw(this.camera, { ...this.colours, skin: this.show.surface ? this.colours.skin : null });
   }
 
   look(view) {
