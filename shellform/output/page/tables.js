@@ -54,9 +54,8 @@ class LiveTable {
   }
 
   write() {
-    const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const told = (row) => this.columns.map((column) => column.text(row)).join(" ").toLowerCase();
-    let shown = this.rows.filter((row) => words.every((word) => told(row).includes(word)));
+    const sought = this.search.value.trim().toLowerCase().replace("-", "−");
+    let shown = this.rows.filter((row) => this.columns.some((column) => column.text(row).toLowerCase().includes(sought)));
     if (this.order) {
       const { column, sign } = this.order;
       shown = [...shown].sort((a, b) => sign * compare(column.value(a), column.value(b)));
