@@ -36,8 +36,9 @@ def line_chart(
     least: float | None = None,
     most: float | None = None,
     limit: float | None = None,
+    main: bool = True,
 ) -> Chart:
-    """Curves over `at` (k,), each (k,), the first drawn strongest. `least` and `most` cut the axis; above `limit` is shaded as not allowed.
+    """Curves over `at` (k,), each (k,), the first drawn strongest where it is the `main` one. `least` and `most` cut the axis; above `limit` is shaded as not allowed.
 
     A value that is no number leaves a gap.
     """
@@ -70,7 +71,7 @@ def line_chart(
     parts.append(f'<text x="{(_LEFT + _WIDTH - _RIGHT) / 2}" y="{_HEIGHT - 4}" text-anchor="middle">design evaluations</text>')
     legend = []
     for k in reversed(range(len(curves))):
-        kind = f"series-{k % _COLOURS + 1}{' main' if k == 0 else ''}"
+        kind = f"series-{(k if main else k + 1) % _COLOURS + 1}{' main' if main and k == 0 else ''}"
         for run in _runs(np.isfinite(values[k])):
             line = " ".join(f"{x(at[i])},{y(values[k, i])}" for i in run)
             parts.append(f'<polyline class="{kind}" points="{line}"/>')

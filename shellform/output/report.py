@@ -42,7 +42,8 @@ class Entry:
     """One run on the page.
 
     `designs` and their `states` by load case, of which `best` is to be built; `loads` (n, 6), N; the `summary` of the run folder; rows
-    of the `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `notes` say what is missing or to be known.
+    of the `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `notes` say what is missing or to be known;
+    `files` are those of the run folder.
     """
 
     title: str
@@ -60,6 +61,7 @@ class Entry:
     limit: float
     bounds: verdict.Bounds
     notes: Sequence[str]
+    files: Sequence[str]
 
 
 def html(entries: Sequence[Entry], versions: Mapping[str, str]) -> str:
@@ -115,6 +117,7 @@ def _told(entry: Entry, number: int) -> dict[str, Any]:
         "pictures": [(picture, _caption(picture.name)) for picture in entry.pictures],
         "notes": [*entry.notes, *entry.summary.get("net", {}).get("notes", []), *entry.summary.get("surface", {}).get("mended", [])],
         "settings": entry.settings,
+        "files": _folders(entry.files),
         "summary": entry.summary,
         "optimisation": optimisation,
         "seconds": entry.summary.get("seconds", {}),
@@ -137,6 +140,15 @@ def _caption(name: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def _folders(files: Sequence[str]) -> dict[str, list[str]]:
+    """File names by folder; "" for those in the run folder itself."""
+    found: dict[str, list[str]] = {}
+    for file in files:
+        folder, _, name = file.rpartition("/")
+        found.setdefault(folder, []).append(name)
+    return found
+
+
 def _charts(history: Sequence[Mapping[str, str]]) -> list[charts.Chart]:
     """Objective and terms, constraints, and the number of cables at each accepted design."""
     rows = [row for row in history if row.get("accepted", "1") == "1"]
@@ -157,7 +169,7 @@ def _charts(history: Sequence[Mapping[str, str]]) -> list[charts.Chart]:
     limits = {verdict.constraint_title(name[11:])[11:]: column(name) for name in rows[0] if name.startswith("constraint.")}
     found = [charts.line_chart("Objective and its terms", at, terms)]
     if limits:
-        found.append(charts.line_chart("Constraints: value over limit, less 1 (cut at −1.5 and 1)", at, limits, least=-1.5, most=1.0, limit=0.0))
+        found.append(charts.line_chart("Constraints: value over limit, less 1 (cut at −1.5 and 1)", at, limits, least=-1.5, most=1.0, limit=0.0, main=False))
     found.append(charts.line_chart("Cables in tension", at, {"cables": column("cables")}))
     return found
 

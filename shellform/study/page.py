@@ -84,6 +84,9 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
         run.case.figures.limit,
         Bounds(run.case.cable.force_max, run.case.optimise.misfit_rms_additional),
         [*notes, *left],
+        sorted(
+            file.relative_to(run.folder).as_posix() for file in run.folder.rglob("*") if file.is_file() and ".part" not in file.name
+        ),
     )
 
 

@@ -115,6 +115,8 @@ def test_the_view_draws_the_shell_and_the_summary_stands_on_the_first_screen(vis
     for words in ("How far off is the shell?", "Is it safe at 1.2 × the load?", "What to buy?"):
         box = page.get_by_text(words).first.bounding_box()
         assert box["y"] + box["height"] < 900
+    page.wait_for_function("[...document.querySelectorAll('.gallery img')].every((each) => each.complete && each.naturalWidth > 0)")
+    assert page.locator(".gallery img").count() == 3
 
 
 def test_a_cable_picked_by_the_mouse_shows_the_numbers_of_the_run(visit, file, run):

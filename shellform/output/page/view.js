@@ -130,11 +130,10 @@ class View {
     this.redraw();
   }
 
-  frame() { // the target with room for arrows and supports: one frame for all states, so that they can be compared
+  frame() { // the target and the state, with room for arrows and supports; another state leaves the camera where it is, to be compared
     const above = 0.06 * this.reach, below = 0.02 * this.reach, points = [];
     for (let k = 0; k < this.target.length / 3; k++) {
-      const p = at(this.target, k);
-      points.push(...plus(p, [0, 0, above]), ...minus(p, [0, 0, below]));
+      for (const p of [at(this.target, k), this.node(k)]) points.push(...plus(p, [0, 0, above]), ...minus(p, [0, 0, below]));
     }
     return points;
   }
