@@ -161,7 +161,7 @@ def design(
     )
     report.close()
     _tell(summary)
-    print(f"Everything is in {output}")
+    print(f"Everything is in {output}" + (f"; look at {output / 'report.html'} first" if until == "report" else ""))
 
 
 @app.command()

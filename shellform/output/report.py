@@ -34,6 +34,7 @@ from shellform.surface.target import Surface
 GENERATOR = "shellform report"  # in the page's head, so that it is known again
 _SCRIPTS = ("solid.js", "view.js", "tables.js", "page.js")
 _MOST_TRIANGLES = 30_000  # of the surface in the view; more are merged
+_BEYOND = 2.0  # of the case's colour scale: where the deviation is larger than this, the view begins with a scale of its own
 _MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 
 
@@ -120,10 +121,11 @@ def _told(entry: Entry, number: int) -> dict[str, Any]:
         "files": _folders(entry.files),
         "summary": entry.summary,
         "optimisation": optimisation,
-        "seconds": entry.summary.get("seconds", {}),
+        "seconds": dict(sorted(entry.summary.get("seconds", {}).items(), key=lambda each: each[0] == "total")),
         "rod": label(entry.shell.rod.resized(entry.designs[entry.best].radius).section),
         "row": best,
         "limit": 1e3 * entry.limit,
+        "beyond": best.get("loads", {}).get("design", {}).get("deviation_max", 0.0) > _BEYOND * entry.limit,
     }
 
 
@@ -132,10 +134,10 @@ def _factor(rows: Mapping[str, Any], load: str) -> float | None:
 
 
 def _caption(name: str) -> str:
-    """A file's name in words: "optimised-design" is "Optimised: design"."""
+    """A file's name in words: "optimised-design" is "Optimised: the design load"."""
     design, dash, load = name.partition("-")
     if dash and design in verdict.TITLES:
-        return f"{verdict.design_title(design)}: {load.replace('-', ' ').replace('_', ' ')}"
+        return f"{verdict.design_title(design)}: {verdict.LOADS.get(load, load.replace('-', ' ').replace('_', ' '))}"
     text = name.replace("-", ": ", 1).replace("-", " ").replace("_", " ")
     return text[:1].upper() + text[1:]
 

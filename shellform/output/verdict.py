@@ -58,7 +58,7 @@ class Check:
 def load_title(name: str, factor: float | None = None) -> str:
     """A load case in words."""
     told = LOADS.get(name, f"“{name}”")
-    return f"{factor:g} × the load" if name == "additional" and factor is not None else told
+    return f"{factor:.3g} × the load" if name == "additional" and factor is not None else told
 
 
 def design_title(name: str) -> str:
@@ -177,7 +177,7 @@ def answers(
                 "How far off is the shell?",
                 f"{_mm(main['deviation_max'])} at most",
                 f"{_mm(main['deviation_mean'])} in the mean, under the design load",
-                bool(main.get("stable") and main.get("on_branch", True)),
+                None if main.get("stable") and main.get("on_branch", True) else False,
             )
         )
     pull = cables.tension(states["design"]) if "design" in states else np.zeros(len(cables.ends))
@@ -199,7 +199,7 @@ def answers(
         detail = f"{_mm(more['deviation_max'])} off at most, {_mm(more['deviation_mean'])} in the mean"
         found.append(
             Answer(
-                f"Is it safe at {factor:g} × the load?",
+                f"Is it safe at {factor:.3g} × the load?",
                 "Yes, it stands" if stands else "No, it snaps through" if more.get("stable") else "No, it is unstable",
                 f"{detail}. At which load it collapses wasn't sought." if stands else detail,
                 stands,

@@ -212,6 +212,7 @@ def test_everything_is_reached_by_keys(visit, file):
     assert "1.2 × the load" in page.locator(".told").text_content()
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.tagName") == "CANVAS"
+    page.keyboard.press("0")
     still = picture(page)
     page.keyboard.press("ArrowLeft")
     turned = picture(page)
@@ -230,6 +231,8 @@ def test_everything_is_reached_by_keys(visit, file):
     page.keyboard.press("ArrowDown")
     page.keyboard.press("Enter")
     assert page.locator(".picked h3").text_content().startswith(f"Rod {cells(page, 'rods', 1)[1]}")
+    page.locator("[id$=-rods] .see").press("Enter")
+    assert 0 <= page.locator(".viewer").bounding_box()["y"] < 400, "from the row to the view"
     page.locator(".gallery button").first.focus()
     page.keyboard.press("Enter")
     assert page.locator("dialog").is_visible()

@@ -7,10 +7,11 @@ class Panel {
     this.article = article;
     this.run = data.runs[Number(article.dataset.run)];
     const best = this.run.designs[this.run.best];
-    this.show = { design: best.name, load: "design", surface: false, cables: true, loads: true, supports: true, colour: "deviation", scale: "case", exaggerate: 1 };
+    this.show = { design: best.name, load: "design", surface: false, cables: true, loads: true, supports: true, colour: "deviation", exaggerate: 1 };
     const find = (what) => article.querySelector(what), spaced = this.run.spacing < 0.2 ? 2 : 1;
     this.mm = (value) => (value === undefined ? "–" : value.toFixed(spaced));
     this.find = find;
+    this.show.scale = find("[name=scale]").value;
     this.cables = new LiveTable(find("[data-table=cables]"), find("[data-search=cables]"), find("[id$=-cables] .count"), [
       { title: "Cable", number: true, value: (row) => row.key, text: (row) => String(row.key + 1) },
       { title: "From joint", value: (row) => row.from, text: (row) => row.from },
@@ -119,9 +120,13 @@ class Panel {
     this.picked = picked;
     this.cables.mark(picked?.kind === "cable" ? picked.index : null, scroll);
     this.rods.mark(picked?.kind === "rod" ? picked.index : null, scroll);
-    const box = this.find(".picked");
+    const box = this.find(".picked"), name = picked && (picked.kind === "cable" ? `Cable ${picked.index + 1}` : `Rod ${this.run.rods[picked.index].name}`);
+    for (const link of this.article.querySelectorAll(".see")) {
+      link.hidden = !picked || !link.closest("section").id.endsWith(`-${picked.kind}s`);
+      link.textContent = `See ${name} in the view`;
+    }
     if (!picked) return box.replaceChildren(element("p", "Pick a cable or a rod in the view, or a row of the tables below.", "quiet"));
-    const head = element("h3", picked.kind === "cable" ? `Cable ${picked.index + 1}` : `Rod ${this.run.rods[picked.index].name}`);
+    const head = element("h3", name);
     const away = element("button", "Let go");
     away.type = "button";
     away.addEventListener("click", () => this.pick(null));
