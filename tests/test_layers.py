@@ -18,8 +18,6 @@ DOORS = {
     "matplotlib": {"output/plots.py"},
     "cvxopt": {"structure/sparse.py"},
     "numba": {"compiled.py"},
-    "PIL": {"output/embed.py"},
-    "jinja2": {"output/report.py"},
 }
 NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "dask", "numba", "scipy", "numpy"]
 

@@ -1,4 +1,4 @@
-"""Pictures as text inside the page; the door to Pillow.
+"""Pictures as text inside the page.
 
 PNG pictures become WebP, which takes a tenth of the bytes at a quality that shows no difference on screen, and those wider than a
 page are made smaller. Films and drawings go in as they are. What would make the page too large is left out and named.

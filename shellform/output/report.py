@@ -42,14 +42,14 @@ _MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 class Entry:
     """One run on the page.
 
-    `designs` and their `states` by load case, of which `best` is to be built; `loads` (n, 6), N; the `summary` of the run folder; rows
+    `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which `best` is to be built; `loads` (n, 6), N; the `summary` of the run folder; rows
     of the `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `notes` say what is missing or to be known;
     `files` are those of the run folder.
     """
 
     title: str
     place: str
-    shell: Gridshell
+    shells: Mapping[str, Gridshell]
     surface: Surface
     loads: Mapping[str, Reals]
     designs: Mapping[str, Design]
@@ -63,6 +63,11 @@ class Entry:
     bounds: verdict.Bounds
     notes: Sequence[str]
     files: Sequence[str]
+
+    @property
+    def shell(self) -> Gridshell:
+        """The shell of the design to build."""
+        return self.shells[self.best]
 
 
 def html(entries: Sequence[Entry], versions: Mapping[str, str]) -> str:
@@ -93,7 +98,7 @@ def _part(name: str) -> str:
 
 def _told(entry: Entry, number: int) -> dict[str, Any]:
     """What the template writes of a run."""
-    found = verdict.checks(entry.shell, entry.designs, entry.summary, entry.bounds)
+    found = verdict.checks(entry.shells, entry.designs, entry.summary, entry.bounds)
     failed = verdict.failed(found, entry.best)
     rows = {name: entry.summary.get("designs", {}).get(name, {}) for name in entry.designs}
     best = rows[entry.best]
@@ -134,11 +139,10 @@ def _factor(rows: Mapping[str, Any], load: str) -> float | None:
 
 
 def _caption(name: str) -> str:
-    """A file's name in words: "optimised-design" is "Optimised: the design load"."""
-    design, dash, load = name.partition("-")
-    if dash and design in verdict.TITLES:
-        return f"{verdict.design_title(design)}: {verdict.LOADS.get(load, load.replace('-', ' ').replace('_', ' '))}"
-    text = name.replace("-", ": ", 1).replace("-", " ").replace("_", " ")
+    """A file's name in words: "utilisation-optimised-design" is "Utilisation: optimised, the design load"."""
+    parts = [verdict.TITLES.get(part, verdict.LOADS.get(part, part.replace("_", " "))) for part in name.split("-")]
+    words = [part if k == 0 else part[:1].lower() + part[1:] for k, part in enumerate(parts)]
+    text = words[0] + (": " + ", ".join(words[1:]) if len(words) > 1 else "")
     return text[:1].upper() + text[1:]
 
 
@@ -213,16 +217,15 @@ def _drawn(entry: Entry) -> dict[str, Any]:
         "strength": bool(np.isfinite(shell.rod.strength)),
         "force_max": entry.bounds.force,
         "target": _floats(place - middle),
-        "lattice": grid.lattice.tolist(),
         "supports": shell.net.supports.tolist(),
         "rods": [
             {
-                "name": f"{rod.direction} {rod.index}".replace("-", "−"),
+                "name": f"{rod.direction.upper()}{number}",
                 "nodes": rod.nodes.tolist(),
                 "length": round(1e3 * rod.length, 3),
                 "crossings": len(rod.crossings),
             }
-            for rod in grid.rods
+            for number, rod in enumerate(grid.rods)
         ],
         "cables": {"ends": shell.cable_ends.tolist(), "joints": [[joint_of[int(n)] for n in pair] for pair in shell.cable_ends]},
         "surface": {"vertices": _floats(vertices - middle), "triangles": _bytes(triangles.astype("<u4"))},
@@ -236,7 +239,7 @@ def _drawn(entry: Entry) -> dict[str, Any]:
 
 
 def _design(entry: Entry, name: str) -> dict[str, Any]:
-    shell, design = entry.shell, entry.designs[name]
+    shell, design = entry.shells[name], entry.designs[name]
     cables = shell.cables(design)
     states = {}
     for load, state in entry.states[name].items():

@@ -24,8 +24,21 @@ TITLES = {
     "initial": "Initial",
     "unloaded": "Optimised unloaded",
     "optimised": "Optimised",
+    "rounded": "Rounded",
     "polished": "Polished",
 }
+_CONSTRAINTS = {
+    "cable_force": "cable forces",
+    "misfit": "misfit",
+    "robust_misfit": "misfit with scatter",
+    "softness": "stiffness of the softest mode",
+    "utilisation": "rods' stress",
+    "connector_turn": "connectors' turning",
+    "slackness": "least pull of a cable",
+    "uplift": "uplift of supports",
+}
+_MADE_FROM_IT = ("rounded", "polished")
+_AT_LEAST = ("softness", "slackness")  # of which as much is demanded, not at most
 _SETTLED = 1e-6  # unbalanced over largest force: what an equilibrium that counts as found stays below
 _SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
 
@@ -67,9 +80,9 @@ def design_title(name: str) -> str:
 
 
 def checks(
-    shell: Gridshell, designs: Mapping[str, Design], summary: Mapping[str, Any], bounds: Bounds
+    shells: Mapping[str, Gridshell], designs: Mapping[str, Design], summary: Mapping[str, Any], bounds: Bounds
 ) -> list[Check]:
-    """Every check, in the order of its weight: standing, stress, forces, misfit, and the optimiser's own constraints."""
+    """Every check of the designs, each on its own shell, in the order of its weight: standing, stress, forces, misfit, and the optimiser's own constraints."""
     told: Mapping[str, Any] = {name: summary.get("designs", {}).get(name, {}) for name in designs}
     loads = list(dict.fromkeys(load for row in told.values() for load in row.get("loads", {})))
     factors = {load: row["loads"][load].get("factor") for row in told.values() for load in loads if load in row.get("loads", {})}
@@ -89,8 +102,11 @@ def checks(
             "stress up to 100 % of the strength",
             of(load, lambda row: _share(row.get("rod_utilisation_max"))),
         )
-    most = max_radius(shell.net, shell.rod)
-    each("Rods bent into the shape (1)", "up to 100 % of the curvature they bear", lambda design: _share(designs[design].radius / most))
+    each(
+        "Rods bent into the shape (1)",
+        "up to 100 % of the curvature they bear",
+        lambda design: _share(designs[design].radius / max_radius(shells[design].net, shells[design].rod)),
+    )
     each(
         "Largest cable force under the design load (5)",
         f"{number(bounds.force)} N",
@@ -103,7 +119,7 @@ def checks(
                 f"{number(1e3 * bounds.misfit)} mm",
                 of(load, lambda row: _below(1e3 * row.get("deviation_rms", math.nan), 1e3 * bounds.misfit, "mm")),
             )
-    for name, value in summary.get("optimisation", {}).get("constraints", {}).items():
+    for name, value in (summary.get("optimisation") or {}).get("constraints", {}).items():
         cell = _constraint(name, value)
         each(constraint_title(name), _constraint_limit(name), lambda design, cell=cell: cell if design == "optimised" else Cell("–", None))
     for load in loads:
@@ -116,26 +132,21 @@ def checks(
 
 
 def failed(found: Sequence[Check], design: str) -> list[Check]:
-    """The checks that don't hold for the design; for a polished one those of the constraints it was polished under as well."""
-    names = [design, "optimised"] if design == "polished" else [design]
+    """The checks that don't hold for the design; for one made from the optimised one those of the constraints it was made under as well."""
+    names = [design, "optimised"] if design in _MADE_FROM_IT else [design]
     return [check for check in found if any(_fails(check, name, design) for name in names)]
 
 
 def asked(found: Sequence[Check], design: str) -> int:
     """How many checks were made of the design."""
-    names = [design, "optimised"] if design == "polished" else [design]
+    names = [design, "optimised"] if design in _MADE_FROM_IT else [design]
     return sum(any(name in check.cells and check.cells[name].holds is not None for name in names) for check in found)
 
 
 def constraint_title(name: str) -> str:
     """A constraint of the optimiser in words."""
     kind, _, load = name.partition(".")
-    words = {
-        "cable_force": "Optimiser: cable forces",
-        "misfit": "Optimiser: misfit",
-        "softness": "Optimiser: stiffness of the softest mode",
-    }
-    told = words.get(kind, f"Optimiser: {kind.replace('_', ' ')}")
+    told = f"Optimiser: {_CONSTRAINTS.get(kind, kind.replace('_', ' '))}"
     return f"{told}, {load} load" if load else told
 
 
@@ -196,12 +207,12 @@ def answers(
     if more:
         factor = more.get("factor", math.nan)
         stands = bool(more.get("stable") and more.get("on_branch", True))
-        detail = f"{_mm(more['deviation_max'])} off at most, {_mm(more['deviation_mean'])} in the mean"
+        detail = f"{_mm(more['deviation_max'])} off at most, {_mm(more['deviation_mean'])} in the mean. {_collapse(main)}"
         found.append(
             Answer(
                 f"Is it safe at {factor:.3g} × the load?",
                 "Yes, it stands" if stands else "No, it snaps through" if more.get("stable") else "No, it is unstable",
-                f"{detail}. At which load it collapses wasn't sought." if stands else detail,
+                detail,
                 stands,
             )
         )
@@ -216,6 +227,15 @@ def answers(
         )
     )
     return found
+
+
+def _collapse(row: Mapping[str, Any]) -> str:
+    """What is known of the load at which the shell loses stability, from the design load's part of the summary."""
+    if row.get("critical_factor") is not None:
+        return f"Stability ends at {row['critical_factor']:.2f} × the design load."
+    if row.get("critical_sought") is not None and row.get("critical_kind") is None:
+        return f"Stable up to {row['critical_sought']:g} × the design load, the most that was tried."
+    return "At which load it collapses isn't known."
 
 
 def _mm(metres: float) -> str:
@@ -256,14 +276,19 @@ def _below(value: float | None, limit: float, unit: str) -> Cell:
 
 
 def _constraint_limit(name: str) -> str:
-    return "at least the stiffness demanded" if name.startswith("softness") else "up to 100 % of the limit"
+    return "at least what is demanded" if name.partition(".")[0] in _AT_LEAST else "up to the limit"
 
 
 def _constraint(name: str, value: float) -> Cell:
-    """From value / limit - 1 <= 0. A misfit counts by its square, a softness is 1 - (stiffness / least)²."""
+    """From value / limit - 1 <= 0. A misfit counts by its square, a softness is 1 - (stiffness / least)², a slackness 1 - pull / least, and an
+    uplift is offset, so that its share tells nothing."""
     if not math.isfinite(value):
         return Cell("not known", False)
-    if name.startswith("softness"):
-        return Cell(f"{math.sqrt(max(1.0 - value, 0.0)):.2f} ×", value <= _SLACK)
-    share = math.sqrt(max(1.0 + value, 0.0)) if name.startswith("misfit") else 1.0 + value
-    return Cell(f"{100.0 * share:.0f} %", value <= _SLACK)
+    kind, holds = name.partition(".")[0], value <= _SLACK
+    if kind in _AT_LEAST:
+        ratio = math.sqrt(max(1.0 - value, 0.0)) if kind == "softness" else 1.0 - value
+        return Cell(f"{ratio:.2f} ×", holds)
+    if kind == "uplift":
+        return Cell("within" if holds else "beyond", holds)
+    share = math.sqrt(max(1.0 + value, 0.0)) if kind == "misfit" else 1.0 + value
+    return Cell(f"{100.0 * share:.0f} %", holds)

@@ -14,7 +14,7 @@ from shellform.output.embed import KINDS, embed
 from shellform.output.report import GENERATOR, Entry, html
 from shellform.output.verdict import Bounds
 from shellform.study.case import write_text
-from shellform.study.folder import Report, Run, read_json, read_run
+from shellform.study.folder import DESIGNS, Report, Run, read_json, read_run
 from shellform.study.run import stage_keys
 
 FILE = "report.html"
@@ -51,14 +51,13 @@ def write_page(runs: Sequence[Run], file: Path) -> Path:
 def entry(run: Run, budget: int = _BUDGET) -> Entry:
     """A run as the page takes it, with at most `budget` bytes of pictures."""
     told = run.summary.get("designs", {})
-    known = [name for name in run.designs if name in told]
+    known = [name for name in run.designs if name in told]  # in the order in which they were made
     if not known:
         raise InputError("the run's summary tells of no design", where=str(run.folder), remedy="Run shellform design on it again.")
     done = _done(run)
     pictures, left = embed(_pictures(run), budget=budget)
-    notes = [
-        f"The design “{name}” is not shown: its stage has not finished. Run shellform design again." for name in run.designs if name not in told
-    ]
+    broken_off = [name for name in DESIGNS if name not in told and (run.folder / f"designs/{name}.npz").is_file()]
+    notes = [f"The design “{name}” is not shown: its stage has not finished. Run shellform design again." for name in broken_off]
     if "initial" not in done:
         notes.append("What is shown was computed before the last change of the case, of its surface, or of shellform: run shellform design again.")
     elif "optimise" not in done and "optimisation" in run.summary:
@@ -67,16 +66,15 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
         notes.append("The run is not optimised (yet): run shellform design without --until, and the optimised design is added.")
     if not pictures:
         notes.append("There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them.")
-    best = [name for name in ("initial", "optimised", "polished") if name in known] or known
     return Entry(
         run.case.title or run.folder.resolve().name,
         run.folder.name or str(run.folder),
-        run.shell,
+        {name: run.shell for name in known},
         run.surface,
         run.loads,
         {name: run.designs[name] for name in known},
         {name: run.states[name] for name in known},
-        best[-1],
+        run.best if run.best in known else known[-1],
         run.summary,
         _history(run.folder / "history.csv"),
         (run.folder / "case.toml").read_text(encoding="utf-8"),
@@ -121,10 +119,12 @@ def _history(file: Path) -> list[dict[str, str]]:
 
 def _pictures(run: Run) -> list[Path]:
     """All pictures but the histories, which the page draws itself: the sheet first, then the designs' by load, then the others."""
-    names = [f"{design}-{load}" for design in ("polished", "optimised", "initial", "unloaded", "unbraced") for load in run.loads]
+    names = [f"{design}-{load}" for design in reversed(DESIGNS) for load in run.loads]
     first = {name: place for place, name in enumerate(["deviations", *names])}
     found = [file for file in sorted((run.folder / "figures").glob("*")) if file.suffix.lower() in KINDS and file.is_file()]
-    return sorted((file for file in found if file.stem not in _DRAWN), key=lambda file: first.get(file.stem, len(first)))
+    films = {file.stem for file in found if file.suffix == ".mp4"}  # which come as GIF as well, many times as large
+    wanted = [file for file in found if file.stem not in _DRAWN and not (file.suffix == ".gif" and file.stem in films)]
+    return sorted(wanted, key=lambda file: first.get(file.stem, len(first)))
 
 
 def _refuse_foreign(file: Path) -> None:

@@ -13,16 +13,16 @@ class Panel {
     this.find = find;
     this.show.scale = find("[name=scale]").value;
     this.cables = new LiveTable(find("[data-table=cables]"), find("[data-search=cables]"), find("[id$=-cables] .count"), [
-      { title: "Cable", number: true, value: (row) => row.key, text: (row) => String(row.key + 1) },
-      { title: "From joint", value: (row) => row.from, text: (row) => row.from },
-      { title: "To joint", value: (row) => row.to, text: (row) => row.to },
+      { title: "Cable", value: (row) => row.order, text: (row) => `C${row.order}` },
+      { title: "From crossing", number: true, value: (row) => row.from, text: (row) => String(row.from) },
+      { title: "To crossing", number: true, value: (row) => row.to, text: (row) => String(row.to) },
       { title: "Rest length [mm]", number: true, value: (row) => row.rest, text: (row) => this.mm(row.rest) },
       { title: "Length [mm]", number: true, value: (row) => row.length, text: (row) => this.mm(row.length) },
       { title: "Force [N]", number: true, value: (row) => row.force, text: (row) => (row.force > 0 ? newtons(row.force) : "slack") },
       { title: "Largest of all loads [N]", number: true, value: (row) => row.most, text: (row) => newtons(row.most) },
     ], (key) => this.pick({ kind: "cable", index: key }));
     this.rods = new LiveTable(find("[data-table=rods]"), find("[data-search=rods]"), find("[id$=-rods] .count"), [
-      { title: "Rod", value: (row) => Number(row.name.slice(2).replace("−", "-")) + (row.name[0] === "v" ? 1e6 : 0), text: (row) => row.name },
+      { title: "Rod", value: (row) => row.key, text: (row) => row.name },
       { title: "Length [mm]", number: true, value: (row) => row.length, text: (row) => this.mm(row.length) },
       { title: "Crossings", number: true, value: (row) => row.crossings, text: (row) => String(row.crossings) },
       { title: "Off at most [mm]", number: true, value: (row) => row.off, text: (row) => row.off.toFixed(2) },
@@ -67,7 +67,9 @@ class Panel {
     else this.view.look(view);
   }
 
-  joint(k) { return `(${this.run.lattice[k].join(", ").replaceAll("-", "−")})`; }
+  name(picked) { // as on the drawings and schedules: cables are counted by design
+    return picked.kind === "cable" ? `C${this.design.cables.indexOf(picked.index)}` : this.run.rods[picked.index].name;
+  }
 
   get design() { return this.run.designs.find((each) => each.name === this.show.design); }
   get state() { return this.design.states[this.show.load]; }
@@ -85,9 +87,9 @@ class Panel {
       this.find(".told").textContent = `${this.design.title} design under ${this.load.title}: ${millimetres(largest(off))} mm off at most, ${millimetres(mean)} in the mean; ${cables}.`;
     }
     for (const words of this.article.querySelectorAll(".which")) words.textContent = `${this.design.title} design under ${this.load.title}`;
-    const all = Object.values(this.design.states), joint = (k) => this.joint(k);
+    const all = Object.values(this.design.states);
     this.cables.fill(this.design.cables.map((cable, k) => ({
-      key: cable, from: joint(this.run.cables.joints[cable][0]), to: joint(this.run.cables.joints[cable][1]), rest: this.design.rest[k],
+      key: cable, order: k, from: this.run.cables.joints[cable][0], to: this.run.cables.joints[cable][1], rest: this.design.rest[k],
       length: this.state.length[k], force: this.state.force[k], most: Math.max(...all.map((state) => state.force[k])), faint: this.state.force[k] <= 0,
     })));
     this.rods.fill(this.run.rods.map((rod, k) => ({ key: k, ...rod, off: this.state.rods[k][0], used: this.state.rods[k][1] })));
@@ -120,7 +122,7 @@ class Panel {
     this.picked = picked;
     this.cables.mark(picked?.kind === "cable" ? picked.index : null, scroll);
     this.rods.mark(picked?.kind === "rod" ? picked.index : null, scroll);
-    const box = this.find(".picked"), name = picked && (picked.kind === "cable" ? `Cable ${picked.index + 1}` : `Rod ${this.run.rods[picked.index].name}`);
+    const box = this.find(".picked"), name = picked && `${picked.kind === "cable" ? "Cable" : "Rod"} ${this.name(picked)}`;
     for (const link of this.article.querySelectorAll(".see")) {
       link.hidden = !picked || !link.closest("section").id.endsWith(`-${picked.kind}s`);
       link.textContent = `See ${name} in the view`;
@@ -135,8 +137,8 @@ class Panel {
   }
 
   cable(index) {
-    const k = this.design.cables.indexOf(index), [from, to] = this.run.cables.joints[index].map((k) => this.joint(k));
-    const words = element("p", `From joint ${from} to ${to}, rest length ${this.mm(this.design.rest[k])} mm.`);
+    const k = this.design.cables.indexOf(index), [from, to] = this.run.cables.joints[index];
+    const words = element("p", `From crossing ${from} to ${to}, rest length ${this.mm(this.design.rest[k])} mm.`);
     return [words, this.overLoads(["Length [mm]", "Force [N]"], (state) => [this.mm(state.length[k]), state.force[k] > 0 ? newtons(state.force[k]) : "slack"])];
   }
 

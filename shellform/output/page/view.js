@@ -232,7 +232,7 @@ class View {
     this.canvas.classList.toggle("over", Boolean(found));
     if (!found) return;
     const away = `${this.deviation[found.node].toFixed(2)} mm off`, k = this.design.cables.indexOf(found.index);
-    this.tip.textContent = found.kind === "cable" ? `Cable ${found.index + 1}: ${newtons(this.state.force[k])} N` : `Rod ${this.run.rods[found.index].name}: ${away}`;
+    this.tip.textContent = found.kind === "cable" ? `Cable C${k}: ${newtons(this.state.force[k])} N` : `Rod ${this.run.rods[found.index].name}: ${away}`;
     const top = this.canvas.offsetTop + y - 36, left = Math.min(x + 12, this.canvas.clientWidth - this.tip.offsetWidth - 8);
     Object.assign(this.tip.style, { left: `${left}px`, top: `${Math.max(top, 4)}px` });
   }
