@@ -1,4 +1,5 @@
-"""Line charts as inline SVG, for the page: no library, no script; colours are the page's own, so that they follow dark and light.
+"""Line charts as inline SVG, for the page: no library, no script; colours are the page's own, so that they follow dark and
+light.
 
 A curve is a row of points joined by straight lines. Values outside the axis are cut at its ends, which the caption says.
 """
@@ -38,7 +39,8 @@ def line_chart(
     limit: float | None = None,
     main: bool = True,
 ) -> Chart:
-    """Curves over `at` (k,), each (k,), the first drawn strongest where it is the `main` one. `least` and `most` cut the axis; above `limit` is shaded as not allowed.
+    """Curves over `at` (k,), each (k,), the first drawn strongest where it is the `main` one. `least` and `most` cut the axis;
+    above `limit` is shaded as not allowed.
 
     A value that is no number leaves a gap.
     """
@@ -61,7 +63,8 @@ def line_chart(
     parts = [f'<svg viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{escape(title, quote=True)}" class="chart">']
     if limit is not None and limit < high:
         parts.append(
-            f'<rect class="refused" x="{_LEFT}" y="{y(high)}" width="{_WIDTH - _LEFT - _RIGHT}" height="{round(y(limit) - y(high), 1)}"/>'
+            f'<rect class="refused" x="{_LEFT}" y="{y(high)}" width="{_WIDTH - _LEFT - _RIGHT}" '
+            f'height="{round(y(limit) - y(high), 1)}"/>'
         )
     for step in steps:
         parts.append(f'<line class="grid" x1="{_LEFT}" x2="{_WIDTH - _RIGHT}" y1="{y(step)}" y2="{y(step)}"/>')

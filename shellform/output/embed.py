@@ -1,7 +1,7 @@
 """Pictures as text inside the page.
 
-PNG pictures become WebP, which takes a tenth of the bytes at a quality that shows no difference on screen, and those wider than a
-page are made smaller. Films and drawings go in as they are. What would make the page too large is left out and named.
+PNG pictures become WebP, which takes a tenth of the bytes at a quality that shows no difference on screen, and those wider
+than a page are made smaller. Films and drawings go in as they are. What would make the page too large is left out and named.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ KINDS = (".png", ".jpg", ".jpeg", ".webp", *_PLAIN)
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture's file name without ending, its `source` as data URI, its size in pixels (0 where not known), and if it is a `film`."""
+    """A picture's file name without ending, its `source` as data URI, its size in pixels (0 where not known), and if it is a
+    `film`."""
 
     name: str
     source: str

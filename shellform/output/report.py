@@ -1,9 +1,9 @@
 """One HTML page with everything that was found, for one run or several side by side: no network, no other file.
 
-The template, the style and the scripts stand in `page/`; the template writes what can be read without a script, and the three-dimensional
-view and its tables take their numbers from JSON inside the page, with positions as base64 of little-endian float32. Titles, file names
-and settings are text from elsewhere: the template escapes them, the JSON has no "<", and the page's own policy refuses every script but its
-own and every request.
+The template, the style and the scripts stand in `page/`; the template writes what can be read without a script, and the
+three-dimensional view and its tables take their numbers from JSON inside the page, with positions as base64 of little-endian
+float32. Titles, file names and settings are text from elsewhere: the template escapes them, the JSON has no "<", and the
+page's own policy refuses every script but its own and every request.
 """
 
 from __future__ import annotations
@@ -42,9 +42,9 @@ _MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 class Entry:
     """One run on the page.
 
-    `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which `best` is to be built; `loads` (n, 6), N; the `summary` of the run folder; rows
-    of the `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `notes` say what is missing or to be known;
-    `files` are those of the run folder.
+    `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which `best` is to be built; `loads`
+    (n, 6), N; the `summary` of the run folder; rows of the `history`; `settings`, the case file's text; `limit`, m, ends the
+    colour scale; `notes` say what is missing or to be known; `files` are those of the run folder.
     """
 
     title: str
@@ -121,7 +121,11 @@ def _told(entry: Entry, number: int) -> dict[str, Any]:
         "checks": found,
         "charts": _charts(entry.history),
         "pictures": [(picture, _caption(picture.name)) for picture in entry.pictures],
-        "notes": [*entry.notes, *entry.summary.get("net", {}).get("notes", []), *entry.summary.get("surface", {}).get("mended", [])],
+        "notes": [
+            *entry.notes,
+            *entry.summary.get("net", {}).get("notes", []),
+            *entry.summary.get("surface", {}).get("mended", []),
+        ],
         "settings": entry.settings,
         "files": _folders(entry.files),
         "summary": entry.summary,
@@ -175,7 +179,8 @@ def _charts(history: Sequence[Mapping[str, str]]) -> list[charts.Chart]:
     limits = {verdict.constraint_title(name[11:])[11:]: column(name) for name in rows[0] if name.startswith("constraint.")}
     found = [charts.line_chart("Objective and its terms", at, terms)]
     if limits:
-        found.append(charts.line_chart("Constraints: value over limit, less 1 (cut at −1.5 and 1)", at, limits, least=-1.5, most=1.0, limit=0.0, main=False))
+        title = "Constraints: value over limit, less 1 (cut at −1.5 and 1)"
+        found.append(charts.line_chart(title, at, limits, least=-1.5, most=1.0, limit=0.0, main=False))
     found.append(charts.line_chart("Cables in tension", at, {"cables": column("cables")}))
     return found
 
@@ -202,7 +207,8 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
 
 
 def _drawn(entry: Entry) -> dict[str, Any]:
-    """What the view and the tables are made from: lengths in mm but for positions, which are in m from the `middle`; forces in N."""
+    """What the view and the tables are made from: lengths in mm but for positions, which are in m from the `middle`; forces in
+    N."""
     shell, grid = entry.shell, entry.shell.net.grid
     place = shell.target.positions
     middle = 0.5 * (place.min(axis=0) + place.max(axis=0))
@@ -227,7 +233,10 @@ def _drawn(entry: Entry) -> dict[str, Any]:
             }
             for number, rod in enumerate(grid.rods)
         ],
-        "cables": {"ends": shell.cable_ends.tolist(), "joints": [[joint_of[int(n)] for n in pair] for pair in shell.cable_ends]},
+        "cables": {
+            "ends": shell.cable_ends.tolist(),
+            "joints": [[joint_of[int(n)] for n in pair] for pair in shell.cable_ends],
+        },
         "surface": {"vertices": _floats(vertices - middle), "triangles": _bytes(triangles.astype("<u4"))},
         "loads": [
             {"name": name, "title": verdict.load_title(name, _factor(rows, name)), "points": _marked(load)}
@@ -250,7 +259,9 @@ def _design(entry: Entry, name: str) -> dict[str, Any]:
             "utilisation": _floats(use),
             "length": np.round(1e3 * cables.lengths(state), 4).tolist(),
             "force": [_short(value) for value in cables.tension(state)],
-            "rods": [[round(1e3 * float(away[rod.nodes].max()), 4), _short(use[rod.nodes].max())] for rod in shell.net.grid.rods],
+            "rods": [
+                [round(1e3 * float(away[rod.nodes].max()), 4), _short(use[rod.nodes].max())] for rod in shell.net.grid.rods
+            ],
         }
     return {
         "name": name,
@@ -282,7 +293,8 @@ def _marked(load: Reals) -> list[int]:
 
 
 def _light(surface: Surface) -> tuple[Reals, Any]:
-    """Vertices (v, 3), m, and triangles (t, 3) of the surface; of a fine one vertices in one cell of a cubic grid are merged to their mean."""
+    """Vertices (v, 3), m, and triangles (t, 3) of the surface; of a fine one vertices in one cell of a cubic grid are merged
+    to their mean."""
     vertices, triangles = np.asarray(surface.vertices), np.asarray(surface.triangles)
     if len(triangles) <= _MOST_TRIANGLES:
         return vertices, triangles

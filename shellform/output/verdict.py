@@ -1,7 +1,7 @@
 """What a run's numbers say: checks with pass or fail for every design, and the answers to what a designer asks first.
 
-A check compares a number of the summary with its limit. It fails where the number is missing because its computation ended without a
-result, and says nothing ("–") where a design was never asked for it. Numbers stand in the units in which people read them: mm, N, %.
+A check compares a number of the summary with its limit, and says nothing where a design was never asked for it. A computation
+that ended without a result fails: its residual is no number. Numbers stand in the units in which people read them: mm, N, %.
 """
 
 from __future__ import annotations
@@ -45,7 +45,8 @@ _SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the case limits: tension `force`, N, under the design load; root mean square `misfit`, m, under every load beyond it."""
+    """What the case limits: tension `force`, N, under the design load; root mean square `misfit`, m, under every load beyond
+    it."""
 
     force: float
     misfit: float
@@ -82,10 +83,13 @@ def design_title(name: str) -> str:
 def checks(
     shells: Mapping[str, Gridshell], designs: Mapping[str, Design], summary: Mapping[str, Any], bounds: Bounds
 ) -> list[Check]:
-    """Every check of the designs, each on its own shell, in the order of its weight: standing, stress, forces, misfit, and the optimiser's own constraints."""
+    """Every check of the designs, each on its own shell: standing, stress, forces, misfit, the optimiser's own constraints,
+    equilibrium."""
     told: Mapping[str, Any] = {name: summary.get("designs", {}).get(name, {}) for name in designs}
     loads = list(dict.fromkeys(load for row in told.values() for load in row.get("loads", {})))
-    factors = {load: row["loads"][load].get("factor") for row in told.values() for load in loads if load in row.get("loads", {})}
+    factors = {
+        load: row["loads"][load].get("factor") for row in told.values() for load in loads if load in row.get("loads", {})
+    }
     found: list[Check] = []
 
     def each(name: str, limit: str, cell: Any) -> None:
@@ -121,7 +125,8 @@ def checks(
             )
     for name, value in (summary.get("optimisation") or {}).get("constraints", {}).items():
         cell = _constraint(name, value)
-        each(constraint_title(name), _constraint_limit(name), lambda design, cell=cell: cell if design == "optimised" else Cell("–", None))
+        cells = {design: cell if design == "optimised" else Cell("–", None) for design in designs}
+        found.append(Check(constraint_title(name), _constraint_limit(name), cells))
     for load in loads:
         each(
             f"In equilibrium under {load_title(load, factors[load])}",
@@ -132,7 +137,8 @@ def checks(
 
 
 def failed(found: Sequence[Check], design: str) -> list[Check]:
-    """The checks that don't hold for the design; for one made from the optimised one those of the constraints it was made under as well."""
+    """The checks that don't hold for the design; for one made from the optimised one those of the constraints it was made
+    under as well."""
     names = [design, "optimised"] if design in _MADE_FROM_IT else [design]
     return [check for check in found if any(_fails(check, name, design) for name in names)]
 
@@ -163,7 +169,8 @@ def number(value: float, digits: int = 3) -> str:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a designer asks first: the `question`, the answer in a few words, what stands behind it, and if it is `good` news (None: neither)."""
+    """What a designer asks first: the `question`, the answer in a few words, what stands behind it, and if it is `good` (None:
+    neither)."""
 
     question: str
     told: str
@@ -174,7 +181,8 @@ class Answer:
 def answers(
     shell: Gridshell, name: str, design: Design, states: Mapping[str, State], summary: Mapping[str, Any]
 ) -> list[Answer]:
-    """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the design to build."""
+    """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the design to
+    build."""
     row = summary.get("designs", {}).get(name, {})
     loads = row.get("loads", {})
     main, more = loads.get("design", {}), loads.get("additional", {})
@@ -196,7 +204,8 @@ def answers(
         Answer(
             "How many cables?",
             f"{len(cables.ends)} of {len(shell.cable_ends)}",
-            f"{number(float(pull.max(initial=0.0)))} N at most in one, {number(float(pull.sum()))} N in all, under the design load",
+            f"{number(float(pull.max(initial=0.0)))} N at most in one, {number(float(pull.sum()))} N in all, "
+            "under the design load",
         )
     )
     used = main.get("rod_utilisation_max")
@@ -206,24 +215,27 @@ def answers(
     )
     if more:
         factor = more.get("factor", math.nan)
-        stands = bool(more.get("stable") and more.get("on_branch", True))
-        detail = f"{_mm(more['deviation_max'])} off at most, {_mm(more['deviation_mean'])} in the mean. {_collapse(main)}"
-        found.append(
-            Answer(
-                f"Is it safe at {factor:.3g} × the load?",
-                "Yes, it stands" if stands else "No, it snaps through" if more.get("stable") else "No, it is unstable",
-                detail,
-                stands,
-            )
-        )
+        used = more.get("rod_utilisation_max", math.nan)
+        known = math.isfinite(used) and math.isfinite(shell.rod.strength)
+        rods_told = f", rods at {100.0 * used:.0f} % of their strength" if known else ""
+        if not more.get("stable"):
+            safe, words = False, "No, it is unstable"
+        elif not more.get("on_branch", True):
+            safe, words = False, "No, it snaps through"
+        elif known and used > 1.0 + _SLACK:
+            safe, words = False, "No, rods break"
+        else:
+            safe, words = True, "Yes, it stands"
+        off = f"{_mm(more['deviation_max'])} off at most, {_mm(more['deviation_mean'])} in the mean{rods_told}"
+        found.append(Answer(f"Is it safe at {factor:.3g} × the load?", words, f"{off}. {_collapse(main)}", safe))
     mass = mass_per_length(section) * float(rods.sum())
     weight = f" ({number(mass)} kg)" if mass > 0.0 else ""
     found.append(
         Answer(
             "What to buy?",
             f"{number(float(rods.sum()))} m of rod{weight}",
-            f"{len(rods)} rods, {len(grid.lattice)} connectors, {len(cables.ends)} cables of {number(float(cables.rest_length.sum()))} m in all, "
-            f"{len(shell.net.supports)} supports",
+            f"{len(rods)} rods, {len(grid.lattice)} connectors, {len(shell.net.supports)} supports, {len(cables.ends)} cables of "
+            f"{number(float(cables.rest_length.sum()))} m in all",
         )
     )
     return found
@@ -280,8 +292,8 @@ def _constraint_limit(name: str) -> str:
 
 
 def _constraint(name: str, value: float) -> Cell:
-    """From value / limit - 1 <= 0. A misfit counts by its square, a softness is 1 - (stiffness / least)², a slackness 1 - pull / least, and an
-    uplift is offset, so that its share tells nothing."""
+    """From value / limit - 1 <= 0. A misfit counts by its square, a softness is 1 - (stiffness / least)², a slackness 1 - pull
+    / least, and an uplift is offset, so that its share tells nothing."""
     if not math.isfinite(value):
         return Cell("not known", False)
     kind, holds = name.partition(".")[0], value <= _SLACK

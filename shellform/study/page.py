@@ -24,9 +24,12 @@ _DRAWN = ("objective", "constraints")
 _HEAD = 2000  # characters in which a page of ours names its maker
 
 
-def write_report(folders: Sequence[str | Path], file: str | Path | None = None, *, report: Report = lambda stage, text: None) -> Path:
-    """Writes the page of one run, or of several side by side, and returns its file: `file`, or report.html in the one run's folder or, for
-    several, in the present one. Raises InputError for what is no run, and for a file that is there and is no page of shellform's."""
+def write_report(
+    folders: Sequence[str | Path], file: str | Path | None = None, *, report: Report = lambda stage, text: None
+) -> Path:
+    """Writes the page of one run, or of several side by side, and returns its file: `file`, or report.html in the one run's
+    folder or, for several, in the present one. Raises InputError for what is no run, and for a file that is there and is no
+    page of shellform's."""
     if not folders:
         raise InputError("there is no run to report", where="report", remedy="Name one or more run folders.")
     runs = []
@@ -53,13 +56,20 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
     told = run.summary.get("designs", {})
     known = [name for name in run.designs if name in told]  # in the order in which they were made
     if not known:
-        raise InputError("the run's summary tells of no design", where=str(run.folder), remedy="Run shellform design on it again.")
+        raise InputError(
+            "the run's summary tells of no design", where=str(run.folder), remedy="Run shellform design on it again."
+        )
     done = _done(run)
     pictures, left = embed(_pictures(run), budget=budget)
     broken_off = [name for name in DESIGNS if name not in told and (run.folder / f"designs/{name}.npz").is_file()]
-    notes = [f"The design “{name}” is not shown: its stage has not finished. Run shellform design again." for name in broken_off]
+    notes = [
+        f"The design “{name}” is not shown: its stage has not finished. Run shellform design again." for name in broken_off
+    ]
     if "initial" not in done:
-        notes.append("What is shown was computed before the last change of the case, of its surface, or of shellform: run shellform design again.")
+        notes.append(
+            "What is shown was computed before the last change of the case, of its surface, or of shellform: "
+            "run shellform design again."
+        )
     elif "optimise" not in done and "optimisation" in run.summary:
         notes.append("The optimised designs were computed before the last change of the case: run shellform design again.")
     if "optimisation" not in run.summary:
@@ -83,7 +93,9 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
         Bounds(run.case.cable.force_max, run.case.optimise.misfit_rms_additional),
         [*notes, *left],
         sorted(
-            file.relative_to(run.folder).as_posix() for file in run.folder.rglob("*") if file.is_file() and ".part" not in file.name
+            file.relative_to(run.folder).as_posix()
+            for file in run.folder.rglob("*")
+            if file.is_file() and ".part" not in file.name
         ),
     )
 
@@ -118,7 +130,8 @@ def _history(file: Path) -> list[dict[str, str]]:
 
 
 def _pictures(run: Run) -> list[Path]:
-    """All pictures but the histories, which the page draws itself: the sheet first, then the designs' by load, then the others."""
+    """All pictures but the histories, which the page draws itself: the sheet first, then the designs' by load, then the
+    others."""
     names = [f"{design}-{load}" for design in reversed(DESIGNS) for load in run.loads]
     first = {name: place for place, name in enumerate(["deviations", *names])}
     found = [file for file in sorted((run.folder / "figures").glob("*")) if file.suffix.lower() in KINDS and file.is_file()]

@@ -1,4 +1,5 @@
-"""A run folder in seconds: the vault with rods twice as far apart, and a design with every third cable left out in the optimised one's place."""
+"""A run folder in seconds: the vault with rods twice as far apart, and a design with every third cable left out in the
+optimised one's place."""
 
 import json
 from dataclasses import replace
@@ -37,7 +38,13 @@ def finish(folder):
     )
     constraints = {"cable_force": -0.5, "misfit.additional": -0.1, "softness.additional": -0.2}
     counts = {"iterations": 1, "evaluations": 3, "rejected": 1, "equilibria": 9, "factorisations": 20}
-    summary["optimisation"] = {"objective_start": 1.0, "objective_end": 0.4, **counts, "status": "no better design", "constraints": constraints}
+    summary["optimisation"] = {
+        "objective_start": 1.0,
+        "objective_end": 0.4,
+        **counts,
+        "status": "no better design",
+        "constraints": constraints,
+    }
     (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     (folder / "history.csv").write_text(HISTORY, encoding="utf-8")
     (folder / "stages.json").write_text(json.dumps(stage_keys(run.case, Path(run.case.surface.file))), encoding="utf-8")

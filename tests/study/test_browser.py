@@ -1,6 +1,8 @@
-"""The page in headless Chromium: it draws, is picked in, searched, sorted, printed, used by keys and read on a phone, and asks for nothing.
+"""The page in headless Chromium: it draws, is picked in, searched, sorted, printed, used by keys and read on a phone, and asks
+for nothing.
 
-Skipped only where there is no Chromium, neither playwright's own (playwright install chromium) nor the system's; scripts/test installs one.
+Skipped only where there is no Chromium, neither playwright's own (playwright install chromium) nor the system's; scripts/test
+installs one.
 """
 
 import base64
@@ -90,7 +92,9 @@ def choose(page, name, value):
 
 
 def cells(page, table, column):
-    return page.eval_on_selector_all(f"[data-table={table}] tbody tr td:nth-child({column})", "cells => cells.map(cell => cell.textContent)")
+    return page.eval_on_selector_all(
+        f"[data-table={table}] tbody tr td:nth-child({column})", "cells => cells.map(cell => cell.textContent)"
+    )
 
 
 def hovered(page, kind):
@@ -115,7 +119,9 @@ def test_the_view_draws_the_shell_and_the_summary_stands_on_the_first_screen(vis
     for words in ("How far off is the shell?", "Is it safe at 1.2 × the load?", "What to buy?"):
         box = page.get_by_text(words).first.bounding_box()
         assert box["y"] + box["height"] < 900
-    page.wait_for_function("[...document.querySelectorAll('.gallery img')].every((each) => each.complete && each.naturalWidth > 0)")
+    page.wait_for_function(
+        "[...document.querySelectorAll('.gallery img')].every((each) => each.complete && each.naturalWidth > 0)"
+    )
     assert page.locator(".gallery img").count() == 3
 
 
@@ -200,7 +206,9 @@ def test_tables_are_sorted_and_searched(visit, file):
     page.fill("[data-search=rods]", "u3")
     assert cells(page, "rods", 1) == ["U3"]
     page.get_by_role("button", name="Sort by Cables").click()
-    column = page.eval_on_selector_all("[id$=-designs] tbody tr td:nth-child(2)", "cells => cells.map(cell => Number(cell.textContent))")
+    column = page.eval_on_selector_all(
+        "[id$=-designs] tbody tr td:nth-child(2)", "cells => cells.map(cell => Number(cell.textContent))"
+    )
     assert column == sorted(column)
 
 

@@ -38,7 +38,13 @@ def test_the_page_stands_in_the_run_folder_and_answers_a_designer_s_questions(co
     file = write_report([copy])
     assert file == copy / "report.html"
     page = text_of(file)
-    for words in ("How far off is the shell?", "How many cables?", "Which rods?", "Is it safe at 1.2 × the load?", "What to buy?"):
+    for words in (
+        "How far off is the shell?",
+        "How many cables?",
+        "Which rods?",
+        "Is it safe at 1.2 × the load?",
+        "What to buy?",
+    ):
         assert words in page
     summary = json.loads(text_of(copy / "summary.json"))
     row = summary["designs"]["optimised"]
@@ -74,7 +80,9 @@ def test_a_case_changed_after_its_designs_is_told(copy):
     (copy / "case.toml").write_text(settings.replace("radius = 0.001", "radius = 0.0011"), encoding="utf-8")
     assert any("shown was computed before the last change" in note for note in entry(read_run(copy)).notes)
     (copy / "case.toml").write_text(settings.replace("vault.py", "moved.py"), encoding="utf-8")
-    assert not any("before the last change" in note for note in entry(read_run(copy)).notes), "it can't be told without the surface"
+    assert not any("before the last change" in note for note in entry(read_run(copy)).notes), (
+        "it can't be told without the surface"
+    )
 
 
 def test_a_damaged_picture_and_one_too_many_are_named_and_the_rest_is_shown(copy):
