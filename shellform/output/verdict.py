@@ -45,11 +45,16 @@ _SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the case limits: tension `force`, N, under the design load; root mean square `misfit`, m, under every load beyond
-    it."""
+    """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root mean square `misfit`, m, under
+    those beyond it; and where an engineer asked for it (None: not) `stress` over strength, connectors' `turn`, rad, `uplift`, N, of supports
+    under any load, and the `critical` factor of the design load up to which it stays stable."""
 
     force: float
     misfit: float
+    stress: float | None = None
+    turn: float | None = None
+    uplift: float | None = None
+    critical: float | None = None
 
 
 @dataclass(frozen=True)
@@ -111,11 +116,31 @@ def checks(
         "up to 100 % of the curvature they bear",
         lambda design: _share(designs[design].radius / max_radius(shells[design].net, shells[design].rod)),
     )
+    def worst(design: str, key: str, loaded: bool = False) -> float | None:
+        rows = [row for load, row in told[design].get("loads", {}).items() if load != "none" or not loaded]
+        return max((row[key] for row in rows if row.get(key) is not None), default=None)
+
     each(
-        "Largest cable force under the design load (5)",
+        "Largest cable force under the design load and those beyond it (5)",
         f"{number(bounds.force)} N",
-        lambda design: _below(told[design].get("cable_force_max"), bounds.force, "N"),
+        lambda design: _below(worst(design, "cable_force_max", True) or told[design].get("cable_force_max"), bounds.force, "N"),
     )
+    for title, key, limit, scale, unit in (
+        ("Rods' stress with axial force under any load", "stress_utilisation_max", bounds.stress, 100.0, "% of the strength"),
+        ("Connectors' turning under any load", "connector_turn_max", bounds.turn, 180.0 / math.pi, "°"),
+        ("Uplift of a support under any load", "uplift_max", bounds.uplift, 1.0, "N"),
+    ):
+        if limit is not None:
+            values = {design: worst(design, key) for design in designs}
+            cells = {d: _below(None if v is None else scale * v, scale * limit, unit) for d, v in values.items()}
+            found.append(Check(title, f"{number(scale * limit)} {unit}", cells))
+    if bounds.critical is not None:
+        least = bounds.critical
+        each(
+            "Stays stable beyond the design load",
+            f"up to {least:g} × the design load",
+            lambda design: _stays(told[design].get("loads", {}).get("design", {}), least),
+        )
     for load in loads:
         if load not in ("none", "design"):
             each(
@@ -266,6 +291,14 @@ def _stands(row: Mapping[str, Any]) -> Cell:
     if not row.get("stable", False):
         return Cell("unstable", False)
     return Cell("stands", True) if row.get("on_branch", True) else Cell("snapped through", False)
+
+
+def _stays(row: Mapping[str, Any], least: float) -> Cell:
+    if row.get("critical_factor") is not None:
+        return Cell(f"{row['critical_factor']:.2f} ×", row["critical_factor"] >= least * (1.0 - _SLACK))
+    if row.get("critical_sought") is not None and row.get("critical_kind") is None:
+        return Cell(f"beyond {row['critical_sought']:g} ×", row["critical_sought"] >= least)
+    return Cell("not known", None)
 
 
 def _settled(row: Mapping[str, Any]) -> Cell:

@@ -76,10 +76,11 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
         notes.append("The run is not optimised (yet): run shellform design without --until, and the optimised design is added.")
     if not pictures:
         notes.append("There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them.")
+    limits = run.case.limits
     return Entry(
         run.case.title or run.folder.resolve().name,
         run.folder.name or str(run.folder),
-        {name: run.shell for name in known},
+        {name: run.shell_of(name) for name in known},
         run.surface,
         run.loads,
         {name: run.designs[name] for name in known},
@@ -90,7 +91,14 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
         (run.folder / "case.toml").read_text(encoding="utf-8"),
         pictures,
         run.case.figures.limit,
-        Bounds(run.case.cable.force_max, run.case.optimise.misfit_rms_additional),
+        Bounds(
+            run.case.cable.force_max,
+            run.case.optimise.misfit_rms_additional,
+            limits.utilisation,
+            limits.connector_turn,
+            limits.uplift,
+            limits.critical_factor,
+        ),
         [*notes, *left],
         sorted(
             file.relative_to(run.folder).as_posix()

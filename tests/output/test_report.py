@@ -66,7 +66,7 @@ def test_a_sound_design_holds_all_checks_those_of_the_optimiser_among_them(shell
         ("none", {"rod_utilisation_max": 1.01}, "Rods under no load"),
         ("additional", {"deviation_rms": 0.0051}, "Deviation under 1.2 × the load, root mean square (6)"),
         ("design", {"residual": float("nan")}, "In equilibrium under the design load"),
-        (None, {"cable_force_max": 20.1}, "Largest cable force under the design load (5)"),
+        (None, {"cable_force_max": 20.1}, "Largest cable force under the design load and those beyond it (5)"),
     ],
 )
 def test_each_check_fails_alone_where_its_number_is_past_the_limit(shell, designs, load, changes, name):
@@ -91,6 +91,27 @@ def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, de
     assert [cell.told for cell in found.values()] == ["35 %", "50 %", "0.90 ×", "1.50 ×", "beyond", "within", "not known"]
     assert [cell.holds for cell in found.values()] == [True, True, False, True, False, True, False]
     assert {"Optimiser: uplift of supports, wind load", "Optimiser: other thing"} < set(found)
+
+
+@pytest.mark.parametrize(
+    ("bound", "load", "changes", "words"),
+    [
+        ({"stress": 0.9}, "none", {"stress_utilisation_max": 0.95}, "95 % of the strength"),
+        ({"turn": 0.1}, "design", {"connector_turn_max": 0.2}, "11.5 °"),
+        ({"uplift": 1.0}, "additional", {"uplift_max": 1.5}, "1.5 N"),
+        ({"critical": 1.5}, "design", {"critical_factor": 1.4}, "1.40 ×"),
+        ({"critical": 4.0}, "design", {"critical_factor": None, "critical_sought": 3.0}, "beyond 3 ×"),
+        ({"force": 20.0}, "additional", {"cable_force_max": 21.0}, "21 N"),
+    ],
+)
+def test_an_engineer_s_limits_are_checked_where_they_are_asked_for(shell, designs, bound, load, changes, words):
+    summary = told(designs, load, **changes)
+    found = failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **bound)), "polished")
+    assert [check.cells["polished"].told for check in found] == [words]
+    if "force" not in bound:
+        assert failed(checks(every(shell, designs), designs, summary, BOUNDS), "polished") == [], "nobody asked"
+    looser = {name: 0.5 * limit if name == "critical" else 2.0 * limit for name, limit in bound.items()}
+    assert failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **looser)), "polished") == []
 
 
 def test_the_polished_design_does_not_fail_by_what_only_the_optimised_one_broke(shell, designs):
