@@ -61,6 +61,7 @@ _KEPT = 0.4  # of the stiffness in any direction, at the additional load, that m
 _THINNING = 1.5  # of the objective that cables with little use may cost
 _REPAIRS = 2  # steps after each batch
 _WIDE = 1e3  # windows, no bound on a group's step beside those on its cables
+_GUARDS = 400  # constraints for each load
 _RECOVERY = 0.1  # of what a window can change at most: by so much cables below that tension must gain under additional loads
 _BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
 FEASIBLE = 1e-3
@@ -411,8 +412,11 @@ class _Search:
             held = guard(self.evaluator.assembly(design), self.point.states[name], shell.cables(design), self.tension, *rates)
             falls = -(held.tension_by_design @ lengths) * width
             scale = np.abs(falls).sum(axis=1)
-            rows.append(falls / scale[:, None])
-            values.append(np.minimum((_BRACE * self.tension - held.tension) / scale, _RECOVERY))
+            asked = np.minimum((_BRACE * self.tension - held.tension) / scale, _RECOVERY)
+            # Where no step within the window lets a cable go slack, there is nothing to guard; of the others the nearest count.
+            near = np.argsort(-asked, kind="stable")[: int(np.clip((asked > -1.0).sum(), 0, _GUARDS))]
+            rows.append(falls[near] / scale[near, None])
+            values.append(asked[near])
         return np.vstack(rows), np.concatenate(values)
 
     def _exact_in_tension(self, slope: Reals, model: TensionModel) -> Reals:
