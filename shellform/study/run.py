@@ -153,6 +153,8 @@ def run_case(
         if not reusable:
             summary["seconds"][stage] = round(time.perf_counter() - began, 3)
             done = {**{s: done[s] for s in STAGES[: STAGES.index(stage)] if s in done}, stage: keys[stage]}
+            if results[stage] is False:  # pictures without OpenGL: once it is there, the next run makes them
+                del done[stage]
         summary["seconds"]["total"] = round(sum(v for k, v in summary["seconds"].items() if k != "total"), 3)
         write_text(folder / "summary.json", json.dumps(summary, indent=1))
         write_text(folder / "stages.json", json.dumps(done))
@@ -344,16 +346,12 @@ def _keep(
 ) -> None:
     """Writes a design's model file, states and summary."""
     summary["designs"][name] = keep_design(job.folder, shell, name, design, loaded, loads)
-    states = {each: loaded[each].equilibrium.state for each in loads}
-    try:
-        write_states(job.folder, shell, name, design, states, loads)
-    except InputError as error:  # these files need VTK, which may be missing; everything else goes on
-        job.report("initial", f"no files of states: {error}")
+    write_states(job.folder, shell, name, design, {each: loaded[each].equilibrium.state for each in loads})
 
 
-def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
-    if not keep:
-        draw_everything(read_run(job.folder), report=job.report)
+def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> bool:
+    """Whether all pictures are there."""
+    return keep or draw_everything(read_run(job.folder), report=job.report)
 
 
 def _follow(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:
