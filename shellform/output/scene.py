@@ -46,8 +46,7 @@ def drawn(pages: Iterable[Page]) -> Iterator[Image]:
 
     Keys and headings that don't change from page to page are drawn once. Raises InputError where VTK can't draw.
     """
-    if not _window_works():
-        raise InputError("VTK lacks a library to draw pictures with (X11, EGL or Mesa)", remedy=f"{_LIBRARIES}.")
+    require()
     windows: dict[tuple[int, int], pv.Plotter] = {}
     kept: dict[tuple[object, ...], Image] = {}
     try:
@@ -69,6 +68,12 @@ def drawn(pages: Iterable[Page]) -> Iterator[Image]:
     finally:
         for plotter in windows.values():
             plotter.close()
+
+
+def require() -> None:
+    """Raises InputError, naming the packages to install, where VTK can't draw."""
+    if not _window_works():
+        raise InputError("VTK lacks a library to draw pictures with (X11, EGL or Mesa)", remedy=f"{_LIBRARIES}.")
 
 
 def _window(size: tuple[int, int]) -> pv.Plotter:

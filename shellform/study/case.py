@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -25,6 +24,7 @@ from pydantic import (
 import shellform
 from shellform.design.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.errors import InputError
+from shellform.written import whole
 
 
 class _Section(BaseModel):
@@ -395,6 +395,5 @@ def _has(entry: Any, name: str) -> bool:
 
 def write_text(path: Path, text: str) -> None:
     """Writes a file whole or not at all."""
-    partial = path.with_name(f"{path.name}.part")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+    with whole(path) as partial:
+        partial.write_text(text, encoding="utf-8")

@@ -32,8 +32,9 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = lambda stage,
 
     Raises InputError for unknown names and where VTK can't draw, NotConverged where there is no path.
     """
-    from shellform.output import render, scene  # noqa: F401 - without OpenGL, say so before computing
+    from shellform.output import render, scene
 
+    scene.require()  # before minutes are spent on states
     name = wish.design or run.best
     for what, each, known in [("--design", name, list(run.designs)), ("--load", wish.load or "design", list(run.loads))]:
         if each not in known:

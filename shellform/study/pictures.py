@@ -81,19 +81,19 @@ def _pixels(text: str) -> tuple[int, int]:
 def draw_everything(run: Run, *, report: Report = lambda stage, text: None) -> bool:
     """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False."""
     from shellform.output import plots
-    from shellform.output.nets import draw_net
+    from shellform.output.nets import draw_net  # loads no OpenGL
 
-    drawn = True
-    try:
+    drawn = pictures_possible(report)
+    if drawn:
         draw_designs(run, report=report)
         for quantity in ("utilisation", "curvature", "shear", "mode"):
-            draw_designs(run, Wish(run.best, "design", quantity), report=report)
+            try:
+                draw_designs(run, Wish(run.best, "design", quantity), report=report)
+            except NotConverged as error:  # of a shell at its limit no mode may be found; the other maps stand
+                report("figures", f"no pictures of the {quantity}: {error}")
         for view in ("top", "front", "side"):
             draw_designs(run, Wish(run.best, "design", view=view), report=report)
         draw_net(run.net, run.folder / "figures")
-    except InputError as error:  # no OpenGL: everything but the pictures is still made
-        report("figures", f"no pictures: {error}")
-        drawn = False
     if not (run.folder / "history.csv").is_file():
         return drawn
     with (run.folder / "history.csv").open(encoding="utf-8", newline="") as file:
@@ -108,6 +108,18 @@ def draw_everything(run: Run, *, report: Report = lambda stage, text: None) -> b
     plots.objective_history(run.folder / "figures/objective.png", at, columns("term."))
     plots.constraint_history(run.folder / "figures/constraints.png", at, columns("constraint."))
     return drawn
+
+
+def pictures_possible(report: Report) -> bool:
+    """Whether VTK can draw; if not, one line says why: everything but the pictures is still made."""
+    try:
+        from shellform.output import scene
+
+        scene.require()
+    except InputError as error:
+        report("figures", f"no pictures: {error}")
+        return False
+    return True
 
 
 def draw_run(folder: str | Path, wish: Wish | None = None) -> list[Path]:

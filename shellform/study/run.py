@@ -31,17 +31,21 @@ from shellform.structure.loading import Loaded
 from shellform.structure.state import State
 from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
 from shellform.study.folder import (
+    FORMAT,
+    VERSION,
     Report,
     history_text,
     keep_design,
     load_surface,
     read_json,
     read_run,
+    refuse_overwriting,
     save_surface,
 )
 from shellform.study.pictures import draw_everything, write_states
 from shellform.study.shell import catalogue_bytes, gridshell, rod_bounds, rod_limits
 from shellform.surface.target import Surface
+from shellform.written import folder as made
 
 STAGES = ("surface", "net", "initial", "optimise", "figures")
 
@@ -107,6 +111,10 @@ class _Job:
     def path(self, name: str) -> Path:
         return self.folder / name
 
+    def tell(self, summary: Mapping[str, Any]) -> None:
+        """Writes summary.json."""
+        write_text(self.path("summary.json"), json.dumps(summary, indent=1))
+
 
 def run_case(
     case: Case,
@@ -128,6 +136,8 @@ def run_case(
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
     keys = _keys(case, file)
+    if not fresh:
+        refuse_overwriting(folder)
     done = {} if fresh else read_json(folder / "stages.json")
     results: dict[str, Any] = {}
     began = time.perf_counter()
@@ -135,32 +145,44 @@ def run_case(
         report("surface", f"reading {file}")
         results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
         report("surface", f"size {told_size(results['surface'])}")
-    try:
-        for part in ("designs", "states", "figures"):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-        write_text(folder / "case.toml", dump_case(case))
-    except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(folder), remedy="Choose another --output.") from error
-    job = _Job(case, folder, report)
     summary = read_json(folder / "summary.json") if done else {}
-    summary = {"format": "shellform-summary", "version": 1, **{k: v for k, v in summary.items() if k != "format"}}
+    summary = {**summary, "format": FORMAT, "version": VERSION, "shellform": shellform.__version__}
     summary.setdefault("seconds", {})
+    for part in ("designs", "states", "figures"):
+        made(folder / part)
+    job = _Job(case, folder, report)
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
+    first = next((stage for stage in STAGES if done.get(stage) != keys[stage]), None)
+    if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
+        _forget(summary, first)
+        done = {stage: done[stage] for stage in STAGES[: STAGES.index(first)]}
+        write_text(folder / "stages.json", json.dumps(done))
+        job.tell(summary)
+    write_text(folder / "case.toml", dump_case(case))
     reusable = True
     for stage in STAGES[: STAGES.index(until) + 1]:
         reusable = reusable and done.get(stage) == keys[stage]
         results[stage] = steps[stage](job, results, summary, reusable)
         if not reusable:
             summary["seconds"][stage] = round(time.perf_counter() - began, 3)
-            done = {**{s: done[s] for s in STAGES[: STAGES.index(stage)] if s in done}, stage: keys[stage]}
-            if results[stage] is False:  # pictures without OpenGL: once it is there, the next run makes them
-                del done[stage]
+            if results[stage] is not False:  # pictures without OpenGL aren't done: once it is there, the next run makes them
+                done = {**done, stage: keys[stage]}
         summary["seconds"]["total"] = round(sum(v for k, v in summary["seconds"].items() if k != "total"), 3)
-        write_text(folder / "summary.json", json.dumps(summary, indent=1))
+        job.tell(summary)
         write_text(folder / "stages.json", json.dumps(done))
         report(stage, f"{'kept' if reusable else 'done'} in {time.perf_counter() - began:.1f} s")
         began = time.perf_counter()
     return summary
+
+
+def _forget(summary: dict[str, Any], stage: str) -> None:
+    """Takes out of the summary what a stage and those after it will find anew."""
+    if STAGES.index(stage) <= STAGES.index("initial"):
+        summary.pop("designs", None)
+    if STAGES.index(stage) <= STAGES.index("optimise"):
+        summary.pop("optimisation", None)
+        for name in ("unloaded", "optimised", "polished"):
+            summary.get("designs", {}).pop(name, None)
 
 
 def _keys(case: Case, file: Path) -> dict[str, str]:
@@ -254,7 +276,6 @@ def _initial(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
     first = summary["designs"]["initial"]["loads"]["design"]
     span = float(max(summary["surface"]["size"][:2]))
     if not first["on_branch"] or first["deviation_max"] > 0.1 * span:
-        write_text(job.path("summary.json"), json.dumps(summary, indent=1))
         raise NotConverged(
             f"The initial design deforms excessively under the design load ({1e3 * first['deviation_max']:.0f} mm); its states "
             f"are kept in {job.path('states')}",
@@ -347,6 +368,7 @@ def _keep(
     """Writes a design's model file, states and summary."""
     summary["designs"][name] = keep_design(job.folder, shell, name, design, loaded, loads)
     write_states(job.folder, shell, name, design, {each: loaded[each].equilibrium.state for each in loads})
+    job.tell(summary)
 
 
 def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> bool:
