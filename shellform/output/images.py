@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -17,10 +18,17 @@ _HOLD = 1.5  # s that the last frame stays
 
 def write_png(path: str | Path, picture: NDArray[np.uint8]) -> None:
     """Writes a picture (height, width, 3 or 4). Raises InputError for another ending and where the file can't be written."""
+    with whole(door(path, ".png")) as partial:
+        partial.write_bytes(png_bytes(picture))
+
+
+def png_bytes(picture: NDArray[np.uint8]) -> bytes:
+    """A picture (height, width, 3 or 4) as the content of a PNG file."""
     from PIL import Image
 
-    with whole(door(path, ".png")) as partial:
-        Image.fromarray(picture).save(partial, format="png", compress_level=4)
+    content = io.BytesIO()
+    Image.fromarray(picture).save(content, format="png", compress_level=4)
+    return content.getvalue()
 
 
 def write_film(path: str | Path, frames: Sequence[NDArray[np.uint8]], *, rate: int = 12) -> None:

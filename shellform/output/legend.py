@@ -101,7 +101,7 @@ def key(scale: Scale, width: int) -> tuple[tuple[Word, ...], tuple[Ramp, ...]]:
     ends = [(0.1, 0.52), (0.66, 0.92)] if scale.force > 0.0 else [(0.22, 0.78)]
     line = min(round(0.9 * scale.letters), round(width / 38))
     name, unit = scale.unit
-    words, ramp = _bar(scale.quantity, name, scale.limit / unit, "≥ ", rod_colours, ends[0], width, line)
+    words, ramp = _bar(scale.quantity, name, scale.limit / unit, "≥ " if scale.beyond else "", rod_colours, ends[0], width, line)
     ramps = [ramp]
     if scale.force > 0.0:
         told = "cable force (pale: slack)" if scale.slack else "cable force"

@@ -110,6 +110,7 @@ class Scale:
     """What all panels of a picture share: metres, newtons and letters."""
 
     limit: float  # in SI units
+    beyond: bool  # whether a value is larger
     force: float  # N; 0 where no cable is taut
     slack: bool  # whether any cable is
     reach: float  # m, the largest extent, which loads are drawn by
@@ -124,7 +125,8 @@ def scale_of(panels: Sequence[Panel], look: Look, size: tuple[int, int]) -> Scal
     force = look.force or max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
     slack = any((panel.cable_forces <= 0.0).any() for panel in panels)
     letters = max(11, round(0.034 * min(size[1], 0.7 * size[0])))
-    return Scale(look.limit, max(force, 0.0), slack, reach, letters, panels[0].quantity, panels[0].unit)
+    beyond = any(panel.deviation.max() > look.limit * (1.0 + 1e-9) for panel in panels)
+    return Scale(look.limit, beyond, max(force, 0.0), slack, reach, letters, panels[0].quantity, panels[0].unit)
 
 
 def drawn_radius(panel: Panel, look: Look, width: float) -> float:

@@ -7,13 +7,15 @@ import subprocess
 import sys
 from dataclasses import replace
 
+import imageio_ffmpeg
 import numpy as np
 import pytest
 import pyvista as pv
+from PIL import Image, ImageSequence
 
 from shellform.errors import InputError
-from shellform.output import legend, render, scene, vtp
-from shellform.output.panel import Look, Panel, Skin
+from shellform.output import images, legend, page, render, scene, vectors, view, vtp
+from shellform.output.panel import Look, Panel, Skin, scale_of
 
 SIZE = (400, 300)
 SMALL = Look(size=SIZE)
@@ -290,3 +292,114 @@ def test_drawing_without_a_display_says_nothing_on_standard_error():
     shell = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
     done = subprocess.run([sys.executable, "-c", code], env=shell, capture_output=True, text=True, check=True)
     assert done.stderr == ""
+
+
+def test_cables_have_a_scale_of_their_own_with_a_key_only_where_one_is_taut():
+    none = replace(panel(), cable_forces=np.zeros(64))
+    taut, slack = (render.image(each, SMALL)[-legend.key_height(SIZE) :].astype(int) for each in (panel(), none))
+    brick = legend.cable_colours(np.array([0.999]))[0]
+    assert (np.abs(taut - brick).max(axis=2) < 4).sum() > 5
+    assert (np.abs(slack - brick).max(axis=2) < 4).sum() == 0
+
+
+def test_both_scales_run_in_lightness_alone_evenly_enough_for_the_colour_blind():
+    def lightness(colours):
+        linear = np.where(colours / 255.0 <= 0.04045, colours / 255.0 / 12.92, ((colours / 255.0 + 0.055) / 1.055) ** 2.4)
+        return 116.0 * np.cbrt(linear @ [0.2126, 0.7152, 0.0722]) - 16.0
+
+    share = np.linspace(0.0, 1.0, 21)
+    for colours, sign in [(legend.rod_colours(share), 1.0), (legend.cable_colours(share), -1.0)]:
+        steps = sign * np.diff(lightness(colours))
+        assert (steps > 0.0).all()
+        assert steps.max() < 2.0 * steps.mean()
+
+
+def test_rods_are_drawn_as_thick_as_can_be_seen_or_as_they_are():
+    seen, true, twenty = (ink(above(render.image(bare(), Look(size=SIZE, thickness=times)))) for times in (0.0, 1.0, 20.0))
+    assert true < seen < twenty
+
+
+def test_without_a_background_the_picture_laid_on_white_is_the_picture():
+    through = render.image(panel(), Look(size=SIZE, transparent=True, surface=Skin(np.eye(3), [[0, 1, 2]])))
+    solid = render.image(panel(), Look(size=SIZE, surface=Skin(np.eye(3), [[0, 1, 2]])))
+    assert through.shape == (300, 400, 4)
+    share = through[..., 3:] / 255.0
+    laid = share * through[..., :3] + (1.0 - share) * 255.0
+    assert np.abs(laid - solid).max() <= 3
+    assert (share == 0.0).mean() > 0.4
+    assert ((share > 0.2) & (share < 0.5)).mean() > 0.02  # the surface
+
+
+def test_the_best_view_has_the_long_axis_across_and_looks_at_what_opens_towards_it():
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    long = panel().positions * [2.0, 1.0, 1.0]
+    along, across = (above(render.image(bare(positions=place), SMALL)) for place in (long, long @ turned.T))
+    np.testing.assert_allclose(ink(along), ink(across), rtol=0.05)
+    leaning = panel().positions + np.outer(panel().positions[:, 1], [0.0, 0.0, -0.8])
+    away = _fitted(leaning).away
+    assert away[1] > 0.0  # it falls towards +y, and is seen from there
+    assert _fitted(panel().positions).away[1] < 0.0
+
+
+def _fitted(positions):
+    given = bare(positions=positions)
+    return view.fitted([given], SMALL, scale_of([given], SMALL, SIZE), SIZE)
+
+
+@pytest.mark.parametrize(("ending", "head"), [(".svg", b"<?xml"), (".pdf", b"%PDF")])
+def test_a_page_of_lines_is_small_repeats_to_the_byte_and_needs_no_opengl(tmp_path, ending, head, monkeypatch):
+    monkeypatch.setattr(scene, "_window_works", lambda: False)
+    for name in "ab":
+        render.picture(tmp_path / f"{name}{ending}", panel(), SMALL)
+    content = (tmp_path / f"a{ending}").read_bytes()
+    assert content.startswith(head)
+    assert content == (tmp_path / f"b{ending}").read_bytes()
+    assert len(content) < 200_000
+
+
+def test_lines_are_drawn_where_the_pixels_are():
+    given = bare(supports=panel().supports)
+    lines, pixels = (above(each) for each in (vectors.rasterised(page.single([given], SMALL)[0]), render.image(given, SMALL)))
+    assert np.mean((lines.min(axis=2) < 200) == (pixels.min(axis=2) < 200)) > 0.95
+    flat = replace(given, positions=given.positions * [1.0, 1.0, 0.0], load_points=panel().load_points)
+    top = vectors.rasterised(page.single([flat], Look(size=SIZE, view="top", surface=Skin(np.eye(3), [[0, 1, 2]])))[0])
+    assert ink(above(top)) > 500
+
+
+def test_pictures_drawn_one_after_the_other_are_those_drawn_alone(tmp_path):
+    far = replace(panel(), deviation=np.full(len(panel().positions), 0.02))
+    render.pictures([tmp_path / "a.png", tmp_path / "b.png"], [panel(), far], SMALL)
+    for name, given in [("a", panel()), ("b", far)]:
+        assert np.abs(np.asarray(Image.open(tmp_path / f"{name}.png")).astype(int) - render.image(given, SMALL)).max() <= 1
+    render.pictures([tmp_path / "a.svg"], [panel()], SMALL)
+    assert (tmp_path / "a.svg").stat().st_size > 0
+
+
+def test_a_film_has_a_frame_for_each_panel_and_one_camera(tmp_path):
+    lower = [replace(panel(), positions=panel().positions * [1.0, 1.0, share]) for share in (0.0, 0.5, 1.0)]
+    files = [tmp_path / "film.gif", tmp_path / "film.mp4"]
+    render.film(files, lower, Look(size=(240, 180), view="front"), rate=10)
+    frames = [np.asarray(frame.convert("RGB")) for frame in ImageSequence.Iterator(Image.open(files[0]))]
+    assert frames[0].shape == (180, 240, 3)
+    assert len(frames) == 3  # Pillow holds the last one instead of repeating it
+    tops = [np.flatnonzero((frame[45:140].min(axis=2) < 200).any(axis=1))[0] for frame in frames]
+    assert tops[0] > tops[1] > tops[2]
+    bars = [frame[140:].astype(int) for frame in frames]
+    assert np.abs(bars[0] - bars[2]).max() <= 2
+    film = imageio_ffmpeg.read_frames(str(files[1]))
+    about = next(film)
+    assert about["size"] == (240, 180)
+    assert sum(1 for _ in film) == 3 + 15
+
+
+def test_films_of_nothing_or_with_other_endings_are_refused(tmp_path):
+    with pytest.raises(InputError, match=r"Use \.gif, \.mp4"):
+        render.film([tmp_path / "a.avi"], [panel()], SMALL)
+    with pytest.raises(InputError, match="has no panels"):
+        render.film([tmp_path / "a.gif"], [], SMALL)
+    with pytest.raises(InputError, match="has no frames"):
+        images.write_film(tmp_path / "a.gif", [])
+    (tmp_path / "b.mp4").mkdir()
+    with pytest.raises(InputError, match="can't be written"):
+        images.write_film(tmp_path / "b.mp4", [np.zeros((60, 80, 3), dtype=np.uint8)])
+    assert [path.name for path in tmp_path.iterdir()] == ["b.mp4"]
