@@ -27,14 +27,6 @@ def shellform(*arguments, env=None, before=None):
     )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def begun(tmp_path_factory):
-    """A run that was left after its initial design."""
-    folder = tmp_path_factory.mktemp("begun") / "run"
-    run_case(load_case(CASE), folder, until="initial")
-    return folder
-
-
 @pytest.fixture
 def copy(begun, tmp_path):
     return Path(shutil.copytree(begun, tmp_path / "copy"))
