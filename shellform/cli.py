@@ -241,7 +241,7 @@ def render(
     load: Annotated[str | None, typer.Option(help="none, design, additional or another of the case's.")] = None,
     design: Annotated[str | None, typer.Option(help="unbraced, initial, unloaded, optimised or polished.")] = None,
     quantity: Annotated[
-        str | None, typer.Option(help="deviation, utilisation, curvature, shear, spring or mode (the softest).")
+        str | None, typer.Option(help="deviation, utilisation, curvature, shear, spring, mode (the softest) or history.")
     ] = None,
     limit: Annotated[float | None, typer.Option(help="End of the colour scale, in SI units; shear in rad.")] = None,
     view: Annotated[str, typer.Option(help="best, top, front or side.")] = "best",

@@ -5,14 +5,18 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shellform.errors import InputError
+from shellform.output.legend import cable_colours, rod_colours
 from shellform.written import door, whole
 
 FILMS = (".gif", ".mp4")
+_COMMON = 8  # of the commonest colours that are kept as they are
+_PACKED = np.array([65536, 256, 1])  # a colour as one number
 _HOLD = 1.5  # s that the last frame stays
 
 
@@ -44,13 +48,32 @@ def write_film(path: str | Path, frames: Sequence[NDArray[np.uint8]], *, rate: i
         (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(partial, still, rate)
 
 
-def _write_gif(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> None:
-    """With one palette for all frames, of the colours that the first, the middle and the last have, so that no scale changes on the way."""
+def few_colours(pictures: Sequence[NDArray[np.uint8]], count: int = 256) -> list[Any]:
+    """The pictures (height, width, 3) as Pillow's palette images of at most `count` colours (128 or more), all with one palette, so that no
+    scale changes on the way.
+
+    The key's colours are in it, and the commonest, such as white. The others are cut from the shades that occur, each as heavy as the
+    logarithm of how often it does: else the surface's greys would take the palette.
+    """
     from PIL import Image
 
-    sample = Image.fromarray(np.vstack([frames[0], frames[len(frames) // 2], frames[-1]]))
-    palette = sample.quantize(256, method=Image.Quantize.MAXCOVERAGE)
-    pages = [Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
+    sample = np.concatenate([picture.reshape(-1, 3) for picture in (pictures[0], pictures[len(pictures) // 2], pictures[-1])])
+    common, often = np.unique(sample @ _PACKED, return_counts=True)
+    fixed = np.vstack([_unpacked(common[np.argsort(-often)[:_COMMON]]), rod_colours(np.linspace(0, 1, 48)), cable_colours(np.linspace(0, 1, 24))])
+    shades, often = np.unique((sample >> 3) @ _PACKED, return_counts=True)
+    heavy = np.repeat(_unpacked(shades) * 8 + 4, np.ceil(np.log2(often + 1)).astype(int), axis=0).astype(np.uint8)
+    cut = Image.fromarray(heavy[None]).quantize(count - len(fixed), method=Image.Quantize.MEDIANCUT, kmeans=3).getpalette() or []
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([*fixed.ravel().tolist(), *cut[: 3 * (count - len(fixed))]])
+    return [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+
+
+def _unpacked(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.column_stack([numbers >> 16, (numbers >> 8) & 255, numbers & 255])
+
+
+def _write_gif(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> None:
+    pages = few_colours(frames)
     pages[0].save(path, format="gif", save_all=True, append_images=pages[1:], duration=round(1000 / rate), loop=0)
 
 

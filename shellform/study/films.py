@@ -20,7 +20,7 @@ from shellform.structure.loading import apply_load
 from shellform.structure.network import assemble
 from shellform.structure.state import State
 from shellform.study.folder import Report, Run
-from shellform.study.pictures import Wish, look_of
+from shellform.study.pictures import Wish, look_of, titled
 from shellform.written import folder as made
 
 _FRAMES = 24  # of a stage
@@ -49,7 +49,7 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = lambda stage,
     look = look_of(run, replace(wish, size=wish.size or _SIZE), panels)
     files = [made(run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings]
     report("film", f"drawing {len(panels)} frames")
-    render.film(files, panels, look)
+    render.film(files, [titled(run, panel) for panel in panels], look)
     return files
 
 

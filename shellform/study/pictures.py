@@ -19,7 +19,7 @@ _LARGEST = 8000  # pixels a side: drawn at twice that, at which drivers end
 _LOADS = {"none": "no load", "design": "design load", "additional": "additional load"}
 
 
-QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode")
+QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode", "history")
 FILMS = ("pour", "erection")
 
 
@@ -55,7 +55,7 @@ def wish(
     """A wish as the command line says it: `size` as WIDTHxHEIGHT, the file's `kind` without a dot. Raises InputError for bad options."""
     if film is not None and film not in FILMS:
         raise InputError("is no film", where="--film", value=film, remedy=f"Known: {', '.join(FILMS)}.")
-    if film is not None and (transparent or quantity in ("spring", "mode")):
+    if film is not None and (transparent or quantity in ("spring", "mode", "history")):
         raise InputError("can't be filmed", where="--film", value="--transparent" if transparent else quantity)
     if quantity is not None and quantity not in QUANTITIES:
         raise InputError("is nothing to draw", where="--quantity", value=quantity, remedy=f"Known: {', '.join(QUANTITIES)}.")
@@ -80,7 +80,6 @@ def _pixels(text: str) -> tuple[int, int]:
 
 def draw_everything(run: Run, *, report: Report = lambda stage, text: None) -> bool:
     """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False."""
-    from shellform.output import plots
     from shellform.output.nets import draw_net  # loads no OpenGL
 
     drawn = pictures_possible(report)
@@ -94,20 +93,24 @@ def draw_everything(run: Run, *, report: Report = lambda stage, text: None) -> b
         for view in ("top", "front", "side"):
             draw_designs(run, Wish(run.best, "design", view=view), report=report)
         draw_net(run.net, run.folder / "figures")
-    if not (run.folder / "history.csv").is_file():
-        return drawn
-    with (run.folder / "history.csv").open(encoding="utf-8", newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["accepted"] == "1"]
-    at = [int(row["evaluation"]) for row in rows]
-
-    def columns(prefix: str) -> dict[str, list[float]]:
-        return {
-            name.removeprefix(prefix): [float(row[name]) for row in rows] for name in rows[0] if name.startswith(prefix)
-        }
-
-    plots.objective_history(run.folder / "figures/objective.png", at, columns("term."))
-    plots.constraint_history(run.folder / "figures/constraints.png", at, columns("constraint."))
+    if (run.folder / "history.csv").is_file():
+        draw_histories(run)
     return drawn
+
+
+def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:
+    """The objective with its terms and cables, and the constraints, at each accepted design; .png, .svg or .pdf."""
+    from shellform.output import plots
+
+    source = run.folder / "history.csv"
+    if not source.is_file():
+        raise InputError("isn't there: nothing was optimised yet", where=str(source), remedy="Run shellform design on it again.")
+    with source.open(encoding="utf-8", newline="") as file:
+        history = plots.read_history(csv.DictReader(file))
+    files = [made(run.folder / "figures") / f"{name}{ending}" for name in ("objective", "constraints")]
+    plots.objective_history(files[0], history.evaluation, history.terms, cables=history.cables)
+    plots.constraint_history(files[1], history.evaluation, history.constraints)
+    return files
 
 
 def pictures_possible(report: Report) -> bool:
@@ -134,6 +137,8 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = lambda 
 
     asked = wish or Wish()
     figures = made(run.folder / "figures")
+    if asked.quantity == "history":
+        return draw_histories(run, ending=asked.endings[0])
     if asked.quantity == "spring":  # what the springs still pull is the net's, whatever the design
         look = Look(size=asked.size or (1600, 1000), view=asked.view, thickness=asked.thickness, transparent=asked.transparent)
         return [nets.draw_map(run.net, "springs", figures / f"net-springs{asked.endings[0]}", look=look)]
@@ -142,7 +147,7 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = lambda 
     rows = [[panel_of(run, name, each, asked.quantity) for each in loads] for name in names]
     look = look_of(run, asked, [panel for row in rows for panel in row])
     files = [figures / f"{_stem(asked, name, each)}{asked.endings[0]}" for name in names for each in loads]
-    render.pictures(files, [panel for row in rows for panel in row], look)
+    render.pictures(files, [titled(run, panel) for row in rows for panel in row], look)
     if len(files) > 1:
         shown = [row for name, row in zip(names, rows, strict=True) if name in _four(run) or asked.design]
         page = figures / f"{_stem(asked, 'deviations' if asked.quantity == 'deviation' else 'all')}{asked.endings[0]}"
@@ -170,6 +175,11 @@ def panel_of(run: Run, design: str, load: str, quantity: str = "deviation") -> A
         return maps.panel_of(run.shell, run.designs[design], state, load=run.loads[load], quantity=quantity, title=title)
     except NotConverged as error:
         raise NotConverged(f"{title}: {error.what}", remedy="Choose another design or load.") from error
+
+
+def titled(run: Run, panel: Any) -> Any:
+    """The panel with the case's title before its own, for a picture that stands alone."""
+    return replace(panel, title=f"{run.case.title}: {panel.title}") if run.case.title else panel
 
 
 def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:

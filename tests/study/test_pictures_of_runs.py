@@ -43,6 +43,15 @@ def test_a_quantity_and_a_view_stand_in_the_file_s_name(run, quantity):
     assert np.ptp(np.asarray(Image.open(files[0]))) > 100
 
 
+def test_histories_are_drawn_from_the_run_s_file_and_missed_where_nothing_was_optimised(run):
+    with pytest.raises(InputError, match=r"history.csv: isn't there: nothing was optimised yet"):
+        draw_designs(run, Wish(quantity="history"))
+    text = "evaluation,accepted,objective,term.misfit,constraint.cable_force,cables\n0,1,1.0,1.0,-0.7,293\n1,1,0.6,0.6,0.0,130\n"
+    (run.folder / "history.csv").write_text(text, encoding="utf-8")
+    assert names(draw_designs(run, Wish(quantity="history", endings=(".pdf",)))) == ["objective.pdf", "constraints.pdf"]
+    (run.folder / "history.csv").unlink()
+
+
 def test_one_scale_of_colours_and_one_of_forces_hold_for_all_panels(run):
     panels = [panel_of(run, "initial", load) for load in run.loads]
     look = look_of(run, Wish(), panels)
@@ -83,7 +92,7 @@ def test_the_options_of_the_command_become_a_wish():
         ({"film": "pour", "transparent": True}, "can't be filmed"),
         ({"film": "pour", "kind": "png"}, "Known: gif, mp4"),
         ({"kind": "gif"}, "Known: png, svg, pdf"),
-        ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, spring, mode"),
+        ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, spring, mode, history"),
         ({"size": "640"}, "WIDTHxHEIGHT"),
         ({"size": "64000x400"}, "too large"),
     ],
