@@ -18,8 +18,8 @@ ONE = "from shellform.study.pictures import Wish, draw_run; draw_run(sys.argv[1]
 
 def main(run: str) -> None:
     from shellform.output import render, scene
-    from shellform.output.page import single
     from shellform.output.panel import Look, Skin
+    from shellform.output.sheets import single
     from shellform.study.folder import read_run
     from shellform.study.pictures import panel_of
 

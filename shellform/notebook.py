@@ -14,7 +14,7 @@ from shellform.design.gridshell import Gridshell
 from shellform.design.optimum import Optimum
 from shellform.errors import InputError
 from shellform.net.net import Net
-from shellform.output import maps, nets, page
+from shellform.output import maps, nets, sheets
 from shellform.output.images import png_bytes
 from shellform.output.panel import Look, Panel
 
@@ -53,7 +53,7 @@ def optimum_png(optimum: Optimum) -> bytes:
 
 def _png(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> bytes:
     many = len(rows[0]) > 1
-    laid = page.table(rows, look, heading) if many else page.single(rows[0], look)[0]
+    laid = sheets.table(rows, look, heading) if many else sheets.single(rows[0], look)[0]
     try:
         from shellform.output import scene
 

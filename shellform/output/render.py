@@ -3,7 +3,7 @@
     from shellform import render
     image = render.deviation("wet.png", shell, best.states["wet"], best.design, limit=0.010)
 
-Panels (`panel.py`, `maps.py`) are laid out on pages (`page.py`) and drawn in one window, off-screen (`scene.py`), or as lines
+Panels (`panel.py`, `maps.py`) are laid out on pages (`sheets.py`) and drawn in one window, off-screen (`scene.py`), or as lines
 (`vectors.py`). The same input gives the same picture.
 """
 
@@ -19,8 +19,8 @@ from shellform.arrays import Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.output import maps
 from shellform.output.images import FILMS, write_film, write_png
-from shellform.output.page import Page, single, table
 from shellform.output.panel import LIMIT, Look, Panel
+from shellform.output.sheets import Page, single, table
 from shellform.structure.state import State
 from shellform.written import door
 

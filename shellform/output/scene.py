@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.output.legend import LOAD, SLACK, SUPPORT, SURFACE, Word, cable_colours, rod_colours
-from shellform.output.page import Drawing, Page
 from shellform.output.panel import Panel, Skin, arrow_length, cable_thickness, drawn_radius, long_enough
+from shellform.output.sheets import Drawing, Page
 from shellform.output.view import Camera
 
 _LIBRARIES = "On Debian and Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri libxrender1; pictures as .svg and .pdf need none of them"

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from shellform.arrays import Reals
 from shellform.output import plots
 from shellform.output.legend import LOAD, SLACK, SUPPORT, SURFACE, cable_colours, rod_colours
-from shellform.output.page import Drawing, Page
 from shellform.output.panel import Panel, Skin, arrow_length, cable_thickness, drawn_radius
+from shellform.output.sheets import Drawing, Page
 from shellform.output.view import Camera
 
 _BANDS = 12  # of depth, between which arrows stand

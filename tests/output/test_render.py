@@ -14,7 +14,7 @@ import pyvista as pv
 from PIL import Image, ImageSequence
 
 from shellform.errors import InputError
-from shellform.output import images, legend, page, render, scene, vectors, view, vtp
+from shellform.output import images, legend, render, scene, sheets, vectors, view, vtp
 from shellform.output.panel import Look, Panel, Skin, scale_of
 
 SIZE = (400, 300)
@@ -359,10 +359,10 @@ def test_a_page_of_lines_is_small_repeats_to_the_byte_and_needs_no_opengl(tmp_pa
 
 def test_lines_are_drawn_where_the_pixels_are():
     given = bare(supports=panel().supports)
-    lines, pixels = (above(each) for each in (vectors.rasterised(page.single([given], SMALL)[0]), render.image(given, SMALL)))
+    lines, pixels = (above(each) for each in (vectors.rasterised(sheets.single([given], SMALL)[0]), render.image(given, SMALL)))
     assert np.mean((lines.min(axis=2) < 200) == (pixels.min(axis=2) < 200)) > 0.95
     flat = replace(given, positions=given.positions * [1.0, 1.0, 0.0], load_points=panel().load_points)
-    top = vectors.rasterised(page.single([flat], Look(size=SIZE, view="top", surface=Skin(np.eye(3), [[0, 1, 2]])))[0])
+    top = vectors.rasterised(sheets.single([flat], Look(size=SIZE, view="top", surface=Skin(np.eye(3), [[0, 1, 2]])))[0])
     assert ink(above(top)) > 500
 
 
