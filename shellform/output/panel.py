@@ -18,6 +18,7 @@ from shellform.errors import InputError
 LIMIT = 0.010  # m, end of the colour scale in figures 12 to 14
 VIEWS = ("best", "top", "front", "side")
 SMALLEST = (160, 120)  # pixels; below it the title leaves no room for the shell
+LARGEST = 8000  # pixels a side: drawn at twice that, near which drivers end
 _THIN = 0.0024  # half the width at which a rod is drawn at least, over the width of the picture
 
 
@@ -101,6 +102,8 @@ class Look:
                 raise InputError("must be 0 or more", where=name, value=getattr(self, name))
         if self.size[0] < SMALLEST[0] or self.size[1] < SMALLEST[1]:
             raise InputError("is too small", where="size", value=self.size, remedy=f"Give {SMALLEST} pixels or more.")
+        if max(self.size) > LARGEST:
+            raise InputError("is too large", where="size", value=self.size, remedy=f"Give at most {LARGEST} pixels a side.")
         if self.frame is not None:
             object.__setattr__(self, "frame", reals("frame", self.frame, (None, 3)))
 

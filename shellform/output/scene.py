@@ -80,6 +80,7 @@ def _window(size: tuple[int, int]) -> pv.Plotter:
     with _quiet():
         plotter = pv.Plotter(off_screen=True, window_size=[_FINER * each for each in size], lighting="none")
         plotter.render_window.SetMultiSamples(0)
+        plotter.renderer.SetUseOIT(False)  # one surface of one colour needs no order, and a third of the time is saved
         plotter.add_light(pv.Light(position=(-0.4, 0.6, 1.0), light_type="camera light"))
     return plotter
 

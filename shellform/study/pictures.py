@@ -15,7 +15,6 @@ from shellform.structure.state import State
 from shellform.study.folder import Report, Run, read_run
 from shellform.written import folder as made
 
-_LARGEST = 8000  # pixels a side: drawn at twice that, at which drivers end
 _LOADS = {"none": "no load", "design": "design load", "additional": "additional load"}
 
 
@@ -73,8 +72,6 @@ def _pixels(text: str) -> tuple[int, int]:
         width, height = (int(each) for each in text.lower().split("x"))
     except ValueError as error:
         raise InputError("must read WIDTHxHEIGHT in pixels", where="--size", value=text, remedy="For example 1600x1000.") from error
-    if max(width, height) > _LARGEST:
-        raise InputError("is too large", where="--size", value=text, remedy=f"Give at most {_LARGEST} pixels a side.")
     return width, height
 
 

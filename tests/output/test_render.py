@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
@@ -237,6 +238,9 @@ def test_panels_of_wrong_arrays_are_refused(name, value, message):
         ({"limit": 0.0}, "must be positive"),
         ({"limit": np.nan}, "must be positive"),
         ({"size": (20, 20)}, "too small"),
+        ({"size": (64000, 400)}, "too large"),
+        ({"thickness": -1.0}, "thickness: must be 0 or more"),
+        ({"force": np.inf}, "force: must be 0 or more"),
                 ({"frame": [1.0, 2.0]}, "frame has the wrong shape"),
     ],
 )
@@ -273,6 +277,27 @@ def test_nothing_is_drawn_without_a_context_and_the_packages_are_named(monkeypat
     monkeypatch.setattr(scene, "_window_works", lambda: False)
     with pytest.raises(InputError, match="apt-get install libegl1"):
         render.image(panel(), SMALL)
+
+
+def test_where_vtk_s_library_is_missing_states_and_lines_are_still_written(tmp_path):
+    code = (
+        "import sys; sys.modules['vtkmodules.vtkRenderingOpenGL2'] = None  # as an import that fails\n"
+        "import numpy as np\n"
+        "from shellform.errors import InputError\n"
+        "from shellform.output import render, vtp\n"
+        "from shellform.output.panel import Panel\n"
+        "panel = Panel('a', np.eye(3), [[0, 1], [1, 2]], np.zeros(3), [[0, 2]], [1.0], [0], [], 0.01)\n"
+        "vtp.write_vtp('a.vtp', panel); render.picture('a.svg', panel)\n"
+        "try:\n    render.picture('a.png', panel)\n"
+        "except InputError as error:\n    print(error)\n"
+    )
+    root = str(Path(__file__).parent.parent.parent)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, env={**os.environ, "PYTHONPATH": root}, capture_output=True, text=True, check=True
+    )
+    assert "PyVista can't be loaded" in done.stdout
+    assert "apt-get install libegl1" in done.stdout
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.svg", "a.vtp"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="VTK chooses its window at run time on Linux")
