@@ -83,7 +83,8 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
     told = f"{panel.quantity.split()[0]}: maximum {largest:{digits}} {name}".rstrip() + f", mean {mean:{digits}} {name}".rstrip()
     taut = panel.cable_forces > 0.0
     if taut.any():
-        told += f"; {int(taut.sum())} cables, {panel.cable_forces.max():.3g} N at most"
+        label, size_of = _newtons(scale.force)
+        told += f"; {int(taut.sum())} cables, {panel.cable_forces.max() / size_of:.3g} {label} at most"
     line = scale.letters
     return (
         Word(panel.title, (0.8 * line, size[1] - 1.7 * line), _fitting(panel.title, line, size[0] - 1.6 * line), bold=True),
@@ -105,7 +106,8 @@ def key(scale: Scale, width: int) -> tuple[tuple[Word, ...], tuple[Ramp, ...]]:
     ramps = [ramp]
     if scale.force > 0.0:
         told = "cable force (pale: slack)" if scale.slack else "cable force"
-        more, ramp = _bar(told, "N", scale.force, "", cable_colours, ends[1], width, line)
+        label, size_of = _newtons(scale.force)
+        more, ramp = _bar(told, label, scale.force / size_of, "", cable_colours, ends[1], width, line)
         words, ramps = words + more, [*ramps, ramp]
     return tuple(words), tuple(ramps)
 
@@ -127,6 +129,11 @@ def _bar(quantity: str, name: str, limit: float, last: str, colours, ends, width
     words.append(Word(quantity, (0.5 * (left + right), 3.2 * line), line, QUIET, justify="center"))
     painted = colours((np.arange(right - left) + 0.5) / (right - left))
     return words, Ramp(left, right, round(1.9 * line), round(2.8 * line), painted)
+
+
+def _newtons(force: float) -> tuple[str, float]:
+    """The unit that forces up to this one, N, are read in."""
+    return ("kN", 1e3) if force >= 1e3 else ("N", 1.0)
 
 
 def _between(table: Reals, share: Reals) -> Colours:

@@ -327,6 +327,23 @@ def test_cables_have_a_scale_of_their_own_with_a_key_only_where_one_is_taut():
     assert (np.abs(slack - brick).max(axis=2) < 4).sum() == 0
 
 
+def test_large_forces_are_told_in_kilonewtons_and_rounding_as_nothing():
+    strong = replace(panel(), cable_forces=1000.0 * panel().cable_forces, deviation=np.full(len(panel().positions), 1e-16))
+    scale = scale_of([strong], SMALL, SIZE)
+    told = legend.title(strong, scale, SIZE)[1].text
+    assert told == "deviation: maximum 0 mm, mean 0 mm; 64 cables, 12 kN at most"
+    assert "12 kN" in [word.text for word in legend.key(scale, SIZE[0])[0]]
+    assert legend.title(panel(), scale_of([panel()], SMALL, SIZE), SIZE)[1].text.endswith("64 cables, 12 N at most")
+
+
+def test_a_value_beyond_the_scale_is_told_at_its_end_and_long_titles_shrink():
+    within, beyond = (legend.key(scale_of([bare(deviation=np.full(len(panel().positions), far))], SMALL, SIZE), 400)[0] for far in (0.01, 0.02))
+    assert "≥ 10.0 mm" in [word.text for word in beyond]
+    assert "10.0 mm" in [word.text for word in within]
+    short, long = (legend.title(replace(panel(), title="A" * count), scale_of([panel()], SMALL, SIZE), SIZE)[0] for count in (10, 90))
+    assert long.pixels < short.pixels
+
+
 def test_both_scales_run_in_lightness_alone_evenly_enough_for_the_colour_blind():
     def lightness(colours):
         linear = np.where(colours / 255.0 <= 0.04045, colours / 255.0 / 12.92, ((colours / 255.0 + 0.055) / 1.055) ** 2.4)

@@ -1,6 +1,7 @@
 """`shellform render`: which files it writes for which wish, and what it refuses."""
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +9,13 @@ import pytest
 from PIL import Image
 
 from shellform.errors import InputError
+from shellform.study import films
+from shellform.study.case import load_case
 from shellform.study.films import draw_film
 from shellform.study.folder import read_run
 from shellform.study.pictures import Wish, draw_designs, draw_run, look_of, panel_of, wish
 
+ROOT = Path(__file__).parent.parent.parent
 NOTHING = {
     "design": None, "load": None, "quantity": None, "limit": None, "view": "best", "size": None, "thickness": 0.0, "transparent": False,
     "kind": None, "film": None,
@@ -74,6 +78,21 @@ def test_the_pour_and_the_erection_are_filmed_from_the_first_state_to_the_last(r
     (rise,) = draw_film(run, "erection", Wish("initial", quantity="utilisation", size=(240, 160), endings=(".gif",)))
     assert rise.name == "erection-initial.gif"
     assert Image.open(rise).n_frames > 25
+
+
+def test_a_shell_poured_in_stages_is_filmed_through_all_of_them(run, monkeypatch):
+    text = (ROOT / "scripts/full_size_poured.toml").read_text(encoding="utf-8").replace("../surfaces", str(ROOT / "surfaces"))
+    file = run.folder / "staged.toml"
+    file.write_text(text + '\n[[load]]\nname = "pour"\nfactors = { rods = 1.0 }\nstages = ["west", "east"]\n', encoding="utf-8")
+    staged = replace(run, case=load_case(file))
+    assert films._stages(staged, None) == ["pour 1", "pour 2"]
+    assert films._stages(staged, "pour 1") == ["pour 1"]
+    assert films._stages(staged, "additional") == ["additional"]
+    assert films._stages(run, None) == ["design"]
+    monkeypatch.setattr(films, "_stages", lambda *_: ["design", "additional"])
+    (film,) = draw_film(run, "pour", Wish("initial", size=(240, 160), endings=(".gif",)))
+    assert film.name == "pour-initial-additional.gif"
+    assert Image.open(film).n_frames == 2 * 24 + 1
 
 
 def test_the_options_of_the_command_become_a_wish():
