@@ -18,7 +18,7 @@ DOORS = {
     "matplotlib": {"output/plots.py"},
     "PIL": {"output/images.py"},
     "imageio_ffmpeg": {"output/images.py"},
-    "cvxopt": {"structure/sparse.py"},
+    "cvxopt": {"structure/sparse.py", "design/convex.py"},
     "numba": {"compiled.py"},
 }
 NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "numba", "scipy", "numpy"]

@@ -69,8 +69,8 @@ def _stages(run: Run, load: str | None) -> list[str]:
 def _pour(run: Run, name: str, stages: Sequence[str], quantity: str, report: Report) -> list[Any]:
     from shellform.output import maps
 
-    design = run.designs[name]
-    assembly = assemble(run.shell.network(design))
+    design, shell = run.designs[name], run.shell_of(name)
+    assembly = assemble(shell.network(design))
     state, before = run.states[name]["none"], run.loads["none"]
     panels: list[Any] = []
     for stage in stages:
@@ -85,7 +85,7 @@ def _pour(run: Run, name: str, stages: Sequence[str], quantity: str, report: Rep
         for share in np.linspace(0.0, 1.0, _FRAMES + 1)[first:]:
             load = before + share * (after - before)
             shown = f"{name} design, {stage} load, {100.0 * share:.0f} %" + ("" if reached.on_branch or share < reached.share else ": snapped")
-            panels.append(maps.panel_of(run.shell, design, _between(found, float(share)), load=load, quantity=quantity, title=shown))
+            panels.append(maps.panel_of(shell, design, _between(found, float(share)), load=load, quantity=quantity, title=shown))
         state, before = reached.equilibrium.state, after
     return panels
 
@@ -106,7 +106,7 @@ def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
     from shellform.output import maps
 
     report("film", "following the grid from the ground")
-    design, shell = run.designs[name], run.shell
+    design, shell = run.designs[name], run.shell_of(name)
     load = run.loads[wish.load] if wish.load else None
     steps = erect(shell, design, load=load, step=1.0 / _FRAMES).steps
     rising = [step for step in steps if step.stage not in ("tightening", "loading")]

@@ -169,7 +169,7 @@ def panel_of(run: Run, design: str, load: str, quantity: str = "deviation") -> A
     title = f"{design} design, {told}"
     state = run.states[design][load]
     try:
-        return maps.panel_of(run.shell, run.designs[design], state, load=run.loads[load], quantity=quantity, title=title)
+        return maps.panel_of(run.shell_of(design), run.designs[design], state, load=run.loads[load], quantity=quantity, title=title)
     except NotConverged as error:
         raise NotConverged(f"{title}: {error.what}", remedy="Choose another design or load.") from error
 
