@@ -80,7 +80,7 @@ def save_net(path: Path, net: Net) -> None:
 def load_net(path: Path) -> Net:
     """The net written by `save_net`. Raises InputError where the file is missing or damaged."""
     if not path.is_file():
-        raise InputError("isn't there: the run is unfinished", where=str(path), remedy="Run shellform design on it again.")
+        raise InputError("isn't there", where=str(path))
     try:
         with np.load(path, allow_pickle=False) as data:
             meta = json.loads(str(data["meta"]))

@@ -90,6 +90,9 @@ def read_run(folder: str | Path) -> Run:
     ready = [name for name in DESIGNS if name in summary.get("designs", {})]
     if not ready:
         raise InputError("the run has no designs yet", where=str(place), remedy="Run shellform design on it again: it goes on.")
+    for file in (place / name for name in ("surface.npz", "net.npz", *(f"designs/{each}.npz" for each in ready))):
+        if not file.is_file():
+            raise InputError("isn't there: the run is unfinished", where=str(file), remedy="Run shellform design on it again: it goes on.")
     case = load_case(place / "case.toml")
     surface = load_surface(place / "surface.npz")
     shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
@@ -243,7 +246,7 @@ def save_arrays(path: Path, **arrays: Any) -> None:
 def arrays_of(path: Path) -> Any:
     """The arrays of an .npz file, as a context manager. Raises InputError where it is missing or damaged."""
     if not path.is_file():
-        raise InputError("isn't there: the run is unfinished", where=str(path), remedy="Run shellform design on it again.")
+        raise InputError("isn't there", where=str(path))
     try:
         return np.load(path, allow_pickle=False)
     except (OSError, ValueError, zipfile.BadZipFile) as error:
