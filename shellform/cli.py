@@ -238,14 +238,36 @@ def _lead(text: str) -> tuple[int, int, float]:
 @app.command()
 def render(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
-    load: Annotated[str | None, typer.Option(help="none, design or additional.")] = None,
+    load: Annotated[str | None, typer.Option(help="none, design, additional or another of the case's.")] = None,
     design: Annotated[str | None, typer.Option(help="unbraced, initial, unloaded, optimised, rounded or polished.")] = None,
-    limit: Annotated[float | None, typer.Option(help="End of the colour scale, m.")] = None,
+    quantity: Annotated[
+        str | None, typer.Option(help="deviation, utilisation, curvature, shear, spring, mode (the softest) or history.")
+    ] = None,
+    limit: Annotated[float | None, typer.Option(help="End of the colour scale, in SI units; shear in rad.")] = None,
+    view: Annotated[str, typer.Option(help="best, top, front or side.")] = "best",
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    rods: Annotated[float, typer.Option(help="Rods so many times as thick as they are; 0: as thick as can be seen.")] = 0.0,
+    kind: Annotated[str | None, typer.Option("--format", help="png, svg or pdf; of films gif or mp4 (default: both).")] = None,
+    transparent: Annotated[bool, typer.Option("--transparent", help="No background.")] = False,
+    film: Annotated[str | None, typer.Option(help="pour: the load coming on; erection: the grid rising from the ground.")] = None,
 ) -> None:
-    """Draw deviation maps of a run."""
-    from shellform.study.pictures import draw_run
+    """Draw maps of a run, or a film."""
+    from shellform.study.folder import read_run
+    from shellform.study.pictures import draw_designs, wish
 
-    for file in draw_run(run, load=load, design=design, limit=limit):
+    asked = wish(
+        design=design, load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods, transparent=transparent,
+        kind=kind, film=film,
+    )  # fmt: skip
+    if film is None:
+        files = draw_designs(read_run(run), asked)
+    else:
+        from shellform.study.films import draw_film
+
+        report = _Progress()
+        files = draw_film(read_run(run), film, asked, report=report)
+        report.close()
+    for file in files:
         print(file)
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -27,6 +26,7 @@ from shellform.design.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.errors import InputError
 from shellform.study.entries import LimitsEntry, RobustEntry
 from shellform.study.entries import Section as _Section
+from shellform.written import whole
 
 _Polygon = list[tuple[float, float]]
 
@@ -422,6 +422,5 @@ def _has(entry: Any, name: str) -> bool:
 
 def write_text(path: Path, text: str) -> None:
     """Writes a file whole or not at all."""
-    partial = path.with_name(f"{path.name}.part")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+    with whole(path) as partial:
+        partial.write_text(text, encoding="utf-8")

@@ -33,12 +33,15 @@ from shellform.structure.loading import Loaded
 from shellform.structure.state import State
 from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
 from shellform.study.folder import (
+    FORMAT,
+    VERSION,
     Report,
     history_text,
     keep_design,
     load_surface,
     read_json,
     read_run,
+    refuse_overwriting,
     save_surface,
 )
 from shellform.study.limits import case_problem, critical_factors
@@ -46,6 +49,7 @@ from shellform.study.pictures import draw_everything, write_states
 from shellform.study.robustness import robustness
 from shellform.study.shell import catalogue_bytes, gridshell, rod_limits, rounding_catalogue
 from shellform.surface.target import Surface
+from shellform.written import folder as made
 
 STAGES = ("surface", "net", "initial", "optimise", "figures", "report")
 
@@ -111,6 +115,10 @@ class _Job:
     def path(self, name: str) -> Path:
         return self.folder / name
 
+    def tell(self, summary: Mapping[str, Any]) -> None:
+        """Writes summary.json."""
+        write_text(self.path("summary.json"), json.dumps(summary, indent=1))
+
 
 def run_case(
     case: Case,
@@ -132,6 +140,8 @@ def run_case(
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
     keys = stage_keys(case, file)
+    if not fresh:
+        refuse_overwriting(folder)
     done = {} if fresh else read_json(folder / "stages.json")
     results: dict[str, Any] = {}
     began = time.perf_counter()
@@ -139,31 +149,46 @@ def run_case(
         report("surface", f"reading {file}")
         results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
         report("surface", f"size {told_size(results['surface'])}")
-    try:
-        for part in ("designs", "states", "figures", "schedules"):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-        write_text(folder / "case.toml", dump_case(case))
-    except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(folder), remedy="Choose another --output.") from error
-    job = _Job(case, folder, report)
     summary = read_json(folder / "summary.json") if done else {}
-    summary = {"format": "shellform-summary", "version": 1, **{k: v for k, v in summary.items() if k != "format"}}
+    summary = {**summary, "format": FORMAT, "version": VERSION, "shellform": shellform.__version__}
     summary.setdefault("seconds", {})
+    for part in ("designs", "states", "figures", "schedules"):
+        made(folder / part)
+    job = _Job(case, folder, report)
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
     steps |= {"report": _report}
+    first = next((stage for stage in STAGES if done.get(stage) != keys[stage]), None)
+    if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
+        _outdate(summary, first)
+        done = {stage: done[stage] for stage in STAGES[: STAGES.index(first)]}
+        write_text(folder / "stages.json", json.dumps(done))
+        job.tell(summary)
+    write_text(folder / "case.toml", dump_case(case))
     reusable = True
     for stage in STAGES[: STAGES.index(until) + 1]:
         reusable = reusable and done.get(stage) == keys[stage]
         results[stage] = steps[stage](job, results, summary, reusable)
         if not reusable:
             summary["seconds"][stage] = round(time.perf_counter() - began, 3)
-            done = {**{s: done[s] for s in STAGES[: STAGES.index(stage)] if s in done}, stage: keys[stage]}
+            if results[stage] is not False:  # pictures without OpenGL aren't done: once it is there, the next run makes them
+                done = {**done, stage: keys[stage]}
         summary["seconds"]["total"] = round(sum(v for k, v in summary["seconds"].items() if k != "total"), 3)
-        write_text(folder / "summary.json", json.dumps(summary, indent=1))
+        job.tell(summary)
         write_text(folder / "stages.json", json.dumps(done))
         report(stage, f"{'kept' if reusable else 'done'} in {time.perf_counter() - began:.1f} s")
         began = time.perf_counter()
     return summary
+
+
+def _outdate(summary: dict[str, Any], stage: str) -> None:
+    """Takes out of the summary what a stage and those after it will find anew."""
+    if STAGES.index(stage) <= STAGES.index("initial"):
+        summary.pop("designs", None)
+    if STAGES.index(stage) <= STAGES.index("optimise"):
+        for key in ("optimisation", "sections", "robust"):
+            summary.pop(key, None)
+        for name in ("unloaded", "optimised", "rounded", "polished"):
+            summary.get("designs", {}).pop(name, None)
 
 
 def stage_keys(case: Case, file: Path) -> dict[str, str]:
@@ -265,7 +290,6 @@ def _initial(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
     first = summary["designs"]["initial"]["loads"]["design"]
     span = float(max(summary["surface"]["size"][:2]))
     if not first["on_branch"] or first["deviation_max"] > 0.1 * span:
-        write_text(job.path("summary.json"), json.dumps(summary, indent=1))
         raise NotConverged(
             f"The initial design deforms excessively under the design load ({1e3 * first['deviation_max']:.0f} mm); its states "
             f"are kept in {job.path('states')}",
@@ -416,16 +440,13 @@ def _keep(
 ) -> None:
     """Writes a design's model file, states and summary."""
     summary["designs"][name] = keep_design(job.folder, shell, name, design, loaded, loads)
-    states = {each: loaded[each].equilibrium.state for each in loads}
-    try:
-        write_states(job.folder, shell, name, design, states, loads)
-    except InputError as error:  # these files need VTK, which may be missing; everything else goes on
-        job.report("initial", f"no files of states: {error}")
+    write_states(job.folder, shell, name, design, {each: loaded[each].equilibrium.state for each in loads})
+    job.tell(summary)
 
 
-def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
-    if not keep:
-        draw_everything(read_run(job.folder), report=job.report)
+def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> bool:
+    """Whether all pictures are there."""
+    return keep or draw_everything(read_run(job.folder), report=job.report)
 
 
 def _report(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
