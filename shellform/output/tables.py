@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import csv
 import io
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from shellform.errors import InputError
+from shellform.output.files import whole
 
 Value = str | float | int | None
 
@@ -54,23 +55,18 @@ def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:
 
     Raises InputError where the folder can't be written to.
     """
-    place = Path(folder)
     files = []
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-        for table in tables:
-            target = place / f"{table.name}.csv"
-            partial = target.with_name(f"{target.name}.part")
+    for table in tables:
+        files.append(Path(folder) / f"{table.name}.csv")
+        with whole(files[-1]) as partial:
             partial.write_text(table_text(table), encoding="utf-8")
-            os.replace(partial, target)
-            files.append(target)
-        files.append(_write_workbook(place / "schedules.xlsx", tables))
-    except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(place), remedy="Choose another folder.") from error
+    files.append(Path(folder) / "schedules.xlsx")
+    with whole(files[-1]) as partial:
+        _workbook(tables).save(partial)
     return files
 
 
-def _write_workbook(target: Path, tables: Sequence[Table]) -> Path:
+def _workbook(tables: Sequence[Table]) -> Any:
     from openpyxl import Workbook
     from openpyxl.styles import Alignment, Font, PatternFill
     from openpyxl.utils import get_column_letter
@@ -104,7 +100,4 @@ def _write_workbook(target: Path, tables: Sequence[Table]) -> Path:
         sheet.page_setup.fitToHeight = 0
         sheet.sheet_properties.pageSetUpPr.fitToPage = True
         sheet.print_title_rows = f"{head}:{head}"
-    partial = target.with_name(f"{target.name}.part")
-    book.save(partial)
-    os.replace(partial, target)
-    return target
+    return book
