@@ -27,5 +27,5 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     except OSError as error:
         raise InputError(f"can't be written: {error}", where=str(target), remedy="Choose another folder.") from error
     finally:
-        if partial.exists():
+        if partial.is_file():
             partial.unlink()
