@@ -20,7 +20,7 @@ from ezdxf.layouts import Modelspace
 import shellform
 from shellform.output import layout
 from shellform.output.files import whole
-from shellform.output.layout import PENS, WIDE, Ring, Sheet, Span, Stroke, Words
+from shellform.output.marks import PENS, WIDE, Mark, Ring, Sheet, Span, Stroke, Words
 from shellform.output.nesting import Cutting
 from shellform.output.plots import Label, Line, Page, write_pages
 from shellform.output.schedules import Built
@@ -83,7 +83,7 @@ def write_dxf(path: str | Path, sheet: Sheet) -> Path:
     return target
 
 
-def _draw(space: Modelspace, mark: layout.Mark) -> None:
+def _draw(space: Modelspace, mark: Mark) -> None:
     on = {"layer": mark.layer}
     if isinstance(mark, Stroke):
         if len(mark.points) == 2:

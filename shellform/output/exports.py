@@ -15,7 +15,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.net.grid import crossing_points
 from shellform.output.files import whole
-from shellform.output.layout import PENS
+from shellform.output.marks import PENS
 from shellform.output.opensees import opensees_script
 from shellform.output.schedules import Built, cable_crossings, rod_names
 from shellform.surface.target import Surface
@@ -33,21 +33,31 @@ _LAYERS = {
 
 
 def write_exports(folder: str | Path, built: Built, target: Surface, loads: Mapping[str, Reals], *, load: str = "design") -> list[Path]:
-    """Writes NAME.vtu, .3dm, .glb, .step and NAME-opensees.py for the geometry under `load`; returns the files.
+    """Writes gridshell.vtu, .3dm, .glb, .step and gridshell-opensees.py for the geometry under `load`; returns the files.
 
-    `loads` (n, 6) by name. Raises InputError for an unknown load and where files can't be written.
+    `loads` (n, 6) by name. The .step is left out where gmsh can't be loaded (`no_step` says why). Raises InputError for an unknown load and where files can't be written.
     """
     if load not in built.states or load not in loads:
         raise InputError("is no load case", where="load", value=load, remedy=f"Known: {', '.join(built.states)}.")
-    place, name = Path(folder), built.name or "gridshell"
-    files = [place / f"{name}.{ending}" for ending in ("vtu", "3dm", "glb", "step")]
+    place = Path(folder)
+    files = [place / f"gridshell{ending}" for ending in (".vtu", ".3dm", ".glb", "-opensees.py")]
     write_vtu(files[0], built)
     write_3dm(files[1], built, target, load=load)
     write_glb(files[2], built, target, load=load)
-    write_step(files[3], built, load=load)
-    files.append(place / f"{name}-opensees.py")
-    write_script(files[-1], built, loads[load], load=load)
+    write_script(files[3], built, loads[load], load=load)
+    if not no_step():
+        files.append(place / "gridshell.step")
+        write_step(files[-1], built, load=load)
     return files
+
+
+def no_step() -> str:
+    """Why no STEP file can be written here: system libraries that gmsh needs are missing. Empty where it can."""
+    try:
+        from shellform.surface import occ  # noqa: F401
+    except InputError as error:
+        return str(error)
+    return ""
 
 
 def write_vtu(path: str | Path, built: Built) -> None:

@@ -13,13 +13,15 @@ in the grid before bracing, to the rest length, and `RESERVE` beyond both for wh
 **Order of tensioning.** Round after round from the supports to the crown: a cable's round is the number of segments from its ends to the
 nearest rod end along the rods, the smaller of both. The grid is held at its feet and the curvature is set there first, so that each
 round pulls against a part that is braced already, and the crown, the softest part, stays free to settle until the end. Within a round
-the cables stand in the order in which they go round the plan, and are best tightened on opposite sides at a time.
+the cables stand in the order in which they go round the plan, and are best tightened on opposite sides at a time. On the optimised vault no
+round loses stability (erection.py), and no cable pulls more than 5.0 N on the way to 4.6 N; the reverse order does as well there.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -29,7 +31,7 @@ from shellform.design.gridshell import Design, Gridshell
 from shellform.errors import InputError
 from shellform.net.grid import Grid, crossing_points
 from shellform.output.nesting import Cutting
-from shellform.output.tables import Table
+from shellform.output.tables import Table, write_tables
 from shellform.structure.sections import mass_per_length
 from shellform.structure.state import State
 
@@ -39,12 +41,12 @@ RESERVE = 0.02  # of the rest length, at both ends of a turnbuckle's range
 @dataclass(frozen=True)
 class Built:
     """A design to build: the `shell`, its `design`, its `states` by load case, "none" among them, and the state `hung` in which the cables
-    are hung in, the erected grid before bracing. `name` of the design and `title` of the job are for the heads."""
+    are hung in, the erected grid before bracing (left out: the target). `name` of the design and `title` of the job are for the heads."""
 
     shell: Gridshell
     design: Design
     states: Mapping[str, State]
-    hung: State
+    hung: State | None = None
     name: str = ""
     title: str = ""
 
@@ -175,7 +177,7 @@ def cables(built: Built) -> Table:
     shell, design = built.shell, built.design
     ties = shell.cables(design)
     pairs = cable_crossings(shell, design)
-    hung = ties.lengths(built.hung)
+    hung = ties.lengths(built.hung or shell.target)
     shortest = (1.0 - RESERVE) * np.minimum(ties.rest_length, hung)
     longest = (1.0 + RESERVE) * np.maximum(ties.rest_length, hung)
     order = np.empty(len(pairs), dtype=np.int64)
@@ -240,6 +242,11 @@ def survey(built: Built) -> Table:
 def all_tables(built: Built, cutting: Cutting) -> list[Table]:
     """Every schedule."""
     return [rods(built, cutting), bars(built, cutting), marks(built), cables(built), supports(built), survey(built)]
+
+
+def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
+    """Writes every schedule as NAME.csv and all of them as schedules.xlsx; returns the files. Raises InputError where they can't be written."""
+    return write_tables(folder, all_tables(built, cutting))
 
 
 def _stage(load: str) -> str:

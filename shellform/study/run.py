@@ -1,6 +1,6 @@
 """The whole job of one case, stage by stage, in a run folder (contracts/run-folder.md).
 
-surface -> net -> initial -> optimise -> figures. Each stage leaves its result in the folder and a key in `stages.json`: a hash of
+surface -> net -> initial -> optimise -> figures -> documents. Each stage leaves its result in the folder and a key in `stages.json`: a hash of
 the entries it depends on, the surface file's bytes, the package's version and the stage before. Run again, a stage whose key is
 unchanged is loaded instead of computed.
 """
@@ -30,6 +30,7 @@ from shellform.structure.equilibrium import Equilibrium
 from shellform.structure.loading import Loaded
 from shellform.structure.state import State
 from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
+from shellform.study.documents import write_documents
 from shellform.study.folder import (
     Report,
     history_text,
@@ -43,7 +44,7 @@ from shellform.study.pictures import draw_everything, write_states
 from shellform.study.shell import catalogue_bytes, gridshell, rod_bounds, rod_limits
 from shellform.surface.target import Surface
 
-STAGES = ("surface", "net", "initial", "optimise", "figures")
+STAGES = ("surface", "net", "initial", "optimise", "figures", "documents")
 
 
 def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
@@ -112,7 +113,7 @@ def run_case(
     case: Case,
     folder: Path,
     *,
-    until: str = "figures",
+    until: str = "documents",
     fresh: bool = False,
     allow_scripts: bool = False,
     report: Report = lambda stage, text: None,
@@ -146,6 +147,7 @@ def run_case(
     summary = {"format": "shellform-summary", "version": 1, **{k: v for k, v in summary.items() if k != "format"}}
     summary.setdefault("seconds", {})
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
+    steps |= {"documents": _documents}
     reusable = True
     for stage in STAGES[: STAGES.index(until) + 1]:
         reusable = reusable and done.get(stage) == keys[stage]
@@ -164,12 +166,14 @@ def run_case(
 def _keys(case: Case, file: Path) -> dict[str, str]:
     """A hash for each stage of all that it depends on."""
     entries = case.model_dump(mode="json")
+    entries["stock"] = {name: entries["rod"].pop(name) for name in ("stock_length", "kerf")}  # which no design depends on
     needs = {
         "surface": ["surface"],
         "net": ["net", "joint"],
         "initial": ["rod", "cable", "load", "part"],
         "optimise": ["optimise"],
         "figures": ["figures", "title"],
+        "documents": ["stock"],
     }
     digest = hashlib.sha256(shellform.__version__.encode() + file.read_bytes())
     keys = {}
@@ -354,6 +358,11 @@ def _keep(
 def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
     if not keep:
         draw_everything(read_run(job.folder), report=job.report)
+
+
+def _documents(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
+    if not keep:
+        summary["documents"] = write_documents(read_run(job.folder), report=job.report)
 
 
 def _follow(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:

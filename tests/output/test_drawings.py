@@ -11,6 +11,7 @@ from pypdf import PdfReader
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
 from shellform.output import drawings, layout, nesting
+from shellform.output.marks import PENS, Words, overlap
 
 
 @pytest.fixture(scope="module")
@@ -106,8 +107,8 @@ def sheets(built):
 
 @pytest.mark.parametrize("which", range(4))
 def test_no_words_lie_on_each_other(built, which):
-    words = [mark for mark in sheets(built)[which].marks if isinstance(mark, layout.Words)]
-    lying = [(a.text, b.text) for a, b in combinations(words, 2) if layout.overlap(a.box, b.box)]
+    words = [mark for mark in sheets(built)[which].marks if isinstance(mark, Words)]
+    lying = [(a.text, b.text) for a, b in combinations(words, 2) if overlap(a.box, b.box)]
     assert lying == []
 
 
@@ -119,9 +120,9 @@ def test_letters_are_legible_on_paper_and_the_drawing_stays_beside_the_column(bu
     page = drawings.paper_page(sheet, built, "1 / 1")
     frame = page.width - 10.0 - 110.0
     for mark in sheet.marks:
-        assert not isinstance(mark, layout.Words) or mark.height >= 0.99 * sheet.lettering
+        assert not isinstance(mark, Words) or mark.height >= 0.99 * sheet.lettering
     assert (page.width, page.height) == drawings.PAPERS[paper]
-    pens = {layout.PENS[layer].colour for layer in ("RODS_U", "CABLES")}
+    pens = {PENS[layer].colour for layer in ("RODS_U", "CABLES")}
     drawn = [x for line in page.lines if line.colour in pens for x, _ in line.points]
     assert drawn
     assert max(drawn) < frame
@@ -142,7 +143,7 @@ def test_several_rods_in_one_row_are_told_apart(built):
     net = replace(built.shell.net, grid=grid, supports=np.zeros(0, dtype=np.int64))
     forked = replace(built, shell=replace(built.shell, net=net, cable_ends=np.zeros((0, 2), dtype=np.int64)))
     sheet = layout.flat_grid(forked)
-    told = {mark.text for mark in sheet.marks if isinstance(mark, layout.Words) and mark.layer == "CUT_LENGTHS"}
+    told = {mark.text for mark in sheet.marks if isinstance(mark, Words) and mark.layer == "CUT_LENGTHS"}
     assert {"U0   6000.0", "U2   1000.0", "1000.0   U3", "U4   1000.0", "1000.0   U5"} <= told
 
 

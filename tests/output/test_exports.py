@@ -1,6 +1,7 @@
 """Files for other programs, each read back by another library and compared with the design."""
 
 import ast
+import sys
 
 import gmsh
 import numpy as np
@@ -9,6 +10,7 @@ import pyvista
 import rhino3dm
 import trimesh
 
+import shellform.surface
 from shellform.errors import InputError
 from shellform.output import exports
 from shellform.surface.occ import session
@@ -29,7 +31,7 @@ def folder(built, vault, loads, tmp_path_factory):
 
 
 def test_the_vtu_file_has_every_element_with_displacements_and_forces(folder, built):
-    mesh = pyvista.read(folder / "test.vtu")
+    mesh = pyvista.read(folder / "gridshell.vtu")
     ties = built.shell.cables(built.design)
     network = built.shell.network(built.design)
     assert mesh.n_cells == len(network.beams.ends) + len(ties.ends)
@@ -41,7 +43,7 @@ def test_the_vtu_file_has_every_element_with_displacements_and_forces(folder, bu
 
 
 def test_the_3dm_file_has_rods_cables_and_supports_on_layers_in_metres(folder, built, vault):
-    model = rhino3dm.File3dm.Read(str(folder / "test.3dm"))
+    model = rhino3dm.File3dm.Read(str(folder / "gridshell.3dm"))
     assert model.Settings.ModelUnitSystem == rhino3dm.UnitSystem.Meters
     layers = {layer.Index: layer.Name for layer in model.Layers}
     found = {}
@@ -63,7 +65,7 @@ def test_the_3dm_file_has_rods_cables_and_supports_on_layers_in_metres(folder, b
 
 
 def test_the_glb_file_has_closed_tubes_of_the_rods_volume(folder, built):
-    scene = trimesh.load(folder / "test.glb")
+    scene = trimesh.load(folder / "gridshell.glb")
     sides, radius = exports.SIDES, built.design.radius
     area = 0.5 * sides * radius**2 * np.sin(2.0 * np.pi / sides)  # of a regular polygon
     place = built.states["design"].positions
@@ -80,7 +82,7 @@ def test_the_glb_file_has_closed_tubes_of_the_rods_volume(folder, built):
 
 def test_the_step_file_has_a_curve_of_each_rod_and_cable_at_the_right_scale(folder, built):
     with session():
-        gmsh.model.occ.importShapes(str(folder / "test.step"), highestDimOnly=False)
+        gmsh.model.occ.importShapes(str(folder / "gridshell.step"), highestDimOnly=False)
         gmsh.model.occ.synchronize()
         curves = gmsh.model.getEntities(1)
         lengths = [gmsh.model.occ.getMass(*curve) for curve in curves]
@@ -91,7 +93,7 @@ def test_the_step_file_has_a_curve_of_each_rod_and_cable_at_the_right_scale(fold
 
 
 def test_the_script_is_that_of_the_design(folder, built):
-    text = (folder / "test-opensees.py").read_text(encoding="utf-8")
+    text = (folder / "gridshell-opensees.py").read_text(encoding="utf-8")
     names = [node.targets[0].id for node in ast.parse(text).body if isinstance(node, ast.Assign)]
     assert names[:8] == ["NODES", "SECTIONS", "BEAMS", "CABLES", "SUPPORTS", "START", "LOAD", "MOVED"]
     assert "The vault, test" in text
@@ -110,6 +112,15 @@ def test_an_unknown_load_and_a_folder_in_the_way_are_refused(built, vault, loads
     ):
         with pytest.raises(InputError, match="can't be written"):
             write(tmp_path / "file")
+
+
+def test_without_gmsh_s_libraries_everything_but_the_step_file_is_written(built, vault, loads, tmp_path, monkeypatch):
+    monkeypatch.delitem(sys.modules, "shellform.surface.occ")
+    monkeypatch.delattr(shellform.surface, "occ")
+    monkeypatch.setitem(sys.modules, "gmsh", None)
+    assert "gmsh can't be loaded" in exports.no_step()
+    exports.write_exports(tmp_path, built, vault, loads)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gridshell-opensees.py", "gridshell.3dm", "gridshell.glb", "gridshell.vtu"]
 
 
 def test_what_a_library_can_not_write_is_said_plainly(built, vault, tmp_path):
