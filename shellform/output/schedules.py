@@ -69,16 +69,16 @@ def rods(built: Built, cutting: Cutting) -> Table:
     """The rods: lengths, marks, section, mass, and from which bars they are cut."""
     section = built.shell.rod.resized(built.design.radius).section
     weight = mass_per_length(section)
-    places: dict[int, list[str]] = {}
+    places: dict[int, list[tuple[int, str]]] = {}
     for number, bar in enumerate(cutting.bars, 1):
         for piece in bar.pieces:
-            said = f"B{number}" if piece.parts == 1 else f"B{number} (part {piece.part})"
-            places.setdefault(piece.rod, []).append(said)
+            said = f"B{number}" if piece.parts == 1 else f"part {piece.part}: B{number}"
+            places.setdefault(piece.rod, []).append((piece.part, said))
     rows = tuple(
         (
             name, rod.direction, rod.length, label(section), weight * rod.length if weight else None, len(rod.marks),
             " ".join(f"{mark:.4f}" for mark in rod.marks), " ".join(map(str, rod.crossings.tolist())),
-            ", ".join(sorted(places[k])), "spliced" if k in cutting.spliced else "",
+            ", ".join(said for _, said in sorted(places[k])), "spliced" if k in cutting.spliced else "",
         )
         for k, (name, rod) in enumerate(zip(rod_names(built.grid), built.grid.rods, strict=True))
     )  # fmt: skip
@@ -192,7 +192,8 @@ def cables(built: Built) -> Table:
         "turnbuckle shortest [m]": shortest,
         "turnbuckle longest [m]": longest,
     }
-    for name, state in built.states.items():
+    for name in _in_order(built):
+        state = built.states[name]
         columns[f"{_stage(name)}: clear length [m]"] = ties.lengths(state)
         columns[f"{_stage(name)}: force [N]"] = ties.tension(state)
     rows = tuple((f"C{k}", *(values[k].item() for values in columns.values())) for k in range(len(pairs)))
@@ -225,7 +226,7 @@ def survey(built: Built) -> Table:
     """Every crossing: where it is wanted, and where it is expected at each load, "none" before the pour."""
     grid, shell = built.grid, built.shell
     places = {"target": shell.net.crossings}
-    places |= {_stage(name): crossing_points(grid, state) for name, state in built.states.items()}
+    places |= {_stage(name): crossing_points(grid, built.states[name]) for name in _in_order(built)}
     across = {(rod.direction, c): name for name, rod in zip(rod_names(grid), grid.rods, strict=True) for c in rod.crossings.tolist()}
     heads = ["crossing", "rod u", "rod v"]
     for name in places:
@@ -247,6 +248,12 @@ def all_tables(built: Built, cutting: Cutting) -> list[Table]:
 def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
     """Writes every schedule as NAME.csv and all of them as schedules.xlsx; returns the files. Raises InputError where they can't be written."""
     return write_tables(folder, all_tables(built, cutting))
+
+
+def _in_order(built: Built) -> list[str]:
+    """The load cases as they come on site: before the pour, the stages of pouring, all of it, and what is only checked."""
+    last = [name for name in ("design", "additional") if name in built.states]
+    return ["none", *(name for name in built.states if name not in ("none", *last)), *last]
 
 
 def _stage(load: str) -> str:

@@ -137,6 +137,12 @@ def test_the_cable_schedule_gives_lengths_and_forces_of_the_states(read, built):
         assert float(row["design: clear length [m]"]) == pytest.approx(apart, abs=1e-6)
 
 
+def test_stages_of_the_pour_come_between_the_erected_and_the_poured_grid(built):
+    poured = replace(built, states={**built.states, "pour 1": built.hung, "pour 2": built.hung})
+    heads = [head for head in schedules.cables(poured).columns if head.endswith("force [N]")]
+    assert [head.partition(":")[0] for head in heads] == ["erected", "pour 1", "pour 2", "design", "additional"]
+
+
 def test_turnbuckles_reach_from_the_length_hung_in_to_the_rest_length(read):
     for row in read["cables"]:
         rest, hung = float(row["rest length [m]"]), float(row["hung in at [m]"])
