@@ -2,7 +2,8 @@
 
 The DXF file has the drawing in mm at real scale, on one layer a kind of thing (RODS_U, RODS_V, CROSSING_NUMBERS, …), with real dimensions. The PDF
 sheet has it at the largest usual scale that fits the smallest paper on which its smallest letters are `SMALLEST` mm high, with notes,
-a list and a title block. What is on it: layout.py. No sheet bears a date: the same design gives the same file.
+a list and a title block; no date, so that the same design gives the same file (DXF has to bear the time at which it was written). What is on the
+sheets: layout.py.
 """
 
 from __future__ import annotations

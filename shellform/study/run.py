@@ -30,7 +30,6 @@ from shellform.structure.equilibrium import Equilibrium
 from shellform.structure.loading import Loaded
 from shellform.structure.state import State
 from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
-from shellform.study.documents import write_documents
 from shellform.study.folder import (
     Report,
     history_text,
@@ -362,6 +361,8 @@ def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
 
 def _documents(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
     if not keep:
+        from shellform.study.documents import write_documents
+
         summary["documents"] = write_documents(read_run(job.folder), report=job.report)
 
 

@@ -100,21 +100,22 @@ def test_the_same_design_gives_the_same_files(folder, built, tmp_path):
     assert (tmp_path / "grid.pdf").read_bytes() == (folder / "grid.pdf").read_bytes()
 
 
+@pytest.fixture(scope="module")
 def sheets(built):
     cutting = nesting.cut(built.grid, stock=0.6)
     return [layout.flat_grid(built), layout.cable_plan(built), layout.support_plan(built), layout.rod_strips(built, cutting)]
 
 
 @pytest.mark.parametrize("which", range(4))
-def test_no_words_lie_on_each_other(built, which):
-    words = [mark for mark in sheets(built)[which].marks if isinstance(mark, Words)]
+def test_no_words_lie_on_each_other(sheets, which):
+    words = [mark for mark in sheets[which].marks if isinstance(mark, Words)]
     lying = [(a.text, b.text) for a, b in combinations(words, 2) if overlap(a.box, b.box)]
     assert lying == []
 
 
 @pytest.mark.parametrize("which", range(4))
-def test_letters_are_legible_on_paper_and_the_drawing_stays_beside_the_column(built, which):
-    sheet = sheets(built)[which]
+def test_letters_are_legible_on_paper_and_the_drawing_stays_beside_the_column(built, sheets, which):
+    sheet = sheets[which]
     paper, scale = drawings.fitted(sheet)
     assert sheet.lettering / scale >= drawings.SMALLEST
     page = drawings.paper_page(sheet, built, "1 / 1")
