@@ -31,7 +31,8 @@ from shellform.design.gridshell import Design, Gridshell
 from shellform.errors import InputError
 from shellform.net.grid import Grid, crossing_points
 from shellform.output.nesting import Cutting
-from shellform.output.tables import Table, write_tables
+from shellform.output.tables import Table, Value, write_tables
+from shellform.structure.network import assemble
 from shellform.structure.sections import mass_per_length
 from shellform.structure.state import State
 
@@ -106,6 +107,33 @@ def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
             f"strong as the rod: {which}."
         )
     return tuple(said)
+
+
+def splices(built: Built, cutting: Cutting) -> Table:
+    """Where rods longer than the stock are spliced, and what the splices bear at each load: tension N and bending moment, interpolated between
+    the nodes."""
+    grid, beams = built.grid, built.shell.beams(built.design.radius)
+    first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in grid.rods])])  # element of each rod
+    forces = {name: beams.local_forces(built.states[name]) for name in _in_order(built)}
+    names = rod_names(grid)
+    places = sorted((piece.rod, piece.start) for bar in cutting.bars for piece in bar.pieces if piece.part > 1)
+    rows = []
+    for number, at in places:
+        rod = grid.rods[number]
+        inside = int(np.clip(np.searchsorted(rod.arc, at) - 1, 0, len(rod.arc) - 2))
+        share = (at - rod.arc[inside]) / (rod.arc[inside + 1] - rod.arc[inside])
+        before = int(np.searchsorted(rod.marks, at)) - 1
+        row: list[Value] = [names[number], float(at), int(rod.crossings[before]), int(rod.crossings[before + 1])]
+        for told in forces.values():
+            axial, _, y_a, z_a, _, y_b, z_b = told[first[number] + inside]
+            # Both ends' moments are counted as they turn the ends, so that a constant bending moment has opposite signs there.
+            bent = (1.0 - share) * np.array([y_a, z_a]) - share * np.array([y_b, z_b])
+            row += [float(axial), float(np.linalg.norm(bent))]
+        rows.append(tuple(row))
+    heads = ["rod", "from the first end [m]", "after crossing", "before crossing"]
+    for name in forces:
+        heads += [f"{_stage(name)}: tension [N]", f"{_stage(name)}: bending moment [N m]"]
+    return Table("splices", tuple(heads), tuple(rows), cutting_notes(cutting, names)[1:] or ("No rod is spliced.",))
 
 
 def marks(built: Built) -> Table:
@@ -204,22 +232,28 @@ def cables(built: Built) -> Table:
 
 
 def supports(built: Built) -> Table:
-    """The supports: which end of which rod, where its axis stands, and how it leaves the ground: bearing from x and rise, rad."""
+    """The supports: which end of which rod, where its axis stands, how it leaves the ground: bearing from x and rise, rad; and with which
+    force the rod acts on it at each load."""
     grid, place = built.grid, built.shell.target.positions
     ends = {
         int(rod.nodes[side]): (name, word, place[rod.nodes[inner]] - place[rod.nodes[side]])
         for name, rod in zip(rod_names(grid), grid.rods, strict=True)
         for side, inner, word in ((0, 1, "first"), (-1, -2, "second"))
     }
+    assembly = assemble(built.shell.network(built.design))
+    pushes = {name: -assembly.evaluate(built.states[name], tangent=False).force[:, :3] for name in _in_order(built)}
     rows = []
     for number, node in enumerate(built.shell.net.supports.tolist()):
         rod, side, along = ends[node]
         x, y, z = place[node].tolist()
         bearing = float(np.arctan2(along[1], along[0]))
         rise = float(np.arctan2(along[2], np.hypot(along[0], along[1])))
-        rows.append((f"S{number}", rod, side, x, y, z, bearing, rise))
-    heads = ("support", "rod", "end", "x [m]", "y [m]", "z [m]", "bearing of the rod [rad]", "rise of the rod [rad]")
-    return Table("supports", heads, tuple(rows), ("Supports stand where they are: before, during and after the pour.",))
+        forces = [value for push in pushes.values() for value in push[node].tolist()]
+        rows.append((f"S{number}", rod, side, x, y, z, bearing, rise, *forces))
+    heads = ["support", "rod", "end", "x [m]", "y [m]", "z [m]", "bearing of the rod [rad]", "rise of the rod [rad]"]
+    heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
+    notes = ("Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them.",)
+    return Table("supports", tuple(heads), tuple(rows), notes)
 
 
 def survey(built: Built) -> Table:
@@ -241,8 +275,10 @@ def survey(built: Built) -> Table:
 
 
 def all_tables(built: Built, cutting: Cutting) -> list[Table]:
-    """Every schedule."""
-    return [rods(built, cutting), bars(built, cutting), marks(built), cables(built), supports(built), survey(built)]
+    """Every schedule, that of the splices also where there are none, so that none is left from another stock."""
+    return [
+        rods(built, cutting), bars(built, cutting), splices(built, cutting), marks(built), cables(built), supports(built), survey(built),
+    ]  # fmt: skip
 
 
 def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:

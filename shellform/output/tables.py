@@ -89,7 +89,7 @@ def _workbook(tables: Sequence[Table]) -> Any:
             letter = get_column_letter(number)
             decimals = "0.0000" if "[m]" in name else "0.00"
             longest = len(name) // 2
-            for cell in (column[0] for column in sheet[f"{letter}{head + 1}:{letter}{head + len(table.rows)}"]):
+            for (cell,) in sheet.iter_rows(min_row=head + 1, max_row=head + len(table.rows), min_col=number, max_col=number):
                 if isinstance(cell.value, float):
                     cell.number_format = decimals
                 longest = max(longest, len(str(cell.value)) if isinstance(cell.value, str) else 8)

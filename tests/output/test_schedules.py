@@ -19,7 +19,7 @@ from shellform.output import nesting, schedules, tables
 def read(built, tmp_path_factory):
     """All tables as written to CSV: a list of rows by name."""
     folder = tmp_path_factory.mktemp("schedules")
-    tables.write_tables(folder, schedules.all_tables(built, nesting.cut(built.grid, stock=2.0)))
+    tables.write_tables(folder, schedules.all_tables(built, nesting.cut(built.grid, stock=0.8)))
     found = {}
     for path in folder.glob("*.csv"):
         with path.open(encoding="utf-8", newline="") as file:
@@ -175,9 +175,46 @@ def test_supports_and_survey_targets_stand_where_the_net_has_them(read, built):
         assert float(row["additional: off the target [m]"]) == pytest.approx(0.02 * abs(net.crossings[k, 2]), abs=1e-6)
 
 
+def test_the_rods_press_on_their_supports_with_the_load(shell):
+    load = 0.3 * shell.point_load(6.9, every=2)
+    loads = {"none": np.zeros_like(load), "design": load}
+    found = sf.follow(shell, shell.design(), loads)
+    built = schedules.Built(shell, shell.design(), {name: each.equilibrium.state for name, each in found.items()})
+    table = schedules.supports(built)
+    for name, weight in (("erected", 0.0), ("design", float(load[:, 2].sum()))):
+        total = [sum(table.column(f"{name}: on the support along {axis} [N]")) for axis in "xyz"]
+        assert total == pytest.approx([0.0, 0.0, weight], abs=1e-4)
+
+
+def test_splices_are_told_with_the_moment_that_they_bear(built, net):
+    cutting = nesting.cut(built.grid, stock=0.6)
+    table = schedules.splices(built, cutting)
+    assert len(table.rows) == sum(piece.part > 1 for bar in cutting.bars for piece in bar.pieces)
+    (warning,) = table.notes
+    assert "SPLICED" in warning
+    stiffness = built.shell.rod.stiffness[2]
+    first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in net.grid.rods])])
+    moments = table.column("design: bending moment [N m]")
+    for name, at, before, after, moment in zip(*(table.column(head) for head in table.columns[:4]), moments, strict=True):
+        number = int(name[1:])
+        rod = net.grid.rods[number]
+        marks = rod.marks[[rod.crossings.tolist().index(before), rod.crossings.tolist().index(after)]]
+        assert at == pytest.approx(marks.mean())
+        # In the state on the target the moment is EI times the net's curvature, here at the splice's own element and its neighbours.
+        near = first[number] + int(np.searchsorted(rod.arc, at)) - 1
+        around = stiffness * net.curvature[near - 1 : near + 2]
+        assert around.min() * 0.99 <= moment <= around.max() * 1.01
+
+
+def test_without_splices_their_list_says_so(built, tmp_path):
+    tables.write_tables(tmp_path, [schedules.splices(built, nesting.cut(built.grid))])
+    assert (tmp_path / "splices.csv").read_text(encoding="utf-8").count("\n") == 1
+    assert load_workbook(tmp_path / "schedules.xlsx")["splices"]["A1"].value == "No rod is spliced."
+
+
 def test_the_workbook_holds_the_same_tables(read, built):
     book = load_workbook(read["folder"] / "schedules.xlsx")
-    wanted = schedules.all_tables(built, nesting.cut(built.grid, stock=2.0))
+    wanted = schedules.all_tables(built, nesting.cut(built.grid, stock=0.8))
     assert book.sheetnames == [table.name for table in wanted]
     for table in wanted:
         rows = list(book[table.name].iter_rows(values_only=True))

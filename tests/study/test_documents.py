@@ -31,7 +31,7 @@ def test_all_documents_of_the_best_design_are_written_and_splices_are_said(run):
     found = write_documents(run, report=lambda stage, text: said.append(text))
     names = {path.relative_to(run.folder).as_posix() for path in run.folder.rglob("*.*")}
     assert {f"drawings/{name}.{kind}" for name in ("grid", "cables", "supports", "rods") for kind in ("dxf", "pdf")} < names
-    assert {f"schedules/{name}.csv" for name in ("rods", "bars", "marks", "cables", "supports", "survey")} < names
+    assert {f"schedules/{name}.csv" for name in ("rods", "bars", "splices", "marks", "cables", "supports", "survey")} < names
     assert {f"models/gridshell{end}" for end in (".vtu", ".3dm", ".glb", ".step", "-opensees.py")} < names
     assert "schedules/schedules.xlsx" in names
     assert not [name for name in names if ".part" in name]
