@@ -3,6 +3,7 @@
 import csv
 from dataclasses import replace
 
+import binpacking
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -101,6 +102,30 @@ def test_as_many_bars_are_bought_as_must_be_where_that_is_known():
     assert (len(cutting.bars), cutting.least) == (5, 5)
     assert cutting.waste == pytest.approx(1.0 - 31.0 / 35.0)
     assert len(nesting.cut(grid, stock=7.0, kerf=0.001).bars) == 5 + 2  # with a saw cut no two of a 3 and a 4 fit, but two of 3 do
+
+
+def test_bars_are_filled_as_full_as_can_be_where_the_library_buys_too_many():
+    # Longest first puts 4 and 4 together and needs three bars of 10; 4 + 3 + 3 twice needs two.
+    needed = dict(enumerate([4.0, 4.0, 3.0, 3.0, 3.0, 3.0]))
+    assert len(binpacking.to_constant_volume(needed, 10.0)) == 3
+    packed = nesting._fullest(needed, 10.0)
+    assert sorted(sorted(needed[k] for k in bar) for bar in packed) == [[3.0, 3.0, 4.0], [3.0, 3.0, 4.0]]
+    assert sorted(k for bar in packed for k in bar) == list(needed)
+    assert nesting._least(list(needed.values()), 10.0) == 2
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.sampled_from([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]), min_size=1, max_size=7))
+def test_no_packing_at_all_needs_fewer_bars_than_the_bound(sizes):
+    def best(left, bars):
+        if not left:
+            return len(bars)
+        one, *others = left
+        tried = [best(others, [*bars[:k], bar - one, *bars[k + 1 :]]) for k, bar in enumerate(bars) if bar >= one]
+        return min([*tried, best(others, [*bars, 8.0 - one])])
+
+    fewest = best(sizes, [])
+    assert nesting._least(sizes, 8.0) <= fewest <= len(nesting._fullest(dict(enumerate(sizes)), 8.0))
 
 
 def test_splicing_is_said_in_the_list_and_neighbours_are_divided_from_opposite_ends():
