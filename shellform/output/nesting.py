@@ -1,8 +1,9 @@
 """Rods cut from stock lengths; the door to binpacking.
 
 A bar of stock length S yields pieces of lengths l with a saw cut of width k after each but for one that ends with the bar:
-Σ (l + k) ≤ S + k. The library packs longest first, each into the fullest bar that takes it. Where it needs more bars than a
-bound says that it takes (`_least`), bars are also filled one by one as full as can be, and the better of both is taken. Of 28 cuttings of five nets 25 met the bound and three were one bar above it.
+Σ (l + k) ≤ S + k. The library packs longest first, each into the fullest bar that takes it. Where it needs more bars than a bound says
+that it takes (`_least`), bars are also filled one by one as full as can be, and the better of both is taken. Of 28 cuttings of five
+nets 25 met the bound and three were one bar above it.
 
 A rod longer than the stock is spliced from pieces whose ends lie halfway between two crossings, away from the joints. Every second
 such rod is divided from its other end, so that splices of neighbours stand in different places.
