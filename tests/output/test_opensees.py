@@ -19,7 +19,8 @@ from shellform.output.opensees import opensees_script
 def lists(text):
     """The lists in the script by name."""
     tree = ast.parse(text)
-    return {node.targets[0].id: ast.literal_eval(node.value) for node in tree.body if isinstance(node, ast.Assign) and isinstance(node.value, ast.List)}
+    assigned = [node for node in tree.body if isinstance(node, ast.Assign) and isinstance(node.value, ast.List)]
+    return {node.targets[0].id: ast.literal_eval(node.value) for node in assigned}
 
 
 def test_the_script_holds_the_network_the_start_and_the_load(shell):
