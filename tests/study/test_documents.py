@@ -23,7 +23,7 @@ def run(built, vault, shell, tmp_path_factory):
     states = {"unbraced": {name: built.hung for name in loads}, "initial": built.states, "polished": built.states}
     designs = {"unbraced": shell.unbraced(), "initial": shell.design(), "polished": built.design}
     case = load_case(CASE, ["rod.stock_length=0.8", "rod.kerf=0.002"])
-    return Run(tmp_path_factory.mktemp("run"), case, vault, shell, loads, designs, states, {})
+    return Run(tmp_path_factory.mktemp("run"), case, vault, shell, loads, designs, states, {"designs": {}})
 
 
 def test_all_documents_of_the_best_design_are_written_and_splices_are_said(run):
