@@ -42,6 +42,10 @@ _ROOMS = {
     "robust": "shellform.design.robust",
     "render": "shellform.output.render",
     "plots": "shellform.output.plots",
+    "nesting": "shellform.output.nesting",
+    "schedules": "shellform.output.schedules",
+    "drawings": "shellform.output.drawings",
+    "exports": "shellform.output.exports",
     "model": "shellform.structure.model",
     "analysis": "shellform.structure.analysis",
 }

@@ -146,7 +146,7 @@ def _given(**options: Any) -> dict[str, Any]:
 def design(
     case: Annotated[Path, typer.Argument(help="Case file (TOML).")],
     output: Annotated[Path, typer.Option(help="Run folder.")],
-    until: Annotated[str, typer.Option(help="Last stage: surface, net, initial, optimise, figures or report.")] = "report",
+    until: Annotated[str, typer.Option(help="Last stage: surface, net, initial, optimise, figures, documents or report.")] = "report",
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute every stage anew.")] = False,
     settings: Annotated[list[str] | None, typer.Option("--set", help="KEY=VALUE in place of an entry.")] = None,
     allow_scripts: Scripts = False,
@@ -410,7 +410,7 @@ class _Progress:
         self.status.start()
 
     def __call__(self, stage: str, text: str) -> None:
-        if text.startswith(("done", "kept", "loading", "no pictures", "size")):
+        if text.startswith(("done", "kept", "loading", "no pictures", "note", "size")):
             self.console.print(f"{stage}: {text}")
         self.status.update(f"{stage}: {text}")
 

@@ -24,11 +24,17 @@ _REMEDIES = {
 
 
 @contextlib.contextmanager
-def whole(path: str | Path) -> Iterator[Path]:
-    """The place to write to; what is there at the end of the block becomes `path`. Raises InputError where it can't be written."""
+def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
+    """The place to write to; what is there at the end of the block becomes `path`. Makes the folder.
+
+    Raises InputError for another `ending` and where the file can't be written; what stood there before is left as it was.
+    """
     target = Path(path)
+    if ending and target.suffix.lower() != ending:
+        raise InputError("has another ending", where=str(target), value=target.suffix, remedy=f"Use {ending}.")
     partial = target.with_name(f"{target.stem}.part{target.suffix}")
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
         yield partial
         os.replace(partial, target)
     except OSError as error:

@@ -8,6 +8,9 @@ from pathlib import Path
 PACKAGE = Path(__file__).parent.parent / "shellform"
 FLOORS = {"errors": -1, "compiled": -1, "arrays": 0, "written": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "notebook": 5, "study": 5, "cli": 6}
 DOORS = {
+    "binpacking": {"output/nesting.py"},
+    "ezdxf": {"output/drawings.py"},
+    "openpyxl": {"output/tables.py"},
     "gmsh": {"surface/occ.py"},
     "meshio": {"surface/meshes.py"},
     "rhino3dm": {"surface/rhino.py"},
@@ -21,7 +24,7 @@ DOORS = {
     "cvxopt": {"structure/sparse.py", "design/convex.py"},
     "numba": {"compiled.py"},
 }
-NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "numba", "scipy", "numpy"]
+NOT_LOADED = ["ezdxf", "openpyxl", "gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "numba", "scipy", "numpy"]
 
 
 def imports(path: Path) -> list[str]:

@@ -1,4 +1,4 @@
-"""Convergence plots (figures 10, 11, 15 and 16 of the paper) and pages of lines; the door to matplotlib.
+"""Convergence plots (figures 10, 11, 15 and 16 of the paper), and pages of lines and words; the door to matplotlib.
 
 Figures are made as objects with their own canvas, so that nothing global is touched and any thread may draw.
 """
@@ -9,11 +9,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
@@ -30,6 +32,8 @@ _FAR = -1.5  # values further below their limit than this run out of the picture
 FORMATS = (".png", ".svg", ".pdf")
 _DOTS = 160.0  # pixels an inch
 _POINT = 72.0 / _DOTS  # points a pixel
+_INCH, _POINTS = 25.4, 72.0  # mm and points in an inch
+_CAPITAL = 0.73  # height of a capital over the font's size
 _WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
 
 
@@ -136,6 +140,79 @@ def constraint_history(
         )  # fmt: skip
     axes.set(xlabel="design evaluations", ylabel="value / limit − 1")
     _save(figure, path)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through `points` (x, y), mm from the page's lower left corner, `width` mm wide."""
+
+    points: Sequence[tuple[float, float]]
+    colour: str = "#000000"
+    width: float = 0.18
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Label:
+    """A line of `text` with capitals `height` mm high, turned by `angle` degrees; `side` and `foot` of it are at `place`, mm."""
+
+    place: tuple[float, float]
+    height: float
+    text: str
+    colour: str = "#000000"
+    angle: float = 0.0
+    side: str = "left"
+    foot: str = "bottom"
+    bold: bool = False
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of `width` and `height`, mm, with its lines and labels."""
+
+    width: float
+    height: float
+    lines: tuple[Line, ...]
+    labels: tuple[Label, ...]
+
+
+def write_pages(path: str | Path, pages: Sequence[Page], title: str = "") -> None:
+    """Writes the pages, to scale and with their words as text, to a PDF; a single page may also go to a PNG or SVG.
+
+    The same pages give the same bytes. The caller sees to it that `path` can be written.
+    """
+    target = Path(path)
+    with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "shellform", "font.family": "DejaVu Sans"}):
+        if target.suffix.lower() != ".pdf":
+            _page(pages[0]).savefig(target, dpi=160)
+            return
+        with PdfPages(target, metadata={"Title": title, "CreationDate": None}) as book:
+            for page in pages:
+                book.savefig(_page(page))
+
+
+def _page(page: Page) -> Figure:
+    figure = Figure(figsize=(page.width / _INCH, page.height / _INCH))
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0.0, page.width), ylim=(0.0, page.height))
+    axes.axis("off")
+    kinds: dict[tuple[str, float, bool], list[Sequence[tuple[float, float]]]] = {}
+    for line in page.lines:
+        kinds.setdefault((line.colour, line.width, line.dashed), []).append(line.points)
+    for (colour, width, dashed), several in kinds.items():
+        style: Any = (0, (8.0, 6.0)) if dashed else "solid"
+        axes.add_collection(
+            LineCollection(several, colors=colour, linewidths=width / _INCH * _POINTS, linestyles=[style], capstyle="round")
+        )
+    vertical = {"bottom": "baseline", "middle": "center_baseline", "top": "top"}
+    for label in page.labels:
+        axes.text(
+            *label.place, label.text, fontsize=label.height / _CAPITAL / _INCH * _POINTS, color=label.colour, rotation=label.angle,
+            ha="center" if label.side == "middle" else label.side, va=vertical[label.foot], rotation_mode="anchor",
+            fontweight="bold" if label.bold else "normal",
+        )  # fmt: skip
+    return figure
 
 
 def _turned(rows: Sequence[Mapping[str, object]]) -> dict[str, Sequence[object]]:

@@ -73,7 +73,12 @@ class NetEntry(_Section):
         return self
 
 
-class OwnRodEntry(_Section):
+class _BoughtEntry(_Section):
+    stock_length: PositiveFloat | None = Field(None, description="in which rods are bought, m; left out: the catalogue's, or 6 m")
+    kerf: float = Field(0.003, ge=0.0, description="width of a saw cut, m")
+
+
+class OwnRodEntry(_BoughtEntry):
     """Rods of given sizes: round, tubes or laths."""
 
     young: PositiveFloat = Field(description="Young's modulus, Pa")
@@ -97,7 +102,7 @@ class OwnRodEntry(_Section):
         return self
 
 
-class StockRodEntry(_Section):
+class StockRodEntry(_BoughtEntry):
     """Rods from a catalogue."""
 
     catalogue: str = Field(description="a shipped catalogue's name, or a TOML file relative to the case file")

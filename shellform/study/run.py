@@ -1,7 +1,7 @@
 """The whole job of one case, stage by stage, in a run folder (contracts/run-folder.md).
 
-surface -> net -> initial -> optimise -> figures -> report. Each stage leaves its result in the folder and a key in `stages.json`: a hash of
-the entries it depends on, the surface file's bytes, the package's version and the stage before. Run again, a stage whose key is
+surface -> net -> initial -> optimise -> figures -> documents -> report. Each stage leaves its result in the folder and a key in
+`stages.json`: a hash of the entries it depends on, the surface file's bytes, the package's version and the stage before. Run again, a stage whose key is
 unchanged is loaded instead of computed.
 """
 
@@ -51,7 +51,7 @@ from shellform.study.shell import catalogue_bytes, gridshell, rod_limits, roundi
 from shellform.surface.target import Surface
 from shellform.written import folder as made
 
-STAGES = ("surface", "net", "initial", "optimise", "figures", "report")
+STAGES = ("surface", "net", "initial", "optimise", "figures", "documents", "report")
 
 
 def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
@@ -156,7 +156,7 @@ def run_case(
         made(folder / part)
     job = _Job(case, folder, report)
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
-    steps |= {"report": _report}
+    steps |= {"documents": _documents, "report": _report}
     first = next((stage for stage in STAGES if done.get(stage) != keys[stage]), None)
     if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
         _outdate(summary, first)
@@ -194,12 +194,14 @@ def _outdate(summary: dict[str, Any], stage: str) -> None:
 def stage_keys(case: Case, file: Path) -> dict[str, str]:
     """A hash for each stage of all that it depends on; `file` is the surface's."""
     entries = case.model_dump(mode="json")
+    entries["stock"] = {name: entries["rod"].pop(name) for name in ("stock_length", "kerf")}  # which no design depends on
     needs = {
         "surface": ["surface"],
         "net": ["net", "joint"],
         "initial": ["rod", "cable", "load", "part"],
         "optimise": ["optimise", "limits", "robust"],
         "figures": ["figures", "title"],
+        "documents": ["stock"],
         "report": [],
     }
     digest = hashlib.sha256(shellform.__version__.encode() + file.read_bytes())
@@ -447,6 +449,13 @@ def _keep(
 def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> bool:
     """Whether all pictures are there."""
     return keep or draw_everything(read_run(job.folder), report=job.report)
+
+
+def _documents(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
+    if not keep:
+        from shellform.study.documents import write_documents
+
+        summary["documents"] = write_documents(read_run(job.folder), report=job.report)
 
 
 def _report(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:

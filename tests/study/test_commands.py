@@ -181,7 +181,7 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
     assert min(braced, key=lambda name: mean[name]["none"]) == "unloaded"
     assert max(braced, key=lambda name: mean[name]["none"]) == "optimised"
     assert min(braced, key=lambda name: mean[name]["design"]) == "optimised"
-    for name in ("case.toml", "history.csv", "net.json", "figures/deviations.png", "figures/objective.png", "report.html"):
+    for name in ("case.toml", "history.csv", "net.json", "figures/deviations.png", "figures/objective.png", "drawings/grid.dxf", "report.html"):
         assert (run / name).stat().st_size > 0
     again = shellform(*arguments, timeout=60)
     assert again.returncode == 0
