@@ -34,6 +34,7 @@ _ROOMS = {
     "funicular": "shellform.surface.funicular",
     "mma": "shellform.design.mma",
     "calibration": "shellform.design.calibration",
+    "comparison": "shellform.design.comparison",
     "site": "shellform.design.site",
     "erection": "shellform.design.erection",
     "robust": "shellform.design.robust",
