@@ -146,7 +146,7 @@ def _given(**options: Any) -> dict[str, Any]:
 def design(
     case: Annotated[Path, typer.Argument(help="Case file (TOML).")],
     output: Annotated[Path, typer.Option(help="Run folder.")],
-    until: Annotated[str, typer.Option(help="Last stage: surface, net, initial, optimise or figures.")] = "figures",
+    until: Annotated[str, typer.Option(help="Last stage: surface, net, initial, optimise, figures or report.")] = "report",
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute every stage anew.")] = False,
     settings: Annotated[list[str] | None, typer.Option("--set", help="KEY=VALUE in place of an entry.")] = None,
     allow_scripts: Scripts = False,
@@ -161,7 +161,7 @@ def design(
     )
     report.close()
     _tell(summary)
-    print(f"Everything is in {output}")
+    print(f"Everything is in {output}" + (f"; look at {output / 'report.html'} first" if until == "report" else ""))
 
 
 @app.command()
@@ -247,6 +247,17 @@ def render(
 
     for file in draw_run(run, load=load, design=design, limit=limit):
         print(file)
+
+
+@app.command()
+def report(
+    runs: Annotated[list[Path], typer.Argument(help="Run folders; several stand side by side.")],
+    output: Annotated[Path | None, typer.Option(help="File; left out: report.html in the run folder, or here for several runs.")] = None,
+) -> None:
+    """Write the page of runs: report.html, one file that needs no network."""
+    from shellform.study.page import write_report
+
+    print(write_report(runs, output))
 
 
 @app.command()

@@ -68,10 +68,9 @@ def minimise(
     return best, _REASONS.get(optimizer.last_optimize_result(), "stopped")
 
 
-def minimise_quadratic(hessian: Reals, slope: Reals, rows: Reals, values: Reals, lower: Reals, upper: Reals) -> Reals:
-    """The u (s,) with the least slope'u + u'hessian u / 2 where values + rows u <= 0 and lower <= u <= upper.
-
-    `hessian` (s, s) is positive semidefinite; u = 0 within the bounds meets the constraints, or is as near as can be.
+def minimise_quadratic(hessian: Reals, slope: Reals, rows: Reals, values: Reals, lower: Reals, upper: Reals) -> Reals | None:
+    """The u (s,) with the least slope'u + u'hessian u / 2 where values + rows u <= 0 and lower <= u <= upper; None where nothing meets
+    them all. `hessian` (s, s) is positive semidefinite.
     """
     from cvxopt import matrix, solvers
 
@@ -80,7 +79,12 @@ def minimise_quadratic(hessian: Reals, slope: Reals, rows: Reals, values: Reals,
     curved = hessian + _REGULAR * max(mean, 1e-300) * np.eye(size)
     left = np.vstack([np.eye(size), -np.eye(size), rows])
     right = np.concatenate([upper, -lower, -values])
-    answer = solvers.qp(matrix(curved), matrix(slope), matrix(left), matrix(right), options={"show_progress": False})
+    try:
+        answer = solvers.qp(matrix(curved), matrix(slope), matrix(left), matrix(right), options={"show_progress": False})
+    except (ValueError, ArithmeticError):  # so CVXOPT ends on some problems without a solution
+        return None
+    if answer["status"] != "optimal":
+        return None
     return np.clip(np.array(answer["x"]).ravel(), lower, upper)
 
 

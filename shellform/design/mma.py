@@ -40,6 +40,7 @@ from shellform.errors import NotConverged
 from shellform.structure.loading import Loaded, apply_load
 from shellform.structure.stability import modes
 from shellform.structure.state import State
+from shellform.structure.threads import dense_on_one
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
 STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
@@ -58,6 +59,7 @@ _BATCHES = 8  # share of the taut cables that the first batch takes, one in so m
 _KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
 _THINNING = 1.5  # of the objective that cables with little use may cost
 _REPAIRS = 2  # steps after each batch
+_RECOVERY = 0.1  # of what a window can change at most: by so much cables below that tension must gain under additional loads
 _BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
 FEASIBLE = 1e-3
 
@@ -83,9 +85,10 @@ def optimize(
 
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
-    search = _Search(problem, start, window, progress)
-    search.keep_stiff(stiffness * search.stiffness())
-    return search.run(evaluations, thin=thin)
+    with dense_on_one():
+        search = _Search(problem, start, window, progress)
+        search.keep_stiff(stiffness * search.stiffness())
+        return search.run(evaluations, thin=thin)
 
 
 def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | None = None) -> Optimum:
@@ -96,12 +99,13 @@ def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | Non
     """
     base = next(iter(best.problem.loads))
     problem = replace(best.problem, minimize=[Share(1.0, Misfit(base))])
-    search = _Search(problem, best.design, WINDOW, progress)
-    search.keep_stiff(_POLISHED * best.stiffness)
-    search.braces[:] = True
-    search.guarded = True
-    search.smallest = _FINEST
-    polished = search.run(evaluations, thin=False)
+    with dense_on_one():
+        search = _Search(problem, best.design, WINDOW, progress)
+        search.keep_stiff(_POLISHED * best.stiffness)
+        search.braces[:] = True
+        search.guarded = True
+        search.smallest = _FINEST
+        polished = search.run(evaluations, thin=False)
     better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
     return polished if better else replace(best, status="no design with less misfit was found", history=polished.history)
 
@@ -328,6 +332,10 @@ class _Search:
 
         if self.guarded:
             u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
+            if u is None:  # the guards ask for more than a step can give: they may keep what they have
+                u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
+            if u is None:
+                u = np.clip(np.zeros(len(width)), low, high)
         else:
             u, _ = minimise(
                 evaluate,
@@ -358,7 +366,7 @@ class _Search:
             falls = -(held.tension_by_design @ lengths) * width
             scale = np.abs(falls).sum(axis=1)
             rows.append(falls / scale[:, None])
-            values.append((np.minimum(held.tension, _BRACE * self.tension) - held.tension) / scale)
+            values.append(np.minimum((_BRACE * self.tension - held.tension) / scale, _RECOVERY))
         return np.vstack(rows), np.concatenate(values)
 
     def _exact_in_tension(self, slope: Reals, model: TensionModel) -> Reals:
@@ -368,16 +376,12 @@ class _Search:
         if not dead.any():
             return slope
         result = slope.copy()
-        away = self.point.states[self.base].positions - self.problem.shell.target.positions
-        free = model.assembly.free
-        moving = free % 6 < 3
-        placed = away.ravel()[3 * (free[moving] // 6) + free[moving] % 6] @ model.state_by_y[moving][:, :count]
         total = np.zeros(count)
         for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True):
             if part.term.load != self.base:
                 continue
             if isinstance(part.term, (Misfit, RobustMisfit)):
-                total += 2.0 * weight * placed
+                total += weight * model.misfit_by_y[:count]
             elif isinstance(part.term, CableForce):
                 total += weight
         result[:count][dead] = total[dead]

@@ -26,6 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
+from shellform.output.colours import VIRIDIS
 
 _LIBRARIES = "On Debian and Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri libxrender1"
 try:
@@ -46,15 +47,7 @@ _VIEWS = {
     "front": ((0.0, -1.0, 0.0), (0.0, 0.0, 1.0)),
     "side": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 }
-# Viridis (van der Walt and Smith, public domain) at 17 equal steps: perceptually uniform, safe for the colour-blind.
-_VIRIDIS = np.array(
-    [
-        (68, 1, 84), (72, 24, 106), (71, 45, 123), (66, 64, 134), (59, 82, 139), (51, 99, 141), (44, 114, 142),
-        (38, 130, 142), (33, 145, 140), (31, 160, 136), (40, 174, 128), (63, 188, 115), (94, 201, 98), (132, 212, 75),
-        (173, 220, 48), (216, 226, 25), (253, 231, 37),
-    ],
-    dtype=np.float64,
-)  # fmt: skip
+_VIRIDIS = np.array(VIRIDIS, dtype=np.float64)
 _CABLE, _SLACK, _SUPPORT, _LOAD, _SURFACE, _INK, _QUIET = (
     "#8a8a8a", "#dcdcdc", "#3a3a3a", "#c8382e", "#b9c4cf", "#1a1a1a", "#5a5a5a",
 )  # fmt: skip

@@ -90,7 +90,10 @@ def read_run(folder: str | Path) -> Run:
     shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
     designs, states = {}, {}
     for name in ready:
-        with arrays_of(place / f"designs/{name}.npz") as data:
+        file = place / f"designs/{name}.npz"
+        with arrays_of(file) as data:
+            if any(f"{each}_positions" not in data for each in loads) or len(data["present"]) != len(shell.cable_ends):
+                raise InputError("is of another net or of other loads", where=str(file), remedy="Run shellform design again.")
             designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
             states[name] = {each: State(data[f"{each}_positions"], data[f"{each}_quaternions"]) for each in loads}
     return Run(place, case, surface, shell, loads, designs, states, summary)

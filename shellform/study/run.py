@@ -1,6 +1,6 @@
 """The whole job of one case, stage by stage, in a run folder (contracts/run-folder.md).
 
-surface -> net -> initial -> optimise -> figures. Each stage leaves its result in the folder and a key in `stages.json`: a hash of
+surface -> net -> initial -> optimise -> figures -> report. Each stage leaves its result in the folder and a key in `stages.json`: a hash of
 the entries it depends on, the surface file's bytes, the package's version and the stage before. Run again, a stage whose key is
 unchanged is loaded instead of computed.
 """
@@ -46,7 +46,7 @@ from shellform.study.robustness import robustness
 from shellform.study.shell import catalogue_bytes, gridshell, rod_limits, rounding_catalogue
 from shellform.surface.target import Surface
 
-STAGES = ("surface", "net", "initial", "optimise", "figures")
+STAGES = ("surface", "net", "initial", "optimise", "figures", "report")
 
 
 def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
@@ -115,7 +115,7 @@ def run_case(
     case: Case,
     folder: Path,
     *,
-    until: str = "figures",
+    until: str = STAGES[-1],
     fresh: bool = False,
     allow_scripts: bool = False,
     report: Report = lambda stage, text: None,
@@ -130,7 +130,7 @@ def run_case(
     if not file.is_file():
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
-    keys = _keys(case, file)
+    keys = stage_keys(case, file)
     done = {} if fresh else read_json(folder / "stages.json")
     results: dict[str, Any] = {}
     began = time.perf_counter()
@@ -149,6 +149,7 @@ def run_case(
     summary = {"format": "shellform-summary", "version": 1, **{k: v for k, v in summary.items() if k != "format"}}
     summary.setdefault("seconds", {})
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
+    steps |= {"report": _report}
     reusable = True
     for stage in STAGES[: STAGES.index(until) + 1]:
         reusable = reusable and done.get(stage) == keys[stage]
@@ -164,8 +165,8 @@ def run_case(
     return summary
 
 
-def _keys(case: Case, file: Path) -> dict[str, str]:
-    """A hash for each stage of all that it depends on."""
+def stage_keys(case: Case, file: Path) -> dict[str, str]:
+    """A hash for each stage of all that it depends on; `file` is the surface's."""
     entries = case.model_dump(mode="json")
     needs = {
         "surface": ["surface"],
@@ -173,6 +174,7 @@ def _keys(case: Case, file: Path) -> dict[str, str]:
         "initial": ["rod", "cable", "load", "part"],
         "optimise": ["optimise", "limits", "robust"],
         "figures": ["figures", "title"],
+        "report": [],
     }
     digest = hashlib.sha256(shellform.__version__.encode() + file.read_bytes())
     keys = {}
@@ -415,6 +417,13 @@ def _keep(
 def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
     if not keep:
         draw_everything(read_run(job.folder), report=job.report)
+
+
+def _report(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
+    if not keep:
+        from shellform.study.page import FILE, write_page
+
+        write_page([read_run(job.folder)], job.path(FILE))
 
 
 def _follow(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:
