@@ -15,7 +15,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.study import rounding
 from shellform.study.case import load_case
 from shellform.study.folder import read_run
-from shellform.study.limits import case_problem, critical_factors, shown
+from shellform.study.limits import below_factor, case_problem, critical_factors, shown
 from shellform.study.run import run_case
 
 ROOT = Path(__file__).parent.parent.parent
@@ -96,6 +96,8 @@ def test_the_critical_factor_told_is_where_the_loaded_path_ends(shell, loads):
     assert set(told) == {"design", "additional"}
     factor = told["design"]["critical_factor"]
     assert told["additional"]["critical_factor"] == pytest.approx(factor / 1.2, rel=1e-3)
+    assert below_factor(told, 1.1 * factor, ["design"]) == ["design"]
+    assert below_factor(told, 0.9 * factor, ["design"]) == []
     below = sf.follow(shell, design, {"near": 0.995 * factor * loads["design"]}, stay=True)["near"]
     beyond = sf.follow(shell, design, {"past": 1.01 * factor * loads["design"]}, stay=True)["past"]
     assert below.on_branch
