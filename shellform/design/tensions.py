@@ -107,7 +107,7 @@ def tension_model(
     stiffness = np.where(tension > 0.0, cables.stiffness / cables.rest_length, 0.0)
     coupling, moved_by = _solved(assembly, state, pull, right)
     # K_t⁻¹ R = K⁻¹ R + K⁻¹ B (I - D B' K⁻¹ B)⁻¹ D B' K⁻¹ R, for R the pulls and the radius' forces alike.
-    middle = np.linalg.solve(np.eye(count) - stiffness[:, None] * coupling[:, :count], stiffness[:, None] * coupling)
+    middle: Reals = np.asarray(np.linalg.solve(np.eye(count) - stiffness[:, None] * coupling[:, :count], stiffness[:, None] * coupling))
     length_by_y = -(coupling + coupling[:, :count] @ middle)
     # K_t⁻¹ R = K⁻¹ R T with T = I + (middle; 0), so that X'X = T' (K⁻¹ R)' (K⁻¹ R) T.
     whole = np.eye(right.shape[1])
@@ -115,7 +115,7 @@ def tension_model(
     away = (state.positions - shell.target.positions).ravel()
     free = assembly.free[assembly.free % 6 < 3]
     misfit_by_y = -2.0 * (away[3 * (free // 6) + free % 6] @ moved_by) @ whole
-    misfit_hessian: Reals = 2.0 * whole.T @ (moved_by.T @ moved_by) @ whole
+    misfit_hessian = 2.0 * whole.T @ (moved_by.T @ moved_by) @ whole
 
     ea = shell.cable.stiffness
     rest_by_y = (ea / (ea + tension))[:, None] * length_by_y

@@ -202,6 +202,8 @@ class OptimiseEntry(_Section):
     catalogue: str | None = Field(None, description="to which a free radius is rounded up; left out: the rods' own, if they have one")
     rounded: int = Field(30, ge=0, description="design evaluations for each section that is tried in rounding; 0: no rounding")
     neighbours: int = Field(1, ge=0, description="sections below and above the rounded one that are tried too")
+    cables_max: PositiveInt | None = Field(None, description="cables are taken away down to this number, if limits allow")
+    symmetric: bool = Field(False, description="cables that a symmetry of the net joins are polished to one length")
     polish: int = Field(20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none")
 
     @model_validator(mode="after")
@@ -209,6 +211,8 @@ class OptimiseEntry(_Section):
         total = self.misfit + self.cable_force + self.rod_radius + self.robust
         if abs(total - 1.0) > 1e-9:
             raise ValueError(f"the shares misfit, cable_force, rod_radius and robust must add up to 1, not {total:g}")
+        if self.symmetric and not self.polish:
+            raise ValueError("symmetric lengths are found in polishing: give polish some evaluations")
         if self.catalogue is not None and not self.rod_radius:
             raise ValueError("catalogue is for a free radius: give rod_radius a share")
         return self

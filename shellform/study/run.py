@@ -20,6 +20,7 @@ import numpy as np
 import shellform
 from shellform.arrays import Reals
 from shellform.design.gridshell import Design, Gridshell
+from shellform.design.grouping import symmetric_groups
 from shellform.design.optimum import Optimum
 from shellform.design.problem import Problem, follow
 from shellform.design.terms import AtMost, CableForces, Misfit, Share
@@ -291,7 +292,15 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         )
 
     problem = case_problem(job.case, shell, loads, start)
-    best = mma.optimize(problem, start, evaluations=entry.evaluations, stiffness=entry.stiffness_min, progress=watch)
+    groups = symmetric_groups(shell) if entry.symmetric else None  # at once: it may be refused
+    best = mma.optimize(
+        problem,
+        start,
+        evaluations=entry.evaluations,
+        stiffness=entry.stiffness_min,
+        most_cables=entry.cables_max,
+        progress=watch,
+    )
     _forget(job, ("unloaded", "optimised", "rounded", "polished"), summary)
     built = {"optimised": best}
     _keep(job, shell, "optimised", best.design, _follow(shell, best.design, loads), loads, summary)
@@ -301,7 +310,7 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
     if entry.polish:
         job.report("optimise", "polishing the cables that are left")
         last = list(built.values())[-1]
-        built["polished"] = mma.polish(last, evaluations=entry.polish)
+        built["polished"] = mma.polish(last, evaluations=entry.polish, groups=groups)
         here = last.problem.shell
         _keep(job, here, "polished", built["polished"].design, _follow(here, built["polished"].design, loads), loads, summary)
         if "section" in summary["designs"].get("rounded", {}):
