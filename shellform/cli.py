@@ -435,6 +435,9 @@ def _tell(summary: dict[str, Any]) -> None:
         over = [f"{name} by {value:.1%}" for name, value in told["constraints"].items() if value > 1e-3]
         if over:
             print(f"limits that are not kept: {', '.join(over)}")
+    for name, design in summary.get("designs", {}).items():
+        if not design.get("critical_factor_kept", True):
+            print(f"the {name} design loses stability before the critical factor asked for (critical_factor in summary.json)")
     for each in summary.get("sections", []):
         found = f"objective {each['objective']:.3g}, {each['cables']} cables" if each["objective"] is not None else "no design"
         print(f"{each['section']:>10}  {found}{'' if each['feasible'] else ': ' + each['why_not']}")

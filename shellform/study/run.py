@@ -44,7 +44,7 @@ from shellform.study.folder import (
     refuse_overwriting,
     save_surface,
 )
-from shellform.study.limits import case_problem, critical_factors
+from shellform.study.limits import below_factor, case_problem, critical_factors
 from shellform.study.pictures import draw_everything, write_states
 from shellform.study.robustness import robustness
 from shellform.study.shell import catalogue_bytes, gridshell, rod_limits, rounding_catalogue
@@ -376,7 +376,8 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         "stiffness_min": best.stiffness,
         "status": best.status,
         "constraints": dict(best.constraints),
-        "feasible": max(best.constraints.values(), default=-1.0) <= mma.FEASIBLE,
+        "feasible": max(best.constraints.values(), default=-1.0) <= mma.FEASIBLE
+        and summary["designs"]["optimised"].get("critical_factor_kept", True),
     }
     write_text(job.path("history.csv"), history_text(best.history))
 
@@ -429,6 +430,9 @@ def _examine(job: _Job, name: str, found: Optimum, loads: Mapping[str, Reals], s
     factors = critical_factors(found.problem.shell, found.design, found.states["none"], loads, wanted=wanted)
     for each, told in factors.items():
         summary["designs"][name]["loads"][each] |= told
+    if wanted is not None:
+        short = below_factor(factors, wanted, job.case.limits.critical_loads)
+        summary["designs"][name]["critical_factor_kept"] = not short
 
 
 def _keep(
