@@ -47,7 +47,8 @@ WINDOW = 0.2  # first half-width, in mean tensions of the start
 STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
 _POLISHED = 0.8  # of that, which polishing may use up
 POLISHING = 20  # design evaluations
-_MARGIN = 0.15  # of the whole additional load that is left between a stage and the end of the stable branch
+_MARGIN = 0.15  # of the whole additional load that is left at first between a stage and the end of the stable branch …
+_NEAREST = 0.01  # … and at last
 _GROW, _SHRINK = 1.6, 0.4
 _GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
 _SETTLED = 1e-3  # relative improvement predicted for the largest window that ends the optimisation
@@ -134,6 +135,7 @@ class _Search:
         self.bounded = [part for part in problem.limits if self._is_bound(part.term)]
         inner = replace(problem, limits=[part for part in problem.limits if not self._is_bound(part.term)])
         self.evaluator = Evaluator(inner, start)
+        self.margin = _MARGIN
         self.began = time.perf_counter()
         reached = self.evaluator.begin()
         states = {self.base: reached[self.base].equilibrium.state}
@@ -152,6 +154,7 @@ class _Search:
         self._modelled: TensionModel | None = None
         self.most_cables: int | None = None
         self.groups: Indices | None = None  # of the present cables, with one rest length each
+        self.climbing = False  # the softest modes stand in for the objective
         self.guarded = False  # cables may not go slack under additional loads
 
     def stiffness(self) -> float:
@@ -171,8 +174,9 @@ class _Search:
         self.accepted, self.history = [self.point], [self._record(self.point, True)]
 
     def run(self, evaluations: int, *, thin: bool) -> Optimum:
-        """First the objective alone, then thinning."""
+        """First the branch up to the additional loads, then the objective alone, then thinning."""
         self.most = evaluations
+        self._climb(evaluations)
         self._descend(evaluations)
         while self.accepted:
             sound = self._sound(self.accepted[-1])
@@ -184,18 +188,40 @@ class _Search:
             self._thin(evaluations)
         return self._finish()
 
+    def _climb(self, evaluations: int) -> None:
+        """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the additional loads are borne whole.
+
+        Each goes along the gradient of the limits on it, with all cables kept taut; it counts where the stable branch reaches farther.
+        """
+        if self.stage == 1.0 or self.least == 0.0:
+            return
+        window, self.guarded, self.climbing = self.window, True, True
+        while self.stage < 1.0 and self.evaluator.evaluations < evaluations and self.window > self.smallest * self.tension:
+            model = self._model()
+            y, _ = self._propose(model)
+            trial = self._try(model, y)
+            stage = 0.0 if trial is None else self._stage(trial.design, trial.states[self.base], 0.0)
+            if trial is None or stage <= self.stage:
+                self.window *= _SHRINK
+                self.history.append(self._record(trial or self.point, False))
+                continue
+            self.stage = stage
+            self.point = self.evaluator.seed(trial.design, self._staged(trial.design, trial.states[self.base], stage), stage)
+            self.accepted.append(self.point)
+            self.history.append(self._record(self.point, True))
+        self.window, self.guarded, self.climbing = window, False, False
+
     def _descend(self, evaluations: int) -> None:
-        """Rounds of model, trial and judgement."""
-        model, refused = self._model(), False
+        """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none may."""
+        model, refused, first = self._model(), False, self.window
         while self.evaluator.evaluations < evaluations:
             y, predicted = self._propose(model)
-            if self.stage == 1.0 and self._violation(self.point) <= 0.0:
-                if -predicted < _SETTLED * self.point.objective and self.window >= self.tension:
-                    self.status = f"the model predicts less than {_SETTLED:.1%} improvement"
+            self.status = self._settled(predicted) or self.status
+            if self._settled(predicted):
+                if self.guarded:
                     return
-                if self.window < self.smallest * self.tension:
-                    self.status = "the objective has no better design within the smallest window"
-                    return
+                self.guarded, self.window = True, first
+                continue
             trial = self._try(model, y)
             if trial is None or self._merit(trial) >= self._merit(self.point):
                 self.window *= _SHRINK
@@ -208,6 +234,16 @@ class _Search:
             refused = False
             self._accept(trial)
             model = self._model()
+
+    def _settled(self, predicted: float) -> str:
+        """The criterion of convergence that the point meets, in words; empty where none is met."""
+        if self.stage < 1.0 or self._violation(self.point) > 0.0:
+            return ""
+        if -predicted < _SETTLED * self.point.objective and self.window >= self.tension:
+            return f"the model predicts less than {_SETTLED:.1%} improvement"
+        if self.window < self.smallest * self.tension:
+            return "the objective has no better design within the smallest window"
+        return ""
 
     def _thin(self, evaluations: int) -> None:
         """Takes away cables that the shell can spare (thinning.py), in batches, and lets the others make up for them.
@@ -336,6 +372,8 @@ class _Search:
             if isinstance(part.term, (Misfit, RobustMisfit)) and part.term.load == self.base
         )
         slope = self._exact_in_tension(slope, model)
+        if self.climbing:
+            slope = self._stiffening() @ model.variables_by_y
         rows = self.point.constraints_by_variables @ model.variables_by_y
         values = self.point.constraints
         falls, margins = self._guarding(model, width)
@@ -396,6 +434,13 @@ class _Search:
             np.full(steps.shape[1], _WIDE),
         )
         return steps @ v if v is not None else np.zeros(count)
+
+    def _stiffening(self) -> Reals:
+        """The gradient (s,) of the limits on the softest modes, each as a share of its own size."""
+        rows = _split(np.arange(len(self.point.constraints), dtype=float), self.evaluator.problem)
+        own = [k for part, where in zip(self.evaluator.problem.limits, rows, strict=True) if isinstance(part.term, Softness) for k in where.astype(int)]
+        slopes = self.point.constraints_by_variables[own]
+        return np.asarray((slopes / np.linalg.norm(slopes, axis=1)[:, None]).sum(axis=0))
 
     def _guarding(self, model: TensionModel, width: Reals) -> tuple[Reals, Reals]:
         """Rows (g, y) and values (g,), at most 0 where each guarded cable keeps its least tension, per window and in shares of what
@@ -493,9 +538,9 @@ class _Search:
             if name != self.base:
                 before, after = self.problem.loads[self.base], self.problem.loads[name]
                 assembly = self.evaluator.assembly(design)
-                loaded = apply_load(assembly, state, before, after, step=0.5, smallest=0.125, stay=True)
+                loaded = apply_load(assembly, state, before, after, step=0.5, smallest=min(0.125, self.margin), stay=True)
                 self.evaluator.factorisations += loaded.factorisations
-                stages.append(1.0 if loaded.on_branch else max(least, loaded.share - _MARGIN))
+                stages.append(1.0 if loaded.on_branch else max(least, loaded.share - self.margin))
         return min(stages, default=1.0)
 
     def _staged(self, design: Design, state: State, stage: float) -> dict[str, State]:
@@ -514,7 +559,10 @@ class _Search:
             return
         design, state = self.point.design, self.point.states[self.base]
         stage = self._stage(design, state, self.stage)
-        if stage > self.stage:
+        if stage <= self.stage:
+            # Far from the end of its branch a design feels no limit on its softest mode, and nothing drives it on: go nearer.
+            self.margin = max(0.5 * self.margin, _NEAREST)
+        else:
             self.stage = stage
             self.point = self.evaluator.seed(design, self._staged(design, state, stage), stage)
 

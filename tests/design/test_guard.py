@@ -88,3 +88,25 @@ def test_a_quadratic_problem_is_solved_to_its_conditions_of_optimality():
     assert (np.abs(u) < 1.0).all()
     np.testing.assert_allclose(active.T @ force, -(hessian @ u + slope), atol=1e-6)
     assert force.min() > 0.0
+
+
+def test_a_start_that_snaps_through_under_the_additional_load_is_led_to_a_design_that_bears_it(shell):
+    openings = [
+        [[x + r * np.cos(k * np.pi / 6), y + r * np.sin(k * np.pi / 6)] for k in range(12)]
+        for x, y, r in [(0.47, 0.0, 0.132), (-0.47, -0.02, 0.132), (0.02, 0.29, 0.152), (-0.05, -0.29, 0.152)]
+    ]
+    wet = 1.1 * shell.point_load(6.9, every=2, openings=openings)
+    problem = sf.Problem(
+        shell,
+        {"wet": wet, "wetter": 1.2 * wet},
+        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
+        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+    )
+    start = sf.follow(shell, shell.design(), problem.loads, stay=True)
+    assert start["wet"].on_branch
+    assert not start["wetter"].on_branch
+    best = mma.optimize(problem, shell.design(), evaluations=12, thin=False)
+    assert best.history[0].stage < 1.0
+    assert all(each.on_branch and each.equilibrium.stable for each in best.loaded.values())
+    assert max(best.constraints.values()) <= mma.FEASIBLE
+    assert best.objective < 0.6
