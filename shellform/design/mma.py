@@ -117,7 +117,7 @@ def polish(
         search = _Search(problem, best.design, WINDOW, progress)
         search.keep_stiff(_POLISHED * best.stiffness)
         search.braces[:] = True
-        search.guarded = True
+        search.guarded = search.always_guarded = True
         search.groups = None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
         search.smallest = _FINEST
         polished = search.run(evaluations, thin=False)
@@ -155,6 +155,7 @@ class _Search:
         self.most_cables: int | None = None
         self.groups: Indices | None = None  # of the present cables, with one rest length each
         self.climbing = False  # the softest modes stand in for the objective
+        self.always_guarded = False
         self.guarded = False  # cables may not go slack under additional loads
 
     def stiffness(self) -> float:
@@ -212,15 +213,17 @@ class _Search:
         self.window, self.guarded, self.climbing = window, False, False
 
     def _descend(self, evaluations: int) -> None:
-        """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none may."""
-        model, refused, first = self._model(), False, self.window
+        """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none may; and so in turns
+        as long as a turn improves the objective."""
+        model, refused, first, before = self._model(), False, self.window, np.inf
         while self.evaluator.evaluations < evaluations:
             y, predicted = self._propose(model)
             self.status = self._settled(predicted) or self.status
             if self._settled(predicted):
-                if self.guarded:
+                if self.always_guarded or (self.guarded and self.point.objective > (1.0 - _SETTLED) * before):
                     return
-                self.guarded, self.window = True, first
+                before = self.point.objective if self.guarded else before
+                self.guarded, self.window = not self.guarded, first
                 continue
             trial = self._try(model, y)
             if trial is None or self._merit(trial) >= self._merit(self.point):
@@ -504,7 +507,7 @@ class _Search:
             design = replace(design, rest_length=rest)
         near = {**self.evaluator.predicted(self.point, design), self.base: model.predicted(y)}
         try:
-            return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage)
+            return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage, lead=not self.guarded)
         except OffBranch:
             return None
 
