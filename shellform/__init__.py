@@ -39,6 +39,7 @@ _ROOMS = {
     "plots": "shellform.output.plots",
     "model": "shellform.structure.model",
     "analysis": "shellform.structure.analysis",
+    "study": "shellform.study",
 }
 _NAMES = {name: home for home, names in _HOMES.items() for name in names}
 

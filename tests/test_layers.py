@@ -18,8 +18,12 @@ DOORS = {
     "matplotlib": {"output/plots.py"},
     "cvxopt": {"structure/sparse.py"},
     "numba": {"compiled.py"},
+    "dask": {"study/sweep.py"},
+    "distributed": {"study/sweep.py"},
+    "pyarrow": {"study/store.py"},
+    "optuna": {"study/search.py"},
 }
-NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "dask", "numba", "scipy", "numpy"]
+NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "dask", "pyarrow", "optuna", "numba", "scipy", "numpy"]
 
 
 def imports(path: Path) -> list[str]:

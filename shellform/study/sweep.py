@@ -1,0 +1,162 @@
+"""Many jobs on many processes: the door to Dask.
+
+Workers are processes with one thread each; linear algebra and loops within them keep to that thread, so that they don't fight for
+cores. Jobs are handed out within a window of twice the threads, and their outcomes are passed on as they come, so that memory doesn't
+grow with the study. A job on which others build is one task on which theirs depend: Dask runs it once, before them. When a worker dies,
+Dask starts another and gives its jobs out again; a job that has taken three workers with it is tried once more when all others are
+done, then given up.
+"""
+
+from __future__ import annotations
+
+import itertools
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from shellform.errors import InputError
+from shellform.study.job import Job, Outcome
+from shellform.study.store import CRASHED
+
+Work = Callable[[Job, Outcome | None], Outcome]
+_DEATHS = 2  # that a job survives
+_AHEAD = 2  # jobs handed out for each thread
+_ONE_THREAD = {
+    name: "1"
+    for name in (
+        "OMP_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "VTK_SMP_MAX_THREADS",
+    )
+} | {"MKL_CBWR": "AUTO"}  # MKL adds up in the same order in each process
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A running cluster: Dask's client and the address of its dashboard."""
+
+    client: Any
+    dashboard: str
+
+
+@contextmanager
+def engine(*, workers: int | None = None, scheduler: str | None = None, processes: bool = True) -> Iterator[Engine]:
+    """`workers` processes on this machine (default: one a core), or the cluster whose `scheduler` has that address.
+
+    Scheduler, workers and dashboard of this machine listen on its loopback address alone. With `processes` False the workers are
+    threads, to try out the engine. Raises InputError where a cluster doesn't answer.
+    """
+    import dask
+
+    quiet = {name: "critical" for name in ("distributed", "bokeh", "tornado", "tornado.application")}
+    settings = {
+        "logging": quiet,
+        "distributed.scheduler.allowed-failures": _DEATHS,
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.worker.daemon": False,  # surface readers are processes of their own
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
+        "distributed.comm.timeouts.connect": "30s",
+    }
+    with dask.config.set(settings):
+        from distributed import Client, LocalCluster
+
+        if scheduler is not None:
+            try:
+                client = Client(scheduler, timeout="20s", set_as_default=False)
+            except (OSError, ValueError, ImportError) as error:
+                raise InputError(f"doesn't answer: {error}", where="--scheduler", value=scheduler) from error
+            try:
+                yield Engine(client, client.dashboard_link or "")
+            finally:
+                client.close(timeout=5)
+            return
+        cluster = LocalCluster(
+            n_workers=workers or _cores(),
+            threads_per_worker=1,
+            processes=processes,
+            host="127.0.0.1" if processes else None,
+            dashboard_address="127.0.0.1:0",
+            worker_dashboard_address=None,
+        )
+        try:
+            client = Client(cluster, set_as_default=False)
+            try:
+                yield Engine(client, cluster.dashboard_link)
+            finally:
+                client.close(timeout=5)
+        finally:
+            cluster.close(timeout=5)
+
+
+def sweep(engine: Engine, jobs: Iterable[Job], work: Work) -> Iterator[list[Outcome]]:
+    """Runs `work` on each job and gives the outcomes in the batches in which they come, in no order."""
+    again: list[Job] = []
+    yield from _pass(engine, jobs, work, lambda job, reason: again.append(job))
+    lost: list[Outcome] = []
+    for job in again:  # alone, so that no other job is blamed
+        yield from _pass(engine, [job], work, lambda job, reason: lost.append(_crashed(job, reason)))
+    if lost:
+        yield lost
+
+
+def _pass(engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, str], None]) -> Iterator[list[Outcome]]:
+    from distributed import as_completed
+
+    client, waiting = engine.client, iter(jobs)
+    running: dict[str, tuple[Job, Any]] = {}
+    shared: dict[str, list[Any]] = {}  # a job before others: its future, and how many running ones need it
+    finished = as_completed([], loop=client.loop)
+    while True:
+        room = _AHEAD * max(1, sum(client.nthreads().values())) - len(running)
+        fresh = [(job, _submit(client, job, work, shared)) for job in itertools.islice(waiting, max(0, room))]
+        running |= {future.key: (job, future) for job, future in fresh}
+        finished.update([future for _, future in fresh])
+        if not running:
+            return
+        done: list[Outcome] = []
+        for future in finished.next_batch(block=True):
+            job = running.pop(future.key)[0]
+            for each in job.before:
+                shared[each.key][1] -= 1
+                if not shared[each.key][1]:
+                    del shared[each.key]
+            try:
+                done.append(future.result())
+            except Exception as error:  # `work` raises nothing: it is its worker that was lost
+                died(job, _reason(error))
+        yield done
+
+
+def _submit(client: Any, job: Job, work: Work, shared: dict[str, list[Any]]) -> Any:
+    before = None
+    for each in job.before:
+        if each.key not in shared:
+            shared[each.key] = [client.submit(work, each, before, key=f"stage-{each.key}", pure=False), 0]
+        shared[each.key][1] += 1
+        before = shared[each.key][0]
+    return client.submit(work, job, before, key=f"design-{job.key}", pure=False)
+
+
+def _crashed(job: Job, reason: str) -> Outcome:
+    return {"key": job.key, "status": CRASHED, "reason": reason, "summary": {}, "seconds": {}, "worker": ""}
+
+
+def _reason(error: BaseException | None) -> str:
+    from distributed.scheduler import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        return f"took {_DEATHS + 1} workers with it: out of memory, or a fault in a library"
+    return f"{type(error).__name__}: {error}"
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
