@@ -59,6 +59,7 @@ class Log:
                 self._enter(row, self._end)
                 self._end += len(line)
         self._open.truncate(self._end)
+        self._begin = self._end
 
     def __enter__(self) -> Log:
         return self
@@ -75,6 +76,10 @@ class Log:
     def __contains__(self, key: object) -> bool:
         """Whether there is a result that stands."""
         return key in self._places and key not in self._crashed
+
+    def old(self, key: str) -> bool:
+        """Whether there was a result that stands when the log was opened."""
+        return key in self and self._places[key] < self._begin
 
     def get(self, key: str) -> dict[str, Any] | None:
         """A design's row, crashed ones too."""

@@ -159,18 +159,21 @@ def _list(study: _Studying, batch: Batch, listed: Any) -> tuple[list[str], Count
     stages = STAGES[: STAGES.index(study.plan.study.until)]
     shared: Counter[str] = Counter()
     keys, fresh, refused = [], set(), []
+    old = set()
     for own in batch():
         design = _identify(study, own)
         listed.write(json.dumps({"key": design.key, "own": dict(design.own)}) + "\n")
         keys.append(design.key)
         if design.key in study.log:
-            study.progress.found += design.key not in fresh
+            if study.log.old(design.key):
+                old.add(design.key)
         elif design.case is None:
             refused.append(_row(design.key, "refused", design.reason))
         elif design.key not in fresh:
             fresh.add(design.key)
             shared.update(design.keys[stage] for stage in stages)
     listed.flush()
+    study.progress.found += len(old)
     if refused:
         _enter(study, list({row["key"]: row for row in refused}.values()))
     study.show(study.progress)
@@ -305,4 +308,4 @@ def _finish(study: _Studying) -> Finding:
             reason = reason or ("" if row is None else f"{row['status']}: {row['reason']}")
     if failed == count:
         raise NotConverged(f"None of {count} designs has a result. The first was {reason}")
-    return Finding(count, failed, study.progress.found, study.folder / "table.parquet")
+    return Finding(count, failed, sum(study.log.old(key) for key in set(keys)), study.folder / "table.parquet")

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -58,6 +59,8 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
         "logging": quiet,
         "distributed.scheduler.allowed-failures": _DEATHS,
         "distributed.scheduler.worker-saturation": 1.0,
+        # Ctrl-C reaches all processes of a terminal; the study alone answers it and ends its workers.
+        "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"],
         "distributed.worker.daemon": False,  # surface readers are processes of their own
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
@@ -69,7 +72,7 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
 
         if scheduler is not None:
             try:
-                client = Client(scheduler, timeout="20s", set_as_default=False)
+                client = Client(scheduler, timeout="10s", set_as_default=False)
             except (OSError, ValueError, ImportError) as error:
                 raise InputError(f"doesn't answer: {error}", where="--scheduler", value=scheduler) from error
             try:
@@ -135,13 +138,14 @@ def _pass(engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, 
 
 
 def _submit(client: Any, job: Job, work: Work, shared: dict[str, list[Any]]) -> Any:
+    """Hands out a job. Each handing out has a name of its own: Dask remembers what failed by name."""
     before = None
     for each in job.before:
         if each.key not in shared:
-            shared[each.key] = [client.submit(work, each, before, key=f"stage-{each.key}", pure=False), 0]
+            shared[each.key] = [client.submit(work, each, before, key=f"stage-{each.key}-{uuid.uuid4().hex}"), 0]
         shared[each.key][1] += 1
         before = shared[each.key][0]
-    return client.submit(work, job, before, key=f"design-{job.key}", pure=False)
+    return client.submit(work, job, before, key=f"design-{job.key}-{uuid.uuid4().hex}")
 
 
 def _crashed(job: Job, reason: str) -> Outcome:
