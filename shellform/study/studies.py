@@ -32,6 +32,7 @@ from shellform.study.front import Front, signed
 from shellform.study.job import NO_ROOM, Job, Outcome, disk_is_full, locked, work
 from shellform.study.plan import Plan, Value, changes, length, read_study, resolved
 from shellform.study.run import STAGES, stage_keys
+from shellform.study.sheet import write_study_page
 from shellform.study.store import Log, designs_of, flat, picked, write_table
 from shellform.study.sweep import Engine, Work, engine, sweep
 
@@ -297,6 +298,7 @@ def _drop(folder: Path) -> None:
 def _finish(study: _Studying) -> Finding:
     plan = study.plan
     write_table(study.folder, study.log, plan.study.column)
+    write_study_page(study.folder, plan)
     if plan.study.keep == "none":
         _drop(study.folder / "stages")
     failed, reason, count = 0, "", 0
