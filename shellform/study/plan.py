@@ -33,7 +33,6 @@ from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    PositiveInt,
     ValidationError,
     field_validator,
     model_validator,
@@ -67,7 +66,7 @@ class VaryEntry(_Part):
     values: list[Value] | None = Field(None, min_length=1, description="the values themselves")
     low: float | None = Field(None, description="of a range")
     high: float | None = Field(None, description="of a range")
-    count: PositiveInt | None = Field(None, description="of values that a grid takes from a range")
+    count: int | None = Field(None, ge=1, le=_MOST, description="of values that a grid takes from a range")
     scale: Literal["linear", "log"] = Field("linear", description="log: equal ratios")
     whole: bool = Field(False, description="whole numbers alone")
     files: str | None = Field(None, description='pattern of files beside or below the study file, like "shells/*.step"')
@@ -94,9 +93,9 @@ class Study(_Part):
     until: Literal["surface", "net", "initial", "optimise", "figures"] = Field("optimise", description="last stage of each design")
     keep: Literal["all", "best", "none"] = Field("best", description="run folders that stay")
     method: Literal["grid", "random", "latin", "sobol", "search"] = Field("grid", description="how the varied entries combine")
-    count: PositiveInt | None = Field(None, description="of designs, for all methods but grid")
-    population: int = Field(24, ge=2, description="of a search's generation")
-    seed: int = Field(1, ge=0)
+    count: int | None = Field(None, ge=1, le=_MOST, description="of designs, for all methods but grid")
+    population: int = Field(24, ge=2, le=10_000, description="of a search's generation")
+    seed: int = Field(1, ge=0, lt=2**32)
     set: dict[str, Any] = Field({}, description="entries for all designs")
     vary: dict[str, VaryEntry] = Field({}, description="entries that vary")
     designs: list[dict[str, Any]] = Field([], description="designs listed one by one; each is combined with all that varies")

@@ -10,10 +10,11 @@ done, then given up.
 from __future__ import annotations
 
 import itertools
+import logging
 import os
 import uuid
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,14 +54,20 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
     threads, to try out the engine. Raises InputError where a cluster doesn't answer.
     """
     import dask
+    from distributed import (  # before the settings: it adds its own, which would be forgotten with them
+        Client,
+        LocalCluster,
+    )
 
     quiet = {name: "critical" for name in ("distributed", "bokeh", "tornado", "tornado.application")}
+    for name in quiet:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     settings = {
         "logging": quiet,
         "distributed.scheduler.allowed-failures": _DEATHS,
         "distributed.scheduler.worker-saturation": 1.0,
         # Ctrl-C reaches all processes of a terminal; the study alone answers it and ends its workers.
-        "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"],
+        "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"] if processes else [],
         "distributed.worker.daemon": False,  # surface readers are processes of their own
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
@@ -68,8 +75,6 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
         "distributed.comm.timeouts.connect": "30s",
     }
     with dask.config.set(settings):
-        from distributed import Client, LocalCluster
-
         if scheduler is not None:
             try:
                 client = Client(scheduler, timeout="10s", set_as_default=False)
@@ -78,7 +83,7 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
             try:
                 yield Engine(client, client.dashboard_link or "")
             finally:
-                client.close(timeout=5)
+                _close(client)
             return
         cluster = LocalCluster(
             n_workers=workers or _cores(),
@@ -93,9 +98,15 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
             try:
                 yield Engine(client, cluster.dashboard_link)
             finally:
-                client.close(timeout=5)
+                _close(client)
         finally:
-            cluster.close(timeout=5)
+            _close(cluster)
+
+
+def _close(part: Any) -> None:
+    """Ends a client or a cluster; one that takes longer than it should is left behind, and ends with this process."""
+    with suppress(TimeoutError):
+        part.close(timeout=10)
 
 
 def sweep(engine: Engine, jobs: Iterable[Job], work: Work) -> Iterator[list[Outcome]]:

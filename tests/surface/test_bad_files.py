@@ -140,6 +140,8 @@ def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
         refused(tmp_path / "a.obj", f"line {good.count(chr(10)) + 1}", bad)
     (tmp_path / "a.obj").write_text(good + "f 1 2 999\n")
     refused(tmp_path / "a.obj", "a face names vertex 999, of 117")
+    (tmp_path / "a.obj").write_text(good + f"f 1 2 {10**20}\n")
+    refused(tmp_path / "a.obj", "a number beyond all counts")
     text = write_off(tmp_path / "a.off", POINTS, QUADS).read_text().splitlines()
     (tmp_path / "a.off").write_text("\n".join([*text[:10], "0 0 x", *text[11:]]))
     refused(tmp_path / "a.off", "line 11")
