@@ -11,7 +11,9 @@ from __future__ import annotations
 
 import itertools
 import logging
+import math
 import os
+import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -25,6 +27,7 @@ from shellform.study.store import CRASHED
 Work = Callable[[Job, Outcome | None], Outcome]
 _DEATHS = 2  # that a job survives
 _AHEAD = 2  # jobs handed out for each thread
+_RECOUNT = 1.0  # seconds after which the cluster's threads are counted anew
 _ONE_THREAD = {
     name: "1"
     for name in (
@@ -50,7 +53,8 @@ class Engine:
 def engine(*, workers: int | None = None, scheduler: str | None = None, processes: bool = True) -> Iterator[Engine]:
     """`workers` processes on this machine (default: one a core), or the cluster whose `scheduler` has that address.
 
-    Scheduler, workers and dashboard of this machine listen on its loopback address alone. With `processes` False the workers are
+    Scheduler, workers and dashboard of this machine listen on its loopback address alone; the first two speak to nobody without the
+    certificate that is made for each cluster. With `processes` False the workers are
     threads, to try out the engine. Raises InputError where a cluster doesn't answer.
     """
     import dask
@@ -90,6 +94,7 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
             threads_per_worker=1,
             processes=processes,
             host="127.0.0.1" if processes else None,
+            security=processes,  # certificates of its own, in memory: nobody else on the machine can send it work
             dashboard_address="127.0.0.1:0",
             worker_dashboard_address=None,
         )
@@ -126,25 +131,28 @@ def _pass(engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, 
     client, waiting = engine.client, iter(jobs)
     running: dict[str, tuple[Job, Any]] = {}
     shared: dict[str, list[Any]] = {}  # a job before others: its future, and how many running ones need it
-    finished = as_completed([], loop=client.loop)
+    finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
+    threads, asked = 1, -math.inf
     while True:
-        room = _AHEAD * max(1, sum(client.nthreads().values())) - len(running)
+        if time.monotonic() > asked + _RECOUNT:
+            threads, asked = max(1, sum(client.nthreads().values())), time.monotonic()
+        room = _AHEAD * threads - len(running)
         fresh = [(job, _submit(client, job, work, shared)) for job in itertools.islice(waiting, max(0, room))]
         running |= {future.key: (job, future) for job, future in fresh}
         finished.update([future for _, future in fresh])
         if not running:
             return
         done: list[Outcome] = []
-        for future in finished.next_batch(block=True):
+        for future, found in finished.next_batch(block=True):
             job = running.pop(future.key)[0]
             for each in job.before:
                 shared[each.key][1] -= 1
                 if not shared[each.key][1]:
                     del shared[each.key]
-            try:
-                done.append(future.result())
-            except Exception as error:  # `work` raises nothing: it is its worker that was lost
-                died(job, _reason(error))
+            if future.status == "finished":
+                done.append(found)
+            else:  # `work` raises nothing: it is its worker that was lost
+                died(job, _reason(found))
         yield done
 
 
@@ -163,9 +171,11 @@ def _crashed(job: Job, reason: str) -> Outcome:
     return {"key": job.key, "status": CRASHED, "reason": reason, "summary": {}, "seconds": {}, "worker": ""}
 
 
-def _reason(error: BaseException | None) -> str:
+def _reason(found: Any) -> str:
+    """Why there is no outcome, from what Dask gives in its place: an error, or its type, itself and its traceback."""
     from distributed.scheduler import KilledWorker
 
+    error = found[1] if isinstance(found, tuple) else found
     if isinstance(error, KilledWorker):
         return f"took {_DEATHS + 1} workers with it: out of memory, or a fault in a library"
     return f"{type(error).__name__}: {error}"

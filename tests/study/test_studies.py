@@ -317,7 +317,10 @@ def test_summaries_become_columns():
 def test_dashboard_and_scheduler_listen_on_loopback_alone(two):
     assert two.dashboard.startswith("http://127.0.0.1:")
     addresses = [two.client.scheduler.address, *two.client.scheduler_info()["workers"]]
-    assert all("//127.0.0.1:" in address for address in addresses)
+    assert all(address.startswith("tls://127.0.0.1:") for address in addresses)
+    plain = addresses[0].replace("tls", "tcp")
+    with pytest.raises(InputError, match="--scheduler"), engine(scheduler=plain):
+        pass  # without the cluster's certificate
     with pytest.raises(InputError, match="--scheduler"), engine(scheduler="tcp://127.0.0.1:9"):
         pass
 
