@@ -131,7 +131,7 @@ def _pass(engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, 
     client, waiting = engine.client, iter(jobs)
     running: dict[str, tuple[Job, Any]] = {}
     shared: dict[str, list[Any]] = {}  # a job before others: its future, and how many running ones need it
-    finished = as_completed([], loop=client.loop, with_results=True, raise_errors=False)
+    finished = as_completed([], loop=client.loop)
     threads, asked = 1, -math.inf
     while True:
         if time.monotonic() > asked + _RECOUNT:
@@ -142,18 +142,28 @@ def _pass(engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, 
         finished.update([future for _, future in fresh])
         if not running:
             return
-        done: list[Outcome] = []
-        for future, found in finished.next_batch(block=True):
-            job = running.pop(future.key)[0]
-            for each in job.before:
+        batch = finished.next_batch(block=True)
+        for future in batch:
+            for each in running[future.key][0].before:
                 shared[each.key][1] -= 1
                 if not shared[each.key][1]:
                     del shared[each.key]
-            if future.status == "finished":
-                done.append(found)
-            else:  # `work` raises nothing: it is its worker that was lost
-                died(job, _reason(found))
-        yield done
+        yield _gathered(client, [(running.pop(future.key)[0], future) for future in batch], died)
+
+
+def _gathered(client: Any, ended: list[tuple[Job, Any]], died: Callable[[Job, str], None]) -> list[Outcome]:
+    """The outcomes of jobs that ended, asked for at once; one by one where a worker was lost between the end and the asking."""
+    try:
+        found: list[Outcome] = client.gather([future for _, future in ended])
+        return found
+    except Exception:  # `work` raises nothing: a worker was lost
+        done = []
+        for job, future in ended:
+            try:
+                done.append(future.result())
+            except Exception as error:
+                died(job, _reason(error))
+        return done
 
 
 def _submit(client: Any, job: Job, work: Work, shared: dict[str, list[Any]]) -> Any:
@@ -171,11 +181,10 @@ def _crashed(job: Job, reason: str) -> Outcome:
     return {"key": job.key, "status": CRASHED, "reason": reason, "summary": {}, "seconds": {}, "worker": ""}
 
 
-def _reason(found: Any) -> str:
-    """Why there is no outcome, from what Dask gives in its place: an error, or its type, itself and its traceback."""
+def _reason(error: Exception) -> str:
+    """Why there is no outcome."""
     from distributed.scheduler import KilledWorker
 
-    error = found[1] if isinstance(found, tuple) else found
     if isinstance(error, KilledWorker):
         return f"took {_DEATHS + 1} workers with it: out of memory, or a fault in a library"
     return f"{type(error).__name__}: {error}"
