@@ -24,7 +24,9 @@ _HOMES = {
     "shellform.design.catalogue": ("Catalogue", "read_catalogue", "rounded_up", "neighbours"),
     "shellform.design.problem": ("Problem", "follow", "deviations"),
     "shellform.design.terms": ("Share", "AtMost", "Misfit", "RmsMisfit", "CableForce", "CableForces", "RodRadius"),
-    "shellform.design.checks": ("RodUtilisation", "ConnectorTurn", "Slackness", "Softness", "Uplift"),
+    "shellform.design.checks": ("RodUtilisation", "ConnectorTurn", "LargestCableForce", "Slackness", "Softness", "Uplift"),
+    "shellform.design.robust": ("RobustMisfit",),
+    "shellform.design.scatter": ("Scatter",),
 }
 _ROOMS = {
     "cad": "shellform.surface.cad",
@@ -32,6 +34,7 @@ _ROOMS = {
     "funicular": "shellform.surface.funicular",
     "mma": "shellform.design.mma",
     "calibration": "shellform.design.calibration",
+    "comparison": "shellform.design.comparison",
     "site": "shellform.design.site",
     "erection": "shellform.design.erection",
     "robust": "shellform.design.robust",

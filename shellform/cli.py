@@ -239,7 +239,7 @@ def _lead(text: str) -> tuple[int, int, float]:
 def render(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
     load: Annotated[str | None, typer.Option(help="none, design or additional.")] = None,
-    design: Annotated[str | None, typer.Option(help="unbraced, initial, unloaded or optimised.")] = None,
+    design: Annotated[str | None, typer.Option(help="unbraced, initial, unloaded, optimised, rounded or polished.")] = None,
     limit: Annotated[float | None, typer.Option(help="End of the colour scale, m.")] = None,
 ) -> None:
     """Draw deviation maps of a run."""
@@ -267,6 +267,103 @@ def study(
         found = run_study(file, output, workers=workers, scheduler=scheduler, allow_scripts=allow_scripts, show=live)
     failed = f", {found.failed} of them without a result (see status and reason)" if found.failed else ""
     print(f"{found.designs} designs, {found.found} found from before{failed}: {found.table}")
+
+
+@app.command()
+def calibrate(
+    source: Annotated[Path, typer.Argument(metavar="RUN|CASE", help="Run folder, or a case file: its grid unbraced.")],
+    scans: Annotated[
+        list[str], typer.Argument(metavar="POINTS.csv=LOAD…", help="Points x, y, z in any order; LOAD: a load case, or a CSV file of node, fx, fy, fz in N.")
+    ],
+    design: Annotated[str | None, typer.Option(help="Of the run, as which the grid was built; left out: unbraced.")] = None,
+    markers: Annotated[Path | None, typer.Option(help="CSV file with a column node or crossing; left out: every crossing.")] = None,
+    unit: Annotated[str, typer.Option(help="Of the points: m, cm, mm, in, ft.")] = "m",
+    noise: Annotated[float, typer.Option(help="Of a measured coordinate, m (one standard deviation).")] = 0.15e-3,
+    free: Annotated[list[str] | None, typer.Option(help="axial, torsion or bending; left out: all that the scans tell.")] = None,
+    placed: Annotated[bool, typer.Option("--placed", help="The points are in the model's axes.")] = False,
+    offsets: Annotated[bool, typer.Option("--offsets", help="Markers sit away from their nodes, the same in all scans.")] = False,
+    output: Annotated[Path | None, typer.Option(help="Folder for results; left out: RUN/schedules, or here.")] = None,
+    allow_scripts: Scripts = False,
+) -> None:
+    """Find the connectors' stiffness from scans of the grid under known loads."""
+    from shellform.study import onsite
+
+    _say(
+        onsite.calibrate(
+            source,
+            scans,
+            design=design,
+            markers=markers,
+            unit=unit,
+            noise=noise,
+            placed=placed,
+            offsets=offsets,
+            output=output,
+            allow_scripts=allow_scripts,
+            free=free or (),
+        )
+    )
+
+
+@app.command()
+def survey(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    measured: Annotated[
+        Path | None, typer.Argument(metavar="SURVEY.csv", help="node or crossing, x, y, z in the model's axes; or x, y, z in any axes and order.")
+    ] = None,
+    design: Annotated[str | None, typer.Option(help="As which the grid was built; left out: the run's last.")] = None,
+    load: Annotated[str, typer.Option(help="Load case that the grid bears.")] = "none",
+    unit: Annotated[str, typer.Option(help="Of the survey: m, cm, mm, in, ft.")] = "m",
+    noise: Annotated[float, typer.Option(help="Of a measured coordinate, m (one standard deviation).")] = 0.15e-3,
+    length_error: Annotated[float, typer.Option(help="Usual error of a cable's rest length, m.")] = 1e-3,
+    step: Annotated[float, typer.Option(help="Rest length of one turn of a turnbuckle, m.")] = 0.25e-3,
+    largest: Annotated[float, typer.Option(help="Largest change of a cable in one round, m.")] = 1.5e-3,
+    cables: Annotated[int, typer.Option(help="Most cables that are turned in one round.")] = 60,
+    after: Annotated[Path | None, typer.Option(help="belief.npz of the round before, once its turns were made.")] = None,
+    replay: Annotated[int | None, typer.Option(metavar="ROUNDS", help="No survey: play that many rounds with random errors and noise.")] = None,
+    markers: Annotated[Path | None, typer.Option(help="For --replay: CSV file with a column node or crossing; left out: every crossing.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="For --replay.")] = 0,
+    slip: Annotated[float, typer.Option(help="For --replay: error of a turn, as a share of it.")] = 0.05,
+    output: Annotated[Path | None, typer.Option(help="Folder for results; left out: RUN/schedules.")] = None,
+) -> None:
+    """Tell the crew which turnbuckles to turn, from a survey of the erected grid."""
+    from shellform.study import onsite
+
+    if (measured is None) == (replay is None):
+        raise InputError("needs either a survey or --replay", where="survey")
+    options = onsite.Survey(design, load, unit, noise, length_error, step, largest, cables, after)
+    if replay is not None:
+        _say(onsite.replay(run, options, rounds=replay, seed=seed, slip=slip, markers=markers, output=output))
+    elif measured is not None:
+        _say(onsite.survey(run, measured, options, output))
+
+
+@app.command()
+def erect(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    design: Annotated[str | None, typer.Option(help="Left out: the run's last.")] = None,
+    load: Annotated[str | None, typer.Option(help="In the end: a load case, or a CSV file of node, fx, fy, fz in N.")] = None,
+    weight: Annotated[str | None, typer.Option(help="All the time, given likewise.")] = None,
+    lift: Annotated[str | None, typer.Option(help="While the supports move, given likewise.")] = None,
+    groups: Annotated[Path | None, typer.Option(help="Cables tightened together: CSV file of cable, group.")] = None,
+    way: Annotated[Path | None, typer.Option(help="Places of the supports on the way: CSV file of stop, node, x, y, z.")] = None,
+    step: Annotated[float, typer.Option(help="Share of a stage.")] = 0.1,
+    output: Annotated[Path | None, typer.Option(help="Folder for results; left out: RUN/schedules.")] = None,
+) -> None:
+    """Follow the grid from flat to erected, tightened and loaded."""
+    from shellform.study import onsite
+
+    _say(
+        onsite.erect(
+            run, design=design, load=load, weight=weight, lift=lift, groups=groups, way=way, step=step, output=output
+        )
+    )
+
+
+def _say(told: Any) -> None:
+    """The lines of a command's result, then its files."""
+    for line in [*told.lines, *told.files]:
+        print(line)
 
 
 @app.command()
@@ -322,6 +419,14 @@ def _tell(summary: dict[str, Any]) -> None:
     if "optimisation" in summary:
         told = summary["optimisation"]
         print(f"objective {told['objective_start']:.3g} -> {told['objective_end']:.3g}: {told['status']}")
+        over = [f"{name} by {value:.1%}" for name, value in told["constraints"].items() if value > 1e-3]
+        if over:
+            print(f"limits that are not kept: {', '.join(over)}")
+    for each in summary.get("sections", []):
+        found = f"objective {each['objective']:.3g}, {each['cables']} cables" if each["objective"] is not None else "no design"
+        print(f"{each['section']:>10}  {found}{'' if each['feasible'] else ': ' + each['why_not']}")
+    for sentence in summary.get("robust", {}).get("sentences", []):
+        print(sentence)
 
 
 def _no_number(value: object) -> Any:

@@ -16,7 +16,7 @@ DOORS = {
     "pyvista": {"output/render.py"},
     "vtk": {"output/render.py"},
     "matplotlib": {"output/plots.py"},
-    "cvxopt": {"structure/sparse.py"},
+    "cvxopt": {"structure/sparse.py", "design/convex.py"},
     "numba": {"compiled.py"},
     "dask": {"study/sweep.py"},
     "distributed": {"study/sweep.py"},

@@ -1,4 +1,4 @@
-"""What an engineer limits besides the paper's constraints: stress, the turning of connectors, slack cables, uplift.
+"""What an engineer limits besides the paper's constraints: stress, the turning of connectors, cable forces, slack cables, uplift.
 
 Each is the largest of many values, v_k at rod ends, connectors, cables or supports, which has no derivative where two change places. The
 Kreisselmeier-Steinhauser function
@@ -16,11 +16,12 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.terms import Measure
 from shellform.errors import InputError
 from shellform.structure import residual
+from shellform.structure.cable import make_cables
 from shellform.structure.network import assemble
 from shellform.structure.results import end_stress, end_stress_by_force, twist
 from shellform.structure.sections import stress_by_size
@@ -30,6 +31,7 @@ from shellform.structure.stability import modes
 from shellform.structure.state import State
 
 SHARPNESS = 200.0  # per unit: 3000 rod ends that are all used to the full are told 4 % too high, and a single one not at all
+_EASED = 10.0  # the same for slack cables: tensions change by many times their least in a step, so that a sharp maximum would hop from cable to cable
 _MODES = 4
 _TURN = 0.1  # rad, the unit of turns
 
@@ -79,11 +81,33 @@ class ConnectorTurn:
 
 
 @dataclass(frozen=True)
+class LargestCableForce:
+    """The largest cable tension, N: constraint (5) for load cases beside the design load, in one value; `scale`, N, is the size of tensions
+    that matter, such as their limit. A cable at less than nine tenths of the largest has no weight."""
+
+    load: str
+    scale: float
+
+    def __post_init__(self) -> None:
+        if not self.scale > 0.0:
+            raise InputError("must be positive", where="largest_cable_force.scale", value=self.scale)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value, N; slack cables count with the push that they would give."""
+        return _of_tensions(shell, design, state, np.flatnonzero(design.present), self.scale, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
 class Slackness:
-    """2 less the least cable tension over `least`, N: at most 1 where every present cable pulls with `least` or more."""
+    """2 less the least cable tension over `least`, N: at most 1 where every present cable pulls with `least` or more.
+
+    It is kept with up to ln(number) / 10 of `least` to spare. Cables longer than `let_out` times their length in the target don't count: those which the
+    optimiser has done without (tensions.py).
+    """
 
     load: str
     least: float
+    let_out: float = np.inf
 
     def __post_init__(self) -> None:
         if not self.least > 0.0:
@@ -91,16 +115,8 @@ class Slackness:
 
     def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
         """One value. A slack cable counts with the tension that it would have if it could push, which tells how slack it is."""
-        cables = shell.cables(design)
-        chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
-        length = np.linalg.norm(chord, axis=1)
-        slope = cables.stiffness / cables.rest_length
-        values = 2.0 - slope * (length - cables.rest_length) / self.least
-        toward = (-slope / length / self.least)[:, None] * chord
-        by_rest = cables.stiffness * length / cables.rest_length**2 / self.least
-        return _largest(
-            shell, 1.0, values, cables.freedoms(), np.hstack([-toward, toward]), np.zeros(len(values)), np.flatnonzero(design.present), by_rest
-        )
+        chosen = np.flatnonzero(design.present & (design.rest_length <= self.let_out * shell.cable_lengths))
+        return _of_tensions(shell, design, state, chosen, SHARPNESS / _EASED, 2.0, -1.0 / self.least)
 
 
 @dataclass(frozen=True)
@@ -167,6 +183,23 @@ class Uplift:
         if np.isin(cables.ends, shell.net.supports).any():
             raise InputError("cables that end at supports are not provided for", where="uplift")
         return _largest(shell, self.offset, self.offset - reaction, freedoms, rows, -change[held])
+
+
+def _of_tensions(
+    shell: Gridshell, design: Design, state: State, chosen: Indices, unit: float, offset: float, factor: float
+) -> Measure:
+    """KS of offset + factor EA (l / l0 - 1) of the `chosen` candidate cables; 0 where there are none."""
+    if not len(chosen):
+        zero = sp.csr_array((1, len(shell.cable_ends)))
+        return Measure(np.zeros(1), sp.csr_array((1, 6 * len(shell.net.grid.flat))), zero, np.zeros(1))
+    cables = make_cables(shell.cable_ends[chosen], rest_length=design.rest_length[chosen], stiffness=shell.cable.stiffness)
+    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    slope = factor * cables.stiffness / cables.rest_length
+    toward = (slope / length)[:, None] * chord
+    values = offset + slope * (length - cables.rest_length)
+    by_rest = -slope * length / cables.rest_length
+    return _largest(shell, unit, values, cables.freedoms(), np.hstack([-toward, toward]), np.zeros(len(values)), chosen, by_rest)
 
 
 def _largest(

@@ -26,13 +26,15 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.design.checks import ConnectorTurn, RodUtilisation, Slackness, Softness, Uplift
-from shellform.design.convex import minimise
+from shellform.design.checks import Softness
+from shellform.design.convex import minimise, minimise_quadratic
 from shellform.design.gridshell import Design
+from shellform.design.guard import guard
 from shellform.design.optimum import Optimum, Step
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
+from shellform.design.robust import RobustMisfit
 from shellform.design.tensions import TensionModel, tension_model
-from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
+from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, Share, Term
 from shellform.design.thinning import kept_stiffness, spared
 from shellform.errors import NotConverged
 from shellform.structure.loading import Loaded, apply_load
@@ -42,18 +44,6 @@ from shellform.structure.state import State
 WINDOW = 0.2  # first half-width, in mean tensions of the start
 STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
 _POLISHED = 0.8  # of that, which polishing may use up
-_NAMES: Mapping[type, str] = {
-    Misfit: "misfit",
-    RmsMisfit: "misfit",
-    CableForce: "cable_force",
-    CableForces: "cable_force",
-    RodRadius: "rod_radius",
-    RodUtilisation: "utilisation",
-    ConnectorTurn: "connector_turn",
-    Slackness: "slackness",
-    Softness: "softness",
-    Uplift: "uplift",
-}
 POLISHING = 20  # design evaluations
 _MARGIN = 0.15  # of the whole additional load that is left between a stage and the end of the stable branch
 _GROW, _SHRINK = 1.6, 0.4
@@ -63,7 +53,7 @@ _SMALLEST = 0.03  # window, in mean tensions, at which no better design is to be
 _FINEST = 0.003  # the same in polishing
 _MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
 _PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
-_FAILURES = 4  # single cables in a row that can't be taken away, after which thinning ends
+_FAILURES = 6  # single cables in a row that can't be taken away, after which thinning ends
 _BATCHES = 8  # share of the taut cables that the first batch takes, one in so many
 _KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
 _THINNING = 1.5  # of the objective that cables with little use may cost
@@ -109,6 +99,7 @@ def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | Non
     search = _Search(problem, best.design, WINDOW, progress)
     search.keep_stiff(_POLISHED * best.stiffness)
     search.braces[:] = True
+    search.guarded = True
     search.smallest = _FINEST
     polished = search.run(evaluations, thin=False)
     better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
@@ -141,6 +132,7 @@ class _Search:
         self.least = 0.0
         self.smallest = _SMALLEST
         self._modelled: TensionModel | None = None
+        self.guarded = False  # cables may not go slack under additional loads
 
     def stiffness(self) -> float:
         """Of the softest mode of the start under the first load, N/m."""
@@ -148,7 +140,8 @@ class _Search:
 
     def keep_stiff(self, least: float) -> None:
         """Adds the limit on the softest mode, N/m, under each additional load."""
-        additional = [name for name in self.evaluator.used() if name != self.base]
+        own = {part.term.load for part in self.problem.limits if isinstance(part.term, Softness)}
+        additional = [name for name in self.evaluator.used() if name not in (self.base, *own) and self.problem.loads[name].any()]
         if not (least > 0.0 and additional):
             return
         self.least = least
@@ -173,7 +166,7 @@ class _Search:
 
     def _descend(self, evaluations: int) -> None:
         """Rounds of model, trial and judgement."""
-        model = self._model()
+        model, refused = self._model(), False
         while self.evaluator.evaluations < evaluations:
             y, predicted = self._propose(model)
             if self.stage == 1.0 and self._violation(self.point) <= 0.0:
@@ -186,10 +179,13 @@ class _Search:
             trial = self._try(model, y)
             if trial is None or self._merit(trial) >= self._merit(self.point):
                 self.window *= _SHRINK
+                refused = True
                 self.history.append(self._record(trial or self.point, False))
                 continue
             ratio = (trial.objective - self.point.objective) / min(predicted, -1e-300)
-            self.window *= _GROW if ratio > _GOOD else (_SHRINK if ratio < _POOR else 1.0)
+            grown = 1.0 if refused else _GROW  # a window that was just refused isn't tried again at once
+            self.window *= grown if ratio > _GOOD else (_SHRINK if ratio < _POOR else 1.0)
+            refused = False
             self._accept(trial)
             model = self._model()
 
@@ -204,6 +200,7 @@ class _Search:
         needed = np.zeros(len(self.braces), dtype=bool)
         self.window = max(self.window, 0.1 * self.tension)
         failures = 0
+        self.guarded = True
         while failures < _FAILURES and self.evaluator.evaluations < evaluations:
             model = self._model()
             leaving = self._spared(model, needed, batch)
@@ -312,31 +309,57 @@ class _Search:
         curvature = sum(
             weight * model.misfit_hessian
             for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True)
-            if isinstance(part.term, Misfit) and part.term.load == self.base
+            if isinstance(part.term, (Misfit, RobustMisfit)) and part.term.load == self.base
         )
         slope = self._exact_in_tension(slope, model)
         rows = self.point.constraints_by_variables @ model.variables_by_y
-        scaled_slope, scaled_rows = slope * width, rows * width
+        values = self.point.constraints
+        falls, margins = self._guarding(model, width)
+        scaled_slope, scaled_rows = slope * width, np.vstack([rows * width, falls])
+        values = np.append(values, margins)
         scaled_curvature = np.asarray(curvature) * width * width[:, None]
+
+        low, high = (lower - model.origin) / width, (upper - model.origin) / width
 
         def evaluate(u: Reals) -> tuple[float, Reals, Reals, Reals]:
             bent = scaled_curvature @ u
             value = float(scaled_slope @ u + 0.5 * u @ bent)
-            return value, scaled_slope + bent, self.point.constraints + scaled_rows @ u, scaled_rows
+            return value, scaled_slope + bent, values + scaled_rows @ u, scaled_rows
 
-        start = np.clip(np.zeros(len(width)), (lower - model.origin) / width, (upper - model.origin) / width)
-        u, _ = minimise(
-            evaluate,
-            start,
-            (lower - model.origin) / width,
-            (upper - model.origin) / width,
-            constraints=len(self.point.constraints),
-            evaluations=_MODEL_EVALUATIONS,
-            tolerance=1e-9,
-        )
+        if self.guarded:
+            u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
+        else:
+            u, _ = minimise(
+                evaluate,
+                np.clip(np.zeros(len(width)), low, high),
+                low,
+                high,
+                constraints=len(values),
+                evaluations=_MODEL_EVALUATIONS,
+                tolerance=1e-9,
+            )
         y = model.origin + width * u
         y[:count][y[:count] < 1e-3 * self.tension] = 0.0
         return y, evaluate(u)[0]
+
+    def _guarding(self, model: TensionModel, width: Reals) -> tuple[Reals, Reals]:
+        """Rows (g, y) and values (g,), at most 0 where each guarded cable keeps its least tension, per window and in shares of what
+        a whole window can change."""
+        rows, values = [np.zeros((0, len(width)))], [np.zeros(0)]
+        shell, design = self.problem.shell, self.point.design
+        lengths = model.variables_by_y[np.flatnonzero(design.present)] * shell.cable_lengths[design.present, None]
+        rates = []
+        if self.problem.frees_radius:
+            lengths = np.vstack([lengths, model.variables_by_y[-1] * design.radius / self.point.variables[-1]])
+            rates = [shell.beams_by_radius(design.radius)]
+        for name in self.evaluator.used()[1:] if self.guarded else []:
+            self.evaluator.factorisations += 1
+            held = guard(self.evaluator.assembly(design), self.point.states[name], shell.cables(design), self.tension, *rates)
+            falls = -(held.tension_by_design @ lengths) * width
+            scale = np.abs(falls).sum(axis=1)
+            rows.append(falls / scale[:, None])
+            values.append((np.minimum(held.tension, _BRACE * self.tension) - held.tension) / scale)
+        return np.vstack(rows), np.concatenate(values)
 
     def _exact_in_tension(self, slope: Reals, model: TensionModel) -> Reals:
         """The sum of tensions is linear in them, also for cables that are dead and so have no slope in their rest length."""
@@ -353,7 +376,7 @@ class _Search:
         for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True):
             if part.term.load != self.base:
                 continue
-            if isinstance(part.term, Misfit):
+            if isinstance(part.term, (Misfit, RobustMisfit)):
                 total += 2.0 * weight * placed
             elif isinstance(part.term, CableForce):
                 total += weight
@@ -376,7 +399,7 @@ class _Search:
 
     def _try(self, model: TensionModel, y: Reals) -> Point | None:
         design = model.design(y, self.point.design.present)
-        near = {**self.point.states, self.base: model.predicted(y)}
+        near = {**self.evaluator.predicted(self.point, design), self.base: model.predicted(y)}
         try:
             return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage)
         except OffBranch:
@@ -463,7 +486,7 @@ class _Search:
         return step
 
     def _name(self, term: Term) -> str:
-        kind = _NAMES[type(term)]
+        kind = _name(type(term))
         return kind if term.load in ("", self.base) else f"{kind}.{term.load}"
 
     def _finish(self) -> Optimum:
@@ -504,6 +527,12 @@ class _Search:
         judge.start, judge.weights = replace(self.evaluator.start, present=design.present), self.evaluator.weights
         self.evaluator = _counted(judge, self.evaluator)
         return self._record(self.evaluator.seed(design, states, 1.0), True)
+
+
+def _name(kind: type) -> str:
+    """A term's name in histories: its class' name in small letters, but for those that stand for the same."""
+    short = {"RmsMisfit": "misfit", "CableForces": "cable_force", "LargestCableForce": "cable_force", "RodUtilisation": "utilisation"}
+    return short.get(kind.__name__) or "".join(f"_{c.lower()}" if c.isupper() else c for c in kind.__name__).lstrip("_")
 
 
 def _counted(judge: Evaluator, counts: Evaluator) -> Evaluator:

@@ -25,13 +25,14 @@ from shellform.structure.assembly import Assembly
 from shellform.structure.equilibrium import find_equilibrium
 from shellform.structure.loading import Loaded, apply_load
 from shellform.structure.network import assemble
-from shellform.structure.sensitivity import by_rest_length, by_stiffness, gradients, respond
+from shellform.structure.sensitivity import by_rest_length, by_stiffness, gradients, predicted, respond
 from shellform.structure.sparse import NotPositiveDefinite
 from shellform.structure.state import State
 
 _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
-_LED = 0.5  # of an additional load, its steps from the first case where the state before is no start
-_FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed
+_LED = 0.5  # of an additional load, the steps by which it is led
+_FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed …
+_NEAR = 0.02  # … but for one whose root mean square distance is below this share of the target's size
 _SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
 
 
@@ -121,7 +122,9 @@ class Evaluator:
             )
         state = reached[first].equilibrium.state
         found = [each.equilibrium.state for each in reached.values() if each.on_branch]
-        self._far = _FAR * max(float(((each.positions - self.shell.target.positions) ** 2).sum()) for each in found)
+        target = self.shell.target.positions
+        near = len(target) * (_NEAR * float(np.ptp(target, axis=0).max())) ** 2
+        self._far = max(near, _FAR * max(float(((each.positions - target) ** 2).sum()) for each in found))
         values = [part.term.measure(self.shell, self.start, state).value[0] for part in self.problem.minimize]
         self.weights = np.array([part.share for part in self.problem.minimize]) / np.maximum(values, 1e-300)
         return reached
@@ -163,21 +166,38 @@ class Evaluator:
         except NotPositiveDefinite as error:
             raise OffBranch(str(error)) from error
 
-    def evaluate(self, variables: Reals, near: Mapping[str, State], stage: float) -> Point:
-        """The design at the variables, its equilibria sought from the states `near` them. Raises OffBranch."""
+    def evaluate(self, variables: Reals, near: Mapping[str, State], stage: float, *, lead: bool = False) -> Point:
+        """The design at the variables, its equilibria sought from the states `near` them; where those of other loads than the first turn out
+        too far off, with `lead` from the first load's, along the load's own path. Raises OffBranch."""
         self.evaluations += 1
         before = self.factorisations
         design = self.design(variables)
         assembly = self.assembly(design)
         try:
-            states: dict[str, State] = {}
-            for name in self.used():
-                states[name] = self._settled(assembly, near[name], states, self.load(name, stage), stage)
-            return self.seed(design, states, stage)
+            found: dict[str, State] = {}
+            # The loads that a design may not bear first, so that giving up costs little; to lead, the first load's state is needed.
+            for name in self.used() if lead else reversed(self.used()):
+                found[name] = self._settled(assembly, near[name], found if lead else {}, self.load(name, stage), stage)
+            return self.seed(design, {name: found[name] for name in self.used()}, stage)
         except OffBranch:
             self.rejected += 1
             self.wasted += self.factorisations - before
             raise
+
+    def predicted(self, point: Point, design: Design) -> dict[str, State]:
+        """Where a change of the point's design, with the same cables, takes its states, to first order."""
+        shell, before = self.shell, point.design
+        change = (design.rest_length - before.rest_length)[before.present]
+        rates = []
+        if self.problem.frees_radius:
+            change = np.append(change, design.radius - before.radius)
+            rates = [shell.beams_by_radius(before.radius)]
+        assembly, cables, found = self.assembly(before), shell.cables(before), {}
+        for name, state in point.states.items():
+            self.factorisations += 1
+            columns = by_rest_length(assembly, state, cables), by_stiffness(assembly, state, *rates)
+            found[name] = predicted(assembly, respond(assembly, state, *columns), change)
+        return found
 
     def assembly(self, design: Design) -> Assembly:
         """The assembly of a design; its pattern is kept while the same cables are present."""
@@ -195,18 +215,14 @@ class Evaluator:
     def _settled(
         self, assembly: Assembly, near: State, known: Mapping[str, State], load: Reals, stage: float
     ) -> State:
-        """The equilibrium next to `near`, or where that is too far off, the one that the load leads to from the first case's.
-
-        The state of the design before is near in most cases; where it isn't, the load's own path tells whether the design bears it.
-        """
+        """The equilibrium next to `near`, or where that is too far off, the one that the load leads to from the first known one."""
         try:
             return self._settle(assembly, near, load)
         except OffBranch:
             if not known:
                 raise
         first, state = next(iter(known.items()))
-        before = self.load(first, stage)
-        loaded = apply_load(assembly, state, before, load, step=_LED, smallest=_LED, stay=True)
+        loaded = apply_load(assembly, state, self.load(first, stage), load, step=_LED, smallest=_LED, stay=True)
         self._count(loaded.factorisations)
         if not loaded.on_branch:
             raise OffBranch("the design doesn't bear the load on its stable branch")

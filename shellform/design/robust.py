@@ -11,8 +11,8 @@ has all three terms. On the vault at 3 N a crossing, supports 0.075 mm off and a
 8.4e-5 were predicted; with twice that scatter 2.7e-4 instead of 1.9e-4: a stiff grid on supports that give way is far from linear, and the predicted
 deviation is then too small (the mean 1.71e-3 instead of 1.69e-3).
 
-What an optimiser needs is `measure`: the Gauss-Newton value d'd + tr(X'X) + k sqrt(var q), without the curvature, and its derivative by the rest
-lengths. That derivative is exact: for G = d(value)/dX, K L = G, the terms -L_k'(dK X_k + dF_k) hold the third derivative of the energy contracted with
+What an optimiser needs is `measure`, and as a term `RobustMisfit`: the Gauss-Newton value d'd + tr(X'X) + k sqrt(var q), without the curvature, and its derivative by the rest
+lengths and the radius. That derivative is exact: for G = d(value)/dX, K L = G, the terms -L_k'(dK X_k + dF_k) hold the third derivative of the energy contracted with
 sum of L_k X_k', and one more adjoint solve carries their dependence on the state to the design.
 """
 
@@ -22,10 +22,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from shellform.arrays import Indices, Reals
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.scatter import Built, Group, Scatter, groups_of, unpacked
+from shellform.design.terms import Measure
 from shellform.design.third import beam_rates, cable_rates
 from shellform.errors import InputError, NotConverged
 from shellform.structure.assembly import Assembly
@@ -118,28 +120,37 @@ def measure(
     if not (deviations >= 0.0 and np.isfinite(deviations)):
         raise InputError("must be finite and not negative", where="deviations", value=deviations)
     line = _Line(shell, design, state, load, scatter)
-    away = line.away.ravel()
-    places = _places(line.motion)
-    along, gram = places.T @ away, places.T @ places
-    root = float(np.sqrt(4.0 * along @ along + 2.0 * (gram**2).sum()))
-    value = float(away @ away + np.trace(gram)) + deviations * root
-    # Derivatives of the value by d and by X.
-    factor = 0.5 * deviations / root if root > 0.0 else 0.0
-    by_away = 2.0 * away + factor * 8.0 * (places @ along)
-    by_places = 2.0 * places + factor * 8.0 * (np.outer(away, along) + places @ gram)
-    right = np.zeros_like(line.motion)
-    right.reshape(-1, 6, right.shape[1])[:, :3] = by_places.reshape(-1, 3, right.shape[1])
-    multipliers = line.solved(right)
-    row = np.zeros((len(line.away), 6))
-    row[:, :3] = by_away.reshape(-1, 3)
-    row = row.ravel() - line.by_state(multipliers)
-    adjoint = line.solved(row)
-    cables = shell.cables(design)
-    columns = by_rest_length(line.assembly, state, cables)
-    found = -(columns.T @ adjoint[line.assembly.free]) - line.by_rest_length(multipliers)
+    part = line.partial(deviations)
+    adjoint = line.solved(part.by_state)
+    columns = by_rest_length(line.assembly, state, shell.cables(design))
     result = np.zeros(len(design.present))
-    result[design.present] = found
-    return Measured(value, result)
+    result[design.present] = part.by_rest_length - columns.T @ adjoint[line.assembly.free]
+    return Measured(part.value, result)
+
+
+@dataclass(frozen=True)
+class RobustMisfit:
+    """The misfit d'd, m², that is kept in spite of scatter under the load case `load`, whose forces are `force` (n, 6): the Gauss-Newton mean and
+    `deviations` standard deviations. A term for objective and limits; it costs a solve for each uncertain variable."""
+
+    load: str
+    force: Reals
+    scatter: Scatter
+    deviations: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not (self.deviations >= 0.0 and np.isfinite(self.deviations)):
+            raise InputError("must be finite and not negative", where="robust.deviations", value=self.deviations)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value, m². Raises NotConverged where the state isn't stable."""
+        line = _Line(shell, design, state, self.force, self.scatter)
+        part = line.partial(self.deviations)
+        by_rest = np.zeros(len(design.present))
+        by_rest[design.present] = part.by_rest_length
+        return Measure(
+            np.array([part.value]), sp.csr_array(part.by_state[None]), sp.csr_array(by_rest[None]), np.array([part.by_radius])
+        )
 
 
 def sample(
@@ -161,11 +172,21 @@ def sample(
     return Sample(np.array(found), lost)
 
 
+@dataclass(frozen=True)
+class _Partial:
+    """The robust value and its derivatives `by_state` (6 n,) at a fixed design, `by_rest_length` (p,) and `by_radius` at a fixed state."""
+
+    value: float
+    by_state: Reals
+    by_rest_length: Reals
+    by_radius: float
+
+
 class _Line:
     """The equilibrium and its linear answer `motion` (6 n, k) to all variables."""
 
     def __init__(self, shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter) -> None:
-        self.shell, self.state = shell, state
+        self.shell, self.state, self.radius = shell, state, design.radius
         self.built = Built(shell.beams(design.radius), shell.cables(design), np.asarray(load), np.zeros_like(load))
         self.groups: list[Group] = groups_of(shell, design, load, scatter)
         self.assembly: Assembly = assemble(shell.network(design))
@@ -183,6 +204,25 @@ class _Line:
             raise NotConverged("The state isn't a stable equilibrium of the design", state=state, remedy="Solve for it first.") from error
         free = self.assembly.free
         self.motion[free] = -self.factor.solve(np.asfortranarray(forces[free]))
+
+    def partial(self, deviations: float) -> _Partial:
+        """d'd + tr(X'X) + `deviations` times the deviation, and its partial derivatives."""
+        away, places = self.away.ravel(), _places(self.motion)
+        along, gram = places.T @ away, places.T @ places
+        root = float(np.sqrt(4.0 * along @ along + 2.0 * (gram**2).sum()))
+        value = float(away @ away + np.trace(gram)) + deviations * root
+        # Derivatives of the value by d and by X.
+        factor = 0.5 * deviations / root if root > 0.0 else 0.0
+        by_away = 2.0 * away + factor * 8.0 * (places @ along)
+        by_places = 2.0 * places + factor * 8.0 * (np.outer(away, along) + places @ gram)
+        right = np.zeros_like(self.motion)
+        right.reshape(-1, 6, right.shape[1])[:, :3] = by_places.reshape(-1, 3, right.shape[1])
+        multipliers = self.solved(right)
+        row = np.zeros((len(self.away), 6))
+        row[:, :3] = by_away.reshape(-1, 3)
+        return _Partial(
+            value, row.ravel() - self.by_state(multipliers), -self.by_rest_length(multipliers), -self.by_radius(multipliers)
+        )
 
     def solved(self, right: Reals) -> Reals:
         """K⁻¹ on the free freedoms, 0 on the held ones, for (6 n,) or (6 n, k)."""
@@ -227,6 +267,14 @@ class _Line:
         for each, columns in self._columns():
             result = result + each.by_rest_length(self.state, multipliers[:, columns])
         return result
+
+    def by_radius(self, multipliers: Reals) -> float:
+        """The same by the rods' radius, on which beams' stiffness depends; no cause of scatter does."""
+        rate = self.shell.beams_by_radius(self.radius)
+        packed = rate.evaluate(self.state, tangent=True).tangent
+        assert packed is not None
+        weights = _weights(rate.freedoms(), multipliers, self.motion)
+        return float((unpacked(packed, weights.shape[1]) * weights).sum())
 
     def drawn(self, z: Reals, shares: Sequence[float]) -> State | None:
         """The equilibrium of the structure at z, on the stable branch; None where it can't be followed in these shares."""

@@ -7,12 +7,12 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import tomli_w
 from pydantic import (
     BaseModel,
-    ConfigDict,
     Discriminator,
     Field,
     PositiveFloat,
@@ -25,11 +25,8 @@ from pydantic import (
 import shellform
 from shellform.design.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.errors import InputError
-
-
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
+from shellform.study.entries import LimitsEntry, RobustEntry
+from shellform.study.entries import Section as _Section
 
 _Polygon = list[tuple[float, float]]
 
@@ -193,6 +190,7 @@ class OptimiseEntry(_Section):
     misfit: float = Field(0.7, ge=0.0, le=1.0, description="share of the misfit in the start value of the objective")
     cable_force: float = Field(0.3, ge=0.0, le=1.0, description="share of the sum of cable forces")
     rod_radius: float = Field(0.0, ge=0.0, le=1.0, description="share of the rod radius; above 0 it is a variable")
+    robust: float = Field(0.0, ge=0.0, le=1.0, description="share of the misfit's mean and deviation as [robust] says")
     rest_length_min: PositiveFloat = Field(0.01, description="bound (3), m")
     rest_length_max: float = Field(1.1, gt=1.0, description="bound (3), times the initial rest length")
     radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
@@ -201,13 +199,18 @@ class OptimiseEntry(_Section):
     stiffness_min: float = Field(
         0.08, ge=0.0, lt=1.0, description="of the softest mode under additional loads, over the start's under the design load"
     )
+    catalogue: str | None = Field(None, description="to which a free radius is rounded up; left out: the rods' own, if they have one")
+    rounded: int = Field(30, ge=0, description="design evaluations for each section that is tried in rounding; 0: no rounding")
+    neighbours: int = Field(1, ge=0, description="sections below and above the rounded one that are tried too")
     polish: int = Field(20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none")
 
     @model_validator(mode="after")
     def _whole(self) -> OptimiseEntry:
-        total = self.misfit + self.cable_force + self.rod_radius
+        total = self.misfit + self.cable_force + self.rod_radius + self.robust
         if abs(total - 1.0) > 1e-9:
-            raise ValueError(f"the shares misfit, cable_force and rod_radius must add up to 1, not {total:g}")
+            raise ValueError(f"the shares misfit, cable_force, rod_radius and robust must add up to 1, not {total:g}")
+        if self.catalogue is not None and not self.rod_radius:
+            raise ValueError("catalogue is for a free radius: give rod_radius a share")
         return self
 
 
@@ -238,12 +241,23 @@ class Case(_Section):
         Annotated[PointsEntry | ConcreteEntry | SheetEntry | RodsWeightEntry | JointsWeightEntry, Field(discriminator="kind")],
     ] = Field({}, description="parts of the load cases, by name")
     optimise: OptimiseEntry
+    limits: LimitsEntry = Field(default_factory=lambda: LimitsEntry.model_validate({}))
+    robust: RobustEntry | None = None
     figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=0.010))
 
     @model_validator(mode="after")
     def _fitting(self) -> Case:
         if self.joint.gap >= 0.5 * self.net.spacing:
             raise ValueError(f"joint.gap ({self.joint.gap:g} m) must be well below net.spacing ({self.net.spacing:g} m)")
+        return self
+
+    @model_validator(mode="after")
+    def _robust(self) -> Case:
+        causes = RobustEntry.model_fields.keys() - {"deviations", "limit", "samples", "seed"}
+        if self.robust is not None and not any(getattr(self.robust, name) for name in causes):
+            raise ValueError(f"nothing scatters in [robust]: give one of {', '.join(sorted(causes))}")
+        if self.optimise.robust and self.robust is None:
+            raise ValueError("a share robust needs a table [robust] that says what scatters")
         return self
 
     @model_validator(mode="after")
@@ -257,7 +271,7 @@ class Case(_Section):
             if names.count(needed) != 1:
                 raise ValueError(f"there must be one [[load]] with the name {needed!r}")
         for each in self.load:
-            if names.count(each.name) > 1 or each.name == "none":
+            if names.count(each.name) > 1 or each.name == "none" or each.name.startswith("critical "):
                 raise ValueError(f"the load's name {each.name!r} is taken")
             if each.stages and each.name in ("design", "additional"):
                 raise ValueError(f"the load {each.name!r} is one case and can't have stages")
@@ -299,15 +313,22 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
         raise InputError("; ".join(told(each, Case) for each in error.errors()), where=str(file)) from error
     place = (file.parent / case.surface.file).resolve()
     found: dict[str, Any] = {"surface": case.surface.model_copy(update={"file": str(place)})}
+    if case.optimise.catalogue is not None:
+        source = _found_catalogue(case.optimise.catalogue, file)
+        read_catalogue(source)
+        found["optimise"] = case.optimise.model_copy(update={"catalogue": source})
     if isinstance(case.rod, StockRodEntry):
-        source = case.rod.catalogue
-        if source not in shipped_catalogues():
-            source = str((file.parent / source).resolve())
+        source = _found_catalogue(case.rod.catalogue, file)
         stock = read_catalogue(source)
         if case.rod.section is not None:
             named(stock, case.rod.section)
         found["rod"] = case.rod.model_copy(update={"catalogue": source})
     return case.model_copy(update=found)
+
+
+def _found_catalogue(source: str, file: Path) -> str:
+    """A shipped catalogue's name, or the absolute path of one relative to the case file."""
+    return source if source in shipped_catalogues() else str((file.parent / source).resolve())
 
 
 def dump_case(case: Case) -> str:
@@ -381,6 +402,8 @@ def _entry(place: Sequence[int | str], root: type[BaseModel]) -> tuple[str, Any]
     section: Any = root
     for part in place:
         plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+        if get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain):  # a table that may be left out
+            plain = next(each for each in get_args(plain) if each is not NoneType)
         told = {tag: each for each in get_args(plain) for tag in _tags(each)}
         if part in told:
             kind = told[part]

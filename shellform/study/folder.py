@@ -11,14 +11,15 @@ import json
 import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shellform.arrays import Reals, read_arrays
-from shellform.design.gridshell import Design, Gridshell
+from shellform.design.catalogue import named
+from shellform.design.gridshell import Design, Gridshell, Rod
 from shellform.design.optimum import Step
 from shellform.design.problem import deviations
 from shellform.errors import InputError
@@ -28,10 +29,11 @@ from shellform.structure.loading import Loaded
 from shellform.structure.model import Model, write_model
 from shellform.structure.state import State
 from shellform.study.case import Case, load_case
-from shellform.study.shell import gridshell
+from shellform.study.limits import shown
+from shellform.study.shell import gridshell, rounding_catalogue
 from shellform.surface.target import Surface
 
-DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "polished")
+DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished")
 VERSION = 1  # of summary.json
 
 Report = Callable[[str, str], None]
@@ -58,8 +60,16 @@ class Run:
 
     @property
     def best(self) -> str:
-        """The name of the design to build: the last made of the polished, the optimised and the initial one."""
-        return [name for name in ("initial", "optimised", "polished") if name in self.designs][-1]
+        """The name of the design to build: the last made of the polished, the rounded, the optimised and the initial one."""
+        return [name for name in ("initial", "optimised", "rounded", "polished") if name in self.designs][-1]
+
+    def shell_of(self, name: str) -> Gridshell:
+        """The shell with the rods of a design: those of a rounded one come from the catalogue."""
+        section = self.summary["designs"].get(name, {}).get("section")
+        catalogue = rounding_catalogue(self.case)
+        if section is None or catalogue is None:
+            return self.shell
+        return replace(self.shell, rod=Rod(named(catalogue, section)))
 
 
 def read_run(folder: str | Path) -> Run:
@@ -133,6 +143,7 @@ def keep_design(
                 "on_branch": loaded[each].on_branch,
                 "residual": loaded[each].equilibrium.residual,
                 "rod_utilisation_max": utilisation(shell, design, states[each]),
+                **shown(shell, design, states[each], loads[each]),
             }
             for each in loads
         },

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,8 +21,9 @@ import numpy as np
 import shellform
 from shellform.arrays import Reals
 from shellform.design.gridshell import Design, Gridshell
+from shellform.design.optimum import Optimum
 from shellform.design.problem import Problem, follow
-from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share
+from shellform.design.terms import AtMost, CableForces, Misfit, Share
 from shellform.errors import InputError, NotConverged
 from shellform.net.files import load_net, net_document, save_net
 from shellform.net.net import Net
@@ -40,8 +41,10 @@ from shellform.study.folder import (
     read_run,
     save_surface,
 )
+from shellform.study.limits import case_problem, critical_factors
 from shellform.study.pictures import draw_everything, write_states
-from shellform.study.shell import catalogue_bytes, gridshell, rod_bounds, rod_limits
+from shellform.study.robustness import robustness
+from shellform.study.shell import catalogue_bytes, gridshell, rod_limits, rounding_catalogue
 from shellform.surface.target import Surface
 
 STAGES = ("surface", "net", "initial", "optimise", "figures")
@@ -137,7 +140,7 @@ def run_case(
         results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
         report("surface", f"size {told_size(results['surface'])}")
     try:
-        for part in ("designs", "states", "figures"):
+        for part in ("designs", "states", "figures", "schedules"):
             (folder / part).mkdir(parents=True, exist_ok=True)
         write_text(folder / "case.toml", dump_case(case))
     except OSError as error:
@@ -163,18 +166,16 @@ def run_case(
 
 
 def stage_keys(case: Case) -> dict[str, str]:
-    """A hash for each stage of all that it depends on; of a file that is its name and content, wherever it lies."""
+    """A hash for each stage of all that it depends on; of the surface file that is its name and content, wherever it lies."""
     entries = case.model_dump(mode="json")
     file = Path(case.surface.file)
     entries["surface"]["file"] = file.name
     stock = catalogue_bytes(case)
-    if stock:
-        del entries["rod"]["catalogue"]
     needs = {
         "surface": ["surface"],
         "net": ["net", "joint"],
         "initial": ["rod", "cable", "load", "part"],
-        "optimise": ["optimise"],
+        "optimise": ["optimise", "limits", "robust"],
         "figures": ["figures", "title"],
     }
     told = file.stat()
@@ -206,14 +207,7 @@ def _surface(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
 def _net(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> Net:
     if keep:
         return load_net(job.path("net.npz"))
-    entry = job.case.net
-    net, angle, offset = oriented_net(
-        results["surface"],
-        net_settings(entry, job.case.joint.gap),
-        angle=entry.angle if entry.angle == "auto" else float(np.deg2rad(entry.angle)),
-        offset=entry.offset,
-        progress=lambda text: job.report("net", text),
-    )
+    net, angle, offset = net_of(job.case, results["surface"], progress=lambda text: job.report("net", text))
     save_net(job.path("net.npz"), net)
     write_text(job.path("net.json"), json.dumps(net_document(net)))
     summary["net"] = {
@@ -223,6 +217,20 @@ def _net(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: b
         "offset": list(offset),
     }
     return net
+
+
+def net_of(
+    case: Case, surface: Surface, *, progress: Callable[[str], None] = lambda text: None
+) -> tuple[Net, float, tuple[float, float]]:
+    """The case's net with its angle, rad, and offset."""
+    entry = case.net
+    return oriented_net(
+        surface,
+        net_settings(entry, case.joint.gap),
+        angle=entry.angle if entry.angle == "auto" else float(np.deg2rad(entry.angle)),
+        offset=entry.offset,
+        progress=progress,
+    )
 
 
 def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
@@ -282,12 +290,6 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
     entry, cable = job.case.optimise, job.case.cable
     shell, loads = results["initial"]["shell"], results["initial"]["loads"]
     start = shell.design(rest_ratio=cable.rest_ratio)
-    shares: list[tuple[float, Any]] = [
-        (entry.misfit, Misfit("design")),
-        (entry.cable_force, CableForce("design")),
-        (entry.rod_radius, RodRadius()),
-    ]
-    others = [name for name in loads if name not in ("none", "design")]
 
     def watch(step: mma.Step) -> None:
         said = "" if step.accepted else ", rejected"
@@ -297,24 +299,30 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
             f"{100 * step.stage:.0f} % of the additional load{said}",
         )
 
-    problem = Problem(
-        shell,
-        {name: loads[name] for name in ("design", *others)},
-        [Share(share, term) for share, term in shares if share > 0.0],
-        [
-            AtMost(cable.force_max, CableForces("design")),
-            *(AtMost(entry.misfit_rms_additional, RmsMisfit(name)) for name in others),
-        ],
-        entry.rest_length_min,
-        entry.rest_length_max,
-        rod_bounds(job.case, shell),
-    )
+    problem = case_problem(job.case, shell, loads, start)
     best = mma.optimize(problem, start, evaluations=entry.evaluations, stiffness=entry.stiffness_min, progress=watch)
+    _forget(job, ("unloaded", "optimised", "rounded", "polished"), summary)
+    built = {"optimised": best}
     _keep(job, shell, "optimised", best.design, _follow(shell, best.design, loads), loads, summary)
+    rounded = _rounded(job, best, start, loads, summary) if problem.frees_radius and entry.rounded else None
+    if rounded is not None:
+        built["rounded"] = rounded
     if entry.polish:
         job.report("optimise", "polishing the cables that are left")
-        polished = mma.polish(best, evaluations=entry.polish)
-        _keep(job, shell, "polished", polished.design, _follow(shell, polished.design, loads), loads, summary)
+        last = list(built.values())[-1]
+        built["polished"] = mma.polish(last, evaluations=entry.polish)
+        here = last.problem.shell
+        _keep(job, here, "polished", built["polished"].design, _follow(here, built["polished"].design, loads), loads, summary)
+        if "section" in summary["designs"].get("rounded", {}):
+            summary["designs"]["polished"]["section"] = summary["designs"]["rounded"]["section"]
+    for name, found in built.items():
+        _examine(job, name, found, loads, summary)
+    if job.case.robust is not None:
+        job.report("optimise", "what scatter does to the shape")
+        name, found = list(built.items())[-1]
+        told = robustness(job.case.robust, found.problem.shell, found.design, found.states["design"], loads["design"])
+        summary["robust"] = {"design": name, **told.summary()}
+        write_text(job.path("schedules/robust.csv"), told.table())
     job.report("optimise", "the design without regard to the loads")
     unloaded = mma.optimize(
         Problem(
@@ -342,8 +350,59 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         "stiffness_min": best.stiffness,
         "status": best.status,
         "constraints": dict(best.constraints),
+        "feasible": max(best.constraints.values(), default=-1.0) <= mma.FEASIBLE,
     }
     write_text(job.path("history.csv"), history_text(best.history))
+
+
+def _rounded(job: _Job, best: Optimum, start: Design, loads: Mapping[str, Reals], summary: dict[str, Any]) -> Optimum | None:
+    """Operation 4: keeps the design "rounded" and the table of sections. None without a catalogue or a design."""
+    from shellform.study import rounding
+
+    entry = job.case.optimise
+    catalogue = rounding_catalogue(job.case)
+    if catalogue is None:
+        return None
+    trials = rounding.tried(
+        best,
+        start,
+        catalogue,
+        lambda shell: case_problem(job.case, shell, loads, start, frees_radius=False),
+        evaluations=entry.rounded,
+        beside=entry.neighbours,
+        progress=lambda text: job.report("optimise", text),
+    )
+    summary["sections"] = [each.row() for each in trials]
+    write_text(job.path("schedules/sections.csv"), rounding.table(trials))
+    taken = rounding.chosen(trials)
+    if taken is None or taken.optimum is None:
+        return None
+    design = taken.optimum.design
+    _keep(job, taken.shell, "rounded", design, _follow(taken.shell, design, loads), loads, summary)
+    summary["designs"]["rounded"] |= {"section": taken.section, "feasible": not taken.why, "why_not": taken.why, "objective": taken.objective}
+    return taken.optimum
+
+
+def _forget(job: _Job, names: Sequence[str], summary: dict[str, Any]) -> None:
+    """Takes designs of an earlier run away, some of which this one may not make."""
+    for name in names:
+        summary["designs"].pop(name, None)
+        for part in (f"designs/{name}.npz", f"designs/{name}.json"):
+            job.path(part).unlink(missing_ok=True)
+        for file in [*job.folder.glob(f"states/{name}-*.vtp"), *job.folder.glob(f"figures/{name}-*.png")]:
+            file.unlink()
+    for key in ("sections", "robust"):
+        summary.pop(key, None)
+        job.path(f"schedules/{key}.csv").unlink(missing_ok=True)
+
+
+def _examine(job: _Job, name: str, found: Optimum, loads: Mapping[str, Reals], summary: dict[str, Any]) -> None:
+    """Adds to a design's part of the summary how far each load could grow."""
+    job.report("optimise", f"critical load factors of the {name} design")
+    wanted = job.case.limits.critical_factor
+    factors = critical_factors(found.problem.shell, found.design, found.states["none"], loads, wanted=wanted)
+    for each, told in factors.items():
+        summary["designs"][name]["loads"][each] |= told
 
 
 def _keep(

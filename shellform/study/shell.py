@@ -10,7 +10,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.design import loads
-from shellform.design.catalogue import largest, named, radius_bounds, read_catalogue
+from shellform.design.catalogue import Catalogue, largest, named, radius_bounds, read_catalogue
 from shellform.design.gridshell import Cable, Gridshell, Joint, Rod, brace, max_radius
 from shellform.design.loads import Region
 from shellform.errors import InputError
@@ -87,11 +87,19 @@ def rod_limits(entry: OwnRodEntry | StockRodEntry, net: Net) -> dict[str, float]
 def rod_bounds(case: Case, shell: Gridshell) -> tuple[float, float]:
     """Bounds (4) of the rods' radius, m: the catalogue's, or from half the start's to the largest that the net allows."""
     rod, lowest = shell.rod, case.optimise.radius_min
-    if isinstance(case.rod, StockRodEntry):
-        low, high = radius_bounds(shell.net, rod, read_catalogue(case.rod.catalogue))
+    catalogue = rounding_catalogue(case)
+    if catalogue is not None:
+        low, high = radius_bounds(shell.net, rod, catalogue)
     else:
         low, high = 0.5 * rod.radius, max(rod.radius, max_radius(shell.net, rod))
     return lowest or low, high
+
+
+def rounding_catalogue(case: Case) -> Catalogue | None:
+    """The catalogue to which a free radius is rounded, if there is one."""
+    if case.optimise.catalogue is not None:
+        return read_catalogue(case.optimise.catalogue)
+    return read_catalogue(case.rod.catalogue) if isinstance(case.rod, StockRodEntry) else None
 
 
 def load_cases(case: Case, shell: Gridshell, surface: Surface) -> dict[str, Reals]:
@@ -144,8 +152,6 @@ def _region(entry: ConcreteEntry | SheetEntry) -> Region:
 
 
 def catalogue_bytes(case: Case) -> bytes:
-    """The content of the case's catalogue, if it has one, for the keys of its stages."""
-    if not isinstance(case.rod, StockRodEntry):
-        return b""
-    path = Path(case.rod.catalogue)
-    return path.read_bytes() if path.is_file() else b""
+    """The content of the case's own catalogues, if it has any, for the keys of its stages."""
+    sources = [case.optimise.catalogue, case.rod.catalogue if isinstance(case.rod, StockRodEntry) else None]
+    return b"".join(Path(each).read_bytes() for each in sources if each is not None and Path(each).is_file())

@@ -30,7 +30,7 @@ CRASHED = "crashed"
 
 _GROUP = 4096  # rows of a row group, and all that are in memory at once
 _KINDS = {"bool": 0, "int": 1, "float": 2, "str": 3}
-_BUILT = ("polished", "optimised", "initial")
+_BUILT = ("polished", "rounded", "optimised", "initial")
 
 
 class Log:

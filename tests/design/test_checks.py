@@ -1,10 +1,20 @@
 """The engineer's limits against re-solved neighbours."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.design.checks import SHARPNESS, ConnectorTurn, RodUtilisation, Slackness, Softness, Uplift
+from shellform.design.checks import (
+    SHARPNESS,
+    ConnectorTurn,
+    LargestCableForce,
+    RodUtilisation,
+    Slackness,
+    Softness,
+    Uplift,
+)
 from shellform.design.problem import Evaluator
 from shellform.errors import InputError
 
@@ -19,11 +29,12 @@ def limited(shell, wet, term):
     return sf.Problem(shell, {"wet": wet}, shares, [sf.AtMost(1.0, term)], radius_bounds=(0.0005, 0.0014))
 
 
-@pytest.mark.parametrize("name", ["stress", "connectors", "slackness", "uplift", "softness"])
+@pytest.mark.parametrize("name", ["stress", "connectors", "cables", "slackness", "uplift", "softness"])
 def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet, name):
     term = {
         "stress": RodUtilisation("wet"),
         "connectors": ConnectorTurn("wet"),
+        "cables": LargestCableForce("wet", 5.0),
         "slackness": Slackness("wet", 0.5),
         "uplift": Uplift("wet", wet, 2.0),
         "softness": Softness("wet", 1.0),
@@ -33,14 +44,13 @@ def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet,
     point = evaluator.seed(shell.design(), states, 1.0)
     rng = np.random.default_rng(3)
     direction = np.append(rng.normal(size=len(point.variables) - 1), 0.7)
-    # Central differences at two steps: the error has to fall with the square of the step, down to rounding.
-    errors = []
+    slopes = []  # central differences at two steps, whose error falls with the square of the step
     for step in (2e-5, 1e-5):
         plus, minus = (evaluator.evaluate(point.variables + s * step * direction, states, 1.0) for s in (1, -1))
-        slope = (plus.constraints[0] - minus.constraints[0]) / (2 * step)
-        errors.append(abs(point.constraints_by_variables[0] @ direction / slope - 1.0))
-    assert errors[1] < 1e-4
-    assert errors[1] < 0.5 * errors[0] or errors[1] < 1e-5
+        slopes.append((plus.constraints[0] - minus.constraints[0]) / (2 * step))
+    # Extrapolated to a step of 0, what is left is the gradient's own error.
+    best = (4.0 * slopes[1] - slopes[0]) / 3.0
+    assert point.constraints_by_variables[0] @ direction == pytest.approx(best, rel=1e-5)
 
 
 def test_the_smooth_maximum_is_never_below_the_largest_and_little_above(shell, wet):
@@ -71,11 +81,28 @@ def test_supports_that_would_lift_are_told_with_their_force(shell, wet):
 def test_limits_that_make_no_sense_are_refused(shell, wet):
     with pytest.raises(InputError, match=r"slackness\.least"):
         Slackness("wet", 0.0)
+    with pytest.raises(InputError, match=r"largest_cable_force\.scale"):
+        LargestCableForce("wet", 0.0)
     with pytest.raises(InputError, match=r"softness\.least"):
         Softness("wet", -1.0)
-    import dataclasses
-
     unknown = dataclasses.replace(shell, rod=sf.Rod.round(young=40e9, radius=0.001))
     state = shell.target
     with pytest.raises(InputError, match="strength"):
         RodUtilisation("wet").measure(unknown, shell.design(), state)
+
+
+def test_the_largest_cable_force_is_told_little_above_and_cables_let_out_are_not_slack(shell, wet):
+    design = shell.design()
+    state = Evaluator(limited(shell, wet, LargestCableForce("wet", 5.0)), design).begin()["wet"].equilibrium.state
+    pull = shell.cables(design).tension(state)
+    told = LargestCableForce("wet", 5.0).measure(shell, design, state).value[0]
+    assert pull.max() <= told <= pull.max() + 5.0 * np.log(len(pull)) / SHARPNESS
+    lengths = design.rest_length.copy()
+    lengths[7] = 1.08 * shell.cable_lengths[7]
+    loose = dataclasses.replace(design, rest_length=lengths)
+    assert Slackness("wet", 0.5).measure(shell, loose, state).value[0] > 10.0
+    others = Slackness("wet", 0.5, let_out=1.05).measure(shell, loose, state).value[0]
+    assert others <= Slackness("wet", 0.5).measure(shell, design, state).value[0] + 1e-12
+    none = shell.unbraced()
+    assert LargestCableForce("wet", 5.0).measure(shell, none, state).value[0] == 0.0
+    assert Slackness("wet", 0.5).measure(shell, none, state).value[0] == 0.0

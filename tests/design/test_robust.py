@@ -7,7 +7,8 @@ import pytest
 
 import shellform as sf
 from shellform.design import robust
-from shellform.design.robust import _Line, measure, sample, spread
+from shellform.design.problem import Evaluator
+from shellform.design.robust import RobustMisfit, _Line, measure, sample, spread
 from shellform.design.scatter import Scatter, groups_of
 from shellform.errors import InputError, NotConverged
 from shellform.structure.equilibrium import find_equilibrium
@@ -137,3 +138,25 @@ def test_drawings_off_the_stable_branch_are_counted_and_have_no_misfit(shell, lo
     drawn = sample(shell, design, state, load, Scatter(loads_all=30.0), count=6, seed=0)
     assert drawn.lost > 0
     assert len(drawn.misfits) + drawn.lost == 6
+
+
+@pytest.mark.parametrize("cause", ["supports", "joints_all", "rest_length", "cable_stiffness"])
+def test_the_gradient_of_the_robust_misfit_as_a_term_agrees_with_re_solved_equilibria(shell, loaded, cause):
+    design, state, load = loaded
+    scatter = Scatter(**{cause: getattr(ALL, cause)})
+    term = RobustMisfit("wet", load, scatter, 2.0)
+    shares = [sf.Share(0.6, sf.Misfit("wet")), sf.Share(0.4, sf.RodRadius())]
+    problem = sf.Problem(shell, {"wet": load}, shares, [sf.AtMost(0.01, term)], radius_bounds=(0.0005, 0.0014))
+    evaluator = Evaluator(problem, design)
+    point = evaluator.seed(design, {"wet": solved(shell, design, state, load)}, 1.0)
+    assert term.measure(shell, design, point.states["wet"]).value[0] == measure(shell, design, point.states["wet"], load, scatter, deviations=2.0).value
+    for direction in (np.append(np.random.default_rng(3).normal(size=len(point.variables) - 1), 0.0), np.eye(len(point.variables))[-1]):
+        values = []
+        for h in (4e-6, -4e-6, 2e-6, -2e-6):
+            other = evaluator.design(point.variables + h * direction)
+            there = solved(shell, other, point.states["wet"], load)
+            values.append(term.measure(shell, other, there).value[0] / 0.01)
+        wide, near = (values[0] - values[1]) / 8e-6, (values[2] - values[3]) / 4e-6
+        assert point.constraints_by_variables[0] @ direction == pytest.approx((4.0 * near - wide) / 3.0, rel=1e-5)
+    with pytest.raises(InputError, match=r"robust\.deviations"):
+        RobustMisfit("wet", load, scatter, -1.0)

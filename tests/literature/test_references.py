@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.optimize import brentq, minimize, root
 
-from shellform.structure.verification import beams, buckling, cables, limits
+from shellform.structure.verification import beams, buckling, cables, exact, limits
 from tests.literature.rods import Piece, about_y, extremum, integrate, solve
 
 
@@ -236,3 +237,10 @@ def test_the_star_dome_s_limits_are_those_of_hooke_s_bars():
             assert np.linalg.eigvalsh(slope)[0] > 0.0
     agree(np.array(found)[:, 0], [load for load, _ in limits.DOME], 3)
     agree(np.array(found)[:, 1], [drop for _, drop in limits.DOME], 5)
+
+
+def test_the_second_kind_s_integral_holds_also_where_scipy_s_jumps():
+    m = 0.256899060094085
+    for phase in (1.3425595440263027, -0.5220281, 0.3, 0.5 * np.pi):
+        wanted = quad(lambda t: np.sqrt(1.0 - m * np.sin(t) ** 2), 0.0, phase, epsabs=1e-13)[0]
+        assert exact.second_kind(phase, m) == pytest.approx(wanted, abs=1e-12)

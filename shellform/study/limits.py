@@ -1,0 +1,173 @@
+"""From a case to its design problem, the engineer's limits included, and what each design shows of them.
+
+Every limit holds under every load case, and those that matter before concrete comes also without load. The critical load factor F is kept by
+a load case "critical NAME", F times the load case, that every accepted design bears on its stable branch, its softest mode keeping
+a share of the initial design's stiffness under the design load (checks.py: Softness): stability doesn't end before F.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.design.checks import (
+    ConnectorTurn,
+    LargestCableForce,
+    RodUtilisation,
+    Slackness,
+    Softness,
+    Uplift,
+)
+from shellform.design.gridshell import Design, Gridshell
+from shellform.design.problem import Problem, follow
+from shellform.design.robust import RobustMisfit
+from shellform.design.scatter import Scatter
+from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
+from shellform.errors import InputError, NotConverged
+from shellform.structure import results
+from shellform.structure.loading import forces
+from shellform.structure.network import assemble
+from shellform.structure.stability import critical_load, modes
+from shellform.structure.state import State
+from shellform.study.case import Case
+from shellform.study.entries import RobustEntry
+from shellform.study.shell import rod_bounds
+
+_SOFTEST = 0.25  # of the initial design's softest mode under the design load, that is left at the critical factor asked for
+_SOUGHT = 3.0  # critical load factor up to which designs are followed
+
+
+def case_problem(case: Case, shell: Gridshell, loads: Mapping[str, Reals], start: Design, *, frees_radius: bool = True) -> Problem:
+    """The problem (2) to (6) of the case on the shell, with its limits; `start` is the initial design. With the radius fixed its share goes to
+    the others in proportion."""
+    entry = case.optimise
+    shares: list[tuple[float, Term]] = [(entry.misfit, Misfit("design")), (entry.cable_force, CableForce("design"))]
+    if frees_radius:
+        shares.append((entry.rod_radius, RodRadius()))
+    robust = robust_misfit(case, loads)
+    if robust is not None:
+        shares.append((entry.robust, robust))
+    total = sum(share for share, _ in shares)
+    others = [name for name in loads if name not in ("none", "design")]
+    limits = [AtMost(case.cable.force_max, CableForces("design"))]
+    for name in others:
+        limits.append(AtMost(entry.misfit_rms_additional, RmsMisfit(name)))
+        limits.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
+    limits += _engineers(case, shell, loads)
+    if case.robust is not None and case.robust.limit is not None and robust is not None:
+        limits.append(AtMost(case.robust.limit**2 * len(shell.net.grid.flat), robust))
+    used = dict(loads)
+    factor, critical = case.limits.critical_factor, []
+    if factor is not None:
+        least = _SOFTEST * _stiffness(shell, start, loads["design"])
+        for each in _known("limits.critical_loads", case.limits.critical_loads, [name for name in loads if name != "none"]):
+            critical.append(f"critical {each}")
+            used[critical[-1]] = factor * loads[each]
+            limits.append(AtMost(1.0, Softness(critical[-1], least)))
+    # The design load leads; its own critical case comes last, where thinning looks at what cables do against buckling.
+    order = ["design", "none", *others, *sorted(critical, key="critical design".__eq__)]
+    return Problem(
+        shell,
+        {name: used[name] for name in order if name in used},
+        [Share(share / total, term) for share, term in shares if share > 0.0],
+        limits,
+        entry.rest_length_min,
+        entry.rest_length_max,
+        rod_bounds(case, shell),
+    )
+
+
+def scatter_of(entry: RobustEntry) -> Scatter:
+    """What scatters."""
+    return Scatter(**{each.name: getattr(entry, each.name) for each in fields(Scatter)})
+
+
+def robust_misfit(case: Case, loads: Mapping[str, Reals]) -> RobustMisfit | None:
+    """The robust misfit of the case under the design load, if it has one."""
+    if case.robust is None:
+        return None
+    return RobustMisfit("design", loads["design"], scatter_of(case.robust), case.robust.deviations)
+
+
+def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[AtMost]:
+    """The limits on rods, connectors, supports and slack cables."""
+    entry, found = case.limits, []
+    for name, load in loads.items():
+        if entry.utilisation is not None:
+            found.append(AtMost(entry.utilisation, RodUtilisation(name)))
+        if entry.connector_turn is not None:
+            found.append(AtMost(entry.connector_turn, ConnectorTurn(name)))
+        if entry.uplift is not None:
+            offset = max(entry.uplift, -float(loads["design"][:, 2].sum()) / len(shell.net.supports))
+            found.append(AtMost(offset + entry.uplift, Uplift(name, load, offset)))
+    if entry.slack_min is not None:
+        longest = case.cable.rest_ratio * case.optimise.rest_length_max
+        let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
+        for name in _known("limits.slack_loads", entry.slack_loads, list(loads)):
+            found.append(AtMost(1.0, Slackness(name, entry.slack_min, let_out)))
+    return found
+
+
+def _known(where: str, names: Sequence[str], known: Sequence[str]) -> Sequence[str]:
+    for name in names:
+        if name not in known:
+            raise InputError("there is no such load case", where=where, value=name, remedy=f"Known: {', '.join(known)}.")
+    return names
+
+
+def _stiffness(shell: Gridshell, start: Design, load: Reals) -> float:
+    """Of the start's softest mode under the design load, N/m. Raises NotConverged where it doesn't bear that."""
+    reached = follow(shell, start, {"design": load}, stay=True)["design"]
+    found = float(modes(assemble(shell.network(start)), reached.equilibrium.state, 1).stiffness[0])
+    if not (reached.on_branch and found > 0.0):
+        raise NotConverged(
+            f"The initial design loses stability at {reached.share:.2f} of the design load, so that no critical factor can be kept",
+            state=reached.equilibrium.state,
+            remedy="Choose a denser grid, thicker rods or stiffer cables.",
+        )
+    return found
+
+
+def shown(shell: Gridshell, design: Design, state: State, load: Reals) -> dict[str, Any]:
+    """What a design shows of the limited quantities in a state under the load, for its part of the summary."""
+    beams, cables = shell.beams(design.radius), shell.cables(design)
+    pull = cables.tension(state)
+    section = shell.rod.resized(design.radius).section
+    used = results.utilisation(beams, beams.local_forces(state), {beams.kinds[0]: section})
+    turn = results.twist(beams.local_deformations(state))[beams.kind == 1]
+    held = shell.net.supports
+    inner = assemble(shell.network(design)).evaluate(state, tangent=False).force
+    return {
+        "stress_utilisation_max": float(np.nanmax(used)),
+        "connector_turn_max": float(np.abs(turn).max(initial=0.0)),
+        "uplift_max": max(0.0, -float((inner - load)[held, 2].min())),
+        "cable_force_max": float(pull.max(initial=0.0)),
+        "cable_force_min": float(pull.min()) if len(pull) else 0.0,
+        "cables_slack": int((pull <= 0.0).sum()),
+    }
+
+
+def critical_factors(
+    shell: Gridshell, design: Design, unloaded: State, loads: Mapping[str, Reals], *, wanted: float | None
+) -> dict[str, dict[str, Any]]:
+    """For each load case the factor at which the design's path from the `unloaded` state loses stability: `critical_factor`, None where it doesn't up to
+    `critical_sought`, and the `critical_kind` of point."""
+    goal = max(_SOUGHT, 1.5 * (wanted or 0.0))
+    assembly, found = assemble(shell.network(design)), {}
+    for name, load in loads.items():
+        if not load.any():
+            continue
+        told: dict[str, Any] = {"critical_sought": goal, "critical_factor": None, "critical_kind": None}
+        try:
+            end = critical_load(assembly, unloaded, forces(load), goal=goal)
+        except NotConverged as error:  # the rest of the summary stands without it
+            told["critical_kind"] = f"not found: {error.what}"
+        else:
+            if end is not None:
+                told |= {"critical_factor": end.factor, "critical_kind": end.kind}
+        found[name] = told
+    return found
