@@ -156,7 +156,8 @@ def test_designs_can_be_listed_and_surfaces_taken_from_a_folder(tmp_path):
         ("[vary]\nsurface.file = { files = '*.step' }", "no such file"),
         ("[vary]\nsurface.file = { files = '**x' }", "surface.file"),
         ("[vary]\nsurface.file = ['../other.obj']", "leads out of"),
-        ("[vary]\ncable.stiffness = { low = 1, high = 2, count = 2000000 }", "designs; up to"),
+        ("[vary]\ncable.stiffness = { low = 1, high = 2, count = 99999999999999999999 }", "less than or equal to 1000000"),
+        ("[vary]\ncable.stiffness = { low = 1, high = 2, count = 2000 }\ncable.force_max = { low = 1, high = 2, count = 2000 }", "designs; up to"),
     ],
 )
 def test_bad_study_files_are_refused_by_entry(tmp_path, text, words):
