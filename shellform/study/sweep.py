@@ -40,6 +40,13 @@ _ONE_THREAD = {
     )
 } | {"MKL_CBWR": "AUTO"}  # MKL adds up in the same order in each process
 
+# Run by each worker process as it starts: Ctrl-C reaches all processes of a terminal, and the study alone answers it and ends its workers.
+_QUIET = """import logging, signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+for name in ("distributed", "distributed.worker", "distributed.nanny"):
+    logging.getLogger(name).setLevel(logging.CRITICAL)
+"""
+
 
 @dataclass(frozen=True)
 class Engine:
@@ -63,15 +70,12 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
         LocalCluster,
     )
 
-    quiet = {name: "critical" for name in ("distributed", "bokeh", "tornado", "tornado.application")}
-    for name in quiet:
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    for name in ("distributed", "distributed.client", "bokeh", "tornado", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters of what they tell is in the rows
     settings = {
-        "logging": quiet,
         "distributed.scheduler.allowed-failures": _DEATHS,
         "distributed.scheduler.worker-saturation": 1.0,
-        # Ctrl-C reaches all processes of a terminal; the study alone answers it and ends its workers.
-        "distributed.worker.preload": ["import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)"] if processes else [],
+        "distributed.worker.preload": [_QUIET] if processes else [],
         "distributed.worker.daemon": False,  # surface readers are processes of their own
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
