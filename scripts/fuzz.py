@@ -89,7 +89,7 @@ def _value(data: bytes, chance: random.Random) -> bytes:
     """Another value somewhere in a JSON document; elsewhere another number."""
     try:
         tree = json.loads(data)
-    except ValueError:
+    except (ValueError, RecursionError):
         return _number(data, chance)
     places: list[tuple[object, object]] = []
     todo = [tree]

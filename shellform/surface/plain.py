@@ -46,6 +46,8 @@ def read_off(file: Path, choice: Choice) -> Draft:
     words = [(number, each) for number, each in lines if each]
     if not words or not words[0][1][0].endswith("OFF") or "BINARY" in words[0][1]:
         raise InputError("isn't a text OFF file", where=str(file), remedy=_ANEW)
+    if len(words) < 2:
+        raise InputError("ends after its first line", where=str(file), remedy=_ANEW)
     head = words[0][1][1:] or words[1][1]
     rows = words[1 if words[0][1][1:] else 2 :]
     last = 1
