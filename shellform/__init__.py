@@ -9,6 +9,8 @@ Everything is loaded when it is first used: `import shellform` itself loads no l
 from __future__ import annotations
 
 import importlib
+import sys
+from functools import partial
 from typing import Any
 
 __version__ = "0.1.0"
@@ -40,6 +42,10 @@ _ROOMS = {
     "robust": "shellform.design.robust",
     "render": "shellform.output.render",
     "plots": "shellform.output.plots",
+    "nesting": "shellform.output.nesting",
+    "schedules": "shellform.output.schedules",
+    "drawings": "shellform.output.drawings",
+    "exports": "shellform.output.exports",
     "model": "shellform.structure.model",
     "analysis": "shellform.structure.analysis",
     "study": "shellform.study",
@@ -57,3 +63,26 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted([*globals(), *_NAMES, *_ROOMS])
+
+
+_PICTURES = {
+    ("shellform.net.net", "Net"): "net_png",
+    ("shellform.design.gridshell", "Gridshell"): "gridshell_png",
+    ("shellform.design.optimum", "Optimum"): "optimum_png",
+}
+
+
+def load_ipython_extension(ipython: Any) -> None:
+    """Nets, gridshells and optima show their picture where they are displayed (`%load_ext shellform`; done by itself where IPython runs)."""
+    formatter = ipython.display_formatter.formatters["image/png"]
+    for (home, name), function in _PICTURES.items():
+        formatter.for_type_by_name(home, name, partial(_drawn, function))
+
+
+def _drawn(function: str, thing: Any) -> bytes:
+    picture: bytes = getattr(importlib.import_module("shellform.notebook"), function)(thing)
+    return picture
+
+
+if "IPython" in sys.modules and (_running := sys.modules["IPython"].get_ipython()) is not None:
+    load_ipython_extension(_running)

@@ -78,6 +78,8 @@ class Arrays(dict[str, Any]):
 
 def read_arrays(path: Path) -> Arrays:
     """All arrays of an .npz file; no objects are unpacked. Raises InputError where it is missing or damaged."""
+    if not path.is_file():
+        raise InputError("isn't there", where=str(path))
     try:
         with np.load(path, allow_pickle=False) as data:
             return Arrays(path, {name: data[name] for name in data.files})

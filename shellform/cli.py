@@ -146,7 +146,7 @@ def _given(**options: Any) -> dict[str, Any]:
 def design(
     case: Annotated[Path, typer.Argument(help="Case file (TOML).")],
     output: Annotated[Path, typer.Option(help="Run folder.")],
-    until: Annotated[str, typer.Option(help="Last stage: surface, net, initial, optimise or figures.")] = "figures",
+    until: Annotated[str, typer.Option(help="Last stage: surface, net, initial, optimise, figures, documents or report.")] = "report",
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute every stage anew.")] = False,
     settings: Annotated[list[str] | None, typer.Option("--set", help="KEY=VALUE in place of an entry.")] = None,
     allow_scripts: Scripts = False,
@@ -161,7 +161,7 @@ def design(
     )
     report.close()
     _tell(summary)
-    print(f"Everything is in {output}")
+    print(f"Everything is in {output}" + (f"; look at {output / 'report.html'} first" if until == "report" else ""))
 
 
 @app.command()
@@ -238,14 +238,36 @@ def _lead(text: str) -> tuple[int, int, float]:
 @app.command()
 def render(
     run: Annotated[Path, typer.Argument(help="Run folder.")],
-    load: Annotated[str | None, typer.Option(help="none, design or additional.")] = None,
+    load: Annotated[str | None, typer.Option(help="none, design, additional or another of the case's.")] = None,
     design: Annotated[str | None, typer.Option(help="unbraced, initial, unloaded, optimised, rounded or polished.")] = None,
-    limit: Annotated[float | None, typer.Option(help="End of the colour scale, m.")] = None,
+    quantity: Annotated[
+        str | None, typer.Option(help="deviation, utilisation, curvature, shear, spring, mode (the softest) or history.")
+    ] = None,
+    limit: Annotated[float | None, typer.Option(help="End of the colour scale, in SI units; shear in rad.")] = None,
+    view: Annotated[str, typer.Option(help="best, top, front or side.")] = "best",
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    rods: Annotated[float, typer.Option(help="Rods so many times as thick as they are; 0: as thick as can be seen.")] = 0.0,
+    kind: Annotated[str | None, typer.Option("--format", help="png, svg or pdf; of films gif or mp4 (default: both).")] = None,
+    transparent: Annotated[bool, typer.Option("--transparent", help="No background.")] = False,
+    film: Annotated[str | None, typer.Option(help="pour: the load coming on; erection: the grid rising from the ground.")] = None,
 ) -> None:
-    """Draw deviation maps of a run."""
-    from shellform.study.pictures import draw_run
+    """Draw maps of a run, or a film."""
+    from shellform.study.folder import read_run
+    from shellform.study.pictures import draw_designs, wish
 
-    for file in draw_run(run, load=load, design=design, limit=limit):
+    asked = wish(
+        design=design, load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods, transparent=transparent,
+        kind=kind, film=film,
+    )  # fmt: skip
+    if film is None:
+        files = draw_designs(read_run(run), asked)
+    else:
+        from shellform.study.films import draw_film
+
+        report = _Progress()
+        files = draw_film(read_run(run), film, asked, report=report)
+        report.close()
+    for file in files:
         print(file)
 
 
@@ -267,6 +289,17 @@ def study(
         found = run_study(file, output, workers=workers, scheduler=scheduler, allow_scripts=allow_scripts, show=live)
     failed = f", {found.failed} of them without a result (see status and reason)" if found.failed else ""
     print(f"{found.designs} designs, {found.found} found from before{failed}: {found.table}")
+
+
+@app.command()
+def report(
+    runs: Annotated[list[Path], typer.Argument(help="Run folders; several stand side by side.")],
+    output: Annotated[Path | None, typer.Option(help="File; left out: report.html in the run folder, or here for several runs.")] = None,
+) -> None:
+    """Write the page of runs: report.html, one file that needs no network."""
+    from shellform.study.page import write_report
+
+    print(write_report(runs, output))
 
 
 @app.command()
@@ -397,7 +430,7 @@ class _Progress:
         self.status.start()
 
     def __call__(self, stage: str, text: str) -> None:
-        if text.startswith(("done", "kept", "loading", "no pictures", "size")):
+        if text.startswith(("done", "kept", "loading", "no pictures", "note", "size")):
             self.console.print(f"{stage}: {text}")
         self.status.update(f"{stage}: {text}")
 
@@ -422,6 +455,9 @@ def _tell(summary: dict[str, Any]) -> None:
         over = [f"{name} by {value:.1%}" for name, value in told["constraints"].items() if value > 1e-3]
         if over:
             print(f"limits that are not kept: {', '.join(over)}")
+    for name, design in summary.get("designs", {}).items():
+        if not design.get("critical_factor_kept", True):
+            print(f"the {name} design loses stability before the critical factor asked for (critical_factor in summary.json)")
     for each in summary.get("sections", []):
         found = f"objective {each['objective']:.3g}, {each['cables']} cables" if each["objective"] is not None else "no design"
         print(f"{each['section']:>10}  {found}{'' if each['feasible'] else ': ' + each['why_not']}")

@@ -6,16 +6,21 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent.parent / "shellform"
-FLOORS = {"errors": -1, "compiled": -1, "arrays": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "study": 5, "cli": 6}
+FLOORS = {"errors": -1, "compiled": -1, "arrays": 0, "written": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "notebook": 5, "study": 5, "cli": 6}
 DOORS = {
+    "binpacking": {"output/nesting.py"},
+    "ezdxf": {"output/drawings.py"},
+    "openpyxl": {"output/tables.py"},
     "gmsh": {"surface/occ.py"},
     "meshio": {"surface/meshes.py"},
     "rhino3dm": {"surface/rhino.py"},
-    "vtkmodules": {"output/render.py", "surface/vtkfiles.py"},
+    "vtkmodules": {"output/scene.py", "output/vtp.py", "surface/vtkfiles.py"},
     "nlopt": {"design/convex.py"},
-    "pyvista": {"output/render.py"},
-    "vtk": {"output/render.py"},
+    "pyvista": {"output/scene.py"},
+    "vtk": {"output/scene.py"},
     "matplotlib": {"output/plots.py"},
+    "PIL": {"output/images.py"},
+    "imageio_ffmpeg": {"output/images.py"},
     "cvxopt": {"structure/sparse.py", "design/convex.py"},
     "numba": {"compiled.py"},
     "dask": {"study/sweep.py"},
@@ -23,7 +28,7 @@ DOORS = {
     "pyarrow": {"study/store.py"},
     "optuna": {"study/search.py"},
 }
-NOT_LOADED = ["gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "dask", "pyarrow", "optuna", "numba", "scipy", "numpy"]
+NOT_LOADED = ["ezdxf", "openpyxl", "gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "pyarrow", "optuna", "numba", "scipy", "numpy"]
 
 
 def imports(path: Path) -> list[str]:

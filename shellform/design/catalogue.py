@@ -53,15 +53,17 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
     material: _Material
     sizes: _Sizes
     title: str = ""
+    stock_length: float | None = None
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """`sections` of one `material` under a `title`, by rising stiffness."""
+    """`sections` of one `material` under a `title`, by rising stiffness; `stock_length`, m, in which they are sold, where it is known."""
 
     title: str
     material: Material
     sections: tuple[Section, ...]
+    stock_length: float | None = None
 
 
 def shipped_catalogues() -> list[str]:
@@ -73,7 +75,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
     """The catalogue in a TOML file, or a shipped one by its name.
 
     `[material]` has young, shear or poisson, density, strength (flexural) and lasting, the share of it that rods bear for as long as they
-    stay bent; `[sizes]` has lists round (diameters), tube (outer diameter, wall) and rectangle (width in the surface, height across
+    stay bent; `stock_length` may say in which lengths, m, they are sold; `[sizes]` has lists round (diameters), tube (outer diameter, wall) and rectangle (width in the surface, height across
     it). SI units. Raises InputError naming the entry that is wrong.
     """
     path = _SHIPPED / f"{source}.toml" if str(source) in shipped_catalogues() else Path(source)
@@ -100,7 +102,10 @@ def read_catalogue(source: str | Path) -> Catalogue:
     ]
     if not sections:
         raise InputError("has no sizes", where=f"catalogue {path}: sizes", remedy="List round, tube or rectangle.")
-    return Catalogue(document.title or path.stem, material, tuple(sorted(sections, key=_order)))
+    stock = document.stock_length
+    if stock is not None and not 0.0 < stock < np.inf:
+        raise InputError("must be positive", where=f"catalogue {path}: stock_length", value=stock)
+    return Catalogue(document.title or path.stem, material, tuple(sorted(sections, key=_order)), stock)
 
 
 def _material(given: _Material) -> Material:

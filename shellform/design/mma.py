@@ -29,6 +29,7 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.design.checks import Softness
 from shellform.design.convex import minimise, minimise_quadratic
 from shellform.design.gridshell import Design
+from shellform.design.grouping import averaged
 from shellform.design.guard import guard
 from shellform.design.optimum import Optimum, Step
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
@@ -40,6 +41,7 @@ from shellform.errors import NotConverged
 from shellform.structure.loading import Loaded, apply_load
 from shellform.structure.stability import modes
 from shellform.structure.state import State
+from shellform.structure.threads import dense_on_one
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
 STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
@@ -58,6 +60,9 @@ _BATCHES = 8  # share of the taut cables that the first batch takes, one in so m
 _KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
 _THINNING = 1.5  # of the objective that cables with little use may cost
 _REPAIRS = 2  # steps after each batch
+_WIDE = 1e3  # windows, no bound on a group's step beside those on its cables
+_GUARDS = 400  # constraints for each load
+_RECOVERY = 0.1  # of what a window can change at most: by so much cables below that tension must gain under additional loads
 _BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
 FEASIBLE = 1e-3
 
@@ -73,35 +78,48 @@ def optimize(
     window: float = WINDOW,
     thin: bool = True,
     stiffness: float = STIFFNESS,
+    most_cables: int | None = None,
     progress: Watch | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
     `window`: half-width of the first step, in mean cable tensions; `thin`: whether cables that do little are taken away at the end;
     `stiffness`: what the softest mode must keep under the additional loads, as a share of the start's under the first (0: nothing);
+    `most_cables`: down to so many cables are taken away whatever they do for the objective, as long as every limit is kept;
     `progress(step)` is called at each trial.
 
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
-    search = _Search(problem, start, window, progress)
-    search.keep_stiff(stiffness * search.stiffness())
-    return search.run(evaluations, thin=thin)
+    with dense_on_one():
+        search = _Search(problem, start, window, progress)
+        search.most_cables = most_cables
+        search.keep_stiff(stiffness * search.stiffness())
+        return search.run(evaluations, thin=thin)
 
 
-def polish(best: Optimum, *, evaluations: int = POLISHING, progress: Watch | None = None) -> Optimum:
+def polish(
+    best: Optimum, *, evaluations: int = POLISHING, groups: Indices | None = None, progress: Watch | None = None
+) -> Optimum:
     """The design of `best` with the cables that it has and the least misfit under the first load, its limits kept.
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the shape alone. The misfit
     never rises: where no better design is found, `best` comes back. The radius stays.
+
+    With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length; the misfit then is compared
+    with that of `best` with averaged lengths. Raises NotConverged where that one doesn't bear the loads.
     """
     base = next(iter(best.problem.loads))
+    if groups is not None:
+        best = replace(best, design=replace(best.design, rest_length=averaged(best.design.rest_length, groups, best.design.present)))
     problem = replace(best.problem, minimize=[Share(1.0, Misfit(base))])
-    search = _Search(problem, best.design, WINDOW, progress)
-    search.keep_stiff(_POLISHED * best.stiffness)
-    search.braces[:] = True
-    search.guarded = True
-    search.smallest = _FINEST
-    polished = search.run(evaluations, thin=False)
+    with dense_on_one():
+        search = _Search(problem, best.design, WINDOW, progress)
+        search.keep_stiff(_POLISHED * best.stiffness)
+        search.braces[:] = True
+        search.guarded = True
+        search.groups = None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
+        search.smallest = _FINEST
+        polished = search.run(evaluations, thin=False)
     better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
     return polished if better else replace(best, status="no design with less misfit was found", history=polished.history)
 
@@ -132,6 +150,8 @@ class _Search:
         self.least = 0.0
         self.smallest = _SMALLEST
         self._modelled: TensionModel | None = None
+        self.most_cables: int | None = None
+        self.groups: Indices | None = None  # of the present cables, with one rest length each
         self.guarded = False  # cables may not go slack under additional loads
 
     def stiffness(self) -> float:
@@ -195,13 +215,15 @@ class _Search:
         Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or that costs too
         much of the objective, is cut; a single cable that can't go is kept for good.
         """
-        budget = _THINNING * self.point.objective
+        thrifty = _THINNING * self.point.objective
         batch = max(1, self._taut(self.point) // _BATCHES)
         needed = np.zeros(len(self.braces), dtype=bool)
         self.window = max(self.window, 0.1 * self.tension)
         failures = 0
         self.guarded = True
         while failures < _FAILURES and self.evaluator.evaluations < evaluations:
+            over = self.most_cables is not None and self._taut(self.point) > self.most_cables
+            budget = np.inf if over else thrifty
             model = self._model()
             leaving = self._spared(model, needed, batch)
             if not len(leaving):
@@ -224,6 +246,8 @@ class _Search:
             failures = 0
             batch = int(1.3 * batch) + 1
         self.status += ", and no further cable can be taken away" if failures else ""
+        if self.most_cables is not None and self._taut(self.point) > self.most_cables:
+            self.status += f"; no design with {self.most_cables} cables was found that keeps every limit"
 
     def _repair(self, point: Point, budget: float) -> Point:
         """A few steps with the cables that are left, none of which may go slack."""
@@ -326,8 +350,15 @@ class _Search:
             value = float(scaled_slope @ u + 0.5 * u @ bent)
             return value, scaled_slope + bent, values + scaled_rows @ u, scaled_rows
 
-        if self.guarded:
+        u: Reals | None
+        if self.groups is not None:
+            u = self._equal_steps(model, width, scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
+        elif self.guarded:
             u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
+            if u is None:  # the guards ask for more than a step can give: they may keep what they have
+                u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
+            if u is None:
+                u = np.clip(np.zeros(len(width)), low, high)
         else:
             u, _ = minimise(
                 evaluate,
@@ -339,8 +370,32 @@ class _Search:
                 tolerance=1e-9,
             )
         y = model.origin + width * u
-        y[:count][y[:count] < 1e-3 * self.tension] = 0.0
+        if self.groups is None:
+            y[:count][y[:count] < 1e-3 * self.tension] = 0.0
         return y, evaluate(u)[0]
+
+    def _equal_steps(
+        self, model: TensionModel, width: Reals, curvature: Reals, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
+    ) -> Reals:
+        """The model's optimum in windows (y,) among steps that change all rest lengths of a group by the same: u = W⁻¹ (∂l0/∂y)⁻¹ G v."""
+        assert self.groups is not None
+        present = self.point.design.present
+        lengths = model.variables_by_y[np.flatnonzero(present)] * self.problem.shell.cable_lengths[present, None]
+        count = len(self.groups)
+        member = np.zeros((count, int(self.groups.max()) + 1))
+        member[np.arange(count), self.groups] = 1.0
+        steps = np.linalg.solve(lengths, member) / width[:, None]
+        steps /= np.abs(steps).max(axis=0)
+        box = np.vstack([steps, -steps])
+        v = minimise_quadratic(
+            steps.T @ curvature @ steps,
+            steps.T @ slope,
+            np.vstack([rows @ steps, box]),
+            np.concatenate([values, -np.maximum(high, 0.0), np.minimum(low, 0.0)]),
+            np.full(steps.shape[1], -_WIDE),
+            np.full(steps.shape[1], _WIDE),
+        )
+        return steps @ v if v is not None else np.zeros(count)
 
     def _guarding(self, model: TensionModel, width: Reals) -> tuple[Reals, Reals]:
         """Rows (g, y) and values (g,), at most 0 where each guarded cable keeps its least tension, per window and in shares of what
@@ -357,8 +412,11 @@ class _Search:
             held = guard(self.evaluator.assembly(design), self.point.states[name], shell.cables(design), self.tension, *rates)
             falls = -(held.tension_by_design @ lengths) * width
             scale = np.abs(falls).sum(axis=1)
-            rows.append(falls / scale[:, None])
-            values.append((np.minimum(held.tension, _BRACE * self.tension) - held.tension) / scale)
+            asked = np.minimum((_BRACE * self.tension - held.tension) / scale, _RECOVERY)
+            # Where no step within the window lets a cable go slack, there is nothing to guard; of the others the nearest count.
+            near = np.argsort(-asked, kind="stable")[: int(np.clip((asked > -1.0).sum(), 0, _GUARDS))]
+            rows.append(falls[near] / scale[near, None])
+            values.append(asked[near])
         return np.vstack(rows), np.concatenate(values)
 
     def _exact_in_tension(self, slope: Reals, model: TensionModel) -> Reals:
@@ -368,16 +426,12 @@ class _Search:
         if not dead.any():
             return slope
         result = slope.copy()
-        away = self.point.states[self.base].positions - self.problem.shell.target.positions
-        free = model.assembly.free
-        moving = free % 6 < 3
-        placed = away.ravel()[3 * (free[moving] // 6) + free[moving] % 6] @ model.state_by_y[moving][:, :count]
         total = np.zeros(count)
         for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True):
             if part.term.load != self.base:
                 continue
             if isinstance(part.term, (Misfit, RobustMisfit)):
-                total += 2.0 * weight * placed
+                total += weight * model.misfit_by_y[:count]
             elif isinstance(part.term, CableForce):
                 total += weight
         result[:count][dead] = total[dead]
@@ -399,6 +453,10 @@ class _Search:
 
     def _try(self, model: TensionModel, y: Reals) -> Point | None:
         design = model.design(y, self.point.design.present)
+        if self.groups is not None:
+            rest = design.rest_length.copy()
+            rest[design.present] = averaged(rest[design.present], self.groups, np.ones(len(self.groups), dtype=bool))
+            design = replace(design, rest_length=rest)
         near = {**self.evaluator.predicted(self.point, design), self.base: model.predicted(y)}
         try:
             return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage)

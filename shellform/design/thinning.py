@@ -21,6 +21,8 @@ from shellform.structure.cable import Cables
 from shellform.structure.sensitivity import element_columns
 from shellform.structure.state import State
 
+_BLOCK = 256  # columns solved for at once
+
 
 def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
     """The matrix S (c, c) of the cables at the stable `state`; slack cables have rows of the identity.
@@ -32,8 +34,11 @@ def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
     stiffness = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
     unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
     pull = element_columns(assembly, cables.freedoms(), np.hstack([-unit, unit]))
-    solved = assembly.factor(state).solve(np.asfortranarray(pull.toarray()))
-    return np.asarray(np.eye(len(unit)) - pull.T @ solved)
+    factor, kept = assembly.factor(state), np.eye(len(unit))
+    for first in range(0, len(unit), _BLOCK):
+        own = slice(first, min(first + _BLOCK, len(unit)))
+        kept[:, own] -= pull.T @ factor.solve(np.asfortranarray(pull[:, own].toarray()))
+    return kept
 
 
 def spared(kept: Reals, order: Indices, most: int, least: float) -> Indices:

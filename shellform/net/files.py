@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from shellform.net.grid import Grid, GridRod
 from shellform.net.net import Net
 from shellform.net.quality import MAPS, Quality
 from shellform.structure.state import State
+from shellform.written import whole
 
 
 def net_document(net: Net) -> dict[str, Any]:
@@ -74,13 +74,12 @@ def save_net(path: Path, net: Net) -> None:
         pieces = [getattr(rod, name) for rod in grid.rods]
         arrays[f"rod_{name}"] = np.concatenate(pieces)
         arrays[f"rod_{name}_ends"] = np.cumsum([len(piece) for piece in pieces])
-    partial = path.with_name(f"{path.name}.part.npz")
-    np.savez_compressed(partial, **arrays)
-    os.replace(partial, path)
+    with whole(path) as partial:
+        np.savez_compressed(partial, **arrays)
 
 
 def load_net(path: Path) -> Net:
-    """The net written by `save_net`. Raises InputError where the file is damaged."""
+    """The net written by `save_net`. Raises InputError where the file is missing or damaged."""
     data = read_arrays(path)
     try:
         meta = json.loads(str(data["meta"]))

@@ -1,30 +1,39 @@
-"""Convergence plots (figures 10, 11, 15 and 16 of the paper); the door to matplotlib.
+"""Convergence plots (figures 10, 11, 15 and 16 of the paper), and pages of lines and words; the door to matplotlib.
 
 Figures are made as objects with their own canvas, so that nothing global is touched and any thread may draw.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from numpy.typing import ArrayLike, NDArray
 
 from shellform.arrays import Reals
 from shellform.errors import InputError
+from shellform.output.legend import Ramp, Word
+from shellform.written import door, whole
 
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
 _DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
 _FAR = -1.5  # values further below their limit than this run out of the picture: what is near is what counts
-_FORMATS = (".png", ".svg", ".pdf")
+FORMATS = (".png", ".svg", ".pdf")
+_DOTS = 160.0  # pixels an inch
+_POINT = 72.0 / _DOTS  # points a pixel
+_INCH, _POINTS = 25.4, 72.0  # mm and points in an inch
+_CAPITAL = 0.73  # height of a capital over the font's size
 _WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
 
 
@@ -133,6 +142,79 @@ def constraint_history(
     _save(figure, path)
 
 
+@dataclass(frozen=True)
+class Line:
+    """A line through `points` (x, y), mm from the page's lower left corner, `width` mm wide."""
+
+    points: Sequence[tuple[float, float]]
+    colour: str = "#000000"
+    width: float = 0.18
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Label:
+    """A line of `text` with capitals `height` mm high, turned by `angle` degrees; `side` and `foot` of it are at `place`, mm."""
+
+    place: tuple[float, float]
+    height: float
+    text: str
+    colour: str = "#000000"
+    angle: float = 0.0
+    side: str = "left"
+    foot: str = "bottom"
+    bold: bool = False
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of `width` and `height`, mm, with its lines and labels."""
+
+    width: float
+    height: float
+    lines: tuple[Line, ...]
+    labels: tuple[Label, ...]
+
+
+def write_pages(path: str | Path, pages: Sequence[Page], title: str = "") -> None:
+    """Writes the pages, to scale and with their words as text, to a PDF; a single page may also go to a PNG or SVG.
+
+    The same pages give the same bytes. The caller sees to it that `path` can be written.
+    """
+    target = Path(path)
+    with rc_context({"pdf.fonttype": 42, "svg.fonttype": "none", "svg.hashsalt": "shellform", "font.family": "DejaVu Sans"}):
+        if target.suffix.lower() != ".pdf":
+            _page(pages[0]).savefig(target, dpi=160)
+            return
+        with PdfPages(target, metadata={"Title": title, "CreationDate": None}) as book:
+            for page in pages:
+                book.savefig(_page(page))
+
+
+def _page(page: Page) -> Figure:
+    figure = Figure(figsize=(page.width / _INCH, page.height / _INCH))
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0.0, page.width), ylim=(0.0, page.height))
+    axes.axis("off")
+    kinds: dict[tuple[str, float, bool], list[Sequence[tuple[float, float]]]] = {}
+    for line in page.lines:
+        kinds.setdefault((line.colour, line.width, line.dashed), []).append(line.points)
+    for (colour, width, dashed), several in kinds.items():
+        style: Any = (0, (8.0, 6.0)) if dashed else "solid"
+        axes.add_collection(
+            LineCollection(several, colors=colour, linewidths=width / _INCH * _POINTS, linestyles=[style], capstyle="round")
+        )
+    vertical = {"bottom": "baseline", "middle": "center_baseline", "top": "top"}
+    for label in page.labels:
+        axes.text(
+            *label.place, label.text, fontsize=label.height / _CAPITAL / _INCH * _POINTS, color=label.colour, rotation=label.angle,
+            ha="center" if label.side == "middle" else label.side, va=vertical[label.foot], rotation_mode="anchor",
+            fontweight="bold" if label.bold else "normal",
+        )  # fmt: skip
+    return figure
+
+
 def _turned(rows: Sequence[Mapping[str, object]]) -> dict[str, Sequence[object]]:
     names = list(rows[0]) if rows else []
     for number, row in enumerate(rows):
@@ -176,20 +258,63 @@ def _curves(axes: Axes, at: Reals, lines: Mapping[str, Reals]) -> None:
 
 def _save(figure: Figure, path: str | Path) -> None:
     """Writes all of the file or nothing; the same history gives the same bytes."""
-    target = Path(path)
-    ending = target.suffix.lower()
-    if ending not in _FORMATS:
-        raise InputError("has another ending", where=str(target), value=ending, remedy=f"Use {', '.join(_FORMATS)}.")
-    if not target.parent.is_dir():
-        raise InputError("the folder doesn't exist", where=str(target.parent), remedy="Make it first.")
+    target = door(path, *FORMATS)
     figure.legend(loc="outside right upper", frameon=False)
-    undated: dict[str, None] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(ending, {})
-    partial = target.with_name(f"{target.stem}.part{target.suffix}")
-    try:
-        with rc_context({"svg.hashsalt": "shellform"}):
-            figure.savefig(partial, dpi=160, metadata=undated)
-        os.replace(partial, target)
-    except OSError as error:
-        raise InputError(f"can't be written: {error.strerror}", where=str(target)) from error
-    finally:
-        partial.unlink(missing_ok=True)
+    _write(figure, target, 160)
+
+
+def _write(figure: Figure, target: Path, resolution: float) -> None:
+    undated: dict[str, None] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(target.suffix.lower(), {})
+    with whole(target) as partial, rc_context({"svg.hashsalt": "shellform", "path.simplify": False}):
+        figure.savefig(partial, dpi=resolution, metadata=undated)
+
+
+def blank(size: tuple[int, int], *, transparent: bool = False) -> Axes:
+    """An empty page measured in pixels from its lower left corner."""
+    figure = Figure(figsize=(size[0] / _DOTS, size[1] / _DOTS), dpi=_DOTS, facecolor="none" if transparent else "white")
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0, size[0]), ylim=(0, size[1]))
+    axes.set_axis_off()
+    return axes
+
+
+def strokes(axes: Axes, ends: Reals, widths: Reals, colours: ArrayLike) -> None:
+    """Straight lines (s, 2, 2) of `widths` (s,), all in pixels, and `colours` (s, 3) from 0 to 1, later ones above earlier ones."""
+    lines = LineCollection(list(np.round(ends, 1)), linewidths=widths * _POINT, colors=colours, capstyle="round", clip_on=False)
+    axes.add_collection(lines, autolim=False)
+
+
+def areas(axes: Axes, corners: Reals, colour: str) -> None:
+    """Filled polygons (p, k, 2), pixels, of one colour."""
+    axes.add_collection(PolyCollection(list(np.round(corners, 1)), facecolors=colour, linewidths=0.0, clip_on=False), autolim=False)
+
+
+def letter(axes: Axes, word: Word, corner: tuple[float, float]) -> None:
+    """A word of a drawing whose lower left corner stands at `corner`."""
+    axes.text(
+        corner[0] + word.at[0], corner[1] + word.at[1], word.text, fontsize=word.pixels * _POINT, color=word.colour,
+        weight="bold" if word.bold else "normal", ha=word.justify, va="baseline",
+    )  # fmt: skip
+
+
+def strip(axes: Axes, ramp: Ramp, corner: tuple[float, float]) -> None:
+    """A strip of colours of a drawing whose lower left corner stands at `corner`."""
+    x, y = corner
+    place = (x + ramp.left, x + ramp.right, y + ramp.low, y + ramp.high)
+    axes.imshow(ramp.colours[None], extent=place, aspect="auto", interpolation="nearest")
+    axes.set(xlim=(0, axes.figure.bbox.width), ylim=(0, axes.figure.bbox.height))
+
+
+def save(axes: Axes, path: str | Path) -> None:
+    """Writes a page as .svg, .pdf or .png: the same page gives the same bytes."""
+    figure = axes.figure
+    assert isinstance(figure, Figure)
+    _write(figure, door(path, *FORMATS), _DOTS)
+
+
+def pixels(axes: Axes) -> NDArray[np.uint8]:
+    """A page as an array (height, width, 4)."""
+    canvas = axes.figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())

@@ -8,7 +8,9 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.output import render
+from shellform.output.panel import Look, Panel
 from shellform.structure.analysis import Analysis
+from shellform.written import folder as made
 
 _AMPLITUDE = 0.05  # of the model's size, at which modes are drawn
 
@@ -17,8 +19,7 @@ def draw_analysis(analysis: Analysis, folder: str | Path) -> list[Path]:
     """Writes state.png, coloured by how far each node has moved, and mode-1.png and so on, coloured by amplitude; returns the files."""
     place = analysis.equilibrium.state.positions
     moved = np.linalg.norm(place - analysis.model.network.nodes, axis=1)
-    target = Path(folder)
-    target.mkdir(parents=True, exist_ok=True)
+    target = made(folder)
     name = "loaded" if analysis.converged else "last state, not in equilibrium"
     files = [_draw(analysis, f"{name}: {1e3 * moved.max():.4g} mm at most", "displacement", place, moved, target / "state.png")]
     critical = analysis.critical
@@ -41,7 +42,7 @@ def _mode(analysis: Analysis, title: str, place: Reals, shape: Reals, target: Pa
 def _draw(analysis: Analysis, title: str, quantity: str, place: Reals, colour: Reals, target: Path) -> Path:
     network = analysis.model.network
     size = float(np.ptp(place, axis=0).max())
-    panel = render.Panel(
+    panel = Panel(
         title,
         place,
         network.beams.ends,
@@ -53,5 +54,5 @@ def _draw(analysis: Analysis, title: str, quantity: str, place: Reals, colour: R
         1e-3 * size,
         quantity,
     )
-    render.picture(target, panel, limit=max(float(colour.max()), 1e-9 * size))
+    render.picture(target, panel, Look(limit=max(float(colour.max()), 1e-9 * size)))
     return target

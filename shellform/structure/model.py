@@ -7,7 +7,6 @@ say, ranges, signs and references, is checked on whole arrays afterwards. Every 
 from __future__ import annotations
 
 import difflib
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,6 +22,7 @@ from shellform.structure.beam import Beams, make_beams
 from shellform.structure.cable import Cables, make_cables
 from shellform.structure.network import Network
 from shellform.structure.state import State, from_vectors
+from shellform.written import whole
 
 _HUGE = 1e30  # squares and ratios of such numbers are still finite
 _Three = tuple[float, float, float]
@@ -118,9 +118,8 @@ def parse_model(data: object) -> Model:
 
 def write_model(path: str | Path, model: Model) -> None:
     """Writes the model; numbers are written so that they are read back exactly. The file appears whole or not at all."""
-    partial = Path(f"{path}.part")
-    partial.write_bytes(msgspec.json.encode(_document(model)))
-    os.replace(partial, path)
+    with whole(path) as partial:
+        partial.write_bytes(msgspec.json.encode(_document(model)))
 
 
 def _document(model: Model) -> dict[str, Any]:

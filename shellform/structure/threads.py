@@ -1,13 +1,15 @@
-"""Compiled loops over elements, shared among the cores.
+"""Compiled loops over elements, shared among the cores, and dense algebra kept on one.
 
-Each element writes to places of its own, so that the result is the same to the last bit on any number of cores.
+Each element writes to places of its own, so that the result is the same to the last bit on any number of cores. Sums over many
+terms in BLAS come out otherwise on another number of threads, which an optimisation's decisions can magnify: 108 and 102 cables.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
@@ -20,6 +22,15 @@ def cores() -> int:
     if asked.isdigit() and int(asked) > 0:
         return int(asked)
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def dense_on_one() -> Iterator[None]:
+    """Dense algebra on one thread within, so that its sums don't depend on their number."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
 
 
 def share(loop: Callable[..., Any], count: int, *arguments: Any) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -27,6 +26,7 @@ from shellform.design.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.errors import InputError
 from shellform.study.entries import LimitsEntry, RobustEntry
 from shellform.study.entries import Section as _Section
+from shellform.written import whole
 
 _Polygon = list[tuple[float, float]]
 
@@ -73,7 +73,12 @@ class NetEntry(_Section):
         return self
 
 
-class OwnRodEntry(_Section):
+class _BoughtEntry(_Section):
+    stock_length: PositiveFloat | None = Field(None, description="in which rods are bought, m; left out: the catalogue's, or 6 m")
+    kerf: float = Field(0.003, ge=0.0, description="width of a saw cut, m")
+
+
+class OwnRodEntry(_BoughtEntry):
     """Rods of given sizes: round, tubes or laths."""
 
     young: PositiveFloat = Field(description="Young's modulus, Pa")
@@ -97,7 +102,7 @@ class OwnRodEntry(_Section):
         return self
 
 
-class StockRodEntry(_Section):
+class StockRodEntry(_BoughtEntry):
     """Rods from a catalogue."""
 
     catalogue: str = Field(description="a shipped catalogue's name, or a TOML file relative to the case file")
@@ -202,6 +207,8 @@ class OptimiseEntry(_Section):
     catalogue: str | None = Field(None, description="to which a free radius is rounded up; left out: the rods' own, if they have one")
     rounded: int = Field(30, ge=0, description="design evaluations for each section that is tried in rounding; 0: no rounding")
     neighbours: int = Field(1, ge=0, description="sections below and above the rounded one that are tried too")
+    cables_max: PositiveInt | None = Field(None, description="cables are taken away down to this number, if limits allow")
+    symmetric: bool = Field(False, description="cables that a symmetry of the net joins are polished to one length")
     polish: int = Field(20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none")
 
     @model_validator(mode="after")
@@ -209,6 +216,8 @@ class OptimiseEntry(_Section):
         total = self.misfit + self.cable_force + self.rod_radius + self.robust
         if abs(total - 1.0) > 1e-9:
             raise ValueError(f"the shares misfit, cable_force, rod_radius and robust must add up to 1, not {total:g}")
+        if self.symmetric and not self.polish:
+            raise ValueError("symmetric lengths are found in polishing: give polish some evaluations")
         if self.catalogue is not None and not self.rod_radius:
             raise ValueError("catalogue is for a free radius: give rod_radius a share")
         return self
@@ -434,6 +443,5 @@ def _has(entry: Any, name: str) -> bool:
 
 def write_text(path: Path, text: str) -> None:
     """Writes a file whole or not at all."""
-    partial = path.with_name(f"{path.name}.part")
-    partial.write_text(text, encoding="utf-8")
-    os.replace(partial, path)
+    with whole(path) as partial:
+        partial.write_text(text, encoding="utf-8")

@@ -10,15 +10,18 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import ValidationError
 
+import shellform
 from shellform.errors import InputError
 from shellform.net.files import net_document, save_net
 from shellform.net.orient import oriented_net
 from shellform.study.case import SurfaceEntry, load_case, write_text
-from shellform.study.folder import Report
+from shellform.study.folder import FORMAT, VERSION, Report, refuse_overwriting
+from shellform.study.pictures import pictures_possible
 from shellform.study.run import net_summary, surface_of, surface_summary, told_size
 from shellform.study.shell import rod_material
 from shellform.surface.reading import FORMATS, kind_of
 from shellform.surface.target import largest_curvature
+from shellform.written import folder as made
 
 _GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
 
@@ -94,25 +97,23 @@ def net_alone(
 
     `options` are the entries of [surface] in a case; `angle` degrees or "auto".
     """
+    refuse_overwriting(folder)
+    if (folder / "stages.json").is_file():
+        raise InputError("holds a run of shellform design", where=str(folder), remedy="Choose another --output for the net alone.")
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
     report("surface", f"size {told_size(surface)}")
     settings = {"spacing": spacing, "gap": gap or _GAP * spacing}
     net, found, offset = oriented_net(surface, settings, angle=_angle(angle), progress=lambda text: report("net", text))
     told = net_summary(net) | {"angle": found, "offset": list(offset)}
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(folder)) from error
+    made(folder)
     save_net(folder / "net.npz", net)
     write_text(folder / "net.json", json.dumps(net_document(net)))
-    document = {"format": "shellform-summary", "version": 1, "surface": surface_summary(surface, str(file)), "net": told}
+    document = {"format": FORMAT, "version": VERSION, "shellform": shellform.__version__, "surface": surface_summary(surface, str(file)), "net": told}
     write_text(folder / "summary.json", json.dumps(document, indent=1))
-    try:
+    if pictures_possible(report):
         from shellform.output.nets import draw_net
 
         draw_net(net, folder / "figures")
-    except InputError as error:  # no OpenGL: everything but the pictures is still made
-        report("figures", f"no pictures: {error}")
     return {"size": told_size(surface), **told}
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import csv
 import io
 import json
-import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+import shellform
 from shellform.arrays import Reals, read_arrays
 from shellform.design.catalogue import named
 from shellform.design.gridshell import Design, Gridshell, Rod
@@ -32,9 +32,14 @@ from shellform.study.case import Case, load_case
 from shellform.study.limits import shown
 from shellform.study.shell import gridshell, rounding_catalogue
 from shellform.surface.target import Surface
+from shellform.written import whole
 
 DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished")
-VERSION = 1  # of summary.json
+FORMAT, VERSION = "shellform-summary", 1  # of summary.json
+WRITTEN = (
+    "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
+    "drawings", "schedules", "report.html", "log.txt",
+)  # fmt: skip
 
 Report = Callable[[str, str], None]
 """Called with the stage and a line of progress."""
@@ -61,7 +66,7 @@ class Run:
     @property
     def best(self) -> str:
         """The name of the design to build: the last made of the polished, the rounded, the optimised and the initial one."""
-        return [name for name in ("initial", "optimised", "rounded", "polished") if name in self.designs][-1]
+        return [name for name in ("unbraced", "initial", "optimised", "rounded", "polished") if name in self.designs][-1]
 
     def shell_of(self, name: str) -> Gridshell:
         """The shell with the rods of a design: those of a rounded one come from the catalogue."""
@@ -73,27 +78,78 @@ class Run:
 
 
 def read_run(folder: str | Path) -> Run:
-    """A run with at least one design. Raises InputError for another folder, a damaged one, or one of a newer version."""
+    """A run with at least one design, finished or not: what the summary tells of is there.
+
+    Raises InputError for another folder, a damaged one, one without designs, and one of a newer version.
+    """
     place = Path(folder)
     if not (place / "case.toml").is_file():
         raise InputError("is no run folder", where=str(place), remedy="Make one with shellform design.")
     summary = read_json(place / "summary.json")
-    if summary.get("version", VERSION) > VERSION:
-        raise InputError(
-            "was written by a newer shellform", where=str(place), value=summary["version"], remedy="Install that version."
-        )
-    ready = [name for name in DESIGNS if (place / f"designs/{name}.npz").is_file()]
+    _refuse_newer(place, summary)
+    ready = [name for name in DESIGNS if name in summary.get("designs", {})]
     if not ready:
-        raise InputError("the run has no designs yet", where=str(place), remedy="Run shellform design on it first.")
+        raise InputError("the run has no designs yet", where=str(place), remedy="Run shellform design on it again: it goes on.")
+    for file in (place / name for name in ("surface.npz", "net.npz", *(f"designs/{each}.npz" for each in ready))):
+        if not file.is_file():
+            raise InputError("isn't there: the run is unfinished", where=str(file), remedy="Run shellform design on it again: it goes on.")
     case = load_case(place / "case.toml")
     surface = load_surface(place / "surface.npz")
     shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
     designs, states = {}, {}
     for name in ready:
         with arrays_of(place / f"designs/{name}.npz") as data:
+            wanted = ["rest_length", "present", "radius", *(f"{each}_{what}" for each in loads for what in ("positions", "quaternions"))]
+            missing = [each for each in wanted if each not in data]
+            if missing or len(data["present"]) != len(shell.cable_ends):
+                raise InputError(
+                    "belongs to another state of the case: the run is half-finished",
+                    where=str(place / f"designs/{name}.npz"),
+                    remedy="Run shellform design on it again: it goes on.",
+                )
             designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
             states[name] = {each: State(data[f"{each}_positions"], data[f"{each}_quaternions"]) for each in loads}
     return Run(place, case, surface, shell, loads, designs, states, summary)
+
+
+def refuse_overwriting(place: Path) -> None:
+    """Raises InputError for a folder in which files that shellform didn't write would be overwritten, or those of a newer version."""
+    if not place.exists():
+        return
+    if not place.is_dir():
+        raise InputError("is a file, not a folder", where=str(place), remedy="Choose another --output.")
+    summary = {} if not _ours(place / "summary.json") else read_json(place / "summary.json")
+    if summary.get("format") == FORMAT:
+        _refuse_newer(place, summary)
+        if _number(summary.get("shellform", "0")) > _number(shellform.__version__):
+            raise InputError(
+                "holds a run of a newer shellform", where=str(place), value=summary["shellform"],
+                remedy="Install that version, choose another --output, or let --fresh overwrite it.",
+            )  # fmt: skip
+        return
+    there = [] if (place / "stages.json").is_file() else [name for name in WRITTEN if (place / name).exists()]
+    if there:
+        raise InputError(
+            f"is no run folder, and {', '.join(there)} in it would be overwritten",
+            where=str(place),
+            remedy="Choose another --output, or let --fresh overwrite it.",
+        )
+
+
+def _ours(path: Path) -> bool:
+    """Whether a file seems to be a summary, be it damaged: the word stands at its beginning."""
+    return path.is_file() and FORMAT.encode() in path.read_bytes()[:200]
+
+
+def _refuse_newer(place: Path, summary: Mapping[str, Any]) -> None:
+    if summary.get("version", VERSION) > VERSION:
+        raise InputError(
+            "was written by a newer shellform", where=str(place), value=summary["version"], remedy="Install that version."
+        )
+
+
+def _number(version: str) -> tuple[int, ...]:
+    return tuple(int(part) for part in version.split(".") if part.isdigit())
 
 
 def save_surface(path: Path, surface: Surface) -> None:
@@ -183,9 +239,8 @@ def utilisation(shell: Gridshell, design: Design, state: State) -> float:
 
 def save_arrays(path: Path, **arrays: Any) -> None:
     """Writes arrays by name into an .npz file."""
-    partial = path.with_name(f"{path.name}.part.npz")
-    np.savez_compressed(partial, **arrays)
-    os.replace(partial, path)
+    with whole(path) as partial:
+        np.savez_compressed(partial, **arrays)
 
 
 def arrays_of(path: Path) -> Any:

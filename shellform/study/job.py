@@ -84,7 +84,8 @@ def _run(job: Job, folder: Path) -> dict[str, Any]:
     try:
         return run_case(job.case, folder, **settings)  # type: ignore[arg-type]
     except InputError as error:
-        if not error.what.startswith("is damaged"):  # by a machine switched off while it wrote
+        # By a machine switched off while it wrote, or killed before its first stage was done.
+        if not error.what.startswith(("is damaged", "is no run folder")):
             raise
         return run_case(job.case, folder, fresh=True, **settings)  # type: ignore[arg-type]
 

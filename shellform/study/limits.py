@@ -2,7 +2,8 @@
 
 Every limit holds under every load case, and those that matter before concrete comes also without load. The critical load factor F is kept by
 a load case "critical NAME", F times the load case, that every accepted design bears on its stable branch, its softest mode keeping
-a share of the initial design's stiffness under the design load (checks.py: Softness): stability doesn't end before F.
+a share of the initial design's stiffness under the design load (checks.py: Softness). Load steps can pass a bifurcation that is followed by stable states again: in the end the paths are followed closely
+(`critical_factors`), and a design whose path ends before F isn't feasible.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ from shellform.study.entries import RobustEntry
 from shellform.study.shell import rod_bounds
 
 _SOFTEST = 0.25  # of the initial design's softest mode under the design load, that is left at the critical factor asked for
+_EQUAL = 1e-3  # relative: critical factors that count as equal
 _SOUGHT = 3.0  # critical load factor up to which designs are followed
 
 
@@ -149,6 +151,12 @@ def shown(shell: Gridshell, design: Design, state: State, load: Reals) -> dict[s
         "cable_force_min": float(pull.min()) if len(pull) else 0.0,
         "cables_slack": int((pull <= 0.0).sum()),
     }
+
+
+def below_factor(factors: Mapping[str, Mapping[str, Any]], wanted: float, names: Sequence[str]) -> list[str]:
+    """Those of the load cases `names` whose path ends below the `wanted` factor, as `critical_factors` found it by following."""
+    found = {name: factors[name]["critical_factor"] for name in names if name in factors}
+    return [name for name, factor in found.items() if factor is not None and factor < wanted * (1.0 - _EQUAL)]
 
 
 def critical_factors(

@@ -24,6 +24,7 @@ from shellform.study.folder import Run, arrays_of, read_run, save_arrays
 from shellform.study.run import net_of, surface_of
 from shellform.study.shell import gridshell
 from shellform.surface.units import METRES
+from shellform.written import folder as made
 
 
 @dataclass(frozen=True)
@@ -72,14 +73,14 @@ def _built(
     if source.suffix.lower() != ".toml":
         run = read_run(source)
         name = _design(run, design, "unbraced")
-        return run.shell_of(name), run.designs[name], run.loads, _folder(output or run.folder / "schedules")
+        return run.shell_of(name), run.designs[name], run.loads, made(output or run.folder / "schedules")
     if design not in (None, "unbraced"):
         raise InputError("a case has no designs yet: the grid is taken unbraced", where="--design", value=design, remedy="Give a run folder.")
     case = load_case(source)
     surface = surface_of(case.surface, allow_scripts=allow_scripts)
     net, _, _ = net_of(case, surface)
     shell, loads = gridshell(case, net, surface)
-    return shell, shell.unbraced(), loads, _folder(output or Path.cwd())
+    return shell, shell.unbraced(), loads, made(output or Path.cwd())
 
 
 def _scan(text: str, shell: Gridshell, loads: Mapping[str, Reals], unit: str, frame: int | None) -> Scan:
@@ -126,7 +127,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     nodes, places, doubts = _surveyed(measured, shell, belief.state, options)
     learnt = site.learn(shell, belief, nodes, places, noise=options.noise)
     step = site.adjust(shell, learnt, goal, options.crew, noise=options.noise)
-    where = _folder(output or run.folder / "schedules")
+    where = made(output or run.folder / "schedules")
     files = [where / each for each in ("turns.csv", "predicted.csv", "belief.npz")]
     write_text(files[0], step.schedule(shell))
     write_text(files[1], _predicted(shell, learnt.state, step, goal))
@@ -175,7 +176,7 @@ def replay(
     turned = [(0, 0), *((int(np.count_nonzero(each.turns)), int(np.abs(each.turns).sum())) for each in played.adjustments)]
     for number, (misfit, (cables, turns)) in enumerate(zip(played.misfits, turned, strict=True)):
         lines.append(f"{number},{_mm(misfit, len(goal))},{cables},{turns}")
-    file = _folder(output or run.folder / "schedules") / "replay.csv"
+    file = made(output or run.folder / "schedules") / "replay.csv"
     write_text(file, "\n".join(lines) + "\n")
     return Told([*lines, f"{100.0 * played.removed:.0f} % of the misfit are gone after {len(played.adjustments)} rounds"], [file])
 
@@ -207,7 +208,7 @@ def erect(
         lift=carried[2],
         step=step,
     )
-    where = _folder(output or run.folder / "schedules")
+    where = made(output or run.folder / "schedules")
     files = [where / "erection.csv", where / "erection.npz"]
     write_text(files[0], done.table())
     save_arrays(files[1], positions=np.stack([each.state.positions for each in done.steps]), stage=np.array([each.stage for each in done.steps]))
@@ -289,14 +290,6 @@ def _design(run: Run, name: str | None, usual: str) -> str:
     if name is not None and name not in run.designs:
         raise InputError("isn't there", where="--design", value=name, remedy=f"Known: {', '.join(run.designs)}.")
     return name or usual
-
-
-def _folder(place: Path) -> Path:
-    try:
-        place.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(place), remedy="Choose another --output.") from error
-    return place
 
 
 def _mm(misfit: float, nodes: int) -> str:

@@ -90,7 +90,7 @@ class Study(_Part):
 
     title: str = ""
     case: str = Field(description="case file, beside or below the study file")
-    until: Literal["surface", "net", "initial", "optimise", "figures"] = Field("optimise", description="last stage of each design")
+    until: Literal["surface", "net", "initial", "optimise", "figures", "documents", "report"] = Field("optimise", description="last stage of each design")
     keep: Literal["all", "best", "none"] = Field("best", description="run folders that stay")
     method: Literal["grid", "random", "latin", "sobol", "search"] = Field("grid", description="how the varied entries combine")
     count: int | None = Field(None, ge=1, le=_MOST, description="of designs, for all methods but grid")

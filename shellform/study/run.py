@@ -1,7 +1,7 @@
 """The whole job of one case, stage by stage, in a run folder (contracts/run-folder.md).
 
-surface -> net -> initial -> optimise -> figures. Each stage leaves its result in the folder and a key in `stages.json`: a hash of
-the entries it depends on, the surface file's bytes, the package's version and the stage before. Run again, a stage whose key is
+surface -> net -> initial -> optimise -> figures -> documents -> report. Each stage leaves its result in the folder and a key in
+`stages.json`: a hash of the entries it depends on, the surface file's bytes, the package's version and the stage before. Run again, a stage whose key is
 unchanged is loaded instead of computed.
 """
 
@@ -21,6 +21,7 @@ import numpy as np
 import shellform
 from shellform.arrays import Reals
 from shellform.design.gridshell import Design, Gridshell
+from shellform.design.grouping import symmetric_groups
 from shellform.design.optimum import Optimum
 from shellform.design.problem import Problem, follow
 from shellform.design.terms import AtMost, CableForces, Misfit, Share
@@ -33,21 +34,25 @@ from shellform.structure.loading import Loaded
 from shellform.structure.state import State
 from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
 from shellform.study.folder import (
+    FORMAT,
+    VERSION,
     Report,
     history_text,
     keep_design,
     load_surface,
     read_json,
     read_run,
+    refuse_overwriting,
     save_surface,
 )
-from shellform.study.limits import case_problem, critical_factors
+from shellform.study.limits import below_factor, case_problem, critical_factors
 from shellform.study.pictures import draw_everything, write_states
 from shellform.study.robustness import robustness
 from shellform.study.shell import catalogue_bytes, gridshell, rod_limits, rounding_catalogue
 from shellform.surface.target import Surface
+from shellform.written import folder as made
 
-STAGES = ("surface", "net", "initial", "optimise", "figures")
+STAGES = ("surface", "net", "initial", "optimise", "figures", "documents", "report")
 
 
 def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
@@ -111,12 +116,16 @@ class _Job:
     def path(self, name: str) -> Path:
         return self.folder / name
 
+    def tell(self, summary: Mapping[str, Any]) -> None:
+        """Writes summary.json."""
+        write_text(self.path("summary.json"), json.dumps(summary, indent=1))
+
 
 def run_case(
     case: Case,
     folder: Path,
     *,
-    until: str = "figures",
+    until: str = STAGES[-1],
     fresh: bool = False,
     allow_scripts: bool = False,
     report: Report = lambda stage, text: None,
@@ -132,6 +141,8 @@ def run_case(
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
     keys = stage_keys(case)
+    if not fresh:
+        refuse_overwriting(folder)
     done = {} if fresh else read_json(folder / "stages.json")
     results: dict[str, Any] = {}
     began = time.perf_counter()
@@ -139,30 +150,46 @@ def run_case(
         report("surface", f"reading {file}")
         results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
         report("surface", f"size {told_size(results['surface'])}")
-    try:
-        for part in ("designs", "states", "figures", "schedules"):
-            (folder / part).mkdir(parents=True, exist_ok=True)
-        write_text(folder / "case.toml", dump_case(case))
-    except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(folder), remedy="Choose another --output.") from error
-    job = _Job(case, folder, report)
     summary = read_json(folder / "summary.json") if done else {}
-    summary = {"format": "shellform-summary", "version": 1, **{k: v for k, v in summary.items() if k != "format"}}
+    summary = {**summary, "format": FORMAT, "version": VERSION, "shellform": shellform.__version__}
     summary.setdefault("seconds", {})
+    for part in ("designs", "states", "figures", "schedules"):
+        made(folder / part)
+    job = _Job(case, folder, report)
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
+    steps |= {"documents": _documents, "report": _report}
+    first = next((stage for stage in STAGES if done.get(stage) != keys[stage]), None)
+    if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
+        _outdate(summary, first)
+        done = {stage: done[stage] for stage in STAGES[: STAGES.index(first)]}
+        write_text(folder / "stages.json", json.dumps(done))
+        job.tell(summary)
+    write_text(folder / "case.toml", dump_case(case))
     reusable = True
     for stage in STAGES[: STAGES.index(until) + 1]:
         reusable = reusable and done.get(stage) == keys[stage]
         results[stage] = steps[stage](job, results, summary, reusable)
         if not reusable:
             summary["seconds"][stage] = round(time.perf_counter() - began, 3)
-            done = {**{s: done[s] for s in STAGES[: STAGES.index(stage)] if s in done}, stage: keys[stage]}
+            if results[stage] is not False:  # pictures without OpenGL aren't done: once it is there, the next run makes them
+                done = {**done, stage: keys[stage]}
         summary["seconds"]["total"] = round(sum(v for k, v in summary["seconds"].items() if k != "total"), 3)
-        write_text(folder / "summary.json", json.dumps(summary, indent=1))
+        job.tell(summary)
         write_text(folder / "stages.json", json.dumps(done))
         report(stage, f"{'kept' if reusable else 'done'} in {time.perf_counter() - began:.1f} s")
         began = time.perf_counter()
     return summary
+
+
+def _outdate(summary: dict[str, Any], stage: str) -> None:
+    """Takes out of the summary what a stage and those after it will find anew."""
+    if STAGES.index(stage) <= STAGES.index("initial"):
+        summary.pop("designs", None)
+    if STAGES.index(stage) <= STAGES.index("optimise"):
+        for key in ("optimisation", "sections", "robust"):
+            summary.pop(key, None)
+        for name in ("unloaded", "optimised", "rounded", "polished"):
+            summary.get("designs", {}).pop(name, None)
 
 
 def stage_keys(case: Case) -> dict[str, str]:
@@ -171,12 +198,15 @@ def stage_keys(case: Case) -> dict[str, str]:
     file = Path(case.surface.file)
     entries["surface"]["file"] = file.name
     stock = catalogue_bytes(case)
+    entries["stock"] = {name: entries["rod"].pop(name) for name in ("stock_length", "kerf")}  # which no design depends on
     needs = {
         "surface": ["surface"],
         "net": ["net", "joint"],
         "initial": ["rod", "cable", "load", "part"],
         "optimise": ["optimise", "limits", "robust"],
         "figures": ["figures", "title"],
+        "documents": ["stock"],
+        "report": [],
     }
     told = file.stat()
     digest = hashlib.sha256(shellform.__version__.encode() + _content(str(file), told.st_size, told.st_mtime_ns))
@@ -273,7 +303,6 @@ def _initial(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], kee
     first = summary["designs"]["initial"]["loads"]["design"]
     span = float(max(summary["surface"]["size"][:2]))
     if not first["on_branch"] or first["deviation_max"] > 0.1 * span:
-        write_text(job.path("summary.json"), json.dumps(summary, indent=1))
         raise NotConverged(
             f"The initial design deforms excessively under the design load ({1e3 * first['deviation_max']:.0f} mm); its states "
             f"are kept in {job.path('states')}",
@@ -300,7 +329,15 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         )
 
     problem = case_problem(job.case, shell, loads, start)
-    best = mma.optimize(problem, start, evaluations=entry.evaluations, stiffness=entry.stiffness_min, progress=watch)
+    groups = symmetric_groups(shell) if entry.symmetric else None  # at once: it may be refused
+    best = mma.optimize(
+        problem,
+        start,
+        evaluations=entry.evaluations,
+        stiffness=entry.stiffness_min,
+        most_cables=entry.cables_max,
+        progress=watch,
+    )
     _forget(job, ("unloaded", "optimised", "rounded", "polished"), summary)
     built = {"optimised": best}
     _keep(job, shell, "optimised", best.design, _follow(shell, best.design, loads), loads, summary)
@@ -310,7 +347,7 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
     if entry.polish:
         job.report("optimise", "polishing the cables that are left")
         last = list(built.values())[-1]
-        built["polished"] = mma.polish(last, evaluations=entry.polish)
+        built["polished"] = mma.polish(last, evaluations=entry.polish, groups=groups)
         here = last.problem.shell
         _keep(job, here, "polished", built["polished"].design, _follow(here, built["polished"].design, loads), loads, summary)
         if "section" in summary["designs"].get("rounded", {}):
@@ -350,7 +387,8 @@ def _optimise(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], ke
         "stiffness_min": best.stiffness,
         "status": best.status,
         "constraints": dict(best.constraints),
-        "feasible": max(best.constraints.values(), default=-1.0) <= mma.FEASIBLE,
+        "feasible": max(best.constraints.values(), default=-1.0) <= mma.FEASIBLE
+        and summary["designs"]["optimised"].get("critical_factor_kept", True),
     }
     write_text(job.path("history.csv"), history_text(best.history))
 
@@ -403,6 +441,9 @@ def _examine(job: _Job, name: str, found: Optimum, loads: Mapping[str, Reals], s
     factors = critical_factors(found.problem.shell, found.design, found.states["none"], loads, wanted=wanted)
     for each, told in factors.items():
         summary["designs"][name]["loads"][each] |= told
+    if wanted is not None:
+        short = below_factor(factors, wanted, job.case.limits.critical_loads)
+        summary["designs"][name]["critical_factor_kept"] = not short
 
 
 def _keep(
@@ -416,16 +457,27 @@ def _keep(
 ) -> None:
     """Writes a design's model file, states and summary."""
     summary["designs"][name] = keep_design(job.folder, shell, name, design, loaded, loads)
-    states = {each: loaded[each].equilibrium.state for each in loads}
-    try:
-        write_states(job.folder, shell, name, design, states, loads)
-    except InputError as error:  # these files need VTK, which may be missing; everything else goes on
-        job.report("initial", f"no files of states: {error}")
+    write_states(job.folder, shell, name, design, {each: loaded[each].equilibrium.state for each in loads})
+    job.tell(summary)
 
 
-def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
+def _figures(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> bool:
+    """Whether all pictures are there."""
+    return keep or draw_everything(read_run(job.folder), report=job.report)
+
+
+def _documents(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
     if not keep:
-        draw_everything(read_run(job.folder), report=job.report)
+        from shellform.study.documents import write_documents
+
+        summary["documents"] = write_documents(read_run(job.folder), report=job.report)
+
+
+def _report(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
+    if not keep:
+        from shellform.study.page import FILE, write_page
+
+        write_page([read_run(job.folder)], job.path(FILE))
 
 
 def _follow(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:

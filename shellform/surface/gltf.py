@@ -1,4 +1,4 @@
-"""GLTF and GLB scenes (Khronos glTF 2.0): their meshes, placed by their nodes.
+"""GLTF and GLB scenes (Khronos glTF 2.0): their meshes, placed by their nodes; and GLB files written.
 
 The format's unit is the metre (many programs write others all the same: state it) and its vertical axis y. Buffers may stand in
 the GLB, in the text as base64, or in files beside it. Compressed meshes (Draco, meshopt) and sparse accessors are refused by
@@ -10,6 +10,8 @@ from __future__ import annotations
 import base64
 import json
 import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +27,7 @@ _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 _DEEPEST = 64
+_VERTICES, _ELEMENTS = 34962, 34963  # what a buffer view is for
 
 
 def read_gltf(file: Path, choice: Choice) -> Draft:
@@ -67,6 +70,62 @@ def _opened(file: Path) -> tuple[dict[str, Any], bytes]:
             inside = chunk
         at += 8 + size
     return tree, inside
+
+
+@dataclass(frozen=True)
+class Solid:
+    """What is written: triangles under a `name`, `points` (n, 3), m, z upwards, with `normals` (n, 3), in a `colour` (r, g, b, opacity), 0 to 1."""
+
+    name: str
+    points: Reals
+    normals: Reals
+    triangles: Indices
+    colour: tuple[float, float, float, float]
+
+
+def write_glb(path: Path, solids: Sequence[Solid]) -> None:
+    """Writes the solids as one GLB, a node, a mesh and a material each; turned so that y is upwards, as the format has it."""
+    data = b""
+    views, accessors, meshes, materials = [], [], [], []
+
+    def stored(array: NDArray[Any], kind: str, target: int) -> int:
+        nonlocal data
+        content = array.tobytes()
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(content), "target": target})
+        data += content + b"\0" * (-len(content) % 4)
+        code = next(number for number, name in _TYPES.items() if np.dtype(name) == array.dtype)
+        entry = {"bufferView": len(views) - 1, "componentType": code, "count": len(array), "type": kind}
+        if target == _VERTICES:
+            entry |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        accessors.append(entry)
+        return len(accessors) - 1
+
+    for solid in solids:
+        upright = [np.ascontiguousarray(each[:, [0, 2, 1]] * [1.0, 1.0, -1.0], dtype="<f4") for each in (solid.points, solid.normals)]
+        place, normal = (stored(each, "VEC3", _VERTICES) for each in upright)
+        order = stored(solid.triangles.astype("<u4").ravel(), "SCALAR", _ELEMENTS)
+        surface = {"baseColorFactor": list(solid.colour), "metallicFactor": 0.0, "roughnessFactor": 0.7}
+        material: dict[str, Any] = {"name": solid.name, "pbrMetallicRoughness": surface, "doubleSided": solid.colour[3] < 1.0}
+        if solid.colour[3] < 1.0:
+            material["alphaMode"] = "BLEND"
+        materials.append(material)
+        primitive = {"attributes": {"POSITION": place, "NORMAL": normal}, "indices": order, "material": len(materials) - 1}
+        meshes.append({"name": solid.name, "primitives": [primitive]})
+    tree = {
+        "asset": {"version": "2.0", "generator": "shellform"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(meshes)))}],
+        "nodes": [{"name": mesh["name"], "mesh": k} for k, mesh in enumerate(meshes)],
+        "meshes": meshes,
+        "materials": materials,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+    }
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), _JSON) + text + struct.pack("<II", len(data), _BIN) + data
+    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
 
 
 class _Scene:

@@ -1,13 +1,15 @@
-"""PLY and MSH files, and meshes written; the door to meshio."""
+"""PLY and MSH files, and meshes and lines written; the door to meshio."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import meshio
 import numpy as np
 
+from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.draft import Choice, Draft, Part, joined
 
@@ -50,3 +52,11 @@ def write_mesh(path: str | Path, surface: Surface) -> None:
         meshio.Mesh(surface.vertices, [("triangle", surface.triangles)]).write(path, file_format=kind)
     except OSError as error:
         raise InputError(f"can't be written: {error}", where=str(path), remedy="Choose another folder.") from error
+
+
+def write_lines(
+    path: Path, points: Reals, lines: Indices, point_data: Mapping[str, Reals], cell_data: Mapping[str, Reals | Indices]
+) -> None:
+    """Writes `lines` (m, 2) between `points` (n, 3), m, as an unstructured grid (.vtu) with data of n and of m rows."""
+    cells = [("line", lines)]
+    meshio.Mesh(points, cells, dict(point_data), {name: [values] for name, values in cell_data.items()}).write(path, "vtu")

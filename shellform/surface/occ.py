@@ -6,7 +6,7 @@ import contextlib
 import math
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -65,6 +65,23 @@ def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
     except Exception as error:
         said = str(error) if type(error) is Exception else f"{type(error).__name__}: {error}"
         raise InputError(f"{what}: {said.rstrip('.')}", where=str(path), remedy=remedy) from error
+
+
+def write_curves(path: Path, curves: Sequence[Reals]) -> None:
+    """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), a straight line where there are two."""
+    with session(), errors(path, "gmsh can't write the curves", "Choose another folder."):
+        occ = gmsh.model.occ
+        for points in curves:
+            tags = [occ.addPoint(*point) for point in points.tolist()]
+            if len(tags) > 2:
+                occ.addSpline(tags)
+            else:
+                occ.addLine(*tags)
+        occ.synchronize()
+        with silence():
+            gmsh.write(str(path))
+    if not path.is_file():  # which gmsh doesn't say
+        raise InputError("can't be written", where=str(path), remedy="Choose another folder.")
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""Rhino's 3DM files; the door to rhino3dm.
+"""Rhino's 3DM files, read and written; the door to rhino3dm.
 
 The unit is the file's. Meshes are taken as they are; NURBS surfaces, extrusions and the trimmed faces of breps are rebuilt in
 gmsh's OpenCASCADE from their control points and edges, and meshed there with exact normals; SubDs are subdivided. Blocks are
@@ -11,15 +11,15 @@ rhino3dm leaves out each knot vector's first and last knot, which no curve depen
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rhino3dm
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.draft import Choice, Draft, Part, among, joined
 
@@ -54,6 +54,50 @@ class Patch:
     knots: tuple[Reals, Reals]
     degree: tuple[int, int]
     loops: tuple[tuple[Curve, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class Item:
+    """What is written: on `layer`, under a `name`, a polyline through `points` (n, 3), m, a point where there is one, or where `triangles`
+    are given their mesh; `told` are its user strings."""
+
+    layer: str
+    name: str
+    points: Reals
+    triangles: Indices | None = None
+    told: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -> None:
+    """Writes the items in metres, each layer in its colour (#rrggbb). Raises OSError where the file can't be written."""
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    model.Settings.ModelAbsoluteTolerance = 1e-6
+    layers = {}
+    for name, colour in colours.items():
+        layer = rhino3dm.Layer()
+        layer.Name, layer.Color = name, (*bytes.fromhex(colour[1:]), 255)
+        layers[name] = model.Layers.Add(layer)
+    for item in items:
+        own = rhino3dm.ObjectAttributes()
+        own.Name, own.LayerIndex = item.name, layers[item.layer]
+        for key, value in item.told.items():
+            own.SetUserString(key, value)
+        if item.triangles is not None:
+            mesh = rhino3dm.Mesh()
+            for point in item.points.tolist():
+                mesh.Vertices.Add(*point)
+            for corners in item.triangles.tolist():
+                mesh.Faces.AddFace(*corners)
+            mesh.Normals.ComputeNormals()
+            model.Objects.AddMesh(mesh, own)
+        elif len(item.points) == 1:
+            model.Objects.AddPoint(rhino3dm.Point3d(*item.points[0].tolist()), own)
+        else:
+            line = rhino3dm.Polyline([rhino3dm.Point3d(*point) for point in item.points.tolist()])
+            model.Objects.AddPolyline(line, own)
+    if not model.Write(str(path), 7):
+        raise OSError(f"rhino3dm can't write {path}")
 
 
 def read_rhino(file: Path, choice: Choice, *, unit: str | None, size: float | None, up: str, face: str | None) -> Draft:

@@ -69,6 +69,11 @@ def test_polishing_lowers_the_misfit_with_the_same_cables_none_of_which_goes_sla
     assert (cables.tension(polished.states["wetter"])[before] > 0.0).mean() > 0.97
 
 
+def test_constraints_that_contradict_each_other_have_no_solution():
+    one = np.ones((1, 1))
+    assert minimise_quadratic(one, np.zeros(1), np.array([[1.0], [-1.0]]), np.array([0.5, 0.5]), -one[0], one[0]) is None
+
+
 def test_a_quadratic_problem_is_solved_to_its_conditions_of_optimality():
     rng = np.random.default_rng(0)
     root = rng.normal(size=(30, 20))

@@ -3,7 +3,7 @@
 import matplotlib.image
 import numpy as np
 
-from shellform.output import nets
+from shellform.output import maps, nets
 
 
 def test_a_net_is_mapped_by_distance_curvature_skewness_and_springs(net, tmp_path):
@@ -16,7 +16,7 @@ def test_a_net_is_mapped_by_distance_curvature_skewness_and_springs(net, tmp_pat
 
 def test_values_at_crossings_are_carried_along_the_rods_and_kept_at_them(net):
     values = np.linspace(1.0, 2.0, len(net.grid.lattice))
-    carried = nets._along_rods(net, values)
+    carried = maps.along_rods(net, values)
     np.testing.assert_array_equal(carried[net.grid.crossing_nodes[:, 0]], values)
     np.testing.assert_array_equal(carried[net.grid.crossing_nodes[:, 1]], values)
     assert 1.0 <= carried.min() <= carried.max() <= 2.0

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.output import plots, render
+from shellform.output import plots, render, vtp
+from shellform.output.panel import Look, Panel
 
 
 @pytest.fixture(scope="module")
@@ -19,21 +20,21 @@ def panel():
     place = np.column_stack([x, y, 0.5 - 0.2 * (x**2 + y**2)])
     cables = np.column_stack([number[:-1, :-1].ravel(), number[1:, 1:].ravel()])
     forces = np.where(np.arange(64) % 2, 1.0, 0.0)
-    return render.Panel("a cap", place, beams, np.zeros(81), cables, forces, np.arange(9), np.array([40]), 0.01)
+    return Panel("a cap", place, beams, np.zeros(81), cables, forces, np.arange(9), np.array([40]), 0.01)
 
 
 def test_the_same_panel_gives_the_same_picture_and_another_deviation_another(panel):
-    first = render.image(panel, size=(300, 200))
-    second = render.image(panel, size=(300, 200))
+    first = render.image(panel, Look(size=(300, 200)))
+    second = render.image(panel, Look(size=(300, 200)))
     assert first.shape == (200, 300, 3)
     assert np.abs(first.astype(int) - second).max() <= 2
-    far = render.image(replace(panel, deviation=np.full(81, 0.01)), size=(300, 200))
+    far = render.image(replace(panel, deviation=np.full(81, 0.01)), Look(size=(300, 200)))
     assert (np.abs(first.astype(int) - far).max(axis=2) > 40).sum() > 500
 
 
 def test_a_sheet_and_a_vtp_file_are_written(tmp_path, panel):
-    render.sheet(tmp_path / "sheet.png", [[panel, panel]], size=(200, 150))
-    render.write_vtp(tmp_path / "state.vtp", panel, {"N": np.ones(len(panel.beams))})
+    render.sheet(tmp_path / "sheet.png", [[panel, panel]], Look(size=(200, 150)))
+    vtp.write_vtp(tmp_path / "state.vtp", panel, {"N": np.ones(len(panel.beams))})
     assert (tmp_path / "sheet.png").read_bytes()[:4] == b"\x89PNG"
     assert b"deviation" in (tmp_path / "state.vtp").read_bytes()
 
@@ -42,9 +43,9 @@ def test_wrong_shapes_views_and_scales_are_refused(panel):
     with pytest.raises(InputError, match="deviation"):
         replace(panel, deviation=np.zeros(3))
     with pytest.raises(InputError, match="view"):
-        render.image(panel, view="inside")
+        render.image(panel, Look(view="inside"))
     with pytest.raises(InputError, match="positive"):
-        render.image(panel, limit=0.0)
+        render.image(panel, Look(limit=0.0))
 
 
 def test_both_histories_are_drawn(tmp_path):

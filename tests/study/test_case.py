@@ -17,7 +17,7 @@ def write(tmp_path, text):
     return file
 
 
-@pytest.mark.parametrize("name", ["scale_model", "scale_model_radius", "full_size", "full_size_poured"])
+@pytest.mark.parametrize("name", ["scale_model", "scale_model_radius", "scale_model_rounded", "full_size", "full_size_poured"])
 def test_shipped_cases_are_valid_and_survive_being_written(tmp_path, name):
     case = load_case(ROOT / f"scripts/{name}.toml")
     again = load_case(write(tmp_path, dump_case(case)))

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shellform.study.run import STAGES
+
 ROOT = Path(__file__).parent.parent.parent
 MODEL = {
     "format": "shellform-model",
@@ -103,6 +105,7 @@ def test_bad_surfaces_and_cases_are_refused_without_a_traceback(tmp_path):
     refused(shellform("design", case, "--output", tmp_path / "run", "--set", "rod.radius=0.01"), "they break")
     refused(shellform("design", case, "--output", tmp_path / "run", "--until", "lunch"), "Stages")
     refused(shellform("render", tmp_path / "none"), "no run folder")
+    refused(shellform("report", tmp_path / "none"), "no run folder")
     own = tmp_path / "own.py"
     own.write_text("raise SystemExit(0)", encoding="utf-8")
     refused(shellform("net", own, "--spacing", 0.1, "--output", tmp_path / "net"), "--allow-scripts")
@@ -178,11 +181,14 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
     assert min(braced, key=lambda name: mean[name]["none"]) == "unloaded"
     assert max(braced, key=lambda name: mean[name]["none"]) == "optimised"
     assert min(braced, key=lambda name: mean[name]["design"]) == "optimised"
-    for name in ("case.toml", "history.csv", "net.json", "figures/deviations.png", "figures/objective.png"):
+    for name in ("case.toml", "history.csv", "net.json", "figures/deviations.png", "figures/objective.png", "drawings/grid.dxf", "report.html"):
         assert (run / name).stat().st_size > 0
     again = shellform(*arguments, timeout=60)
     assert again.returncode == 0
-    assert again.stderr.count("kept") == 5
+    assert again.stderr.count("kept") == len(STAGES)
+    page = shellform("report", run, "--output", tmp_path / "page.html")
+    assert page.stdout.strip() == str(tmp_path / "page.html"), page.stderr
+    assert (run / "report.html").stat().st_size < 15e6
     for name in ("optimised", "unbraced"):
         found = shellform("analyse", run / f"designs/{name}.json", "--load", "design")
         assert found.returncode == 0, found.stderr

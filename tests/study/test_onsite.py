@@ -220,7 +220,7 @@ def test_bad_options_are_refused(folder, tmp_path):
         ({"length_error": -1.0}, "--length-error"),
         ({"load": "storm"}, "--load"),
         ({"design": "best"}, "--design"),
-        ({"after": tmp_path / "none.npz"}, "damaged"),
+        ({"after": tmp_path / "none.npz"}, "isn't there"),
     ):
         with pytest.raises(InputError, match=said):
             onsite.survey(folder, good, onsite.Survey(**options))

@@ -1,0 +1,70 @@
+"""Files appear whole or not at all: each is written beside its place and then moved there.
+
+So an interrupted run leaves nothing half-written, and a full disc or a closed folder is told in one sentence.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from shellform.errors import InputError
+
+_REMEDIES = {
+    errno.ENOSPC: "Free some space, then run the same command again: what was finished is kept.",
+    errno.EDQUOT: "Free some space, then run the same command again: what was finished is kept.",
+    errno.EFBIG: "Choose a file system that takes larger files, or raise the limit on their size.",
+    errno.EACCES: "Choose a folder that you may write to.",
+    errno.EPERM: "Choose a folder that you may write to.",
+    errno.EROFS: "Choose a folder that you may write to.",
+}
+
+
+@contextlib.contextmanager
+def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
+    """The place to write to; what is there at the end of the block becomes `path`. Makes the folder.
+
+    Raises InputError for another `ending` and where the file can't be written; what stood there before is left as it was.
+    """
+    target = Path(path)
+    if ending and target.suffix.lower() != ending:
+        raise InputError("has another ending", where=str(target), value=target.suffix, remedy=f"Use {ending}.")
+    partial = target.with_name(f"{target.stem}.part{target.suffix}")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        yield partial
+        os.replace(partial, target)
+    except OSError as error:
+        raise refusal(target, error) from error
+    finally:
+        with contextlib.suppress(OSError):
+            partial.unlink(missing_ok=True)
+
+
+def refusal(path: Path, error: OSError) -> InputError:
+    """What to say where a file or folder can't be written."""
+    remedy = _REMEDIES.get(error.errno or 0, "")
+    return InputError(f"can't be written: {error.strerror or error}", where=str(path), remedy=remedy)
+
+
+def folder(path: str | Path) -> Path:
+    """Makes a folder and those above it. Raises InputError where that can't be done."""
+    place = Path(path)
+    try:
+        place.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise refusal(place, error) from error
+    return place
+
+
+def door(path: str | Path, *endings: str) -> Path:
+    """The path of a file to write. Raises InputError for other endings and missing folders."""
+    target = Path(path)
+    if target.suffix.lower() not in endings:
+        raise InputError("has another ending", where=str(target), value=target.suffix, remedy=f"Use {', '.join(endings)}.")
+    if not target.parent.is_dir():
+        raise InputError("the folder doesn't exist", where=str(target.parent), remedy="Make it first.")
+    return target

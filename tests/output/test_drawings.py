@@ -1,0 +1,157 @@
+"""Drawings, read back with ezdxf and pypdf and compared with the net; what is written on them doesn't lie on top of each other."""
+
+from dataclasses import replace
+from itertools import combinations
+
+import ezdxf
+import numpy as np
+import pytest
+from pypdf import PdfReader
+
+from shellform.errors import InputError
+from shellform.net.grid import lattice_grid
+from shellform.output import drawings, layout, nesting
+from shellform.output.marks import PENS, Words, overlap
+
+
+@pytest.fixture(scope="module")
+def folder(built, tmp_path_factory):
+    place = tmp_path_factory.mktemp("drawings")
+    drawings.write_drawings(place, built, nesting.cut(built.grid, stock=0.6))
+    return place
+
+
+def on(space, layer, kind):
+    return [entity for entity in space if entity.dxf.layer == layer and entity.dxftype() == kind]
+
+
+@pytest.mark.parametrize("name", ["grid", "cables", "supports", "rods"])
+def test_each_dxf_file_is_sound_and_in_millimetres(folder, name):
+    document = ezdxf.readfile(folder / f"{name}.dxf")
+    audit = document.audit()
+    assert not audit.errors
+    assert not audit.fixes
+    assert document.units == ezdxf.units.MM
+    assert {entity.dxf.layer for entity in document.modelspace()} <= {layer.dxf.name for layer in document.layers}
+
+
+def test_the_flat_grid_has_every_rod_and_crossing_at_real_scale(folder, net):
+    space = ezdxf.readfile(folder / "grid.dxf").modelspace()
+    for direction in "uv":
+        lines = on(space, f"RODS_{direction.upper()}", "LINE")
+        rods = [rod for rod in net.grid.rods if rod.direction == direction]
+        lengths = [line.dxf.start.distance(line.dxf.end) for line in lines]
+        assert sorted(lengths) == pytest.approx(sorted(1e3 * rod.length for rod in rods), abs=1e-6)
+    rings = np.array([tuple(ring.dxf.center)[:2] for ring in on(space, "CROSSINGS", "CIRCLE")])
+    assert rings == pytest.approx(1e3 * net.grid.flat[net.grid.crossing_nodes[:, 0], :2], abs=1e-6)
+    numbers = [text.dxf.text for text in on(space, "CROSSING_NUMBERS", "TEXT")]
+    assert numbers == [str(k) for k in range(len(net.grid.lattice))]
+    told = [text.dxf.text for text in on(space, "CUT_LENGTHS", "TEXT")]
+    for k, rod in enumerate(net.grid.rods):
+        assert f"{rod.direction.upper()}{k}   {1e3 * rod.length:.1f}" in told
+    spans = on(space, "DIMENSIONS", "DIMENSION")
+    columns = np.ptp(net.grid.lattice[:, 0])
+    texts = {span.dxf.text: span.get_measurement() for span in spans}
+    assert texts[f"{columns} × 55 = {55 * columns}"] == pytest.approx(55.0 * columns)
+
+
+def test_the_cable_plan_names_every_cable_between_its_crossings(folder, built):
+    space = ezdxf.readfile(folder / "cables.dxf").modelspace()
+    names = [text.dxf.text.partition("·")[0] for text in on(space, "CABLE_NAMES", "TEXT")]
+    assert names == [f"C{k}" for k in range(built.design.present.sum())]
+    lengths = [line.dxf.start.distance(line.dxf.end) for line in on(space, "CABLES", "LINE")]
+    assert lengths == pytest.approx([55.0 * 2.0**0.5 - 2 * 0.13 * 55.0] * len(names), abs=1e-6)
+
+
+def test_supports_stand_on_the_plan_where_the_net_has_them(folder, built):
+    space = ezdxf.readfile(folder / "supports.dxf").modelspace()
+    middles = [np.mean(square.get_points("xy")[:4], axis=0) for square in on(space, "SUPPORTS", "LWPOLYLINE")]
+    net = built.shell.net
+    assert np.array(middles) == pytest.approx(1e3 * net.target.positions[net.supports, :2], abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["grid", "cables", "supports"])
+def test_each_sheet_is_one_page_of_a_usual_size_with_title_and_numbers_as_text(folder, built, name):
+    pages = PdfReader(folder / f"{name}.pdf").pages
+    assert len(pages) == 1
+    size = sorted((float(pages[0].mediabox.width) / 72 * 25.4, float(pages[0].mediabox.height) / 72 * 25.4), reverse=True)
+    assert any(size == pytest.approx(paper, abs=0.1) for paper in drawings.PAPERS.values())
+    text = pages[0].extract_text()
+    for word in ("The vault", "scale", "1 : 2", "mm", "test"):
+        assert word in text
+    words = text.split()
+    wanted = range(len(built.shell.net.supports) if name == "supports" else len(built.grid.lattice))
+    assert all(f"S{k}" in words if name == "supports" else str(k) in words for k in wanted)
+
+
+def test_the_rod_sheets_have_every_mark_and_splice(folder, built):
+    pages = PdfReader(folder / "rods.pdf").pages
+    assert len(pages) == -(-len(built.grid.rods) // drawings.STRIPS)
+    text = " ".join(page.extract_text() for page in pages)
+    for k, rod in enumerate(built.grid.rods):
+        assert f"{rod.direction.upper()}{k}" in text
+        assert f"L = {1e3 * rod.length:.1f}" in text
+        assert all(f"{1e3 * mark:.1f}" in text for mark in rod.marks)
+    assert text.count("splice ") == sum(rod.length > 0.6 for rod in built.grid.rods)
+
+
+def test_the_same_design_gives_the_same_files(folder, built, tmp_path):
+    drawings.write_pdf(tmp_path / "grid.pdf", [layout.flat_grid(built)], built)
+    assert (tmp_path / "grid.pdf").read_bytes() == (folder / "grid.pdf").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def sheets(built):
+    cutting = nesting.cut(built.grid, stock=0.6)
+    return [layout.flat_grid(built), layout.cable_plan(built), layout.support_plan(built), layout.rod_strips(built, cutting)]
+
+
+@pytest.mark.parametrize("which", range(4))
+def test_no_words_lie_on_each_other(sheets, which):
+    words = [mark for mark in sheets[which].marks if isinstance(mark, Words)]
+    lying = [(a.text, b.text) for a, b in combinations(words, 2) if overlap(a.box, b.box)]
+    assert lying == []
+
+
+@pytest.mark.parametrize("which", range(4))
+def test_letters_are_legible_on_paper_and_the_drawing_stays_beside_the_column(built, sheets, which):
+    sheet = sheets[which]
+    paper, scale = drawings.fitted(sheet)
+    assert sheet.lettering / scale >= drawings.SMALLEST
+    page = drawings.paper_page(sheet, built, "1 / 1")
+    frame = page.width - 10.0 - 110.0
+    for mark in sheet.marks:
+        assert not isinstance(mark, Words) or mark.height >= 0.99 * sheet.lettering
+    assert (page.width, page.height) == drawings.PAPERS[paper]
+    pens = {PENS[layer].colour for layer in ("RODS_U", "CABLES")}
+    drawn = [x for line in page.lines if line.colour in pens for x, _ in line.points]
+    assert drawn
+    assert max(drawn) < frame
+
+
+def test_the_gaps_between_lines_on_paper_are_to_scale(built):
+    sheet = layout.flat_grid(built)
+    _, scale = drawings.fitted(sheet)
+    page = drawings.paper_page(sheet, built, "1 / 1")
+    lengths = sorted(abs(line.points[1][0] - line.points[0][0]) for line in page.lines if line.colour == "#0072b2")
+    assert lengths == pytest.approx(sorted(1e3 * rod.length / scale for rod in built.grid.rods if rod.direction == "u"))
+
+
+def test_several_rods_in_one_row_are_told_apart(built):
+    # Two arms joined by a bar below: rows 2 and 3 have two u rods each.
+    places = [(i, j) for i in range(7) for j in range(4) if j < 2 or i in (0, 1, 5, 6)]
+    grid = lattice_grid(np.array(places), spacing=(1.0, 1.0), gap=0.01, elements=1)
+    net = replace(built.shell.net, grid=grid, supports=np.zeros(0, dtype=np.int64))
+    forked = replace(built, shell=replace(built.shell, net=net, cable_ends=np.zeros((0, 2), dtype=np.int64)))
+    sheet = layout.flat_grid(forked)
+    told = {mark.text for mark in sheet.marks if isinstance(mark, Words) and mark.layer == "CUT_LENGTHS"}
+    assert {"U0   6000.0", "U2   1000.0", "1000.0   U3", "U4   1000.0", "1000.0   U5"} <= told
+
+
+def test_drawings_that_can_not_be_written_leave_nothing_behind(built, tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(InputError, match="can't be written"):
+        drawings.write_drawings(tmp_path / "file", built, nesting.cut(built.grid))
+    with pytest.raises(InputError, match="another ending"):
+        drawings.write_dxf(tmp_path / "grid.dwg", layout.flat_grid(built))
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]

@@ -1,0 +1,132 @@
+"""Files for other programs, each read back by another library and compared with the design."""
+
+import ast
+import sys
+
+import gmsh
+import numpy as np
+import pytest
+import pyvista
+import rhino3dm
+import trimesh
+
+import shellform.surface
+from shellform.errors import InputError
+from shellform.output import exports
+from shellform.surface.occ import session
+
+
+@pytest.fixture(scope="module")
+def loads(shell):
+    load = shell.point_load(6.9, every=2)
+    return {"none": np.zeros_like(load), "design": load, "additional": 1.2 * load}
+
+
+@pytest.fixture(scope="module")
+def folder(built, vault, loads, tmp_path_factory):
+    place = tmp_path_factory.mktemp("models")
+    files = exports.write_exports(place, built, vault, loads)
+    assert sorted(files) == sorted(place.iterdir())
+    return place
+
+
+def test_the_vtu_file_has_every_element_with_displacements_and_forces(folder, built):
+    mesh = pyvista.read(folder / "gridshell.vtu")
+    ties = built.shell.cables(built.design)
+    network = built.shell.network(built.design)
+    assert mesh.n_cells == len(network.beams.ends) + len(ties.ends)
+    assert np.asarray(mesh.points) == pytest.approx(built.shell.target.positions, abs=1e-12)
+    for name, state in built.states.items():
+        assert mesh.points + mesh.point_data[f"displacement {name} [m]"] == pytest.approx(state.positions, abs=1e-9)
+        forces = mesh.cell_data[f"cable force {name} [N]"]
+        assert forces[mesh.cell_data["kind"] == 2] == pytest.approx(ties.tension(state))
+
+
+def test_the_3dm_file_has_rods_cables_and_supports_on_layers_in_metres(folder, built, vault):
+    model = rhino3dm.File3dm.Read(str(folder / "gridshell.3dm"))
+    assert model.Settings.ModelUnitSystem == rhino3dm.UnitSystem.Meters
+    layers = {layer.Index: layer.Name for layer in model.Layers}
+    found = {}
+    for each in model.Objects:
+        found.setdefault(layers[each.Attributes.LayerIndex], {})[each.Attributes.Name] = each
+    state, grid = built.states["design"], built.grid
+    for k, rod in enumerate(grid.rods):
+        curve = found[f"rods {rod.direction}"][f"{rod.direction.upper()}{k}"].Geometry
+        points = np.array([(p.X, p.Y, p.Z) for p in (curve.Point(i) for i in range(curve.PointCount))])
+        assert points == pytest.approx(state.positions[rod.nodes], abs=1e-12)
+    ties = built.shell.cables(built.design)
+    assert len(found["cables"]) == len(ties.ends)
+    strings = dict(found["cables"]["C3"].Attributes.GetUserStrings())
+    assert float(strings["rest length [m]"]) == pytest.approx(ties.rest_length[3], abs=1e-6)
+    assert float(strings["force under design [N]"]) == pytest.approx(ties.tension(state)[3], abs=1e-6)
+    assert len(found["supports"]) == len(built.shell.net.supports)
+    assert len(found["crossings"]) == len(grid.lattice)
+    assert len(found["target"]["target"].Geometry.Vertices) == len(vault.vertices)
+
+
+def test_the_glb_file_has_closed_tubes_of_the_rods_volume(folder, built):
+    scene = trimesh.load(folder / "gridshell.glb")
+    sides, radius = exports.SIDES, built.design.radius
+    area = 0.5 * sides * radius**2 * np.sin(2.0 * np.pi / sides)  # of a regular polygon
+    place = built.states["design"].positions
+    for direction in "uv":
+        part = scene.geometry[f"rods {direction}"]
+        part.merge_vertices(merge_norm=True, merge_tex=True)
+        assert part.is_watertight
+        length = sum(np.linalg.norm(np.diff(place[rod.nodes], axis=0), axis=1).sum() for rod in built.grid.rods if rod.direction == direction)
+        assert part.volume == pytest.approx(area * length, rel=2e-3)
+    assert set(scene.geometry) == {"rods u", "rods v", "cables", "supports", "target"}
+    high = scene.geometry["rods v"].bounds[1][1]  # the format's y axis is upwards
+    assert high == pytest.approx(place[:, 2].max() + radius, abs=radius)
+
+
+def test_the_step_file_has_a_curve_of_each_rod_and_cable_at_the_right_scale(folder, built):
+    with session():
+        gmsh.model.occ.importShapes(str(folder / "gridshell.step"), highestDimOnly=False)
+        gmsh.model.occ.synchronize()
+        curves = gmsh.model.getEntities(1)
+        lengths = [gmsh.model.occ.getMass(*curve) for curve in curves]
+    place = built.states["design"].positions
+    rods = [np.linalg.norm(np.diff(place[rod.nodes], axis=0), axis=1).sum() for rod in built.grid.rods]
+    cables = built.shell.cables(built.design).lengths(built.states["design"])
+    assert lengths == pytest.approx([*rods, *cables], rel=1e-3)
+
+
+def test_the_script_is_that_of_the_design(folder, built):
+    text = (folder / "gridshell-opensees.py").read_text(encoding="utf-8")
+    names = [node.targets[0].id for node in ast.parse(text).body if isinstance(node, ast.Assign)]
+    assert names[:8] == ["NODES", "SECTIONS", "BEAMS", "CABLES", "SUPPORTS", "START", "LOAD", "MOVED"]
+    assert "The vault, test" in text
+
+
+def test_an_unknown_load_and_a_folder_in_the_way_are_refused(built, vault, loads, tmp_path):
+    with pytest.raises(InputError, match="is no load case"):
+        exports.write_exports(tmp_path, built, vault, loads, load="snow")
+    (tmp_path / "file").write_text("in the way")
+    for write in (
+        lambda place: exports.write_vtu(place / "a.vtu", built),
+        lambda place: exports.write_3dm(place / "a.3dm", built, vault),
+        lambda place: exports.write_glb(place / "a.glb", built, vault),
+        lambda place: exports.write_step(place / "a.step", built),
+        lambda place: exports.write_script(place / "a.py", built, loads["design"]),
+    ):
+        with pytest.raises(InputError, match="can't be written"):
+            write(tmp_path / "file")
+
+
+def test_without_gmsh_s_libraries_everything_but_the_step_file_is_written(built, vault, loads, tmp_path, monkeypatch):
+    monkeypatch.delitem(sys.modules, "shellform.surface.occ")
+    monkeypatch.delattr(shellform.surface, "occ")
+    monkeypatch.setitem(sys.modules, "gmsh", None)
+    assert "gmsh can't be loaded" in exports.no_step()
+    exports.write_exports(tmp_path, built, vault, loads)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["gridshell-opensees.py", "gridshell.3dm", "gridshell.glb", "gridshell.vtu"]
+
+
+def test_what_a_library_can_not_write_is_said_plainly(built, vault, tmp_path):
+    (tmp_path / "model.part.3dm").mkdir()  # rhino3dm says no without a reason
+    with pytest.raises(InputError, match="can't be written"):
+        exports.write_3dm(tmp_path / "model.3dm", built, vault)
+    (tmp_path / "model.part.step").mkdir()
+    with pytest.raises(InputError, match=r"can't (write the curves|be written)"):
+        exports.write_step(tmp_path / "model.step", built)

@@ -1,0 +1,266 @@
+"""Cut list, nesting, cable schedule and setting-out, read back from their files and compared with the net."""
+
+import csv
+from dataclasses import replace
+
+import binpacking
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from openpyxl import load_workbook
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.net.grid import lattice_grid
+from shellform.output import nesting, schedules, tables
+
+
+@pytest.fixture(scope="module")
+def read(built, tmp_path_factory):
+    """All tables as written to CSV: a list of rows by name."""
+    folder = tmp_path_factory.mktemp("schedules")
+    tables.write_tables(folder, schedules.all_tables(built, nesting.cut(built.grid, stock=0.8)))
+    found = {}
+    for path in folder.glob("*.csv"):
+        with path.open(encoding="utf-8", newline="") as file:
+            found[path.stem] = list(csv.DictReader(file))
+    found["folder"] = folder
+    return found
+
+
+def test_the_cut_list_has_every_rod_with_its_length_and_marks(read, net):
+    rows = read["rods"]
+    assert [row["rod"] for row in rows] == [f"{rod.direction.upper()}{k}" for k, rod in enumerate(net.grid.rods)]
+    assert sum(float(row["length [m]"]) for row in rows) == pytest.approx(sum(rod.length for rod in net.grid.rods), abs=1e-4)
+    for row, rod in zip(rows, net.grid.rods, strict=True):
+        marks = [float(mark) for mark in row["marks from the first end [m]"].split()]
+        assert marks == pytest.approx(rod.marks.tolist(), abs=5.1e-5)
+        assert row["crossing numbers"].split() == [str(k) for k in rod.crossings]
+        assert row["section"] == "⌀ 2 mm"
+        assert row["mass [kg]"] == ""  # the density isn't known
+
+
+def test_each_crossing_is_marked_once_on_both_rods_that_cross_there(read, net):
+    rows = read["marks"]
+    assert len(rows) == 2 * len(net.grid.lattice)
+    pairs = {(row["rod"], row["crosses rod"]) for row in rows}
+    assert all((b, a) in pairs for a, b in pairs)
+    for row in rows:
+        rod = net.grid.rods[int(row["rod"][1:])]
+        place = rod.nodes[rod.at[int(row["mark"]) - 1]]
+        along = np.linalg.norm(net.grid.flat[place] - net.grid.flat[rod.nodes[0]])
+        assert float(row["from the first end [m]"]) == pytest.approx(along, abs=1e-6)
+        assert place in net.grid.crossing_nodes[int(row["crossing"])]
+
+
+def test_masses_are_density_times_section_times_length(built):
+    rod = sf.Rod.round(young=40e9, radius=0.001, strength=255e6, density=1900.0)
+    heavy = replace(built, shell=replace(built.shell, rod=rod))
+    found = schedules.rods(heavy, nesting.cut(built.grid)).column("mass [kg]")
+    total = 1900.0 * np.pi * 0.001**2 * sum(one.length for one in built.grid.rods)
+    assert sum(found) == pytest.approx(total)
+
+
+def covered(cutting, grid):
+    """The stretches of each rod that bars yield, from its first end on."""
+    found = {}
+    for bar in cutting.bars:
+        used = sum(piece.length for piece in bar.pieces) + cutting.kerf * (len(bar.pieces) - 1)
+        assert used <= cutting.stock + 1e-7
+        assert bar.offcut == pytest.approx(max(0.0, cutting.stock - used - cutting.kerf), abs=1e-7)
+        for piece in bar.pieces:
+            found.setdefault(piece.rod, []).append((piece.start, piece.length, piece.part, piece.parts))
+    assert sorted(found) == list(range(len(grid.rods)))
+    for number, pieces in found.items():
+        at = 0.0
+        for part, (start, length, said, parts) in enumerate(sorted(pieces), 1):
+            assert start == pytest.approx(at, abs=1e-9)
+            assert (said, parts) == (part, len(pieces))
+            at += length
+        assert at == pytest.approx(grid.rods[number].length)
+    return found
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.floats(0.12, 3.0), st.floats(0.0, 0.02))
+def test_bars_yield_every_rod_whole_whatever_the_stock_and_the_saw(net, stock, kerf):
+    cutting = nesting.cut(net.grid, stock=stock, kerf=kerf)
+    found = covered(cutting, net.grid)
+    assert len(cutting.bars) >= cutting.least
+    assert cutting.spliced == tuple(k for k, rod in enumerate(net.grid.rods) if rod.length > stock + 1e-9)
+    for number in cutting.spliced:
+        marks = net.grid.rods[number].marks
+        for start, *_ in sorted(found[number])[1:]:
+            assert np.abs(marks - start).min() > 0.4 * net.spacing
+
+
+def test_as_many_bars_are_bought_as_must_be_where_that_is_known():
+    grid = lattice_grid(np.array([(i, j) for i in range(4) for j in range(5)]), spacing=(1.0, 1.0), gap=0.01, elements=1)
+    # u rods of 3 m (5), v rods of 4 m (4): bars of 7 m take one of each, and the fifth u rod stands alone.
+    cutting = nesting.cut(grid, stock=7.0, kerf=0.0)
+    assert (len(cutting.bars), cutting.least) == (5, 5)
+    assert cutting.waste == pytest.approx(1.0 - 31.0 / 35.0)
+    assert len(nesting.cut(grid, stock=7.0, kerf=0.001).bars) == 5 + 2  # with a saw cut no two of a 3 and a 4 fit, but two of 3 do
+
+
+def test_bars_are_filled_as_full_as_can_be_where_the_library_buys_too_many():
+    # Longest first puts 4 and 4 together and needs three bars of 10; 4 + 3 + 3 twice needs two.
+    needed = dict(enumerate([4.0, 4.0, 3.0, 3.0, 3.0, 3.0]))
+    assert len(binpacking.to_constant_volume(needed, 10.0)) == 3
+    packed = nesting._fullest(needed, 10.0)
+    assert sorted(sorted(needed[k] for k in bar) for bar in packed) == [[3.0, 3.0, 4.0], [3.0, 3.0, 4.0]]
+    assert sorted(k for bar in packed for k in bar) == list(needed)
+    assert nesting._least(list(needed.values()), 10.0) == 2
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.lists(st.sampled_from([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]), min_size=1, max_size=7))
+def test_no_packing_at_all_needs_fewer_bars_than_the_bound(sizes):
+    def best(left, bars):
+        if not left:
+            return len(bars)
+        one, *others = left
+        tried = [best(others, [*bars[:k], bar - one, *bars[k + 1 :]]) for k, bar in enumerate(bars) if bar >= one]
+        return min([*tried, best(others, [*bars, 8.0 - one])])
+
+    fewest = best(sizes, [])
+    assert nesting._least(sizes, 8.0) <= fewest <= len(nesting._fullest(dict(enumerate(sizes)), 8.0))
+
+
+def test_splicing_is_said_in_the_list_and_neighbours_are_divided_from_opposite_ends():
+    grid = lattice_grid(np.array([(i, j) for i in range(8) for j in range(3)]), spacing=(1.0, 1.0), gap=0.01, elements=1)
+    cutting = nesting.cut(grid, stock=5.0, kerf=0.0)
+    starts = [sorted(start for start, *_ in pieces)[1] for rod, pieces in sorted(covered(cutting, grid).items()) if rod < 3]
+    assert starts == [4.5, 2.5, 4.5]
+    (told, warned) = schedules.cutting_notes(cutting, schedules.rod_names(grid))
+    assert "bars of 5 m" in told
+    assert "3 rods are longer than the stock and must be SPLICED" in warned
+    assert "U0, U1, U2" in warned
+
+
+@pytest.mark.parametrize(
+    ("stock", "kerf", "word"), [(0.05, 0.0, "can't be spliced"), (-1.0, 0.0, "rod.stock_length"), (1.0, 1.0, "rod.kerf")]
+)
+def test_stock_that_can_not_be_used_is_refused(net, stock, kerf, word):
+    with pytest.raises(InputError, match=word):
+        nesting.cut(net.grid, stock=stock, kerf=kerf)
+
+
+def test_the_cable_schedule_gives_lengths_and_forces_of_the_states(read, built):
+    rows, ties = read["cables"], built.shell.cables(built.design)
+    assert len(rows) == built.design.present.sum()
+    for name, head in [("none", "erected"), ("design", "design"), ("additional", "additional")]:
+        state = built.states[name]
+        assert [float(row[f"{head}: force [N]"]) for row in rows] == pytest.approx(ties.tension(state).tolist(), abs=1e-6)
+        assert [float(row[f"{head}: clear length [m]"]) for row in rows] == pytest.approx(ties.lengths(state).tolist(), abs=1e-6)
+    for row in rows:
+        ends = [int(row["from crossing"]), int(row["to crossing"])]
+        lattice = built.grid.lattice[ends]
+        assert np.abs(lattice[1] - lattice[0]).tolist() == [1, 1]  # a diagonal
+        apart = np.linalg.norm(np.subtract(*built.shell.target.positions[built.grid.crossing_nodes[ends, 0]]))
+        assert float(row["design: clear length [m]"]) == pytest.approx(apart, abs=1e-6)
+
+
+def test_stages_of_the_pour_come_between_the_erected_and_the_poured_grid(built):
+    poured = replace(built, states={**built.states, "pour 1": built.hung, "pour 2": built.hung})
+    heads = [head for head in schedules.cables(poured).columns if head.endswith("force [N]")]
+    assert [head.partition(":")[0] for head in heads] == ["erected", "pour 1", "pour 2", "design", "additional"]
+
+
+def test_turnbuckles_reach_from_the_length_hung_in_to_the_rest_length(read):
+    for row in read["cables"]:
+        rest, hung = float(row["rest length [m]"]), float(row["hung in at [m]"])
+        assert float(row["turnbuckle shortest [m]"]) == pytest.approx(0.98 * min(rest, hung), abs=2e-6)
+        assert float(row["turnbuckle longest [m]"]) == pytest.approx(1.02 * max(rest, hung), abs=2e-6)
+
+
+def test_cables_are_tightened_from_the_supports_to_the_crown(read, built):
+    rows = sorted(read["cables"], key=lambda row: int(row["tensioning order"]))
+    assert [int(row["tensioning order"]) for row in rows] == list(range(1, len(rows) + 1))
+    rounds = [int(row["tensioning round"]) for row in rows]
+    assert rounds == sorted(rounds)
+    height = built.shell.net.crossings[:, 2]
+    mean = [np.mean([height[int(row["from crossing"])] for row in rows if int(row["tensioning round"]) == k]) for k in (1, max(rounds))]
+    assert mean[0] < mean[1]
+
+
+def test_supports_and_survey_targets_stand_where_the_net_has_them(read, built):
+    net = built.shell.net
+    for number, row in enumerate(read["supports"]):
+        assert [float(row[f"{axis} [m]"]) for axis in "xyz"] == pytest.approx(net.target.positions[net.supports[number]].tolist(), abs=1e-6)
+        rod = net.grid.rods[int(row["rod"][1:])]
+        assert rod.nodes[0 if row["end"] == "first" else -1] == net.supports[number]
+        assert float(row["rise of the rod [rad]"]) > 0.0  # every rod of the vault goes up from its foot
+    assert len(read["survey"]) == len(net.grid.lattice)
+    for k, row in enumerate(read["survey"]):
+        assert [float(row[f"target: {axis} [m]"]) for axis in "xyz"] == pytest.approx(net.crossings[k].tolist(), abs=1e-6)
+        assert float(row["design: off the target [m]"]) == pytest.approx(0.0, abs=1e-6)
+        assert float(row["erected: z [m]"]) == pytest.approx(1.01 * net.crossings[k, 2], abs=1e-6)
+        assert float(row["additional: off the target [m]"]) == pytest.approx(0.02 * abs(net.crossings[k, 2]), abs=1e-6)
+
+
+def test_the_rods_press_on_their_supports_with_the_load(shell):
+    load = 0.3 * shell.point_load(6.9, every=2)
+    loads = {"none": np.zeros_like(load), "design": load}
+    found = sf.follow(shell, shell.design(), loads)
+    built = schedules.Built(shell, shell.design(), {name: each.equilibrium.state for name, each in found.items()})
+    table = schedules.supports(built)
+    for name, weight in (("erected", 0.0), ("design", float(load[:, 2].sum()))):
+        total = [sum(table.column(f"{name}: on the support along {axis} [N]")) for axis in "xyz"]
+        assert total == pytest.approx([0.0, 0.0, weight], abs=1e-4)
+
+
+def test_splices_are_told_with_the_moment_that_they_bear(built, net):
+    cutting = nesting.cut(built.grid, stock=0.6)
+    table = schedules.splices(built, cutting)
+    assert len(table.rows) == sum(piece.part > 1 for bar in cutting.bars for piece in bar.pieces)
+    (warning,) = table.notes
+    assert "SPLICED" in warning
+    stiffness = built.shell.rod.stiffness[2]
+    first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in net.grid.rods])])
+    moments = table.column("design: bending moment [N m]")
+    for name, at, before, after, moment in zip(*(table.column(head) for head in table.columns[:4]), moments, strict=True):
+        number = int(name[1:])
+        rod = net.grid.rods[number]
+        marks = rod.marks[[rod.crossings.tolist().index(before), rod.crossings.tolist().index(after)]]
+        assert at == pytest.approx(marks.mean())
+        # In the state on the target the moment is EI times the net's curvature, here at the splice's own element and its neighbours.
+        near = first[number] + int(np.searchsorted(rod.arc, at)) - 1
+        around = stiffness * net.curvature[near - 1 : near + 2]
+        assert around.min() * 0.99 <= moment <= around.max() * 1.01
+
+
+def test_without_splices_their_list_says_so(built, tmp_path):
+    tables.write_tables(tmp_path, [schedules.splices(built, nesting.cut(built.grid))])
+    assert (tmp_path / "splices.csv").read_text(encoding="utf-8").count("\n") == 1
+    assert load_workbook(tmp_path / "schedules.xlsx")["splices"]["A1"].value == "No rod is spliced."
+
+
+def test_the_workbook_holds_the_same_tables(read, built):
+    book = load_workbook(read["folder"] / "schedules.xlsx")
+    wanted = schedules.all_tables(built, nesting.cut(built.grid, stock=0.8))
+    assert book.sheetnames == [table.name for table in wanted]
+    for table in wanted:
+        rows = list(book[table.name].iter_rows(values_only=True))
+        notes = len(table.notes)
+        assert [row[0] for row in rows[:notes]] == list(table.notes)
+        assert list(rows[notes]) == list(table.columns)
+        for row, found in zip(table.rows, rows[notes + 1 :], strict=True):
+            for value, cell in zip(row, found, strict=True):
+                assert cell == (pytest.approx(value, rel=1e-14) if isinstance(value, float) else None if value == "" else value)
+
+
+def test_a_folder_that_can_not_be_written_to_is_named(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(InputError, match="can't be written"):
+        tables.write_tables(tmp_path / "file", [tables.Table("a", ("x [m]",), ((1.0,),))])
+
+
+def test_tables_and_states_that_do_not_fit_are_refused(built):
+    with pytest.raises(InputError, match="row 1"):
+        tables.Table("a", ("x",), ((1,), (1, 2)))
+    with pytest.raises(InputError, match="is no column"):
+        tables.Table("a", ("x",), ((1,),)).column("y")
+    with pytest.raises(InputError, match="state without load"):
+        replace(built, states={"design": built.hung})
