@@ -48,6 +48,7 @@ _ROOMS = {
     "exports": "shellform.output.exports",
     "model": "shellform.structure.model",
     "analysis": "shellform.structure.analysis",
+    "study": "shellform.study",
 }
 _NAMES = {name: home for home, names in _HOMES.items() for name in names}
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import zipfile
+import zlib
 from collections.abc import Sequence
-from typing import TypeVar
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -60,6 +63,31 @@ def flags(name: str, value: ArrayLike, shape: Shape) -> Flags:
     if raw.dtype.kind != "b":
         raise InputError(f"{name} must be true or false", value=_short(value))
     return _frozen(_shaped(name, raw, shape))
+
+
+class Arrays(dict[str, Any]):
+    """The arrays of a file by name. Raises InputError for a name that isn't there."""
+
+    def __init__(self, path: Path, content: dict[str, Any]) -> None:
+        super().__init__(content)
+        self.path = path
+
+    def __missing__(self, name: str) -> Any:
+        raise InputError(f"is damaged: {name} is missing", where=str(self.path), remedy="Run again with --fresh.")
+
+
+def read_arrays(path: Path) -> Arrays:
+    """All arrays of an .npz file; no objects are unpacked. Raises InputError where it is missing or damaged."""
+    if not path.is_file():
+        raise InputError("isn't there", where=str(path))
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return Arrays(path, {name: data[name] for name in data.files})
+    except (OSError, EOFError, ValueError, TypeError, AttributeError, NotImplementedError, RuntimeError, MemoryError) as error:
+        cause: Exception = error
+    except (KeyError, OverflowError, SyntaxError, zipfile.BadZipFile, zlib.error) as error:
+        cause = error
+    raise InputError(f"is damaged: {cause}", where=str(path), remedy="Run again with --fresh.") from cause
 
 
 def _shaped(name: str, raw: NDArray[_T], shape: Shape) -> NDArray[_T]:

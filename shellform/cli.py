@@ -272,6 +272,26 @@ def render(
 
 
 @app.command()
+def study(
+    file: Annotated[Path, typer.Argument(metavar="STUDY.toml", help="Study file.")],
+    output: Annotated[Path, typer.Option(help="Folder of the study; a second call on it goes on where it stopped.")],
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes on this machine; left out: one a core.")] = None,
+    scheduler: Annotated[str | None, typer.Option(help="Address of a Dask scheduler, whose workers see the folder too.")] = None,
+    allow_scripts: Scripts = False,
+) -> None:
+    """Compute many designs: what varies, its table and its page."""
+    from shellform.study.live import Live
+    from shellform.study.studies import run_study
+
+    if workers is not None and scheduler is not None:
+        raise InputError("the cluster has its own workers", where="--workers", remedy="Leave out --workers or --scheduler.")
+    with Live() as live:
+        found = run_study(file, output, workers=workers, scheduler=scheduler, allow_scripts=allow_scripts, show=live)
+    failed = f", {found.failed} of them without a result (see status and reason)" if found.failed else ""
+    print(f"{found.designs} designs, {found.found} found from before{failed}: {found.table}")
+
+
+@app.command()
 def report(
     runs: Annotated[list[Path], typer.Argument(help="Run folders; several stand side by side.")],
     output: Annotated[Path | None, typer.Option(help="File; left out: report.html in the run folder, or here for several runs.")] = None,

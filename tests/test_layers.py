@@ -23,8 +23,12 @@ DOORS = {
     "imageio_ffmpeg": {"output/images.py"},
     "cvxopt": {"structure/sparse.py", "design/convex.py"},
     "numba": {"compiled.py"},
+    "dask": {"study/sweep.py"},
+    "distributed": {"study/sweep.py"},
+    "pyarrow": {"study/store.py"},
+    "optuna": {"study/search.py"},
 }
-NOT_LOADED = ["ezdxf", "openpyxl", "gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "numba", "scipy", "numpy"]
+NOT_LOADED = ["ezdxf", "openpyxl", "gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "pyarrow", "optuna", "numba", "scipy", "numpy"]
 
 
 def imports(path: Path) -> list[str]:

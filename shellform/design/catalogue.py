@@ -87,7 +87,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
     except msgspec.ValidationError as error:
         what, _, place = str(error).partition(" - at ")
         raise InputError(what[:1].lower() + what[1:], where=f"catalogue {path}: {place.strip('`$.') or 'top'}") from error
-    except (msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"isn't valid TOML: {error}", where=f"catalogue {path}") from error
     material = _checked(f"catalogue {path}", lambda: _material(document.material))
     kinds: list[tuple[str, Sequence[Any], Callable[[Any], Section]]] = [

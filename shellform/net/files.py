@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from shellform.arrays import read_arrays
 from shellform.errors import InputError
 from shellform.net.grid import Grid, GridRod
 from shellform.net.net import Net
@@ -79,30 +80,30 @@ def save_net(path: Path, net: Net) -> None:
 
 def load_net(path: Path) -> Net:
     """The net written by `save_net`. Raises InputError where the file is missing or damaged."""
-    if not path.is_file():
-        raise InputError("isn't there", where=str(path))
+    data = read_arrays(path)
     try:
-        with np.load(path, allow_pickle=False) as data:
-            meta = json.loads(str(data["meta"]))
-            pieces = {
-                name: np.split(data[f"rod_{name}"], data[f"rod_{name}_ends"][:-1])
-                for name in ("nodes", "arc", "crossings", "at")
-            }
-            rods = tuple(
-                GridRod(str(direction), index, *(pieces[name][k] for name in ("nodes", "arc", "crossings", "at")))
-                for k, (direction, index) in enumerate(zip(data["directions"], meta["indices"], strict=True))
-            )
-            grid = Grid(
-                data["flat"],
-                rods,
-                data["lattice"],
-                data["crossing_nodes"],
-                meta["spacing"],
-                meta["gap"],
-                meta["spacing_v"],
-            )
-            quality = Quality(**meta["quality"], **{name: data[f"map_{name}"] for name in MAPS})
-            target = State(data["positions"], data["quaternions"])
-            return Net(grid, target, data["supports"], quality, tuple(meta["notes"]))
-    except (OSError, ValueError, KeyError, TypeError) as error:
+        meta = json.loads(str(data["meta"]))
+        pieces = {
+            name: np.split(data[f"rod_{name}"], data[f"rod_{name}_ends"][:-1])
+            for name in ("nodes", "arc", "crossings", "at")
+        }
+        rods = tuple(
+            GridRod(str(direction), index, *(pieces[name][k] for name in ("nodes", "arc", "crossings", "at")))
+            for k, (direction, index) in enumerate(zip(data["directions"], meta["indices"], strict=True))
+        )
+        grid = Grid(
+            data["flat"],
+            rods,
+            data["lattice"],
+            data["crossing_nodes"],
+            meta["spacing"],
+            meta["gap"],
+            meta["spacing_v"],
+        )
+        quality = Quality(**meta["quality"], **{name: data[f"map_{name}"] for name in MAPS})
+        target = State(data["positions"], data["quaternions"])
+        return Net(grid, target, data["supports"], quality, tuple(meta["notes"]))
+    except InputError:
+        raise
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
         raise InputError(f"is damaged: {error}", where=str(path), remedy="Run again with --fresh.") from error

@@ -292,9 +292,14 @@ def _torsion(slenderness: float) -> tuple[float, float]:
     return 1.0 / 3.0 - scale * slenderness * total, -scale * (total + slenderness * rate)
 
 
+_LARGEST = 1e3  # m, far beyond any rod: a wrong unit, and later an overflow
+
+
 def _positive(section: Round | Tube | Rectangle) -> None:
     for each in fields(section):
         if each.name != "material":
             value = getattr(section, each.name)
             if not (value > 0.0 and math.isfinite(value)):
                 raise InputError("must be positive and finite", where=f"section.{each.name}", value=value)
+            if value > _LARGEST:
+                raise InputError(f"must be below {_LARGEST:g} m", where=f"section.{each.name}", value=value)

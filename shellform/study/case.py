@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -296,19 +296,30 @@ def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
 
     The paths of its surface and catalogue are made absolute. Raises InputError naming every entry that is wrong.
     """
-    file = Path(path)
+    data = read_toml(Path(path))
+    for setting in settings:
+        _set(data, setting)
+    return make_case(data, Path(path))
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """The tables of a TOML file. Raises InputError where it can't be read."""
     try:
-        data = tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"can't be read: {error}", where=str(file)) from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"isn't valid TOML: {error}", where=str(file)) from error
-    for setting in settings:
-        _set(data, setting)
+    except RecursionError as error:
+        raise InputError("isn't valid TOML: it is nested too deeply", where=str(file)) from error
+
+
+def make_case(data: Mapping[str, Any], file: Path) -> Case:
+    """As `load_case`, from the tables of a file that are read already."""
     try:
         case = Case.model_validate(data)
     except ValidationError as error:
-        raise InputError("; ".join(_told(each) for each in error.errors()), where=str(file)) from error
+        raise InputError("; ".join(told(each, Case) for each in error.errors()), where=str(file)) from error
     place = (file.parent / case.surface.file).resolve()
     found: dict[str, Any] = {"surface": case.surface.model_copy(update={"file": str(place)})}
     if case.optimise.catalogue is not None:
@@ -359,18 +370,23 @@ def _set(data: dict[str, Any], setting: str) -> None:
         value = tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         value = text  # a bare word stands for itself
-    *sections, last = key.strip().split(".")
+    set_entry(data, key.strip(), value, where="--set")
+
+
+def set_entry(data: dict[str, Any], key: str, value: Any, *, where: str) -> None:
+    """Puts a value in place of the entry named like "net.spacing". Raises InputError where that lies inside another value."""
+    *sections, last = key.split(".")
     for section in sections:
         data = data.setdefault(section, {})
         if not isinstance(data, dict):
-            raise InputError("names an entry inside a value", where="--set", value=setting)
+            raise InputError("names an entry inside a value", where=where, value=key)
     data[last] = value
 
 
-def _told(error: Any) -> str:
-    """One validation error in words: the entry, what is wrong, the value, and the nearest known name."""
+def told(error: Any, root: type[BaseModel]) -> str:
+    """One validation error in words: the entry of the file of `root`'s kind, what is wrong, the value, and the nearest known name."""
     kind = error["type"]
-    entry, model = _entry(error["loc"])
+    entry, model = _entry(error["loc"], root)
     if kind == "extra_forbidden":
         near = difflib.get_close_matches(str(error["loc"][-1]), model.model_fields, n=1, cutoff=0.5)
         hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(model.model_fields)}"
@@ -387,12 +403,12 @@ def _told(error: Any) -> str:
     return f"{entry}: {message}{value}"
 
 
-def _entry(place: Sequence[int | str]) -> tuple[str, Any]:
+def _entry(place: Sequence[int | str], root: type[BaseModel]) -> tuple[str, Any]:
     """The name of an entry as the file has it, and the section in which it stands; where an entry may be of several kinds, the
     place that pydantic gives names the kind too."""
     names: list[str] = []
-    kind: Any = Case
-    section: Any = Case
+    kind: Any = root
+    section: Any = root
     for part in place:
         plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
         if get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain):  # a table that may be left out
@@ -410,7 +426,7 @@ def _entry(place: Sequence[int | str]) -> tuple[str, Any]:
             kind = Any if field is None else field.annotation
         else:
             kind = Any
-    return ".".join(names) or "case", section
+    return ".".join(names) or root.__name__.lower(), section
 
 
 def _tags(choice: Any) -> list[str]:

@@ -123,7 +123,7 @@ def _done(run: Run) -> set[str]:
     """The stages whose results are those of the case as it stands; where its surface is elsewhere, all that were finished."""
     kept = read_json(run.folder / "stages.json")
     file = Path(run.case.surface.file)
-    keys = stage_keys(run.case, file) if file.is_file() else kept
+    keys = stage_keys(run.case) if file.is_file() else kept
     return {stage for stage, key in kept.items() if keys.get(stage) == key}
 
 

@@ -12,6 +12,7 @@ import json
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +140,7 @@ def run_case(
     if not file.is_file():
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
-    keys = stage_keys(case, file)
+    keys = stage_keys(case)
     if not fresh:
         refuse_overwriting(folder)
     done = {} if fresh else read_json(folder / "stages.json")
@@ -191,9 +192,12 @@ def _outdate(summary: dict[str, Any], stage: str) -> None:
             summary.get("designs", {}).pop(name, None)
 
 
-def stage_keys(case: Case, file: Path) -> dict[str, str]:
-    """A hash for each stage of all that it depends on; `file` is the surface's."""
+def stage_keys(case: Case) -> dict[str, str]:
+    """A hash for each stage of all that it depends on; of the surface file that is its name and content, wherever it lies."""
     entries = case.model_dump(mode="json")
+    file = Path(case.surface.file)
+    entries["surface"]["file"] = file.name
+    stock = catalogue_bytes(case)
     entries["stock"] = {name: entries["rod"].pop(name) for name in ("stock_length", "kerf")}  # which no design depends on
     needs = {
         "surface": ["surface"],
@@ -204,13 +208,20 @@ def stage_keys(case: Case, file: Path) -> dict[str, str]:
         "documents": ["stock"],
         "report": [],
     }
-    digest = hashlib.sha256(shellform.__version__.encode() + file.read_bytes())
+    told = file.stat()
+    digest = hashlib.sha256(shellform.__version__.encode() + _content(str(file), told.st_size, told.st_mtime_ns))
     keys = {}
     for stage in STAGES:
-        digest.update(catalogue_bytes(case) if stage == "initial" else b"")
+        digest.update(stock if stage == "initial" else b"")
         digest.update(json.dumps({name: entries[name] for name in needs[stage]}, sort_keys=True).encode())
         keys[stage] = digest.hexdigest()
     return keys
+
+
+@cache
+def _content(file: str, size: int, written: int) -> bytes:
+    """A hash of a file as it was when it had this size and time: studies ask for the same ones many times."""
+    return hashlib.sha256(Path(file).read_bytes()).digest()
 
 
 def _surface(job: _Job, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> Surface:

@@ -11,6 +11,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError
 
+_MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000
 _NAMES_TOLD = 12
 
@@ -87,6 +88,10 @@ def joined(parts: Sequence[Part], choice: Choice, where: str) -> Draft:
                     f"a face names vertex {1 + int(block.max() if block.min() >= 0 else block.min())}, of {len(part.points)}",
                     where=where,
                     remedy="Export the mesh anew.",
+                )
+            if block.shape[1] > _MOST_CORNERS:
+                raise InputError(
+                    f"has a face of {block.shape[1]:,} corners; up to {_MOST_CORNERS:,} are read", where=where, remedy="Export triangles."
                 )
             triangles.append(triangulated(part.points, block) + count)
         points.append(part.points)

@@ -43,7 +43,7 @@ def read_gltf(file: Path, choice: Choice) -> Draft:
         parts = [part for root in roots for part in scene.parts(root, np.eye(4), 0)]
     except InputError:
         raise
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError, struct.error, OSError) as error:
+    except (KeyError, IndexError, TypeError, ValueError, AttributeError, struct.error, OSError, RecursionError) as error:
         said = f"{type(error).__name__}: {error}"
         raise InputError(
             f"can't be read as glTF: {said}", where=str(file), remedy="Export it anew, uncompressed."

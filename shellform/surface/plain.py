@@ -36,7 +36,7 @@ def read_obj(file: Path, choice: Choice) -> Draft:
         except (ValueError, IndexError) as error:
             raise _bad_line(file, number, line) from error
     place = np.array(points, dtype=float).reshape(-1, 3)
-    parts = [Part(called, layer, place, _blocks(blocks)) for (layer, called), blocks in groups.items()]
+    parts = [Part(called, layer, place, _blocks(blocks, file)) for (layer, called), blocks in groups.items()]
     return joined(parts, choice, str(file))
 
 
@@ -46,6 +46,8 @@ def read_off(file: Path, choice: Choice) -> Draft:
     words = [(number, each) for number, each in lines if each]
     if not words or not words[0][1][0].endswith("OFF") or "BINARY" in words[0][1]:
         raise InputError("isn't a text OFF file", where=str(file), remedy=_ANEW)
+    if len(words) < 2:
+        raise InputError("ends after its first line", where=str(file), remedy=_ANEW)
     head = words[0][1][1:] or words[1][1]
     rows = words[1 if words[0][1][1:] else 2 :]
     last = 1
@@ -62,7 +64,7 @@ def read_off(file: Path, choice: Choice) -> Draft:
             else:
                 size = int(row[0])
                 blocks.setdefault(size, []).append([int(row[1 + k]) for k in range(size)])
-        part = Part("", "", np.array(place, dtype=float).reshape(-1, 3), _blocks(blocks))
+        part = Part("", "", np.array(place, dtype=float).reshape(-1, 3), _blocks(blocks, file))
     except (ValueError, IndexError) as error:
         raise _bad_line(file, last, "") from error
     return joined([part], choice, str(file))
@@ -108,8 +110,11 @@ def _facets(name: str, corners: Reals) -> Part:
     return Part(name, "", corners.reshape(-1, 3), (np.arange(3 * len(corners)).reshape(-1, 3),))
 
 
-def _blocks(blocks: dict[int, list[list[int]]]) -> tuple[Indices, ...]:
-    return tuple(np.array(each, dtype=np.int64) for size, each in blocks.items() if size > 2)
+def _blocks(blocks: dict[int, list[list[int]]], file: Path) -> tuple[Indices, ...]:
+    try:
+        return tuple(np.array(each, dtype=np.int64) for size, each in blocks.items() if size > 2)
+    except OverflowError as error:
+        raise InputError("a face names a vertex with a number beyond all counts", where=str(file), remedy=_ANEW) from error
 
 
 def _lines(file: Path) -> list[str]:

@@ -199,6 +199,7 @@ def test_a_catalogue_that_the_net_breaks_altogether_is_refused(net):
         ("255e6", "-1.0", "material.strength.*positive"),
         ("[0.0024, 0.002, 0.0022, 0.004]", "[]", "has no sizes"),
         ("[material]", "[material", "isn't valid TOML"),
+        ("[material]", f"x = {'[' * 3000}\n[material]", "isn't valid TOML"),
     ],
 )
 def test_wrong_catalogues_are_refused_with_their_entry(tmp_path, old, new, said):

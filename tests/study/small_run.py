@@ -3,7 +3,6 @@ optimised one's place."""
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -47,7 +46,7 @@ def finish(folder):
     }
     (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
     (folder / "history.csv").write_text(HISTORY, encoding="utf-8")
-    (folder / "stages.json").write_text(json.dumps(stage_keys(run.case, Path(run.case.surface.file))), encoding="utf-8")
+    (folder / "stages.json").write_text(json.dumps(stage_keys(run.case)), encoding="utf-8")
     shade = np.linspace(0, 255, 64).astype(np.uint8)
     for name in ("deviations", "optimised-design", "net-skew"):
         Image.fromarray(np.dstack([np.tile(shade, (40, 1))] * 3)).save(folder / f"figures/{name}.png")

@@ -140,9 +140,13 @@ def test_lines_that_can_not_be_read_are_quoted_by_number(tmp_path):
         refused(tmp_path / "a.obj", f"line {good.count(chr(10)) + 1}", bad)
     (tmp_path / "a.obj").write_text(good + "f 1 2 999\n")
     refused(tmp_path / "a.obj", "a face names vertex 999, of 117")
+    (tmp_path / "a.obj").write_text(good + f"f 1 2 {10**20}\n")
+    refused(tmp_path / "a.obj", "a number beyond all counts")
     text = write_off(tmp_path / "a.off", POINTS, QUADS).read_text().splitlines()
     (tmp_path / "a.off").write_text("\n".join([*text[:10], "0 0 x", *text[11:]]))
     refused(tmp_path / "a.off", "line 11")
+    (tmp_path / "a.off").write_text("OFF\n")
+    refused(tmp_path / "a.off", "ends after its first line")
     (tmp_path / "a.off").write_text("OFF BINARY\n\1\2")
     refused(tmp_path / "a.off", "isn't a text OFF file")
     (tmp_path / "a.obj").write_bytes(b"v 0 0 0\nv\0\n")
@@ -167,6 +171,15 @@ def test_gltf_files_that_need_what_is_not_here_are_refused_by_name(tmp_path):
     ]:
         (tmp_path / "a.gltf").write_text(json.dumps({**tree, **change}))
         refused(tmp_path / "a.gltf", word)
+
+
+def test_a_gltf_file_nested_without_end_and_a_face_of_thousands_of_corners_are_refused(tmp_path):
+    (tmp_path / "a.gltf").write_text('{"asset": {}, "bufferViews": ' + 9000 * "[")
+    refused(tmp_path / "a.gltf", "can't be read as glTF")
+    mesh = compas_mesh(POINTS, QUADS)
+    mesh["data"]["face"]["3"] = 5000 * [1, 2]
+    (tmp_path / "a.json").write_text(json.dumps(mesh))
+    refused(tmp_path / "a.json", "a face of 10,000 corners; up to 1,000 are read")
 
 
 def test_a_damaged_compas_mesh_is_named(tmp_path):

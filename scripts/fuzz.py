@@ -1,0 +1,331 @@
+"""Thousands of damaged inputs for every reader: each is read or refused with a message, within 20 s, and leaves no torn file.
+
+    scripts/fuzz.py [--count 10000] [--seed 1] [--kind KIND …]
+
+Good files of each kind are damaged at random: bits turned, pieces cut, doubled, moved and filled with junk, numbers made huge, negative,
+not a number, values of JSON exchanged for others. A child process reads them, so that a crash or a hang costs nobody anything but is
+counted. What fails is kept in a folder that is named at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import io
+import json
+import random
+import re
+import select
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+_LONGEST = 20.0  # seconds
+_MEMORY = 6 * 1024**3
+_NUMBERS = [b"0", b"-1", b"nan", b"inf", b"-inf", b"1e308", b"1e-308", b"99999999999999999999", b"0.5", b"2147483648", b"1e5", b"3", b""]
+_VALUES = [None, True, -1, 0, 1e308, float("nan"), float("inf"), "", "x", [], {}, [[]], [None], {"a": 1}, 2**63, "9" * 5000]
+_FOREIGN = {"step", "igs", "brep", "3dm", "ply", "msh", "vtk", "vtp", "vtu"}  # read in a process of their own, a second each
+_SHARES = {"case": 16, "study": 10, "model": 16, "obj": 7, "off": 6, "stl": 7, "gltf": 7, "glb": 6, "json": 7, "scan": 6}
+_SHARES |= {"catalogue": 4, "sections": 3, "run": 4, "log": 4, "design": 1} | dict.fromkeys(sorted(_FOREIGN), 0.25)
+
+
+def damaged(data: bytes, chance: random.Random) -> bytes:
+    """A file's bytes after one to four accidents."""
+    for _ in range(chance.choice([1, 1, 1, 2, 4])):
+        data = chance.choice(_ACCIDENTS)(data, chance)
+    return data
+
+
+def _bits(data: bytes, chance: random.Random) -> bytes:
+    changed = bytearray(data)
+    for _ in range(chance.choice([1, 3, 30])):
+        if changed:
+            changed[chance.randrange(len(changed))] ^= 1 << chance.randrange(8)
+    return bytes(changed)
+
+
+def _cut(data: bytes, chance: random.Random) -> bytes:
+    a, b = sorted(chance.randrange(len(data) + 1) for _ in range(2))
+    return data[:a] if chance.random() < 0.3 else data[:a] + data[b:]
+
+
+def _double(data: bytes, chance: random.Random) -> bytes:
+    a, b = sorted(chance.randrange(len(data) + 1) for _ in range(2))
+    return data[:b] + data[a:b] * chance.choice([1, 1, 5]) + data[b:]
+
+
+def _junk(data: bytes, chance: random.Random) -> bytes:
+    at = chance.randrange(len(data) + 1)
+    junk = chance.choice([chance.randbytes(chance.randrange(1, 40)), b"\0" * 9, b"[" * 3000, b"{" * 90, b"\xff\xfe", "ü\u202e𝄞".encode(), b'"', b"\n"])
+    return data[:at] + junk + data[at:]
+
+
+def _number(data: bytes, chance: random.Random) -> bytes:
+    found = list(re.finditer(rb"-?\d+(\.\d*)?([eE][-+]?\d+)?", data[:200_000]))
+    if not found:
+        return _bits(data, chance)
+    one = chance.choice(found)
+    return data[: one.start()] + chance.choice(_NUMBERS) + data[one.end() :]
+
+
+def _lines(data: bytes, chance: random.Random) -> bytes:
+    lines = data.split(b"\n")
+    a, b = chance.randrange(len(lines)), chance.randrange(len(lines))
+    lines[a], lines[b] = lines[b], lines[a] if chance.random() < 0.5 else lines[b]
+    if chance.random() < 0.3:
+        del lines[a]
+    return b"\n".join(lines)
+
+
+def _value(data: bytes, chance: random.Random) -> bytes:
+    """Another value somewhere in a JSON document; elsewhere another number."""
+    try:
+        tree = json.loads(data)
+    except (ValueError, RecursionError):
+        return _number(data, chance)
+    places: list[tuple[object, object]] = []
+    todo = [tree]
+    while todo and len(places) < 20_000:
+        each = todo.pop()
+        for key in each if isinstance(each, dict) else range(len(each)) if isinstance(each, list) else []:
+            places.append((each, key))
+            todo.append(each[key])
+    if not places:
+        return data
+    branch, key = chance.choice(places)
+    if chance.random() < 0.2:
+        del branch[key]  # type: ignore[attr-defined]
+    else:
+        branch[key] = chance.choice(_VALUES)  # type: ignore[index]
+    return json.dumps(tree).encode()
+
+
+_ACCIDENTS: list[Callable[[bytes, random.Random], bytes]] = [_bits, _cut, _double, _junk, _number, _number, _lines, _value, _value]
+
+
+def sound(folder: Path) -> dict[str, list[Path]]:
+    """Good files of each kind; made in `folder`."""
+    import pyvista
+
+    from shellform.study.case import load_case
+    from shellform.study.run import run_case
+    from shellform.study.store import Log
+    from tests.study.stubs import study_file
+    from tests.study.test_commands import MODEL
+    from tests.surface.shells import cap
+    from tests.surface.test_bad_files import every_format
+
+    folder.mkdir(parents=True, exist_ok=True)
+    files: dict[str, list[Path]] = collections.defaultdict(list)
+    for file in every_format(folder):
+        files[{"iges": "igs", "brp": "brep"}.get(file.suffix[1:], file.suffix[1:])].append(file)
+    points, _quads = cap()
+    pyvista.PolyData(points).save(folder / "points.vtp")
+    study = study_file(
+        folder / "study",
+        "[set]\noptimise.evaluations = 3\n[vary]\nnet.spacing = { low = 0.1, high = 0.12, count = 3 }\ncable.stiffness = [100, 187]\n"
+        '[function]\njoint.gap = "net.spacing / 60"\n[column]\ncables = "designs.best.cables"\n[objective]\ncables = "min"\n',
+    )
+    files["study"] = [study]
+    files["case"] = [study.with_name("dome.toml"), ROOT / "scripts/full_size_poured.toml", ROOT / "scripts/scale_model.toml"]
+    files["design"] = [study.with_name("dome.toml")]
+    whole = {
+        **MODEL,
+        "cables": [{"nodes": [0, 2], "EA": 5.0, "rest_length": 1.9}],
+        "springs": [],
+        "start": {"positions": MODEL["nodes"], "quaternions": [[1, 0, 0, 0]] * 3},
+    }
+    for name, model in [("model.json", MODEL), ("whole.json", {k: v for k, v in whole.items() if k != "springs"})]:
+        (folder / name).write_text(json.dumps(model))
+        files["model"].append(folder / name)
+    (folder / "scan.csv").write_text("# x y z\n" + "\n".join(f"{k},{0.5 * k},{0.1 * k * k}" for k in range(30)))
+    files["scan"] = [folder / "scan.csv"]
+    (folder / "sections.toml").write_text('[rod]\nshape = "tube"\nradius = 0.02\nwall = 0.003\nyoung = 4e10\npoisson = 0.3\nstrength = 2e8\n')
+    files["sections"] = [folder / "sections.toml"]
+    files["catalogue"] = sorted((ROOT / "shellform").rglob("gfrp_*.toml"))
+    run = folder / "run"
+    run_case(load_case(study.with_name("dome.toml")), run, until="initial")
+    files["run"] = [file for file in run.rglob("*") if file.suffix in (".json", ".npz", ".toml") and "states" not in file.parts]
+    with Log(folder / "results.jsonl") as log:
+        log.add([{"key": f"{k:032d}", "status": "done", "reason": "", "values": {"x": k}, "seconds": {}, "worker": ""} for k in range(20)])
+    files["log"] = [folder / "results.jsonl"]
+    return dict(files)
+
+
+def attempt(kind: str, number: int, files: dict[str, list[Path]], place: Path) -> str:
+    """Damages a file of a kind by the number and reads it; says "read", "refused", or what went wrong."""
+    from shellform.errors import InputError, NotConverged
+
+    chance = random.Random(f"{kind} {number}")
+    good = chance.choice(files[kind])
+    data = damaged(good.read_bytes(), chance)
+    shutil.rmtree(place, ignore_errors=True)
+    place.mkdir(parents=True)
+    bad = place / good.name
+    if kind == "run":
+        run = next(each for each in good.parents if (each / "case.toml").is_file())
+        shutil.copytree(run, place / "run")
+        bad = place / "run" / good.relative_to(run)
+    elif kind in ("study", "design"):
+        shutil.copy(files["design"][0], place)
+    bad.write_bytes(data)
+    try:
+        _read(kind, bad, place)
+    except (InputError, NotConverged) as error:
+        said = str(error)
+        return "refused" if said.strip() and "\n" not in said[:40] else f"BAD no message: {said!r}"
+    except RecursionError:
+        return "BAD RecursionError"
+    except Exception:  # what the readers must never raise
+        return "BAD " + " | ".join(traceback.format_exc().strip().splitlines()[-5:])
+    finally:
+        torn = [file.name for file in place.rglob("*") if ".part" in file.name]
+        if torn:
+            print(f"torn {torn}", file=sys.stderr)
+    return "read"
+
+
+def _read(kind: str, bad: Path, place: Path) -> None:
+    if kind == "case":
+        from shellform.study.case import dump_case, load_case
+
+        dump_case(load_case(bad))
+    elif kind == "study":
+        from shellform.study.plan import changes, read_study, resolved
+
+        plan = read_study(bad)
+        for own, _ in zip(changes(plan), range(5), strict=False):
+            resolved(plan, own)
+    elif kind == "model":
+        from shellform.structure.model import read_model
+
+        read_model(bad)
+    elif kind == "scan":
+        from shellform.design.scan import read_points
+
+        read_points(bad)
+    elif kind == "sections":
+        from shellform.structure.results import read_sections
+
+        read_sections(bad)
+    elif kind == "catalogue":
+        from shellform.design.catalogue import read_catalogue
+
+        read_catalogue(bad)
+    elif kind == "run":
+        from shellform.study.folder import read_run
+
+        read_run(place / "run")
+    elif kind == "log":
+        from shellform.study.store import Log
+
+        with Log(bad) as log:
+            for key in log:
+                log.get(key)
+    elif kind == "design":
+        from shellform.study.case import load_case
+        from shellform.study.run import run_case
+
+        case = load_case(bad)
+        if case.net.spacing > 0.05 and (case.surface.size or 1.0) > 0.01 and case.net.elements < 9:  # no larger jobs than the sound one
+            run_case(case, place / "out", until="surface")
+    else:
+        from shellform.surface.reading import read_surface
+
+        read_surface(bad)
+
+
+def child(folder: Path) -> None:
+    """Reads lines of kind and number, and answers each with a line."""
+    import resource
+
+    said = sys.stdout
+    sys.stdout = io.StringIO()
+    files = sound(folder / "sound")
+    resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, _MEMORY))
+    print("ready", file=said, flush=True)
+    for line in sys.stdin:
+        kind, number = line.split()
+        print(attempt(kind, int(number), files, folder / "try"), file=said, flush=True)
+
+
+def fuzz(asks: list[tuple[str, int]], folder: Path, tell: Callable[[str], None] = lambda text: None) -> tuple[dict[str, collections.Counter[str]], list[str]]:
+    """Has all attempts made; returns counts of answers by kind, and what went wrong."""
+    counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
+    wrong: list[str] = []
+    process: subprocess.Popen[str] | None = None
+    for done, (kind, number) in enumerate(asks):
+        if process is None:
+            command = [sys.executable, str(Path(__file__).resolve()), "--child", str(folder)]
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=ROOT)
+            if _answer(process, 300.0) != "ready":
+                raise RuntimeError("the child didn't start")
+        assert process.stdin is not None
+        process.stdin.write(f"{kind} {number}\n")
+        process.stdin.flush()
+        began = time.monotonic()
+        told = _answer(process, _LONGEST * 1.5)
+        if told is None:
+            process.kill()
+            status = process.wait()
+            told = f"BAD {'hang' if time.monotonic() - began > _LONGEST else f'crash, status {status}'}"
+            process = None
+        counts[kind][told.split()[0]] += 1
+        if told.startswith("BAD"):
+            wrong.append(f"{kind} {number}: {told}")
+            tell(wrong[-1])
+        if done % 500 == 499:
+            tell(f"{done + 1} of {len(asks)}, {len(wrong)} wrong")
+    if process is not None and process.stdin is not None:
+        process.stdin.close()
+        process.wait()
+    return dict(counts), wrong
+
+
+def _answer(process: subprocess.Popen[str], longest: float) -> str | None:
+    assert process.stdout is not None
+    if not select.select([process.stdout], [], [], longest)[0]:
+        return None
+    return process.stdout.readline().strip() or None
+
+
+def asked(count: int, seed: int, kinds: list[str]) -> list[tuple[str, int]]:
+    """What to try: kinds by their shares, in mixed order."""
+    total = sum(_SHARES[kind] for kind in kinds)
+    asks = [(kind, 1_000_000 * seed + k) for kind in kinds for k in range(max(1, round(count * _SHARES[kind] / total)))]
+    random.Random(seed).shuffle(asks)
+    return asks
+
+
+def main() -> int:
+    """Status 0 where nothing went wrong."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", nargs="*", default=list(_SHARES), choices=list(_SHARES))
+    parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.child:
+        child(options.child)
+        return 0
+    folder = Path(tempfile.mkdtemp(prefix="fuzz"))
+    began = time.monotonic()
+    counts, wrong = fuzz(asked(options.count, options.seed, options.kind), folder, lambda text: print(text, flush=True))
+    for kind, each in sorted(counts.items()):
+        print(f"{kind:>10}  " + ", ".join(f"{count} {what}" for what, count in sorted(each.items())))
+    total = sum(sum(each.values()) for each in counts.values())
+    print(f"{total} inputs in {time.monotonic() - began:.0f} s: {len(wrong)} went wrong")
+    shutil.rmtree(folder, ignore_errors=True)
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,69 @@
+"""The progress of a study on the terminal: a table that is drawn anew, or lines where nobody looks at one."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from shellform.study.studies import Progress
+
+_EVERY = 10.0  # seconds between lines
+
+
+class Live:
+    """Shows a study's progress on standard error; use it as a context manager and call it with the progress."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.live import Live as Drawn
+
+        self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+        self._drawn = Drawn(console=self._console, refresh_per_second=4, transient=True) if self._console.is_terminal else None
+        self._told = 0.0
+        self._dashboard = ""
+
+    def __enter__(self) -> Live:
+        if self._drawn:
+            self._drawn.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._drawn:
+            self._drawn.stop()
+
+    def __call__(self, progress: Progress) -> None:
+        if progress.dashboard != self._dashboard:
+            self._dashboard = progress.dashboard
+            self._console.print(f"dashboard: {progress.dashboard}")
+        if self._drawn:
+            self._drawn.update(_table(progress))
+        elif time.perf_counter() - self._told > _EVERY:
+            self._told = time.perf_counter()
+            self._console.print(_line(progress))
+
+
+def _line(progress: Progress) -> str:
+    ready = progress.found + progress.done
+    spent = time.perf_counter() - progress.began
+    rest = f", about {spent / progress.done * max(0, progress.total - ready):.0f} s to go" if progress.done else ""
+    failed = f", {progress.failed} without a result" if progress.failed else ""
+    return f"study: {ready} of {progress.total} designs{failed}{rest}"
+
+
+def _table(progress: Progress) -> Any:
+    from rich.table import Table
+
+    table = Table(title=_line(progress), title_justify="left", caption=progress.dashboard or None)
+    names = [name for name in (progress.rows[-1] if progress.rows else {}) if name not in ("key", "reason")]
+    for name in names:
+        table.add_column(name)
+    for row in progress.rows:
+        table.add_row(*(_cell(row, name) for name in names))
+    return table
+
+
+def _cell(row: dict[str, Any], name: str) -> str:
+    value = row.get(name)
+    if name == "status" and value != "done":
+        return f"{value}: {row['reason'][:60]}"
+    return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)

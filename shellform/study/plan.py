@@ -1,0 +1,333 @@
+"""The study file: a base case, what varies, and which numbers are of interest; and the designs that this makes.
+
+    case = "scale_model.toml"        # beside the study file, or below it
+    method = "latin"                 # grid, random, latin, sobol, search
+    count = 64
+    [set]                            # for all designs
+    optimise.evaluations = 30
+    [vary]
+    net.spacing = { low = 0.050, high = 0.060 }
+    cable.stiffness = [100, 187, 400]
+    surface.file = { files = "shells/*.step" }
+    [function]
+    joint.gap = "net.spacing / 27.5"
+    [column]
+    cables = "designs.best.cables"
+    [objective]
+    cables = "min"
+
+Samples are SciPy's (`scipy.stats.qmc`) from a seed, so that the same file always makes the same designs in the same order.
+"""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from shellform.errors import InputError
+from shellform.study.case import Case, make_case, read_toml, set_entry, told
+from shellform.study.expressions import evaluate
+
+_MOST = 1_000_000  # designs
+_LEAVES = {"values", "low", "high", "count", "scale", "whole", "files"}
+_COLUMNS = {
+    "misfit": "designs.best.loads.design.deviation_rms",
+    "cables": "designs.best.cables",
+    "rod_radius": "designs.best.rod_radius",
+    "utilisation": "designs.best.loads.design.rod_utilisation_max",
+}
+
+Value = bool | int | float | str
+Unit = Callable[[float], Value]
+"""From [0, 1) to a value."""
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class VaryEntry(_Part):
+    """How one entry of the case varies: a list, a range, or files."""
+
+    values: list[Value] | None = Field(None, min_length=1, description="the values themselves")
+    low: float | None = Field(None, description="of a range")
+    high: float | None = Field(None, description="of a range")
+    count: int | None = Field(None, ge=1, le=_MOST, description="of values that a grid takes from a range")
+    scale: Literal["linear", "log"] = Field("linear", description="log: equal ratios")
+    whole: bool = Field(False, description="whole numbers alone")
+    files: str | None = Field(None, description='pattern of files beside or below the study file, like "shells/*.step"')
+
+    @model_validator(mode="after")
+    def _one_way(self) -> VaryEntry:
+        if (self.low is None) != (self.high is None):
+            raise ValueError("a range needs both low and high")
+        if [self.values, self.low, self.files].count(None) != 2:
+            raise ValueError("give one of: a list of values, low and high, files")
+        if self.low is not None and self.high is not None:
+            if not self.low < self.high:
+                raise ValueError("low must be below high")
+            if self.scale == "log" and self.low <= 0.0:
+                raise ValueError("equal ratios need a low above zero")
+        return self
+
+
+class Study(_Part):
+    """A study file's entries."""
+
+    title: str = ""
+    case: str = Field(description="case file, beside or below the study file")
+    until: Literal["surface", "net", "initial", "optimise", "figures", "documents", "report"] = Field("optimise", description="last stage of each design")
+    keep: Literal["all", "best", "none"] = Field("best", description="run folders that stay")
+    method: Literal["grid", "random", "latin", "sobol", "search"] = Field("grid", description="how the varied entries combine")
+    count: int | None = Field(None, ge=1, le=_MOST, description="of designs, for all methods but grid")
+    population: int = Field(24, ge=2, le=10_000, description="of a search's generation")
+    seed: int = Field(1, ge=0, lt=2**32)
+    set: dict[str, Any] = Field({}, description="entries for all designs")
+    vary: dict[str, VaryEntry] = Field({}, description="entries that vary")
+    designs: list[dict[str, Any]] = Field([], description="designs listed one by one; each is combined with all that varies")
+    function: dict[str, str | float] = Field({}, description="entries that follow from others")
+    column: dict[str, str] = Field(_COLUMNS, description="name = path in summary.json; designs.best is the last one made")
+    objective: dict[str, Literal["min", "max"]] = Field({}, description="columns to be small or large")
+    limit: dict[str, float] = Field({}, description="largest value of a column in a usable design")
+
+    @field_validator("set", "function", mode="before")
+    @classmethod
+    def _plain(cls, value: Any) -> Any:
+        return _flat(value, ())
+
+    @field_validator("vary", mode="before")
+    @classmethod
+    def _ways(cls, value: Any) -> Any:
+        found = _flat(value, _LEAVES)
+        return {k: {"values": v} if isinstance(v, list) else v for k, v in found.items()} if isinstance(found, dict) else found
+
+    @field_validator("designs", mode="before")
+    @classmethod
+    def _each_plain(cls, value: Any) -> Any:
+        return [_flat(each, ()) for each in value] if isinstance(value, list) else value
+
+    @model_validator(mode="before")
+    @classmethod
+    def _usual(cls, data: Any) -> Any:
+        """Without columns of its own a study is after misfit and cables."""
+        if isinstance(data, dict) and "column" not in data and "objective" not in data:
+            return {**data, "objective": {"misfit": "min", "cables": "min"}}
+        return data
+
+    @model_validator(mode="after")
+    def _whole(self) -> Study:
+        if self.method != "grid" and self.count is None:
+            raise ValueError(f"method {self.method!r} needs a count")
+        if self.method != "grid" and not self.vary:
+            raise ValueError(f"method {self.method!r} needs entries under [vary]")
+        if self.method == "search" and self.designs:
+            raise ValueError("a search makes its own designs")
+        if self.method == "search" and not self.objective:
+            raise ValueError("a search needs an [objective]")
+        taken = [*self.set, *self.vary, *self.function]
+        for name in taken:
+            if taken.count(name) > 1:
+                raise ValueError(f"{name} stands in more than one of [set], [vary] and [function]")
+        for name in [*self.objective, *self.limit]:
+            if name not in self.column:
+                raise ValueError(f"{name!r} is no column; known are {', '.join(self.column)}")
+        return self
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A study read and checked: its entries, the file, the base case's tables and entries, and how each varied entry is drawn."""
+
+    study: Study
+    file: Path
+    tables: Mapping[str, Any]
+    base: Mapping[str, Any]
+    lists: Mapping[str, Sequence[Value]]
+    ranges: Mapping[str, Unit]
+
+
+def read_study(path: str | Path) -> Plan:
+    """The plan in a study file. Raises InputError naming every entry that is wrong."""
+    file = Path(path)
+    try:
+        study = Study.model_validate(read_toml(file))
+    except ValidationError as error:
+        raise InputError("; ".join(told(each, Study) for each in error.errors()), where=str(file)) from error
+    return make_plan(study, file)
+
+
+def make_plan(study: Study, file: Path) -> Plan:
+    """The plan of a study's entries; paths are relative to `file`."""
+    case = _inside(file, study.case, "case")
+    tables = read_toml(case)
+    base = make_case(tables, case).model_dump(mode="json")
+    lists: dict[str, Sequence[Value]] = {}
+    ranges: dict[str, Unit] = {}
+    for name, entry in study.vary.items():
+        if entry.files is not None:
+            lists[name] = _files(file, entry.files, f"vary.{name}.files")
+        elif entry.values is not None:
+            lists[name] = [
+                str(_inside(file, str(each), f"vary.{name}")) if name == "surface.file" else each for each in entry.values
+            ]
+        elif study.method == "grid":
+            if entry.count is None:
+                raise InputError("a grid needs the range's count", where=f"{file}: vary.{name}", remedy="For example count = 5.")
+            at = [k / max(1, entry.count - 1) for k in range(entry.count)]
+            lists[name] = list(dict.fromkeys(ranged(entry, each) for each in at))
+        else:
+            ranges[name] = lambda at, entry=entry: ranged(entry, at)  # type: ignore[misc]
+    plan = Plan(study, file, tables, base, lists, ranges)
+    if length(plan) > _MOST:
+        raise InputError(f"makes {length(plan):,} designs; up to {_MOST:,} are taken", where=str(file))
+    if study.method != "search":
+        resolved(plan, next(iter(changes(plan))))  # what is wrong with all designs is wrong with the study
+    return plan
+
+
+def ranged(entry: VaryEntry, at: float) -> Value:
+    """The value of a range at 0 (low) to 1 (high)."""
+    low, high = float(entry.low or 0.0), float(entry.high or 0.0)
+    value = low * (high / low) ** at if entry.scale == "log" else low + at * (high - low)
+    return round(value) if entry.whole else min(max(value, low), high)
+
+
+def length(plan: Plan) -> int:
+    """How many designs a plan makes; for a search, at the most."""
+    study = plan.study
+    sampled = math.prod(len(each) for each in plan.lists.values()) if study.method == "grid" else int(study.count or 0)
+    return sampled * max(1, len(study.designs))
+
+
+def changes(plan: Plan) -> Iterator[dict[str, Value]]:
+    """The entries that each design has of its own, in order, without those that follow from others."""
+    for listed in plan.study.designs or [{}]:
+        for each in _samples(plan):
+            yield {**each, **listed}
+
+
+def _samples(plan: Plan) -> Iterator[dict[str, Value]]:
+    study, names = plan.study, list(plan.study.vary)
+    if study.method == "grid":
+        for values in itertools.product(*(plan.lists[name] for name in names)):
+            yield dict(zip(names, values, strict=True))
+        return
+    from scipy.stats import qmc
+
+    count = int(study.count or 0)
+    if study.method == "random":
+        import numpy as np
+
+        points = np.random.default_rng(study.seed).random((count, len(names)))
+    elif study.method == "latin":
+        points = qmc.LatinHypercube(len(names), rng=study.seed).random(count)
+    else:
+        points = qmc.Sobol(len(names), rng=study.seed).random_base2(math.ceil(math.log2(max(count, 2))))[:count]
+    for point in points:
+        yield {name: placed(plan, name, float(at)) for name, at in zip(names, point, strict=True)}
+
+
+def placed(plan: Plan, name: str, at: float) -> Value:
+    """The value of a varied entry at a place in [0, 1)."""
+    if name in plan.ranges:
+        return plan.ranges[name](at)
+    values = plan.lists[name]
+    return values[min(int(at * len(values)), len(values) - 1)]
+
+
+def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Value]]:
+    """A design's case, and the entries in which it differs: its `own` and those that follow from them.
+
+    Raises InputError where the case is refused.
+    """
+    study = plan.study
+    given: dict[str, Any] = {**study.set, **own}
+    found: dict[str, float] = {}
+    asked: list[str] = []
+
+    def entry(name: str) -> float:
+        if name in found:
+            return found[name]
+        if name in study.function:
+            if name in asked:
+                raise InputError("follows from itself", where=f"{plan.file}: function.{name}")
+            asked.append(name)
+            text = study.function[name]
+            found[name] = float(text) if not isinstance(text, str) else evaluate(text, f"{plan.file}: function.{name}", entry)
+            return found[name]
+        value = given[name] if name in given else _entry(plan.base, name)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise InputError("is no number of the case", where=f"{plan.file}: function", value=name)
+        return float(value)
+
+    follow = {name: _as_the_base(plan, name, entry(name)) for name in study.function}
+    tables = copy.deepcopy(dict(plan.tables))
+    for name, value in {**given, **follow}.items():
+        set_entry(tables, name, value, where=f"{plan.file}: {name}")
+    return make_case(tables, plan.file.parent / study.case), {**own, **follow}
+
+
+def _as_the_base(plan: Plan, name: str, value: float) -> Value:
+    """Whole numbers stay whole, so that a count may follow from others."""
+    return round(value) if isinstance(_entry(plan.base, name), int) and value == round(value) else value
+
+
+def _entry(tables: Any, name: str) -> Any:
+    for part in name.split("."):
+        if not isinstance(tables, Mapping) or part not in tables:
+            return None
+        tables = tables[part]
+    return tables
+
+
+def _flat(value: Any, leaves: Any, prefix: str = "") -> Any:
+    """Nested tables as one, by dotted names; a table with one of `leaves` is a value."""
+    if not isinstance(value, dict):
+        return value
+    found: dict[str, Any] = {}
+    for key, each in value.items():
+        if isinstance(each, dict) and not (leaves and leaves & each.keys()):
+            found |= _flat(each, leaves, f"{prefix}{key}.")
+        else:
+            found[f"{prefix}{key}"] = each
+    return found
+
+
+def _inside(file: Path, name: str, where: str) -> Path:
+    """A path in the study file, which may not lead out of its folder."""
+    root = file.parent.resolve()
+    place = (root / name).resolve()
+    if root != place and root not in place.parents:
+        raise InputError(
+            "leads out of the study file's folder", where=f"{file}: {where}", value=name, remedy="Put the study file beside or above it."
+        )
+    return place
+
+
+def _files(file: Path, pattern: str, where: str) -> list[str]:
+    root = file.parent.resolve()
+    if Path(pattern).is_absolute() or ".." in Path(pattern).parts or not pattern.strip():
+        raise InputError("leads out of the study file's folder", where=f"{file}: {where}", value=pattern)
+    try:
+        found = sorted(str(_inside(file, str(each), where)) for each in root.glob(pattern) if each.is_file())
+    except (ValueError, NotImplementedError, OSError) as error:
+        raise InputError(f"is no pattern: {error}", where=f"{file}: {where}", value=pattern) from error
+    if not found:
+        raise InputError("there is no such file", where=f"{file}: {where}", value=pattern)
+    return found
+
+

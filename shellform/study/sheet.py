@@ -1,0 +1,89 @@
+"""The page of a study folder, from its table and the runs that were kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from shellform.design.problem import deviations
+from shellform.errors import InputError
+from shellform.output.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
+from shellform.study.case import write_text
+from shellform.study.folder import read_run
+from shellform.study.front import Front, signed
+from shellform.study.plan import Plan
+from shellform.study.store import read_table
+
+
+def write_study_page(folder: Path, plan: Plan) -> Path:
+    """Writes study.html."""
+    entry = plan.study
+    own = [
+        f"case.{name}"
+        for name in dict.fromkeys(
+            [*entry.vary, *(n for each in entry.designs for n in each), *entry.function]
+        )
+    ]
+    table = read_table(folder, ["number", "key", "status", "reason", *own, *entry.column])
+    columns: dict[str, list[Any]] = table.to_pydict()
+    count = table.num_rows
+    signs = signed(entry.objective)
+    front = Front(signs, entry.limit)
+    first: dict[str, int] = {}
+    done = [k for k in range(count) if columns["status"][k] == "done"]
+    for k in done:
+        front.add(columns["key"][k], {"status": "done", **{name: columns[name][k] for name in entry.column}})
+        first.setdefault(columns["key"][k], k)
+    ordered = sorted(front.found, key=lambda key: (front.found[key], key))
+    rows = chosen(count, [first[key] for key in ordered])
+    best = spread(ordered)
+    pictures, limit = _pictures(folder, best)
+    notes = (
+        []
+        if len(rows) == count
+        else [f"{len(rows)} of {count} designs are drawn, those on the front among them."]
+    )
+    if entry.keep == "none":
+        notes.append("No run was kept (keep), so that there are no pictures.")
+    if pictures:
+        notes.append(f"Pictures: distance from the target under the design load, from 0 (dark) to {1e3 * limit:.3g} mm (yellow).")
+    sheet = Sheet(
+        title=entry.title or f"Study of {entry.case}",
+        rows=[{name: values[k] for name, values in columns.items()} for k in rows],
+        varied=own,
+        found=list(entry.column),
+        goals=signs,
+        front=ordered,
+        best=best,
+        links={key: _link(folder, key) for key in front.found if (folder / "runs" / key).is_dir()},
+        pictures=pictures,
+        designs={"done": len(done), "failed": count - len(done)},
+        correlation=rank_correlations(
+            {name: [columns[name][k] for k in done] for name in own},
+            {name: [columns[name][k] for k in done] for name in entry.column},
+        ),
+        notes=notes,
+    )
+    write_text(folder / "study.html", study_page(sheet))
+    return folder / "study.html"
+
+
+def _link(folder: Path, key: str) -> str:
+    page = folder / "runs" / key / "report.html"
+    return f"runs/{key}/report.html" if page.is_file() else f"runs/{key}/"
+
+
+def _pictures(folder: Path, keys: list[str]) -> tuple[dict[str, str], float]:
+    """A thumbnail of the last design of each kept run under its design load, all in the same colours, and the distance at which these
+    end, m; none of runs that stopped before."""
+    seen: dict[str, tuple[Any, Any]] = {}
+    limit = 0.0
+    for key in keys:
+        try:
+            run = read_run(folder / "runs" / key)
+        except InputError:
+            continue
+        state = run.states[run.best]["design"]
+        seen[key] = run.shell, state
+        limit = max(limit, float(deviations(run.shell, state).max()))
+    return {key: thumbnail(shell, state, limit) for key, (shell, state) in seen.items()}, limit

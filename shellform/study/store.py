@@ -1,0 +1,275 @@
+"""What a study has found: an append-only log, and the table made from it (door to PyArrow).
+
+    DIR/results.jsonl   a line a finished design: checksum, then JSON with its key, status, reason, values and seconds
+    DIR/table.parquet   a row a design in the study's order, all numbers of its summary as columns
+    DIR/table.csv       the same with the columns that were asked for
+    DIR/seconds.csv     what each design took; apart, since it differs from run to run
+
+A line counts once its checksum and line end are on the disk; what a kill or a full disk leaves behind it is cut off at the next
+start. So a design is in the log entirely or not at all, and computed once. The table is written anew beside the old one and then put
+in its place. It depends on the log's content, not on the order of its lines, so that a study that was stopped ends with the same bytes
+as one that wasn't.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from shellform.errors import InputError
+from shellform.study.case import write_text
+
+CRASHED = "crashed"
+"""Status of a design that took its worker down: not final, a later call tries again."""
+
+_GROUP = 4096  # rows of a row group, and all that are in memory at once
+_KINDS = {"bool": 0, "int": 1, "float": 2, "str": 3}
+_BUILT = ("polished", "rounded", "optimised", "initial")
+
+
+class Log:
+    """The results of a study by key, on the disk; in memory a place in the file for each, and the columns with their kinds."""
+
+    def __init__(self, file: Path) -> None:
+        """Opens the log or begins one. Raises InputError where a line before the last is damaged."""
+        self.file = file
+        self.kinds: dict[str, int] = {}
+        self._places: dict[str, int] = {}
+        self._crashed: set[str] = set()
+        try:
+            self._open = open(file, "a+b", buffering=0)  # noqa: SIM115 (it is open as long as the log)
+        except OSError as error:
+            raise InputError(f"can't be written: {error}", where=str(file), remedy="Choose another --output.") from error
+        self._end = 0
+        self._open.seek(0)
+        with open(file, "rb") as lines:
+            for line in lines:
+                row = _row(line)
+                if row is None:
+                    if lines.read(1):
+                        self._open.close()
+                        raise InputError("is damaged", where=f"{file}, byte {self._end}", remedy="Choose another --output.")
+                    break
+                self._enter(row, self._end)
+                self._end += len(line)
+        self._open.truncate(self._end)
+        self._begin = self._end
+
+    def __enter__(self) -> Log:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._open.close()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def __contains__(self, key: object) -> bool:
+        """Whether there is a result that stands."""
+        return key in self._places and key not in self._crashed
+
+    def old(self, key: str) -> bool:
+        """Whether there was a result that stands when the log was opened."""
+        return key in self and self._places[key] < self._begin
+
+    def get(self, key: str) -> dict[str, Any] | None:
+        """A design's row, crashed ones too."""
+        if key not in self._places:
+            return None
+        with open(self.file, "rb") as file:
+            return self._at(file, key)
+
+    def rows(self, keys: Iterable[str]) -> Iterator[dict[str, Any] | None]:
+        """As `get`, for many."""
+        with open(self.file, "rb") as file:
+            for key in keys:
+                yield self._at(file, key) if key in self._places else None
+
+    def _at(self, file: Any, key: str) -> dict[str, Any]:
+        file.seek(self._places[key])
+        row = _row(file.readline())
+        if row is None:
+            raise InputError("has been changed by somebody else", where=str(self.file))
+        return row
+
+    def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
+        """Adds rows with one write and one wait for the disk. Raises OSError, and holds none of them, where there is no room."""
+        lines = [_line(row) for row in rows]
+        block, told = b"".join(lines), 0
+        try:
+            while told < len(block):
+                told += self._open.write(block[told:])
+            os.fsync(self._open.fileno())
+        except OSError:
+            self._open.truncate(self._end)
+            raise
+        for row, line in zip(rows, lines, strict=True):
+            self._enter(row, self._end)
+            self._end += len(line)
+
+    def _enter(self, row: Mapping[str, Any], place: int) -> None:
+        key = row["key"]
+        self._places[key] = place
+        (self._crashed.add if row["status"] == CRASHED else self._crashed.discard)(key)
+        for name, value in row["values"].items():
+            kind = _KINDS[type(value).__name__]
+            known = self.kinds.get(name, kind)
+            # Booleans among numbers become numbers.
+            self.kinds[name] = kind if kind == known else max(kind, known, 2)
+
+
+def _line(row: Mapping[str, Any]) -> bytes:
+    text = json.dumps(row, separators=(",", ":")).encode()
+    return b"%08x %s\n" % (zlib.crc32(text), text)
+
+
+def _row(line: bytes) -> dict[str, Any] | None:
+    """The row of a whole line; None of a torn one."""
+    if not line.endswith(b"\n") or line[8:9] != b" " or line[:8] != b"%08x" % zlib.crc32(line[9:-1]):
+        return None
+    found: dict[str, Any] = json.loads(line[9:])
+    return found
+
+
+def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
+    """The numbers, words and flags of a summary by dotted name; short lists of numbers by place, lists of words joined."""
+    found: dict[str, Any] = {}
+    if isinstance(tree, Mapping):
+        for key, value in tree.items():
+            found |= flat(value, f"{prefix}.{key}" if prefix else str(key))
+    elif isinstance(tree, list):
+        if all(isinstance(each, str) for each in tree):
+            found[prefix] = "; ".join(tree)
+        elif len(tree) <= 3 and all(isinstance(each, int | float) for each in tree):
+            found |= {f"{prefix}.{k}": value for k, value in enumerate(tree)}
+    elif isinstance(tree, bool | int | float | str):
+        found[prefix] = tree
+    return found
+
+
+def picked(values: Mapping[str, Any], columns: Mapping[str, str]) -> dict[str, Any]:
+    """The columns that were asked for, of a row's values; None where a design has no such number."""
+    best = next((name for name in _BUILT if f"designs.{name}.cables" in values), "initial")
+    return {name: values.get(path.replace("designs.best.", f"designs.{best}.")) for name, path in columns.items()}
+
+
+def designs_of(file: Path) -> Iterator[dict[str, Any]]:
+    """The designs of a study in order: key and own entries, as `run_study` lists them."""
+    with open(file, encoding="utf-8") as lines:
+        for line in lines:
+            yield json.loads(line)
+
+
+def write_table(folder: Path, log: Log, columns: Mapping[str, str]) -> int:
+    """Writes the tables of all designs in designs.jsonl that have a row in the log; returns how many."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    own: dict[str, int] = {}
+    for design in designs_of(folder / "designs.jsonl"):
+        for name, value in design["own"].items():
+            kind = _KINDS[type(value).__name__]
+            own[name] = kind if own.get(name, kind) == kind else max(kind, own[name], 2)
+    types = [pa.bool_(), pa.int64(), pa.float64(), pa.string()]
+    names = sorted(log.kinds)
+    picks = {name: _kind_of_pick(path, log.kinds) for name, path in columns.items()}
+    fields = [
+        ("number", 1),
+        ("key", 3),
+        ("status", 3),
+        ("reason", 3),
+        *((f"case.{name}", kind) for name, kind in own.items()),
+        *picks.items(),
+        *((name, log.kinds[name]) for name in names if name not in picks),
+    ]
+    schema = pa.schema([(name, types[kind]) for name, kind in fields])
+    text, seconds = io.StringIO(), io.StringIO()
+    short, long = csv.writer(text, lineterminator="\n"), csv.writer(seconds, lineterminator="\n")
+    head = [name for name, _ in fields[: 4 + len(own) + len(picks)]]
+    short.writerow(head)
+    long.writerow(["number", "key", "worker", "stage", "seconds"])
+    count = 0
+    partial = folder / "table.parquet.part"
+    with pq.ParquetWriter(partial, schema, compression="zstd") as writer:
+        for group in _groups(folder, log, columns):
+            count += len(group)
+            arrays = [_array(pa, group, name, kind, types[kind]) for name, kind in fields]
+            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+            for row in group:
+                short.writerow([_cell(row.get(name), kind) for name, kind in fields[: len(head)]])
+                for stage, spent in row["seconds"].items():
+                    long.writerow([row["number"], row["key"], row["worker"], stage, spent])
+    with open(partial, "rb") as written:
+        os.fsync(written.fileno())
+    os.replace(partial, folder / "table.parquet")
+    write_text(folder / "table.csv", text.getvalue())
+    write_text(folder / "seconds.csv", seconds.getvalue())
+    return count
+
+
+def _cell(value: Any, kind: int) -> Any:
+    return float(value) if kind == 2 and value is not None else value
+
+
+def _kind_of_pick(path: str, kinds: Mapping[str, int]) -> int:
+    known = {kinds[name] for name in (path.replace("designs.best.", f"designs.{each}.") for each in _BUILT) if name in kinds}
+    return 2 if not known else known.pop() if len(known) == 1 else max(*known, 2)
+
+
+def _groups(folder: Path, log: Log, columns: Mapping[str, str]) -> Iterator[list[dict[str, Any]]]:
+    group: list[dict[str, Any]] = []
+    designs = list(enumerate(designs_of(folder / "designs.jsonl")))
+    found = log.rows(design["key"] for _, design in designs)
+    for (number, design), row in zip(designs, found, strict=True):
+        if row is None:
+            continue
+        group.append(
+            {
+                **row["values"],
+                **picked(row["values"], columns),
+                **{f"case.{name}": value for name, value in design["own"].items()},
+                **{name: row[name] for name in ("key", "status", "reason", "seconds", "worker")},
+                "number": number,
+            }
+        )
+        if len(group) == _GROUP:
+            yield group
+            group = []
+    if group:
+        yield group
+
+
+def _array(pa: Any, rows: Sequence[Mapping[str, Any]], name: str, kind: int, form: Any) -> Any:
+    values = [row.get(name) for row in rows]
+    if kind >= 2:
+        to: Any = float if kind == 2 else str
+        values = [None if value is None else to(value) for value in values]
+    return pa.array(values, form)
+
+
+def read_table(folder: str | Path, columns: Sequence[str] | None = None, filters: Any = None) -> Any:
+    """A study's table as a `pyarrow.Table`, of some columns and rows if asked: `filters=[("cables", "<", 100)]`.
+
+    Raises InputError where there is none, or a damaged one.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    file = Path(folder) / "table.parquet"
+    if not file.is_file():
+        raise InputError("there is no table", where=str(file), remedy="Make one with shellform study.")
+    try:
+        return pq.read_table(file, columns=None if columns is None else list(columns), filters=filters)
+    except (pa.ArrowException, OSError) as error:
+        raise InputError(f"is damaged: {error}", where=str(file), remedy="Run the study again; its results are kept.") from error
+
+

@@ -1,0 +1,313 @@
+"""A whole study: its designs on an engine, its results in a store, and going on where it stopped.
+
+    DIR/study.toml       a copy of the study file
+    DIR/designs.jsonl    a line a design: key and own entries
+    DIR/results.jsonl    a line a result, table.parquet, table.csv, seconds.csv (see `store`)
+    DIR/runs/KEY         run folders, of those that are kept and those at work
+    DIR/stages/KEY       what several designs share: the surface, the net, the first equilibria
+    DIR/study.html       the page
+
+A design's key is a hash of its resolved settings, the bytes of its files and the version of the package: the same design is computed
+once, whatever it is called, and a second call on a folder finds what is there. Killed in the middle, each worker repeats at most
+the stage that it was at.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import shellform
+from shellform.errors import InputError, NotConverged
+from shellform.study.case import Case, check_script, write_text
+from shellform.study.front import Front, signed
+from shellform.study.job import NO_ROOM, Job, Outcome, disk_is_full, locked, work
+from shellform.study.plan import Plan, Value, changes, length, read_study, resolved
+from shellform.study.run import STAGES, stage_keys
+from shellform.study.sheet import write_study_page
+from shellform.study.store import Log, designs_of, flat, picked, write_table
+from shellform.study.sweep import Engine, Work, engine, sweep
+
+_SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
+_LATEST = 12  # rows shown
+_SHORT = 32  # hexadecimal digits of a key: 128 bits
+
+
+@dataclass
+class Progress:
+    """How far a study is, as it goes on; `rows` are the latest with the columns asked for."""
+
+    total: int = 0
+    done: int = 0
+    failed: int = 0
+    found: int = 0
+    dashboard: str = ""
+    began: float = field(default_factory=time.perf_counter)
+    rows: list[dict[str, Any]] = field(default_factory=list)
+
+
+Batch = Callable[[], Iterable[Mapping[str, Value]]]
+"""Gives the entries of a batch of designs, the same each time."""
+Show = Callable[[Progress], None]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a study ended with: counts of designs, those `found` in the folder from before, and the table."""
+
+    designs: int
+    failed: int
+    found: int
+    table: Path
+
+
+@dataclass(frozen=True)
+class _Studying:
+    plan: Plan
+    folder: Path
+    log: Log
+    front: Front
+    progress: Progress
+    show: Show
+    allow_scripts: bool
+
+
+@dataclass(frozen=True)
+class _Design:
+    key: str
+    own: Mapping[str, Value]
+    case: Case | None  # None: refused for `reason`
+    keys: Mapping[str, str]
+    reason: str = ""
+
+
+def run_study(
+    file: str | Path,
+    folder: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    allow_scripts: bool = False,
+    show: Show = lambda progress: None,
+    work: Work = work,
+) -> Finding:
+    """Runs the designs of a study file in `folder` that aren't there yet, and writes its table and page.
+
+    `workers` processes on this machine, or those of a Dask `scheduler`, which have to see the folder by the same name. `show` is called
+    with the progress. Raises InputError for a bad study, NotConverged where the disk is full or no design has a result.
+    """
+    plan = read_study(file)
+    place = Path(folder).resolve()
+    try:
+        for part in ("runs", "stages"):
+            (place / part).mkdir(parents=True, exist_ok=True)
+        write_text(place / "study.toml", Path(file).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"can't be written: {error}", where=str(place), remedy="Choose another --output.") from error
+    try:
+        with locked(place / "lock", wait=False), Log(place / "results.jsonl") as log:
+            front = Front(signed(plan.study.objective), plan.study.limit)
+            study = _Studying(plan, place, log, front, Progress(total=length(plan)), show, allow_scripts)
+            _tidy(study)
+            _go(study, work, workers, scheduler)
+            return _finish(study)
+    except BlockingIOError as error:
+        raise InputError("another study is at work here", where=str(place)) from error
+    except OSError as error:
+        what = "There is no room on the disk" if disk_is_full(error) else "The study was broken off"
+        raise NotConverged(f"{what}: {error}", remedy="Run the same command again: it goes on from here.") from error
+
+
+def _go(study: _Studying, work: Work, workers: int | None, scheduler: str | None) -> None:
+    """Batch after batch: one, or a search's generations."""
+    if study.plan.study.method == "search":
+        from shellform.study.search import generations
+
+        batches = generations(study.plan)
+    else:
+        batches = _at_once(study.plan)
+    with ExitStack() as stack, open(study.folder / "designs.jsonl", "w", encoding="utf-8") as listed:
+        opened: Engine | None = None
+        batch = next(batches, None)
+        while batch is not None:
+            keys, shared, fresh = _list(study, batch, listed)
+            if fresh and opened is None:
+                opened = stack.enter_context(engine(workers=workers, scheduler=scheduler))
+                study.progress.dashboard = opened.dashboard
+            if fresh and opened is not None:
+                _compute(study, opened, _jobs(study, batch, shared), work)
+            rows = study.log.rows(keys) if study.plan.study.method == "search" else []
+            try:
+                batch = batches.send([_told(study, row) for row in rows])
+            except StopIteration:
+                batch = None
+
+
+def _at_once(plan: Plan) -> Generator[Batch, list[dict[str, Any]], None]:
+    yield lambda: changes(plan)
+
+
+def _list(study: _Studying, batch: Batch, listed: Any) -> tuple[list[str], Counter[str], int]:
+    """Lists a batch's designs; returns their keys, how often each stage is needed by those to be computed, and how many these are."""
+    stages = STAGES[: STAGES.index(study.plan.study.until)]
+    shared: Counter[str] = Counter()
+    keys, fresh, refused = [], set(), []
+    old = set()
+    for own in batch():
+        design = _identify(study, own)
+        listed.write(json.dumps({"key": design.key, "own": dict(design.own)}) + "\n")
+        keys.append(design.key)
+        if design.key in study.log:
+            if study.log.old(design.key):
+                old.add(design.key)
+        elif design.case is None:
+            refused.append(_row(design.key, "refused", design.reason))
+        elif design.key not in fresh:
+            fresh.add(design.key)
+            shared.update(design.keys[stage] for stage in stages)
+    listed.flush()
+    study.progress.found += len(old)
+    if refused:
+        _enter(study, list({row["key"]: row for row in refused}.values()))
+    study.show(study.progress)
+    return keys, shared, len(fresh)
+
+
+def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
+    """A design's case and key."""
+    values: Mapping[str, Value] = own
+    try:
+        case, values = resolved(study.plan, own)
+        file = Path(case.surface.file)
+        if not file.is_file():
+            raise InputError("there is no such file", where=f"surface.file: {file}")
+        check_script(file, allow_scripts=study.allow_scripts)
+        keys = stage_keys(case)
+    except InputError as error:
+        digest = hashlib.sha256(f"{shellform.__version__} refused {json.dumps(dict(values))} {error}".encode())
+        return _Design(digest.hexdigest()[:_SHORT], values, None, {}, str(error))
+    until = study.plan.study.until
+    # What a summary tells of a net depends on the rods as well.
+    digest = hashlib.sha256(f"{until} {keys['initial' if until == 'net' else until]}".encode())
+    return _Design(digest.hexdigest()[:_SHORT], values, case, keys)
+
+
+def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]:
+    """The designs of a batch that have no result yet, with the stages that they share with others."""
+    until, seen = study.plan.study.until, set()
+    stages = STAGES[: STAGES.index(until)]
+    for own in batch():
+        design = _identify(study, own)
+        if design.case is None or design.key in study.log or design.key in seen:
+            continue
+        seen.add(design.key)
+        before: tuple[Job, ...] = ()
+        counts = [shared[design.keys[stage]] for stage in stages]
+        for k, stage in enumerate(stages):
+            # A stage that all who share it share the next of, too, needs no folder of its own.
+            if counts[k] > 1 and counts[k] > (counts[k + 1] if k + 1 < len(counts) else 1):
+                key = design.keys[stage][:_SHORT]
+                folder = str(study.folder / "stages" / key)
+                before = (*before, Job(key, design.case, stage, folder, before, study.allow_scripts))
+        yield Job(design.key, design.case, until, str(study.folder / "runs" / design.key), before, study.allow_scripts)
+
+
+def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) -> None:
+    written, cost = time.perf_counter(), 0.0
+    try:
+        for outcomes in sweep(opened, jobs, work):
+            _enter(study, [_row_of(outcome) for outcome in outcomes])
+            study.show(study.progress)
+            now = time.perf_counter()
+            if now - written > max(2.0, cost / _SHARE_OF_TIME):
+                write_table(study.folder, study.log, study.plan.study.column)
+                written = time.perf_counter()
+                cost = written - now
+    except KeyboardInterrupt:
+        write_table(study.folder, study.log, study.plan.study.column)
+        raise
+
+
+def _row(key: str, status: str, reason: str) -> dict[str, Any]:
+    return {"key": key, "status": status, "reason": reason, "values": {}, "seconds": {}, "worker": ""}
+
+
+def _row_of(outcome: Outcome) -> dict[str, Any]:
+    if outcome["status"] == NO_ROOM:
+        raise NotConverged(f"A worker found no room: {outcome['reason']}", remedy="Make room and run the same command again.")
+    values = {name: value for name, value in outcome["summary"].items() if name not in ("format", "version", "seconds")}
+    return {
+        **_row(outcome["key"], outcome["status"], outcome["reason"]),
+        "values": flat(values),
+        "seconds": outcome["seconds"],
+        "worker": outcome["worker"],
+    }
+
+
+def _enter(study: _Studying, rows: Sequence[dict[str, Any]]) -> None:
+    """Into the log first; then run folders that nobody wants may go."""
+    if not rows:
+        return
+    study.log.add(rows)
+    for row in rows:
+        study.progress.done += 1
+        study.progress.failed += row["status"] != "done"
+        study.progress.rows.append(_told(study, row))
+        for key in _unwanted(study, row):
+            _drop(study.folder / "runs" / key)
+    del study.progress.rows[:-_LATEST]
+
+
+def _told(study: _Studying, row: dict[str, Any] | None) -> dict[str, Any]:
+    """A row with the columns that were asked for, alone."""
+    if row is None:
+        return {"status": "missing"}
+    told = {name: row[name] for name in ("key", "status", "reason")}
+    return {**told, **picked(row["values"], study.plan.study.column)}
+
+
+def _unwanted(study: _Studying, row: dict[str, Any]) -> list[str]:
+    """The runs that aren't kept, now that this design is known."""
+    keep = study.plan.study.keep
+    off = study.front.add(row["key"], _told(study, row))
+    return off if keep == "best" else [row["key"]] if keep == "none" else []
+
+
+def _tidy(study: _Studying) -> None:
+    """Brings the front up to the log, and drops what an earlier call had no time to drop."""
+    keys = list(study.log)
+    for row in study.log.rows(keys):
+        if row is not None:
+            for key in _unwanted(study, row):
+                _drop(study.folder / "runs" / key)
+
+
+def _drop(folder: Path) -> None:
+    if folder.is_dir():
+        shutil.rmtree(folder, ignore_errors=True)  # a leftover is dropped by the next call
+
+
+def _finish(study: _Studying) -> Finding:
+    plan = study.plan
+    write_table(study.folder, study.log, plan.study.column)
+    write_study_page(study.folder, plan)
+    if plan.study.keep == "none":
+        _drop(study.folder / "stages")
+    failed, reason, count = 0, "", 0
+    keys = [design["key"] for design in designs_of(study.folder / "designs.jsonl")]
+    for row in study.log.rows(keys):
+        count += 1
+        if row is None or row["status"] != "done":
+            failed += 1
+            reason = reason or ("" if row is None else f"{row['status']}: {row['reason']}")
+    if failed == count:
+        raise NotConverged(f"None of {count} designs has a result. The first was {reason}")
+    return Finding(count, failed, sum(study.log.old(key) for key in set(keys)), study.folder / "table.parquet")

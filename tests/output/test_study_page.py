@@ -1,0 +1,75 @@
+"""The page of a study stands alone, tells what is in the table, and runs nothing but its own script."""
+
+import json
+import re
+
+import pytest
+
+from shellform.output.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
+
+
+def sheet(**changes):
+    rows = [
+        {"number": k, "key": f"k{k}", "status": "done", "reason": "", "case.net.spacing": 0.1 + 0.01 * k, "misfit": 1e-3 * k, "cables": 9 - k}
+        for k in range(5)
+    ]
+    rows[3] |= {"status": "refused", "reason": "</script><script>alert(1)</script>", "misfit": None, "cables": None}
+    rows[4] |= {"misfit": float("nan")}
+    given = {
+        "title": "Weights <b>",
+        "rows": rows,
+        "varied": ["case.net.spacing"],
+        "found": ["misfit", "cables"],
+        "goals": {"misfit": 1.0, "cables": 1.0},
+        "front": ["k0", "k1"],
+        "best": ["k0", "k1"],
+        "links": {"k0": "runs/k0/report.html"},
+        "pictures": {"k0": "<svg></svg>"},
+        "designs": {"done": 4, "failed": 1},
+        "correlation": {"case.net.spacing": {"misfit": 1.0, "cables": -1.0}},
+        "notes": [],
+    }
+    return Sheet(**{**given, **changes})
+
+
+def test_the_page_asks_for_nothing_and_escapes_what_comes_from_elsewhere():
+    page = study_page(sheet())
+    assert "default-src 'none'" in page
+    assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)
+    assert "<b>" not in page
+    assert page.count("<script") == 2
+    assert "&lt;/script&gt;" in page
+    data = json.loads(page.split('id="data">')[1].split("</script>")[0])
+    assert [row[:3] for row in data["rows"]] == [[0, 1, 0.1], [1, 1, 0.11], [2, 0, 0.12], [4, 0, 0.14]]
+    assert data["rows"][3][3:] == [None, 5]
+    assert data["links"] == {"0": "runs/k0/report.html"}
+    assert "−1.00" in page
+    assert '<a href="runs/k0/report.html">Design 0</a>' in page
+
+
+def test_rank_correlation_is_spearmans():
+    given = {"a": [1, 2, 3, 4, None, "x"], "same": 6 * [1.0], "word": list("abcdef")}
+    found = {"up": [1.0, 10.0, 100.0, 1000.0, 5.0, 6.0], "down": [4, 3, 2, 1, 7, 8], "other": [1, 3, 2, 4, 9, 9]}
+    told = rank_correlations(given, found)
+    assert list(told) == ["a"]
+    assert told["a"] == pytest.approx({"up": 1.0, "down": -1.0, "other": 0.8})
+
+
+def test_large_studies_are_thinned_but_for_the_front():
+    assert chosen(3, [1]) == [0, 1, 2]
+    few = chosen(100_000, [7, 99_998])
+    assert {0, 7, 99_998, 99_999} <= set(few)
+    assert len(few) <= 4002
+    assert spread([str(k) for k in range(100)], 3) == ["0", "50", "99"]
+    assert spread([], 3) == []
+
+
+def test_a_thumbnail_shows_each_rod_in_the_colour_of_its_distance(shell):
+    target = shell.target
+    assert thumbnail(shell, target, 0.01).count("<path") == 1
+    moved = target.positions.copy()
+    moved[: len(moved) // 2, 2] += 0.02
+    drawn = thumbnail(shell, type(target)(moved, target.quaternions), 0.01)
+    assert {"#440154", "#fde725"} <= set(re.findall(r'stroke="(#\w+)"', drawn))
+    assert "20.0 mm off at most" in drawn
+    assert len(drawn) < 60_000

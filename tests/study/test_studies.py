@@ -1,0 +1,400 @@
+"""A study ends with the same table whatever happens to it on the way, and computes nothing twice."""
+
+import csv
+import errno
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from shellform.errors import InputError, NotConverged
+from shellform.study import run
+from shellform.study.case import load_case
+from shellform.study.folder import read_run
+from shellform.study.front import Front
+from shellform.study.job import Job, work
+from shellform.study.store import Log, flat, read_table
+from shellform.study.studies import run_study
+from shellform.study.sweep import engine, sweep
+from tests.study.stubs import ROOT, deadly, quick, study_file
+
+GRID = """
+[vary]
+net.spacing = [0.1, 0.11, 0.12, 0.3]
+cable.stiffness = [100, 187.0, 400]
+"""
+SEARCH = """
+method = "search"
+count = 20
+population = 6
+seed = 3
+[vary]
+net.spacing = { low = 0.1, high = 0.15 }
+cable.stiffness = { low = 50, high = 500, scale = "log" }
+net.elements = [2, 3]
+[objective]
+misfit = "min"
+cables = "min"
+[limit]
+misfit = 0.001
+"""
+
+
+@pytest.fixture(scope="module")
+def two():
+    with engine(workers=2) as opened:
+        yield opened
+
+
+@pytest.fixture
+def on_two(two, monkeypatch):
+    """Studies use the engine that runs already."""
+    from contextlib import nullcontext
+
+    monkeypatch.setattr("shellform.study.studies.engine", lambda **_: nullcontext(two))
+
+
+def rows(folder):
+    with open(folder / "table.csv", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def table(folder):
+    return (folder / "table.parquet").read_bytes(), (folder / "table.csv").read_bytes()
+
+
+def calls(folder):
+    return {file.parent.name: int(file.read_text()) for file in (folder / "runs").glob("*/calls")}
+
+
+def test_a_study_has_a_row_a_design_and_a_second_call_computes_nothing(tmp_path, on_two):
+    file = study_file(tmp_path, 'keep = "all"' + GRID)
+    found = run_study(file, tmp_path / "out", work=quick)
+    assert (found.designs, found.failed, found.found) == (12, 3, 0)
+    told = rows(tmp_path / "out")
+    assert [int(row["number"]) for row in told] == list(range(12))
+    assert [row["status"] for row in told] == 9 * ["done"] + 3 * ["no result"]
+    assert told[11]["reason"] == "it can't be built in RUN"
+    assert told[4]["cables"] == str(round(44 + 0.02 * 187))
+    assert told[11]["cables"] == ""
+    before = table(tmp_path / "out")
+    again = run_study(file, tmp_path / "out", work=quick)
+    assert (again.designs, again.failed, again.found) == (12, 3, 12)
+    assert set(calls(tmp_path / "out").values()) == {1}
+    assert table(tmp_path / "out") == before
+    few = read_table(tmp_path / "out", ["number", "case.net.spacing", "cables"], [("cables", "<", 46), ("cables", ">", 42)])
+    assert few.to_pydict() == {"number": [1], "case.net.spacing": [0.1], "cables": [44]}
+    seconds = (tmp_path / "out/seconds.csv").read_text()
+    assert seconds.count(",here,here,0.01\n") == 12
+
+
+def test_equal_designs_are_computed_once_and_new_ones_alone_are_added(tmp_path, on_two):
+    text = 'keep = "all"\ndesigns = [{ net.spacing = 0.1 }, { net.spacing = 0.10 }, { net.spacing = 1e-1, cable.stiffness = 187 }]\n'
+    run_study(study_file(tmp_path, text), tmp_path / "out", work=quick)
+    told = rows(tmp_path / "out")
+    assert len(told) == 3
+    assert len({row["key"] for row in told}) == 1
+    assert list(calls(tmp_path / "out").values()) == [1]
+    more = text.replace("}]", "}, { net.spacing = 0.11 }]")
+    assert run_study(study_file(tmp_path, more), tmp_path / "out", work=quick).found == 1
+    assert sorted(calls(tmp_path / "out").values()) == [1, 1]
+    # The surface's name and place don't matter, its bytes do.
+    key = rows(tmp_path / "out")[0]["key"]
+    (tmp_path / "dome.py").write_bytes((ROOT / "surfaces/dome.py").read_bytes())
+    moved = text + f'[set]\nsurface.file = "{tmp_path / "dome.py"}"\n'
+    run_study(study_file(tmp_path, moved), tmp_path / "out", work=quick, allow_scripts=True)
+    assert rows(tmp_path / "out")[0]["key"] == key
+    (tmp_path / "dome.py").write_bytes((ROOT / "surfaces/dome.py").read_bytes() + b"#\n")
+    run_study(study_file(tmp_path, moved), tmp_path / "out", work=quick, allow_scripts=True)
+    assert rows(tmp_path / "out")[0]["key"] != key
+
+
+def test_designs_that_are_refused_have_a_row_with_the_reason(tmp_path, on_two):
+    file = study_file(tmp_path, "[vary]\nnet.spacing = [0.1, 0.003]\nsurface.dimensions.height = [0.2, 0.1]\nrod.wall = [0.0005, 0.02]\n")
+    found = run_study(file, tmp_path / "out", work=quick)
+    assert (found.designs, found.failed) == (8, 6)
+    reasons = {row["reason"] for row in rows(tmp_path / "out")}
+    assert any("must be well below net.spacing" in each for each in reasons)
+    assert any("a tube's wall" in each for each in reasons)
+
+
+@pytest.mark.parametrize(("keep", "left"), [("all", 12), ("none", 0), ("best", 3)])
+def test_runs_are_kept_or_dropped_by_choice(tmp_path, on_two, keep, left):
+    run_study(study_file(tmp_path, f'keep = "{keep}"' + GRID), tmp_path / "out", work=quick)
+    kept = {folder.name for folder in (tmp_path / "out/runs").iterdir()}
+    assert len(kept) == left
+    if keep == "best":
+        done = [row for row in rows(tmp_path / "out") if row["status"] == "done"]
+        pairs = {row["key"]: (float(row["misfit"]), float(row["cables"])) for row in done}
+        front = {
+            key
+            for key, one in pairs.items()
+            if not any(a <= one[0] and b <= one[1] and (a, b) != one for a, b in pairs.values())
+        }
+        assert kept == front
+
+
+def test_a_design_that_kills_its_workers_is_recorded_and_the_rest_goes_on(tmp_path, on_two):
+    file = study_file(tmp_path, "[vary]\ncable.stiffness = [100, 333, 666, 187, 150, 120]\n")
+    found = run_study(file, tmp_path / "out", work=deadly)
+    assert (found.designs, found.failed) == (6, 1)
+    told = rows(tmp_path / "out")
+    assert [row["status"] for row in told] == ["done", "done", "crashed", "done", "done", "done"]
+    assert "took 3 workers with it" in told[2]["reason"]
+    # A crash may have been the machine's fault: the next call tries again.
+    found = run_study(file, tmp_path / "out", work=quick)
+    assert (found.failed, found.found) == (0, 5)
+    clean = tmp_path / "clean"
+    run_study(file, clean, work=quick)
+    assert table(clean) == table(tmp_path / "out")
+
+
+def study_process(file, folder, work):
+    code = (
+        "import sys\nfrom tests.study import stubs\nfrom shellform.study.studies import run_study\n"
+        f"if __name__ == '__main__':\n    run_study({str(file)!r}, {str(folder)!r}, workers=2, work=stubs.{work})\n"
+    )
+    script = folder.parent / "go.py"
+    script.write_text(code)
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen([sys.executable, str(script)], env=environment, start_new_session=True, stderr=subprocess.DEVNULL)
+
+
+def wait_for_rows(folder, count):
+    log, began = folder / "results.jsonl", time.monotonic()
+    while not log.exists() or log.read_bytes().count(b"\n") < count:
+        assert time.monotonic() - began < 120
+        time.sleep(0.02)
+
+
+def test_a_study_killed_in_the_middle_goes_on_and_ends_with_the_same_bytes(tmp_path, on_two):
+    many = 'keep = "all"\n[vary]\ncable.stiffness = { low = 100, high = 400, count = 40 }\n'
+    file = study_file(tmp_path, many)
+    out = tmp_path / "out"
+    job = study_process(file, out, "slow")
+    wait_for_rows(out, 12)
+    job.kill()
+    job.wait()
+    killed = (out / "results.jsonl").read_bytes().count(b"\n")
+    assert killed < 40
+    job = study_process(file, out, "slow")
+    assert job.wait(120) == 0
+    keys = [line.split(b'"')[3] for line in (out / "results.jsonl").read_bytes().splitlines()]
+    assert len(keys) == len(set(keys)) == 40
+    # Four were handed out at the kill, at the most; nothing else was done twice.
+    assert sum(calls(out).values()) <= 44
+    run_study(file, tmp_path / "whole", work=quick)
+    assert table(tmp_path / "whole") == table(out)
+
+
+def test_ctrl_c_stops_a_study_with_130_and_keeps_its_table(tmp_path):
+    file = study_file(tmp_path, "until = 'net'\n[vary]\nnet.spacing = { low = 0.11, high = 0.13, count = 200 }\n")
+    command = [sys.executable, "-m", "shellform", "study", str(file), "--output", str(tmp_path / "out"), "--workers", "2"]
+    job = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT, start_new_session=True)
+    wait_for_rows(tmp_path / "out", 3)
+    os.killpg(job.pid, signal.SIGINT)
+    _, said = job.communicate(timeout=60)
+    assert job.returncode == 130
+    assert "the same command goes on from there" in said
+    assert "Traceback" not in said
+    assert 3 <= len(rows(tmp_path / "out")) < 200
+
+
+def test_the_log_cuts_off_what_a_kill_left_and_refuses_damage_before_it(tmp_path):
+    file = tmp_path / "results.jsonl"
+    row = {"key": "a", "status": "done", "reason": "", "values": {"x": 1}, "seconds": {}, "worker": ""}
+    with Log(file) as log:
+        log.add([row, {**row, "key": "b", "values": {"x": 2.5, "y": "ü"}}])
+    whole = file.read_bytes()
+    for cut in range(len(whole)):
+        file.write_bytes(whole[:cut])
+        with Log(file) as log:
+            assert len(log) == whole[:cut].count(b"\n")
+            log.add([{**row, "key": "c"}])
+        with Log(file) as log:
+            assert "c" in log
+            assert log.get("c")["values"] == {"x": 1}
+    file.write_bytes(whole)
+    with Log(file) as log:
+        assert log.kinds == {"x": 2, "y": 3}
+    file.write_bytes(whole.replace(b'"x":1', b'"x":7'))
+    with pytest.raises(InputError, match=r"is damaged.*Choose another"):
+        Log(file)
+
+
+def test_a_full_disk_leaves_no_part_of_a_row(tmp_path, monkeypatch):
+    row = {"key": "a", "status": "done", "reason": "", "values": {}, "seconds": {}, "worker": ""}
+    with Log(tmp_path / "results.jsonl") as log:
+        log.add([row])
+        size = (tmp_path / "results.jsonl").stat().st_size
+
+        def full(number):
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+        monkeypatch.setattr(os, "fsync", full)
+        with pytest.raises(OSError, match="No space"):
+            log.add([{**row, "key": "b"}])
+        assert "b" not in log
+    assert (tmp_path / "results.jsonl").stat().st_size == size
+
+
+def test_a_study_stops_where_the_disk_is_full_and_goes_on_once_there_is_room(tmp_path, on_two, monkeypatch):
+    file = study_file(tmp_path, GRID)
+    fsync = os.fsync
+
+    def full(number):
+        if len(os.listdir(tmp_path / "out/runs")) > 3:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        fsync(number)
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(NotConverged, match=r"no room on the disk.*same command"):
+        run_study(file, tmp_path / "out", work=quick)
+    monkeypatch.setattr(os, "fsync", fsync)
+    assert run_study(file, tmp_path / "out", work=quick).designs == 12
+    run_study(file, tmp_path / "whole", work=quick)
+    assert table(tmp_path / "whole") == table(tmp_path / "out")
+
+
+def test_two_studies_do_not_work_in_one_folder(tmp_path, on_two):
+    from shellform.study.job import locked
+
+    file = study_file(tmp_path, GRID)
+    (tmp_path / "out").mkdir()
+    with locked(tmp_path / "out/lock", wait=False), pytest.raises(InputError, match="another study is at work here"):
+        run_study(file, tmp_path / "out", work=quick)
+
+
+def test_a_study_without_any_result_says_so(tmp_path, on_two):
+    with pytest.raises(NotConverged, match=r"None of 1 designs.*it can't be built"):
+        run_study(study_file(tmp_path, "[vary]\nnet.spacing = [0.3]\n"), tmp_path / "out", work=quick)
+
+
+def test_a_search_is_the_same_from_its_seed_however_often_it_was_stopped(tmp_path, on_two):
+    run_study(study_file(tmp_path, SEARCH), tmp_path / "whole", work=quick)
+    whole = rows(tmp_path / "whole")
+    assert len(whole) == 20
+    first, last = whole[:6], whole[-6:]
+    assert min(float(row["misfit"]) for row in last) < 0.001
+    assert len({row["case.net.spacing"] for row in first}) == 6
+    # What a search stopped after eight designs has left: the log alone.
+    (tmp_path / "out").mkdir()
+    lines = (tmp_path / "whole/results.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "out/results.jsonl").write_bytes(b"".join(lines[:8]) + lines[9][:40])
+    found = run_study(study_file(tmp_path, SEARCH), tmp_path / "out", work=quick)
+    assert found.found == 8
+    assert table(tmp_path / "out") == table(tmp_path / "whole")
+    run_study(study_file(tmp_path, SEARCH.replace("seed = 3", "seed = 4")), tmp_path / "other", work=quick)
+    assert rows(tmp_path / "other")[0]["case.net.spacing"] != whole[0]["case.net.spacing"]
+
+
+def test_the_front_holds_what_nothing_beats_and_keeps_limits():
+    front = Front({"a": 1.0, "b": -1.0}, {"a": 5.0})
+    for key, a, b, off in [
+        ("one", 1, 1, []),
+        ("worse", 2, 1, ["worse"]),
+        ("other", 2, 2, []),
+        ("best", 1, 3, ["one", "other"]),
+        ("same", 1, 3, []),
+        ("beyond", 6, 9, ["beyond"]),
+        ("none", None, 9, ["none"]),
+        ("nan", float("nan"), 9, ["nan"]),
+    ]:
+        assert front.add(key, {"status": "done", "a": a, "b": b}) == off
+    assert front.add("failed", {"status": "no result", "a": 0, "b": 9}) == ["failed"]
+    assert set(front.found) == {"best", "same"}
+
+
+def test_summaries_become_columns():
+    tree = {"a": {"b": 1, "c": [1.0, 2.0]}, "d": ["x", "y"], "e": None, "f": [[1]], "g": True, "h": list(range(9))}
+    assert flat(tree) == {"a.b": 1, "a.c.0": 1.0, "a.c.1": 2.0, "d": "x; y", "g": True}
+
+
+def test_dashboard_and_scheduler_listen_on_loopback_alone(two):
+    assert two.dashboard.startswith("http://127.0.0.1:")
+    addresses = [two.client.scheduler.address, *two.client.scheduler_info()["workers"]]
+    assert all(address.startswith("tls://127.0.0.1:") for address in addresses)
+    plain = addresses[0].replace("tls", "tcp")
+    with pytest.raises(InputError, match="--scheduler"), engine(scheduler=plain):
+        pass  # without the cluster's certificate
+    with pytest.raises(InputError, match="--scheduler"), engine(scheduler="tcp://127.0.0.1:9"):
+        pass
+
+
+def test_workers_have_one_thread_each(two):
+    def threads():
+        from shellform.structure.threads import cores
+
+        return cores(), {os.environ[f"{name}_NUM_THREADS"] for name in ("OMP", "MKL", "OPENBLAS", "NUMBA")}
+
+    assert set(map(str, two.client.run(threads).values())) == {"(1, {'1'})"}
+
+
+def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(tmp_path, two, on_two):
+    file = study_file(
+        tmp_path, 'keep = "all"\n[vary]\nnet.spacing = [0.12, 0.13]\noptimise.misfit = [0.7, 0.4]\n[function]\n'
+        'optimise.cable_force = "1 - optimise.misfit"\n'
+    )  # fmt: skip
+    run_study(file, tmp_path / "out")
+    told = rows(tmp_path / "out")
+    assert [row["status"] for row in told] == 4 * ["done"], [row["reason"] for row in told]
+    # The surface is shared by all, the first equilibria by two each; nets go with these.
+    assert len(list((tmp_path / "out/stages").iterdir())) == 3
+    alone = study_file(tmp_path / "alone", 'designs = [{ optimise.misfit = 0.4, optimise.cable_force = 0.6, net.spacing = 0.13 }]')
+    run_study(alone, tmp_path / "alone/out")
+    mine, theirs = rows(tmp_path / "out")[3], rows(tmp_path / "alone/out")[0]
+    assert {name: mine[name] for name in ("key", "misfit", "cables")} == {name: theirs[name] for name in ("key", "misfit", "cables")}
+    kept = read_run(tmp_path / "out/runs" / mine["key"])
+    assert kept.summary["designs"]["optimised"]["cables"] == int(mine["cables"])
+    # A folder that a machine left damaged when it was switched off is done anew.
+    damaged = tmp_path / "out/runs" / mine["key"]
+    (damaged / "net.npz").write_bytes(b"")
+    stages = json.loads((damaged / "stages.json").read_text())
+    (damaged / "stages.json").write_text(json.dumps({name: stages[name] for name in ("surface", "net", "initial")}))
+    outcome = work(Job(mine["key"], kept.case, "optimise", str(damaged)))
+    assert outcome["status"] == "done", outcome["reason"]
+    assert outcome["summary"]["designs"]["optimised"]["cables"] == int(mine["cables"])
+
+
+def test_work_turns_whatever_happens_into_a_row(tmp_path, monkeypatch):
+    case = load_case(study_file(tmp_path, "").with_name("dome.toml"))
+
+    def raising(error):
+        def fail(*arguments, **settings):
+            raise error
+
+        return fail
+
+    for error, status, words in [
+        (InputError("is wrong", where=f"{tmp_path / 'r'}/net"), "refused", "RUN/net: is wrong"),
+        (NotConverged("no way"), "no result", "no way"),
+        (MemoryError(), "no result", "the memory is full"),
+        (ZeroDivisionError("by zero"), "error", "ZeroDivisionError: by zero (test_studies.py"),
+        (OSError(errno.ENOSPC, "No space left"), "no room", "No space left"),
+        (OSError(errno.EACCES, "Denied"), "error", "Denied"),
+    ]:
+        monkeypatch.setattr(run, "run_case", raising(error))
+        told = work(Job("k", case, "net", str(tmp_path / "r")))
+        assert told["status"] == status
+        assert words in told["reason"]
+
+
+def test_outcomes_come_as_they_are_ready_and_jobs_are_drawn_as_they_are_needed(tmp_path, two):
+    case = load_case(study_file(tmp_path, "").with_name("dome.toml"))
+    drawn = []
+
+    def jobs():
+        for k in range(40):
+            drawn.append(k)
+            yield Job(f"{k:032d}", case, "net", str(tmp_path / f"{k}"))
+
+    came, most = 0, 0
+    for batch in sweep(two, jobs(), quick):
+        most = max(most, len(drawn) - came)
+        came += len(batch)
+    assert came == 40
+    assert most <= 8
