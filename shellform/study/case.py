@@ -26,7 +26,7 @@ from shellform.design.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.errors import InputError
 from shellform.study.entries import LimitsEntry, RobustEntry
 from shellform.study.entries import Section as _Section
-from shellform.written import whole
+from shellform.written import write_text as write_text  # studies take it from here
 
 _Polygon = list[tuple[float, float]]
 
@@ -439,9 +439,3 @@ def _tags(choice: Any) -> list[str]:
 
 def _has(entry: Any, name: str) -> bool:
     return name in entry if isinstance(entry, dict) else hasattr(entry, name)
-
-
-def write_text(path: Path, text: str) -> None:
-    """Writes a file whole or not at all."""
-    with whole(path) as partial:
-        partial.write_text(text, encoding="utf-8")

@@ -32,7 +32,7 @@ from shellform.net.orient import oriented_net
 from shellform.structure.equilibrium import Equilibrium
 from shellform.structure.loading import Loaded
 from shellform.structure.state import State
-from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case, write_text
+from shellform.study.case import Case, NetEntry, SurfaceEntry, check_script, dump_case
 from shellform.study.folder import (
     FORMAT,
     VERSION,
@@ -51,6 +51,7 @@ from shellform.study.robustness import robustness
 from shellform.study.shell import catalogue_bytes, gridshell, rod_limits, rounding_catalogue
 from shellform.surface.target import Surface
 from shellform.written import folder as made
+from shellform.written import write_text
 
 STAGES = ("surface", "net", "initial", "optimise", "figures", "documents", "report")
 
