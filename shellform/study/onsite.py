@@ -21,7 +21,7 @@ from shellform.structure.state import State
 from shellform.study import tables
 from shellform.study.case import load_case
 from shellform.study.folder import Run, read_run
-from shellform.study.run import net_of, surface_of
+from shellform.study.shape import net_of, surface_of
 from shellform.study.shell import gridshell
 from shellform.surface.units import METRES
 from shellform.written import folder as made

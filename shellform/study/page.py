@@ -72,6 +72,8 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
         notes.append("The run is not optimised (yet): run shellform design without --until, and the optimised design is added.")
     if not pictures:
         notes.append("There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them.")
+    for stage, why in run.summary.get("failed", {}).items():
+        notes.append(f"The stage “{stage}” failed: {why}")
     limits = run.case.limits
     return Entry(
         run.case.title or run.folder.resolve().name,
