@@ -220,7 +220,8 @@ class _Search:
             y, predicted = self._propose(model)
             self.status = self._settled(predicted) or self.status
             if self._settled(predicted):
-                if self.always_guarded or (self.guarded and self.point.objective > (1.0 - _SETTLED) * before):
+                turned = self.guarded and self.point.objective > (1.0 - _SETTLED) * before
+                if self.always_guarded or turned or len(self.evaluator.used()) == 1:  # without additional loads there are no guards
                     return
                 before = self.point.objective if self.guarded else before
                 self.guarded, self.window = not self.guarded, first
