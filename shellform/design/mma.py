@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from shellform.design.convex import minimise, minimise_quadratic
 from shellform.design.gridshell import Design
 from shellform.design.grouping import averaged
 from shellform.design.guard import guard
-from shellform.design.optimum import Optimum, Step
+from shellform.design.optimum import Checkpoint, Optimum, Step
 from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
 from shellform.design.robust import RobustMisfit
 from shellform.design.tensions import TensionModel, tension_model
@@ -69,6 +69,10 @@ FEASIBLE = 1e-3
 
 
 Watch = Callable[[Step], None]
+Keep = Callable[[Checkpoint], None]
+
+_NUMBERS = ("stage", "window", "margin", "guarded", "climbing", "status")
+_COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 
 
 def optimize(
@@ -81,13 +85,15 @@ def optimize(
     stiffness: float = STIFFNESS,
     most_cables: int | None = None,
     progress: Watch | None = None,
+    keep: Keep | None = None,
+    resume: Checkpoint | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
     `window`: half-width of the first step, in mean cable tensions; `thin`: whether cables that do little are taken away at the end;
     `stiffness`: what the softest mode must keep under the additional loads, as a share of the start's under the first (0: nothing);
     `most_cables`: down to so many cables are taken away whatever they do for the objective, as long as every limit is kept;
-    `progress(step)` is called at each trial.
+    `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes on from there to the same result.
 
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
@@ -95,6 +101,9 @@ def optimize(
         search = _Search(problem, start, window, progress)
         search.most_cables = most_cables
         search.keep_stiff(stiffness * search.stiffness())
+        search.keep = keep
+        if resume is not None:
+            search.resume(resume)
         return search.run(evaluations, thin=thin)
 
 
@@ -125,6 +134,21 @@ def polish(
     return polished if better else replace(best, status="no design with less misfit was found", history=polished.history)
 
 
+@dataclass(frozen=True)
+class Track:
+    """Where a search is on its way: its `phase`; the `first` window, N; whether the last trial was `refused`; the objective `before` this turn;
+    in thinning the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables `needed` (c,)."""
+
+    first: float
+    phase: str = "climb"
+    refused: bool = False
+    before: float = float("inf")
+    thrifty: float = 0.0
+    batch: int = 0
+    failures: int = 0
+    needed: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+
 class _Search:
     """The state of one optimisation."""
 
@@ -138,9 +162,13 @@ class _Search:
         self.margin = _MARGIN
         self.began = time.perf_counter()
         reached = self.evaluator.begin()
-        states = {self.base: reached[self.base].equilibrium.state}
-        self.stage = self._stage(start, states[self.base], 0.0)
-        self.point = self.evaluator.seed(start, self._staged(start, states[self.base], self.stage), self.stage)
+        state = reached[self.base].equilibrium.state
+        if all(reached[name].on_branch for name in self.evaluator.used()):
+            self.stage, states = 1.0, {name: reached[name].equilibrium.state for name in self.evaluator.used()}
+        else:
+            self.stage = self._stage(start, state, 0.0)
+            states = self._staged(start, state, self.stage)
+        self.point = self.evaluator.seed(start, states, self.stage)
         self.tension = float(np.mean(self._tensions(self.point)))
         self.window = window * self.tension
         self.braces = np.zeros(int(start.present.sum()), dtype=bool)
@@ -157,6 +185,8 @@ class _Search:
         self.climbing = False  # the softest modes stand in for the objective
         self.always_guarded = False
         self.guarded = False  # cables may not go slack under additional loads
+        self.keep: Keep | None = None
+        self.track = Track(self.window)
 
     def stiffness(self) -> float:
         """Of the softest mode of the start under the first load, N/m."""
@@ -177,17 +207,52 @@ class _Search:
     def run(self, evaluations: int, *, thin: bool) -> Optimum:
         """First the branch up to the additional loads, then the objective alone, then thinning."""
         self.most = evaluations
-        self._climb(evaluations)
-        self._descend(evaluations)
-        while self.accepted:
-            sound = self._sound(self.accepted[-1])
-            if sound is not None:
-                self.accepted[-1] = self.point = sound
-                break
-            self.accepted.pop()
-        if self.accepted and thin:
+        if self.track.phase == "climb":
+            self._climb(evaluations)
+            self.track = replace(self.track, phase="descend")
+        if self.track.phase == "descend":
+            self._descend(evaluations)
+            while self.accepted:
+                sound = self._sound(self.accepted[-1])
+                if sound is not None:
+                    self.accepted[-1] = self.point = sound
+                    break
+                self.accepted.pop()
+            if self.accepted and thin:
+                self._begin_thinning()
+        if self.track.phase == "thin":
             self._thin(evaluations)
         return self._finish()
+
+    def _told(self) -> None:
+        """Hands out where the search stands."""
+        if self.keep is not None:
+            self.keep(self._checkpoint())
+
+    def _checkpoint(self) -> Checkpoint:
+        counted = self.evaluator
+        numbers = {name: getattr(self, name) for name in _NUMBERS}
+        numbers |= {name: getattr(counted, name) for name in _COUNTS}
+        numbers |= {name: getattr(self.track, name) for name in ("phase", "first", "refused", "before", "thrifty", "batch", "failures")}
+        arrays = {"rest_length": self.point.design.rest_length, "braces": self.braces, "needed": self.track.needed}
+        for name, state in self.point.states.items():
+            arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
+        return Checkpoint(numbers | {"radius": self.point.design.radius}, arrays, tuple(self.history))
+
+    def resume(self, checkpoint: Checkpoint) -> None:
+        """Goes back to where a search of the same problem, start and settings stood."""
+        numbers, arrays = checkpoint.numbers, checkpoint.arrays
+        for name in _NUMBERS:
+            setattr(self, name, numbers[name])
+        self.braces = np.array(arrays["braces"])
+        design = Design(arrays["rest_length"], self.evaluator.start.present, numbers["radius"])
+        states = {name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"]) for name in self.evaluator.used()}
+        self.point = self.evaluator.seed(design, states, self.stage)
+        for name in _COUNTS:
+            setattr(self.evaluator, name, numbers[name])
+        own = ("phase", "first", "refused", "before", "thrifty", "batch", "failures")
+        self.track = Track(**{name: numbers[name] for name in own}, needed=np.array(arrays["needed"]))
+        self.accepted, self.history = [self.point], list(checkpoint.history)
 
     def _climb(self, evaluations: int) -> None:
         """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the additional loads are borne whole.
@@ -196,8 +261,9 @@ class _Search:
         """
         if self.stage == 1.0 or self.least == 0.0:
             return
-        window, self.guarded, self.climbing = self.window, True, True
+        self.guarded = self.climbing = True
         while self.stage < 1.0 and self.evaluator.evaluations < evaluations and self.window > self.smallest * self.tension:
+            self._told()
             model = self._model()
             y, _ = self._propose(model)
             trial = self._try(model, y)
@@ -210,34 +276,36 @@ class _Search:
             self.point = self.evaluator.seed(trial.design, self._staged(trial.design, trial.states[self.base], stage), stage)
             self.accepted.append(self.point)
             self.history.append(self._record(self.point, True))
-        self.window, self.guarded, self.climbing = window, False, False
+        self.window, self.guarded, self.climbing = self.track.first, self.always_guarded, False
 
     def _descend(self, evaluations: int) -> None:
         """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none may; and so in turns
         as long as a turn improves the objective."""
-        model, refused, first, before = self._model(), False, self.window, np.inf
+        track = self.track
         while self.evaluator.evaluations < evaluations:
+            self.track = track
+            self._told()
+            model = self._model()
             y, predicted = self._propose(model)
             self.status = self._settled(predicted) or self.status
             if self._settled(predicted):
-                turned = self.guarded and self.point.objective > (1.0 - _SETTLED) * before
+                turned = self.guarded and self.point.objective > (1.0 - _SETTLED) * track.before
                 if self.always_guarded or turned or len(self.evaluator.used()) == 1:  # without additional loads there are no guards
                     return
-                before = self.point.objective if self.guarded else before
-                self.guarded, self.window = not self.guarded, first
+                track = replace(track, before=self.point.objective if self.guarded else track.before)
+                self.guarded, self.window = not self.guarded, track.first
                 continue
             trial = self._try(model, y)
             if trial is None or self._merit(trial) >= self._merit(self.point):
                 self.window *= _SHRINK
-                refused = True
+                track = replace(track, refused=True)
                 self.history.append(self._record(trial or self.point, False))
                 continue
             ratio = (trial.objective - self.point.objective) / min(predicted, -1e-300)
-            grown = 1.0 if refused else _GROW  # a window that was just refused isn't tried again at once
+            grown = 1.0 if track.refused else _GROW  # a window that was just refused isn't tried again at once
             self.window *= grown if ratio > _GOOD else (_SHRINK if ratio < _POOR else 1.0)
-            refused = False
+            track = replace(track, refused=False)
             self._accept(trial)
-            model = self._model()
 
     def _settled(self, predicted: float) -> str:
         """The criterion of convergence that the point meets, in words; empty where none is met."""
@@ -249,23 +317,31 @@ class _Search:
             return "the objective has no better design within the smallest window"
         return ""
 
+    def _begin_thinning(self) -> None:
+        self.window = max(self.window, 0.1 * self.tension)
+        self.guarded = True
+        self.track = replace(
+            self.track,
+            phase="thin",
+            thrifty=_THINNING * self.point.objective,
+            batch=max(1, self._taut(self.point) // _BATCHES),
+            needed=np.zeros(len(self.braces), dtype=bool),
+        )
+
     def _thin(self, evaluations: int) -> None:
         """Takes away cables that the shell can spare (thinning.py), in batches, and lets the others make up for them.
 
         Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or that costs too
         much of the objective, is cut; a single cable that can't go is kept for good.
         """
-        thrifty = _THINNING * self.point.objective
-        batch = max(1, self._taut(self.point) // _BATCHES)
-        needed = np.zeros(len(self.braces), dtype=bool)
-        self.window = max(self.window, 0.1 * self.tension)
-        failures = 0
-        self.guarded = True
-        while failures < _FAILURES and self.evaluator.evaluations < evaluations:
+        track = self.track
+        while track.failures < _FAILURES and self.evaluator.evaluations < evaluations:
+            self.track = track
+            self._told()
             over = self.most_cables is not None and self._taut(self.point) > self.most_cables
-            budget = np.inf if over else thrifty
+            budget = np.inf if over else track.thrifty
             model = self._model()
-            leaving = self._spared(model, needed, batch)
+            leaving = self._spared(model, track.needed, track.batch)
             if not len(leaving):
                 self.status += ", and every cable that is left is needed for stability"
                 return
@@ -278,14 +354,14 @@ class _Search:
             sound = self._sound(trial) if trial is not None and fits else None
             if sound is None:
                 self.history.append(self._record(trial or self.point, False))
-                needed[leaving] = len(leaving) == 1
-                failures += len(leaving) == 1
-                batch = max(1, len(leaving) // 3)
+                alone = len(leaving) == 1
+                needed = track.needed.copy()
+                needed[leaving] = alone
+                track = replace(track, needed=needed, failures=track.failures + alone, batch=max(1, len(leaving) // 3))
                 continue
             self._accept(sound)
-            failures = 0
-            batch = int(1.3 * batch) + 1
-        self.status += ", and no further cable can be taken away" if failures else ""
+            track = replace(track, failures=0, batch=int(1.3 * track.batch) + 1)
+        self.status += ", and no further cable can be taken away" if track.failures else ""
         if self.most_cables is not None and self._taut(self.point) > self.most_cables:
             self.status += f"; no design with {self.most_cables} cables was found that keeps every limit"
 
