@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,9 @@ FILE = "optimise.npz"
 def save_checkpoint(folder: Path, key: str, checkpoint: Checkpoint) -> None:
     """Writes the checkpoint of the stage with the `key`. Raises InputError where it can't be written."""
     told = {"key": key, "numbers": dict(checkpoint.numbers), "history": [asdict(step) for step in checkpoint.history]}
+    arrays: dict[str, Any] = {**checkpoint.arrays, "told": np.array(json.dumps(told))}
     with whole(folder / FILE, ".npz") as partial:
-        np.savez(partial, told=np.array(json.dumps(told)), **checkpoint.arrays)
+        np.savez(partial, **arrays)
 
 
 def load_checkpoint(folder: Path, key: str) -> Checkpoint | None:
