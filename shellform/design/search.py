@@ -37,6 +37,7 @@ _FAILURES = 6  # single cables in a row that can't be taken away, after which th
 _BATCHES = 8  # share of the taut cables that the first batch takes, one in so many
 _KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
 _THINNING = 1.5  # of the objective that cables with little use may cost
+_IDLE = 0.2  # of the cables in a search that may be slack under all loads before they are left out of it
 _REPAIRS = 2  # steps after each batch
 FEASIBLE = 1e-3
 
@@ -148,10 +149,11 @@ class Search:
         numbers = {name: getattr(self, name) for name in _NUMBERS}
         numbers |= {name: getattr(counted, name) for name in _COUNTS}
         numbers |= {name: getattr(self.track, name) for name in ("phase", "first", "refused", "before", "thrifty", "batch", "failures")}
-        arrays = {"rest_length": self.point.design.rest_length, "braces": self.braces, "needed": self.track.needed}
+        design = self.point.design
+        arrays = {"rest_length": design.rest_length, "present": design.present, "braces": self.braces, "needed": self.track.needed}
         for name, state in self.point.states.items():
             arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
-        return Checkpoint(numbers | {"radius": self.point.design.radius}, arrays, tuple(self.history))
+        return Checkpoint(numbers | {"radius": design.radius}, arrays, tuple(self.history))
 
     def resume(self, checkpoint: Checkpoint) -> None:
         """Goes back to where a search of the same problem, start and settings stood."""
@@ -159,6 +161,7 @@ class Search:
         for name in _NUMBERS:
             setattr(self, name, numbers[name])
         self.braces = np.array(arrays["braces"])
+        self.evaluator.start = replace(self.evaluator.start, present=np.array(arrays["present"]))
         design = Design(arrays["rest_length"], self.evaluator.start.present, numbers["radius"])
         states = {name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"]) for name in self.evaluator.used()}
         self.point = self.evaluator.seed(design, states, self.stage)
@@ -250,7 +253,8 @@ class Search:
         """
         track = self.track
         while track.failures < _FAILURES and self.evaluator.evaluations < evaluations:
-            self.track = track
+            self.track = self._without_slack(track)
+            track = self.track
             self._told()
             over = self.most_cables is not None and self._taut(self.point) > self.most_cables
             budget = np.inf if over else track.thrifty
@@ -278,6 +282,21 @@ class Search:
         self.status += ", and no further cable can be taken away" if track.failures else ""
         if self.most_cables is not None and self._taut(self.point) > self.most_cables:
             self.status += f"; no design with {self.most_cables} cables was found that keeps every limit"
+
+    def _without_slack(self, track: Track) -> Track:
+        """Leaves cables out of the search that are slack under all loads, once they are many: a model solves for every cable in it."""
+        design, cables = self.point.design, self.problem.shell.cables(self.point.design)
+        pulls = np.array([cables.tension(state) for state in self.point.states.values()])
+        kept = (pulls > 0.0).any(axis=0)
+        if kept.mean() > 1.0 - _IDLE:
+            return track
+        present = design.present.copy()
+        present[np.flatnonzero(present)[~kept]] = False
+        self.evaluator.start = replace(self.evaluator.start, present=present)
+        self.braces = self.braces[kept]
+        self.point = self.evaluator.seed(replace(design, present=present), self.point.states, self.stage)
+        self.accepted[-1] = self.point
+        return replace(track, needed=track.needed[kept])
 
     def _repair(self, point: Point, budget: float) -> Point:
         """A few steps with the cables that are left, none of which may go slack."""
