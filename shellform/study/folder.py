@@ -37,7 +37,7 @@ DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished"
 FORMAT, VERSION = "shellform-summary", 1  # of summary.json
 WRITTEN = (
     "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
-    "drawings", "schedules", "report.html", "log.txt",
+    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt",
 )  # fmt: skip
 
 Report = Callable[[str, str], None]
