@@ -279,7 +279,8 @@ class Search:
                 continue
             self._accept(sound)
             track = replace(track, failures=0, batch=int(1.3 * track.batch) + 1)
-        self.status += ", and no further cable can be taken away" if track.failures else ""
+        done = track.failures >= _FAILURES
+        self.status += ", and no further cable can be taken away" if done else ", and thinning ended with the last evaluation"
         if self.most_cables is not None and self._taut(self.point) > self.most_cables:
             self.status += f"; no design with {self.most_cables} cables was found that keeps every limit"
 
