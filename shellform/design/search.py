@@ -170,6 +170,7 @@ class Search:
         own = ("phase", "first", "refused", "before", "thrifty", "batch", "failures")
         self.track = Track(**{name: numbers[name] for name in own}, needed=np.array(arrays["needed"]))
         self.accepted, self.history = [self.point], list(checkpoint.history)
+        self.began -= self.history[-1].seconds
 
     def _climb(self, evaluations: int) -> None:
         """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the additional loads are borne whole.

@@ -23,11 +23,12 @@ from shellform.written import write_text
 
 @dataclass(frozen=True)
 class Making:
-    """A run that is being made: its `case`, its `folder`, and whom to `report` progress to."""
+    """A run that is being made: its `case`, its `folder`, whom to `report` progress to, and the `keys` of its stages."""
 
     case: Case
     folder: Path
     report: Report
+    keys: Mapping[str, str]
 
     def path(self, name: str) -> Path:
         """Of a file in the folder."""

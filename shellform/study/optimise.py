@@ -15,6 +15,7 @@ from shellform.design.optimum import Optimum
 from shellform.design.problem import Problem
 from shellform.design.terms import AtMost, CableForces, Misfit, Share
 from shellform.errors import NotConverged
+from shellform.study.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
 from shellform.study.designs import Making, followed, forget, keep
 from shellform.study.folder import history_text
 from shellform.study.limits import below_factor, case_problem, critical_factors
@@ -43,6 +44,10 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
 
     problem = case_problem(making.case, shell, loads, start)
     groups = symmetric_groups(shell) if entry.symmetric else None  # at once: it may be refused
+    key = making.keys["optimise"]
+    stood = load_checkpoint(making.folder, key)
+    if stood is not None:
+        making.report("optimise", f"going on after evaluation {stood.numbers['evaluations']}")
     best = mma.optimize(
         problem,
         start,
@@ -50,6 +55,8 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
         stiffness=entry.stiffness_min,
         most_cables=entry.cables_max,
         progress=watch,
+        keep=lambda checkpoint: save_checkpoint(making.folder, key, checkpoint),
+        resume=stood,
     )
     forget(making, ("unloaded", "optimised", "rounded", "polished"), summary)
     built = {"optimised": best}
@@ -114,6 +121,7 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
         and summary["designs"]["optimised"].get("critical_factor_kept", True),
         **asked,
     }
+    drop_checkpoint(making.folder)
 
 
 def _came_of(making: Making, design: Design, groups: Indices | None) -> dict[str, Any]:

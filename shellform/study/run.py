@@ -21,6 +21,7 @@ from shellform.net.files import load_net, net_document, save_net
 from shellform.net.net import Net
 from shellform.study import designs
 from shellform.study.case import Case, check_script, dump_case
+from shellform.study.checkpoint import drop_checkpoint
 from shellform.study.designs import Making
 from shellform.study.folder import (
     FORMAT,
@@ -78,7 +79,9 @@ def run_case(
     summary.setdefault("seconds", {})
     for part in ("designs", "states", "figures", "schedules"):
         made(folder / part)
-    making = Making(case, folder, report)
+    making = Making(case, folder, report, keys)
+    if fresh:
+        drop_checkpoint(folder)
     steps = {"surface": _surface, "net": _net, "initial": _initial, "optimise": _optimise, "figures": _figures}
     steps |= {"documents": _documents, "report": _report}
     first = next((stage for stage in STAGES if done.get(stage) != keys[stage]), None)

@@ -6,7 +6,7 @@ import json
 import pytest
 
 from shellform.errors import InputError, NotConverged
-from shellform.study import documents, optimise
+from shellform.study import checkpoint, documents, optimise
 from shellform.study.case import load_case
 from shellform.study.folder import read_run
 from shellform.study.run import STAGES, run_case
@@ -106,3 +106,37 @@ def test_a_stage_that_fails_leaves_the_others_to_be_made_and_is_made_by_the_next
     run_case(load_case(file), tmp_path)
     assert set(listed(tmp_path)) == set(STAGES)
     assert "failed" not in read_run(tmp_path).summary
+
+
+def test_an_optimisation_broken_off_goes_on_from_its_checkpoint_to_the_same_bytes(file, tmp_path):
+    case = load_case(file, ["optimise.evaluations=8"])
+    whole = run_case(case, tmp_path / "whole", until="optimise")
+    assert not (tmp_path / "whole" / checkpoint.FILE).exists()
+
+    def stop(stage, text):
+        if text.startswith("evaluation 4/"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path / "broken", until="optimise", report=stop)
+    assert (tmp_path / "broken" / checkpoint.FILE).is_file()
+    lines = []
+    again = run_case(case, tmp_path / "broken", until="optimise", report=lambda stage, text: lines.append(text))
+    assert any(line.startswith("going on after evaluation") for line in lines)
+    assert again["optimisation"] == whole["optimisation"]
+    for name in ("optimised.json", "unloaded.json"):
+        assert (tmp_path / "broken/designs" / name).read_bytes() == (tmp_path / "whole/designs" / name).read_bytes()
+
+
+def test_a_fresh_run_takes_no_checkpoint_up(file, tmp_path):
+    case = load_case(file, ["optimise.evaluations=8"])
+
+    def stop(stage, text):
+        if text.startswith("evaluation 4/"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path, until="optimise", report=stop)
+    lines = []
+    run_case(case, tmp_path, until="optimise", fresh=True, report=lambda stage, text: lines.append(text))
+    assert not any(line.startswith("going on") for line in lines)
