@@ -69,7 +69,7 @@ def _version(asked: bool) -> None:
         from importlib.metadata import PackageNotFoundError, version
 
         print(f"shellform {shellform.__version__}")
-        for name in ("numpy", "scipy", "numba", "cvxopt", "gmsh", "nlopt", "pyvista"):
+        for name in ("numpy", "scipy", "numba", "cvxopt", "gmsh", "nlopt", "pyvista", "ezdxf", "dask"):
             try:
                 print(f"{name} {version(name)}")
             except PackageNotFoundError:
@@ -103,6 +103,29 @@ def check(
 
     options = _given(unit=unit, up=up, size=size, layer=layer, object=name, face=face, piece=piece, fill=fill, ground=ground)
     for label, value in check_file(file, options, allow_scripts=allow_scripts).items():
+        print(f"{label:>22}  {value}")
+
+
+@app.command()
+def new(
+    surface: Annotated[Path, typer.Argument(help="A surface file or shipped builder script.")],
+    output: Annotated[Path, typer.Option(help="Case file to write, CASE.toml.")],
+    unit: Unit = None,
+    up: Up = None,
+    size: Size = None,
+    layer: Layer = None,
+    name: Object = None,
+    face: Face = None,
+    piece: Piece = None,
+    fill: Fill = None,
+    ground: Ground = None,
+    allow_scripts: Scripts = False,
+) -> None:
+    """Write a commented case file for a surface."""
+    from shellform.study.propose import propose_case
+
+    options = _given(unit=unit, up=up, size=size, layer=layer, object=name, face=face, piece=piece, fill=fill, ground=ground)
+    for label, value in propose_case(surface, output, options, allow_scripts=allow_scripts).items():
         print(f"{label:>22}  {value}")
 
 
