@@ -10,6 +10,9 @@ import errno
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from shellform.errors import InputError
 
@@ -42,6 +45,18 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str, ending: str = "") -> None:
+    """Writes a text file in UTF-8. Raises InputError as `whole`."""
+    with whole(path, ending) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def write_arrays(path: str | Path, **arrays: Any) -> None:
+    """Writes arrays by name into an .npz file, for `arrays.read_arrays`. Raises InputError as `whole`."""
+    with whole(path, ".npz") as partial:
+        np.savez_compressed(partial, **arrays)
 
 
 def refusal(path: Path, error: OSError) -> InputError:

@@ -3,10 +3,12 @@
 import errno
 import os
 
+import numpy as np
 import pytest
 
+from shellform.arrays import read_arrays
 from shellform.errors import InputError
-from shellform.written import whole
+from shellform.written import whole, write_arrays, write_text
 
 
 def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
@@ -36,3 +38,14 @@ def test_a_failure_of_any_kind_leaves_nothing_half_written(tmp_path):
     with pytest.raises(ZeroDivisionError):
         break_off(tmp_path / "a.txt", ZeroDivisionError())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_arrays_and_text_come_back_as_they_were_written(tmp_path):
+    write_arrays(tmp_path / "new/a.npz", places=np.eye(3), name=np.array("ø"))
+    back = read_arrays(tmp_path / "new/a.npz")
+    assert (back["places"] == np.eye(3)).all()
+    assert str(back["name"]) == "ø"
+    with pytest.raises(InputError, match=r"a\.txt: has another ending"):
+        write_arrays(tmp_path / "a.txt", places=np.eye(3))
+    write_text(tmp_path / "a.csv", "ø 2 mm\n")
+    assert (tmp_path / "a.csv").read_bytes() == "ø 2 mm\n".encode()

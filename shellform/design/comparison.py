@@ -93,7 +93,7 @@ class Plain:
         if self._at[0] != key:
             near = min(self.points, key=lambda point: float(np.linalg.norm(point.variables - variables)))
             try:
-                point, there = self.evaluator.evaluate(np.array(variables), near.states, 1.0), True
+                point, there = self.evaluator.evaluate(np.array(variables), near.states, 1.0, lead=True), True
             except OffBranch:
                 point, there = near, False
             if there:

@@ -4,71 +4,45 @@ MMA replaces the problem by a sequence of convex ones that are solved exactly. I
 cables work together, and in the rest lengths it is kinked where a cable goes slack: on a prestressed gridshell its first trials snap
 the shell through and its later ones hardly move (README, "What was tried"). Here each convex problem is the model in tensions
 (tensions.py), exact in first order and with the misfit's Gauss-Newton curvature; NLopt's MMA solves it within a window round the
-present design, and the trial is then evaluated by its true equilibria:
+present design (proposal.py), and the trial is then evaluated by its true equilibria (search.py):
 
 - it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
 - a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
 - under the additional loads no mode may become softer than a share of what the softest one has at the start under the first load
   (checks.py: Softness): deviations don't see buckling coming, its stiffness does, and designs keep away from the end of their branch;
-- additional loads are staged: each accepted design raises them as far as its own stable branch reaches, less a margin, so that a
-  start that doesn't bear them is led to a design that does.
+- a start that doesn't bear the additional loads climbs first: steps along the gradient of that stiffness carry its stable branch up to them;
+- where no better design is found cables are kept taut under the additional loads (guard.py), and free again in turns;
+- then cables that the shell can spare are taken away in batches, the others kept taut.
 
-At the end the cables without tension are taken away and the design is loaded along the documented path (loading.py); if it
-should not bear all loads there, the last accepted design that does is returned.
+The search ends where the model predicts less than 0.1 % improvement in its largest window, where the smallest window has no better design,
+or where the evaluations are used up, and thinning after six single cables in a row that can't go; the status says which it was. At the
+end the cables without tension are taken away and the design is loaded along the documented path (loading.py); if it should not bear
+all loads there, the last accepted design that does is returned.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices, Reals
-from shellform.design.checks import Softness
-from shellform.design.convex import minimise, minimise_quadratic
+from shellform.arrays import Indices
+from shellform.design.convex import minimise
 from shellform.design.gridshell import Design
 from shellform.design.grouping import averaged
-from shellform.design.guard import guard
-from shellform.design.optimum import Optimum, Step
-from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
-from shellform.design.robust import RobustMisfit
-from shellform.design.tensions import TensionModel, tension_model
-from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, Share, Term
-from shellform.design.thinning import kept_stiffness, spared
-from shellform.errors import NotConverged
-from shellform.structure.loading import Loaded, apply_load
-from shellform.structure.stability import modes
-from shellform.structure.state import State
+from shellform.design.optimum import Checkpoint, Optimum, Step
+from shellform.design.problem import Problem
+from shellform.design.search import FEASIBLE, Keep, Search, Watch
+from shellform.design.terms import Misfit, Share
 from shellform.structure.threads import dense_on_one
+
+__all__ = ["FEASIBLE", "Checkpoint", "Optimum", "Step", "minimise", "optimize", "polish"]
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
 STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
 _POLISHED = 0.8  # of that, which polishing may use up
 POLISHING = 20  # design evaluations
-_MARGIN = 0.15  # of the whole additional load that is left at first between a stage and the end of the stable branch …
-_NEAREST = 0.01  # … and at last
-_GROW, _SHRINK = 1.6, 0.4
-_GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
-_SETTLED = 1e-3  # relative improvement predicted for the largest window that ends the optimisation
-_SMALLEST = 0.03  # window, in mean tensions, at which no better design is to be found
-_FINEST = 0.003  # the same in polishing
-_MODEL_EVALUATIONS = 2000  # of the convex model, some 50 microseconds each
-_PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
-_FAILURES = 6  # single cables in a row that can't be taken away, after which thinning ends
-_BATCHES = 8  # share of the taut cables that the first batch takes, one in so many
-_KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
-_THINNING = 1.5  # of the objective that cables with little use may cost
-_REPAIRS = 2  # steps after each batch
-_WIDE = 1e3  # windows, no bound on a group's step beside those on its cables
-_GUARDS = 400  # constraints for each load
-_RECOVERY = 0.1  # of what a window can change at most: by so much cables below that tension must gain under additional loads
-_BRACE = 0.05  # least tension of the cables that are kept while thinning, in mean tensions of the start
-FEASIBLE = 1e-3
-
-
-Watch = Callable[[Step], None]
+_FINEST = 0.003  # window of polishing, in mean tensions, at which no better design is to be found
 
 
 def optimize(
@@ -81,20 +55,25 @@ def optimize(
     stiffness: float = STIFFNESS,
     most_cables: int | None = None,
     progress: Watch | None = None,
+    keep: Keep | None = None,
+    resume: Checkpoint | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
     `window`: half-width of the first step, in mean cable tensions; `thin`: whether cables that do little are taken away at the end;
     `stiffness`: what the softest mode must keep under the additional loads, as a share of the start's under the first (0: nothing);
     `most_cables`: down to so many cables are taken away whatever they do for the objective, as long as every limit is kept;
-    `progress(step)` is called at each trial.
+    `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes on from there to the same result.
 
     Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
     """
     with dense_on_one():
-        search = _Search(problem, start, window, progress)
+        search = Search(problem, start, window, progress)
         search.most_cables = most_cables
         search.keep_stiff(stiffness * search.stiffness())
+        search.keep = keep
+        if resume is not None:
+            search.resume(resume)
         return search.run(evaluations, thin=thin)
 
 
@@ -114,7 +93,7 @@ def polish(
         best = replace(best, design=replace(best.design, rest_length=averaged(best.design.rest_length, groups, best.design.present)))
     problem = replace(best.problem, minimize=[Share(1.0, Misfit(base))])
     with dense_on_one():
-        search = _Search(problem, best.design, WINDOW, progress)
+        search = Search(problem, best.design, WINDOW, progress)
         search.keep_stiff(_POLISHED * best.stiffness)
         search.braces[:] = True
         search.guarded = search.always_guarded = True
@@ -123,539 +102,3 @@ def polish(
         polished = search.run(evaluations, thin=False)
     better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
     return polished if better else replace(best, status="no design with less misfit was found", history=polished.history)
-
-
-class _Search:
-    """The state of one optimisation."""
-
-    def __init__(self, problem: Problem, start: Design, window: float, progress: Watch | None) -> None:
-        self.problem, self.progress = problem, progress
-        self.base = next(iter(problem.loads))
-        # Limits on the base load's cable forces are bounds of the model; the others stay constraints.
-        self.bounded = [part for part in problem.limits if self._is_bound(part.term)]
-        inner = replace(problem, limits=[part for part in problem.limits if not self._is_bound(part.term)])
-        self.evaluator = Evaluator(inner, start)
-        self.margin = _MARGIN
-        self.began = time.perf_counter()
-        reached = self.evaluator.begin()
-        states = {self.base: reached[self.base].equilibrium.state}
-        self.stage = self._stage(start, states[self.base], 0.0)
-        self.point = self.evaluator.seed(start, self._staged(start, states[self.base], self.stage), self.stage)
-        self.tension = float(np.mean(self._tensions(self.point)))
-        self.window = window * self.tension
-        self.braces = np.zeros(int(start.present.sum()), dtype=bool)
-        self.objective_start = self.point.objective
-        self.accepted = [self.point]
-        self.history = [self._record(self.point, True)]
-        self.status = "the number of evaluations was reached"
-        self.most = 0
-        self.least = 0.0
-        self.smallest = _SMALLEST
-        self._modelled: TensionModel | None = None
-        self.most_cables: int | None = None
-        self.groups: Indices | None = None  # of the present cables, with one rest length each
-        self.climbing = False  # the softest modes stand in for the objective
-        self.always_guarded = False
-        self.guarded = False  # cables may not go slack under additional loads
-
-    def stiffness(self) -> float:
-        """Of the softest mode of the start under the first load, N/m."""
-        return float(modes(self.evaluator.assembly(self.point.design), self.point.states[self.base], 1).stiffness[0])
-
-    def keep_stiff(self, least: float) -> None:
-        """Adds the limit on the softest mode, N/m, under each additional load."""
-        own = {part.term.load for part in self.problem.limits if isinstance(part.term, Softness)}
-        additional = [name for name in self.evaluator.used() if name not in (self.base, *own) and self.problem.loads[name].any()]
-        if not (least > 0.0 and additional):
-            return
-        self.least = least
-        limits = [*self.evaluator.problem.limits, *(AtMost(1.0, Softness(name, least)) for name in additional)]
-        self.evaluator.problem = replace(self.evaluator.problem, limits=limits)
-        self.point = self.evaluator.seed(self.point.design, self.point.states, self.stage)
-        self.accepted, self.history = [self.point], [self._record(self.point, True)]
-
-    def run(self, evaluations: int, *, thin: bool) -> Optimum:
-        """First the branch up to the additional loads, then the objective alone, then thinning."""
-        self.most = evaluations
-        self._climb(evaluations)
-        self._descend(evaluations)
-        while self.accepted:
-            sound = self._sound(self.accepted[-1])
-            if sound is not None:
-                self.accepted[-1] = self.point = sound
-                break
-            self.accepted.pop()
-        if self.accepted and thin:
-            self._thin(evaluations)
-        return self._finish()
-
-    def _climb(self, evaluations: int) -> None:
-        """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the additional loads are borne whole.
-
-        Each goes along the gradient of the limits on it, with all cables kept taut; it counts where the stable branch reaches farther.
-        """
-        if self.stage == 1.0 or self.least == 0.0:
-            return
-        window, self.guarded, self.climbing = self.window, True, True
-        while self.stage < 1.0 and self.evaluator.evaluations < evaluations and self.window > self.smallest * self.tension:
-            model = self._model()
-            y, _ = self._propose(model)
-            trial = self._try(model, y)
-            stage = 0.0 if trial is None else self._stage(trial.design, trial.states[self.base], 0.0)
-            if trial is None or stage <= self.stage:
-                self.window *= _SHRINK
-                self.history.append(self._record(trial or self.point, False))
-                continue
-            self.stage = stage
-            self.point = self.evaluator.seed(trial.design, self._staged(trial.design, trial.states[self.base], stage), stage)
-            self.accepted.append(self.point)
-            self.history.append(self._record(self.point, True))
-        self.window, self.guarded, self.climbing = window, False, False
-
-    def _descend(self, evaluations: int) -> None:
-        """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none may; and so in turns
-        as long as a turn improves the objective."""
-        model, refused, first, before = self._model(), False, self.window, np.inf
-        while self.evaluator.evaluations < evaluations:
-            y, predicted = self._propose(model)
-            self.status = self._settled(predicted) or self.status
-            if self._settled(predicted):
-                if self.always_guarded or (self.guarded and self.point.objective > (1.0 - _SETTLED) * before):
-                    return
-                before = self.point.objective if self.guarded else before
-                self.guarded, self.window = not self.guarded, first
-                continue
-            trial = self._try(model, y)
-            if trial is None or self._merit(trial) >= self._merit(self.point):
-                self.window *= _SHRINK
-                refused = True
-                self.history.append(self._record(trial or self.point, False))
-                continue
-            ratio = (trial.objective - self.point.objective) / min(predicted, -1e-300)
-            grown = 1.0 if refused else _GROW  # a window that was just refused isn't tried again at once
-            self.window *= grown if ratio > _GOOD else (_SHRINK if ratio < _POOR else 1.0)
-            refused = False
-            self._accept(trial)
-            model = self._model()
-
-    def _settled(self, predicted: float) -> str:
-        """The criterion of convergence that the point meets, in words; empty where none is met."""
-        if self.stage < 1.0 or self._violation(self.point) > 0.0:
-            return ""
-        if -predicted < _SETTLED * self.point.objective and self.window >= self.tension:
-            return f"the model predicts less than {_SETTLED:.1%} improvement"
-        if self.window < self.smallest * self.tension:
-            return "the objective has no better design within the smallest window"
-        return ""
-
-    def _thin(self, evaluations: int) -> None:
-        """Takes away cables that the shell can spare (thinning.py), in batches, and lets the others make up for them.
-
-        Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or that costs too
-        much of the objective, is cut; a single cable that can't go is kept for good.
-        """
-        thrifty = _THINNING * self.point.objective
-        batch = max(1, self._taut(self.point) // _BATCHES)
-        needed = np.zeros(len(self.braces), dtype=bool)
-        self.window = max(self.window, 0.1 * self.tension)
-        failures = 0
-        self.guarded = True
-        while failures < _FAILURES and self.evaluator.evaluations < evaluations:
-            over = self.most_cables is not None and self._taut(self.point) > self.most_cables
-            budget = np.inf if over else thrifty
-            model = self._model()
-            leaving = self._spared(model, needed, batch)
-            if not len(leaving):
-                self.status += ", and every cable that is left is needed for stability"
-                return
-            self.braces = model.origin[: len(self.braces)] > 0.0
-            self.braces[leaving] = False
-            trial = self._without(model, leaving)
-            if trial is not None and self._merit(trial) < 2.0 * budget:
-                trial = self._repair(trial, budget)
-            fits = trial is not None and self._merit(trial) <= budget and self._violation(trial) <= 0.0
-            sound = self._sound(trial) if trial is not None and fits else None
-            if sound is None:
-                self.history.append(self._record(trial or self.point, False))
-                needed[leaving] = len(leaving) == 1
-                failures += len(leaving) == 1
-                batch = max(1, len(leaving) // 3)
-                continue
-            self._accept(sound)
-            failures = 0
-            batch = int(1.3 * batch) + 1
-        self.status += ", and no further cable can be taken away" if failures else ""
-        if self.most_cables is not None and self._taut(self.point) > self.most_cables:
-            self.status += f"; no design with {self.most_cables} cables was found that keeps every limit"
-
-    def _repair(self, point: Point, budget: float) -> Point:
-        """A few steps with the cables that are left, none of which may go slack."""
-        before, self.point = self.point, point
-        for _ in range(min(_REPAIRS, self.most - self.evaluator.evaluations)):
-            model = self._model()
-            y, _ = self._propose(model)
-            trial = self._try(model, y)
-            if trial is None or self._merit(trial) >= self._merit(self.point):
-                self.window *= _SHRINK
-            else:
-                self.window *= _GROW
-                self.point = trial
-        self.window = float(np.clip(self.window, 0.05 * self.tension, self.tension))
-        best, self.point = self.point, before
-        return best
-
-    def _spared(self, model: TensionModel, needed: Flags, most: int) -> Indices:
-        """Taut cables, numbered among those present, that can go at once, from the one with the least use."""
-        state = self.point.states[self.evaluator.used()[-1]]
-        kept = kept_stiffness(model.assembly, state, self.problem.shell.cables(self.point.design))
-        loss = 1.0 - np.diag(kept)
-        pull = model.origin[: len(loss)]
-        score = loss / loss.sum() + pull / pull.sum()
-        free = np.flatnonzero((pull > 0.0) & ~needed)
-        return spared(kept, free[np.argsort(score[free], kind="stable")], most, _KEPT)
-
-    def _accept(self, trial: Point) -> None:
-        self.point = trial
-        self._raise()
-        self.accepted.append(self.point)
-        self.history.append(self._record(self.point, True))
-
-    def _sound(self, point: Point) -> Point | None:
-        """The same design in the states to which the documented path leads, without its slack cables; None where it doesn't bear all loads
-        there or breaks a limit: of two equilibria side by side, a search from design to design may have come to the other one."""
-        design = without_slack(self.problem.shell, point.design, point.states[self.base])
-        loaded = follow(self.problem.shell, design, self.problem.loads, stay=True)
-        self.evaluator.factorisations += sum(each.factorisations for each in loaded.values())
-        if not all(each.on_branch for each in loaded.values()):
-            return None
-        states = {name: loaded[name].equilibrium.state for name in self.evaluator.used()}
-        try:
-            found = self.evaluator.seed(point.design, states, 1.0)
-        except OffBranch:
-            return None
-        return found if self._violation(found) <= max(self._violation(point), 0.0) else None
-
-    def _taut(self, point: Point) -> int:
-        return int((self._tensions(point) > 0.0).sum())
-
-    def _is_bound(self, term: Term) -> bool:
-        return isinstance(term, CableForces) and term.load == self.base and term.chosen is None
-
-    def _model(self) -> TensionModel:
-        """The convex model at the present point, made once for each."""
-        if self._modelled is None or self._modelled.point is not self.point:
-            self._modelled = self._new_model()
-        return self._modelled
-
-    def _new_model(self) -> TensionModel:
-        shell, design = self.problem.shell, self.point.design
-        longest = (self.evaluator.bounds()[1][: len(shell.cable_lengths)] * shell.cable_lengths)[design.present]
-        return tension_model(
-            shell,
-            self.evaluator.assembly(design),
-            self.point,
-            self.point.states[self.base],
-            longest,
-            frees_radius=self.problem.frees_radius,
-        )
-
-    def _propose(self, model: TensionModel) -> tuple[Reals, float]:
-        """The model's optimum within the window, and the change of the objective that it predicts."""
-        count = len(model.length)
-        lower, upper = self._box(model)
-        width = np.full(len(model.origin), self.window)
-        if self.problem.frees_radius:
-            width[-1] = 0.1 * model.origin[-1] * min(self.window / self.tension, 1.0)
-        lower = np.minimum(np.maximum(lower, model.origin - width), model.origin + width)
-        upper = np.maximum(np.minimum(upper, model.origin + width), lower)
-        slope = self.point.objective_by_variables @ model.variables_by_y
-        curvature = sum(
-            weight * model.misfit_hessian
-            for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True)
-            if isinstance(part.term, (Misfit, RobustMisfit)) and part.term.load == self.base
-        )
-        slope = self._exact_in_tension(slope, model)
-        if self.climbing:
-            slope = self._stiffening() @ model.variables_by_y
-        rows = self.point.constraints_by_variables @ model.variables_by_y
-        values = self.point.constraints
-        falls, margins = self._guarding(model, width)
-        scaled_slope, scaled_rows = slope * width, np.vstack([rows * width, falls])
-        values = np.append(values, margins)
-        scaled_curvature = np.asarray(curvature) * width * width[:, None]
-
-        low, high = (lower - model.origin) / width, (upper - model.origin) / width
-
-        def evaluate(u: Reals) -> tuple[float, Reals, Reals, Reals]:
-            bent = scaled_curvature @ u
-            value = float(scaled_slope @ u + 0.5 * u @ bent)
-            return value, scaled_slope + bent, values + scaled_rows @ u, scaled_rows
-
-        u: Reals | None
-        if self.groups is not None:
-            u = self._equal_steps(model, width, scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
-        elif self.guarded:
-            u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
-            if u is None:  # the guards ask for more than a step can give: they may keep what they have
-                u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
-            if u is None:
-                u = np.clip(np.zeros(len(width)), low, high)
-        else:
-            u, _ = minimise(
-                evaluate,
-                np.clip(np.zeros(len(width)), low, high),
-                low,
-                high,
-                constraints=len(values),
-                evaluations=_MODEL_EVALUATIONS,
-                tolerance=1e-9,
-            )
-        y = model.origin + width * u
-        if self.groups is None:
-            y[:count][y[:count] < 1e-3 * self.tension] = 0.0
-        return y, evaluate(u)[0]
-
-    def _equal_steps(
-        self, model: TensionModel, width: Reals, curvature: Reals, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
-    ) -> Reals:
-        """The model's optimum in windows (y,) among steps that change all rest lengths of a group by the same: u = W⁻¹ (∂l0/∂y)⁻¹ G v."""
-        assert self.groups is not None
-        present = self.point.design.present
-        lengths = model.variables_by_y[np.flatnonzero(present)] * self.problem.shell.cable_lengths[present, None]
-        count = len(self.groups)
-        member = np.zeros((count, int(self.groups.max()) + 1))
-        member[np.arange(count), self.groups] = 1.0
-        steps = np.linalg.solve(lengths, member) / width[:, None]
-        steps /= np.abs(steps).max(axis=0)
-        box = np.vstack([steps, -steps])
-        v = minimise_quadratic(
-            steps.T @ curvature @ steps,
-            steps.T @ slope,
-            np.vstack([rows @ steps, box]),
-            np.concatenate([values, -np.maximum(high, 0.0), np.minimum(low, 0.0)]),
-            np.full(steps.shape[1], -_WIDE),
-            np.full(steps.shape[1], _WIDE),
-        )
-        return steps @ v if v is not None else np.zeros(count)
-
-    def _stiffening(self) -> Reals:
-        """The gradient (s,) of the limits on the softest modes, each as a share of its own size."""
-        rows = _split(np.arange(len(self.point.constraints), dtype=float), self.evaluator.problem)
-        own = [k for part, where in zip(self.evaluator.problem.limits, rows, strict=True) if isinstance(part.term, Softness) for k in where.astype(int)]
-        slopes = self.point.constraints_by_variables[own]
-        return np.asarray((slopes / np.linalg.norm(slopes, axis=1)[:, None]).sum(axis=0))
-
-    def _guarding(self, model: TensionModel, width: Reals) -> tuple[Reals, Reals]:
-        """Rows (g, y) and values (g,), at most 0 where each guarded cable keeps its least tension, per window and in shares of what
-        a whole window can change."""
-        rows, values = [np.zeros((0, len(width)))], [np.zeros(0)]
-        shell, design = self.problem.shell, self.point.design
-        lengths = model.variables_by_y[np.flatnonzero(design.present)] * shell.cable_lengths[design.present, None]
-        rates = []
-        if self.problem.frees_radius:
-            lengths = np.vstack([lengths, model.variables_by_y[-1] * design.radius / self.point.variables[-1]])
-            rates = [shell.beams_by_radius(design.radius)]
-        for name in self.evaluator.used()[1:] if self.guarded else []:
-            self.evaluator.factorisations += 1
-            held = guard(self.evaluator.assembly(design), self.point.states[name], shell.cables(design), self.tension, *rates)
-            falls = -(held.tension_by_design @ lengths) * width
-            scale = np.abs(falls).sum(axis=1)
-            asked = np.minimum((_BRACE * self.tension - held.tension) / scale, _RECOVERY)
-            # Where no step within the window lets a cable go slack, there is nothing to guard; of the others the nearest count.
-            near = np.argsort(-asked, kind="stable")[: int(np.clip((asked > -1.0).sum(), 0, _GUARDS))]
-            rows.append(falls[near] / scale[near, None])
-            values.append(asked[near])
-        return np.vstack(rows), np.concatenate(values)
-
-    def _exact_in_tension(self, slope: Reals, model: TensionModel) -> Reals:
-        """The sum of tensions is linear in them, also for cables that are dead and so have no slope in their rest length."""
-        count = len(model.length)
-        dead = model.origin[:count] <= 0.0
-        if not dead.any():
-            return slope
-        result = slope.copy()
-        total = np.zeros(count)
-        for weight, part in zip(self.evaluator.weights, self.evaluator.problem.minimize, strict=True):
-            if part.term.load != self.base:
-                continue
-            if isinstance(part.term, (Misfit, RobustMisfit)):
-                total += weight * model.misfit_by_y[:count]
-            elif isinstance(part.term, CableForce):
-                total += weight
-        result[:count][dead] = total[dead]
-        return result
-
-    def _box(self, model: TensionModel) -> tuple[Reals, Reals]:
-        """Bounds of y from bounds (3), (4) and the limits (5) on the base load's cable forces."""
-        stiffness = self.problem.shell.cable.stiffness
-        shortest = self.problem.rest_length_min
-        upper = stiffness * (model.length / shortest - 1.0)
-        for part in self.bounded:
-            upper = np.minimum(upper, part.limit)
-        lower = np.where(self.braces, _BRACE * self.tension, 0.0)
-        if self.problem.frees_radius:
-            low, high = self.evaluator.bounds()
-            scale = self.evaluator.start.radius
-            lower, upper = np.append(lower, low[-1] * scale), np.append(upper, high[-1] * scale)
-        return lower, upper
-
-    def _try(self, model: TensionModel, y: Reals) -> Point | None:
-        design = model.design(y, self.point.design.present)
-        if self.groups is not None:
-            rest = design.rest_length.copy()
-            rest[design.present] = averaged(rest[design.present], self.groups, np.ones(len(self.groups), dtype=bool))
-            design = replace(design, rest_length=rest)
-        near = {**self.evaluator.predicted(self.point, design), self.base: model.predicted(y)}
-        try:
-            return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage, lead=not self.guarded)
-        except OffBranch:
-            return None
-
-    def _without(self, model: TensionModel, leaving: Indices) -> Point | None:
-        """The point without some cables, the others at the rest lengths that they have: the shell moves less than at their tensions."""
-        design = self.point.design
-        rest = design.rest_length.copy()
-        rest[np.flatnonzero(design.present)[leaving]] = model.longest[leaving]
-        variables = self.evaluator.variables(replace(design, rest_length=rest))
-        try:
-            return self.evaluator.evaluate(variables, self.point.states, self.stage)
-        except OffBranch:
-            return None
-
-    def _merit(self, point: Point) -> float:
-        return point.objective + _PENALTY * max(self._violation(point), 0.0)
-
-    def _violation(self, point: Point) -> float:
-        values = [float(point.constraints.max(initial=-1.0))]
-        values += [float(self._tensions(point).max(initial=0.0)) / part.limit - 1.0 for part in self.bounded]
-        largest = max(values)
-        return largest if largest > FEASIBLE else 0.0
-
-    def _tensions(self, point: Point) -> Reals:
-        return self.problem.shell.cables(point.design).tension(point.states[self.base])
-
-    def _stage(self, design: Design, state: State, least: float) -> float:
-        """The stage to which the design's stable branch under the additional loads allows to go."""
-        stages = []
-        for name in self.evaluator.used():
-            if name != self.base:
-                before, after = self.problem.loads[self.base], self.problem.loads[name]
-                assembly = self.evaluator.assembly(design)
-                loaded = apply_load(assembly, state, before, after, step=0.5, smallest=min(0.125, self.margin), stay=True)
-                self.evaluator.factorisations += loaded.factorisations
-                stages.append(1.0 if loaded.on_branch else max(least, loaded.share - self.margin))
-        return min(stages, default=1.0)
-
-    def _staged(self, design: Design, state: State, stage: float) -> dict[str, State]:
-        """The states of all load cases at a stage, reached step by step from the base load's."""
-        states = {self.base: state}
-        for name in self.evaluator.used():
-            if name != self.base:
-                before, after = self.problem.loads[self.base], self.evaluator.load(name, stage)
-                loaded = apply_load(self.evaluator.assembly(design), state, before, after)
-                self.evaluator.factorisations += loaded.factorisations
-                states[name] = loaded.equilibrium.state
-        return states
-
-    def _raise(self) -> None:
-        if self.stage == 1.0:
-            return
-        design, state = self.point.design, self.point.states[self.base]
-        stage = self._stage(design, state, self.stage)
-        if stage <= self.stage:
-            # Far from the end of its branch a design feels no limit on its softest mode, and nothing drives it on: go nearer.
-            self.margin = max(0.5 * self.margin, _NEAREST)
-        else:
-            self.stage = stage
-            self.point = self.evaluator.seed(design, self._staged(design, state, stage), stage)
-
-    def _record(self, point: Point, accepted: bool) -> Step:
-        problem = self.evaluator.problem
-        pull = self._tensions(point)
-        terms = {
-            self._name(part.term): float(value) for part, value in zip(problem.minimize, point.terms, strict=True)
-        }
-        constraints = {self._name(part.term): float(pull.max(initial=0.0)) / part.limit - 1.0 for part in self.bounded}
-        constraints |= {
-            self._name(part.term): float(value.max())
-            for part, value in zip(problem.limits, _split(point.constraints, problem), strict=True)
-        }
-        step = Step(
-            self.evaluator.evaluations,
-            point.objective,
-            terms,
-            constraints,
-            int((pull > 0.0).sum()),
-            self.stage,
-            accepted,
-            time.perf_counter() - self.began,
-        )
-        if self.progress is not None:
-            self.progress(step)
-        return step
-
-    def _name(self, term: Term) -> str:
-        kind = _name(type(term))
-        return kind if term.load in ("", self.base) else f"{kind}.{term.load}"
-
-    def _finish(self) -> Optimum:
-        """The last accepted design that bears all loads on the documented path."""
-        shell, problem = self.problem.shell, self.problem
-        none = np.zeros((len(shell.net.grid.flat), 6))
-        if not self.accepted:
-            raise NotConverged(
-                "No design was found that carries all loads",
-                state=self.point.design,
-                iterations=self.evaluator.factorisations,
-                remedy="Choose a denser grid, thicker rods, stiffer cables, or more evaluations.",
-            )
-        point = self.accepted[-1]
-        design = without_slack(shell, point.design, point.states[self.base])
-        loaded = follow(shell, design, {"none": none, **problem.loads})
-        final = self._judge(design, loaded)
-        return Optimum(
-            problem,
-            design,
-            loaded,
-            self.objective_start,
-            final.objective,
-            final.constraints,
-            tuple(self.history),
-            self.status,
-            self.evaluator.evaluations,
-            self.evaluator.rejected,
-            self.evaluator.equilibria,
-            self.evaluator.factorisations,
-            self.evaluator.wasted,
-            self.least,
-        )
-
-    def _judge(self, design: Design, loaded: Mapping[str, Loaded]) -> Step:
-        states = {name: loaded[name].equilibrium.state for name in self.problem.loads}
-        judge = Evaluator(self.evaluator.problem, design)
-        judge.start, judge.weights = replace(self.evaluator.start, present=design.present), self.evaluator.weights
-        self.evaluator = _counted(judge, self.evaluator)
-        return self._record(self.evaluator.seed(design, states, 1.0), True)
-
-
-def _name(kind: type) -> str:
-    """A term's name in histories: its class' name in small letters, but for those that stand for the same."""
-    short = {"RmsMisfit": "misfit", "CableForces": "cable_force", "LargestCableForce": "cable_force", "RodUtilisation": "utilisation"}
-    return short.get(kind.__name__) or "".join(f"_{c.lower()}" if c.isupper() else c for c in kind.__name__).lstrip("_")
-
-
-def _counted(judge: Evaluator, counts: Evaluator) -> Evaluator:
-    judge.evaluations, judge.rejected = counts.evaluations, counts.rejected
-    judge.equilibria, judge.factorisations, judge.wasted = counts.equilibria, counts.factorisations, counts.wasted
-    return judge
-
-
-def _split(values: Reals, problem: Problem) -> list[Reals]:
-    """Constraint values limit by limit."""
-    sizes = []
-    for part in problem.limits:
-        chosen = part.term.chosen if isinstance(part.term, CableForces) else ()
-        sizes.append(
-            1 if not isinstance(part.term, CableForces) else len(problem.shell.cable_ends) if chosen is None else len(chosen)
-        )
-    return np.split(values, np.cumsum(sizes)[:-1]) if sizes else []

@@ -1,9 +1,12 @@
-"""What an optimisation tells: its steps, and the design at its end."""
+"""What an optimisation tells: its steps, where it stands on the way, and the design at its end."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
 
 from shellform.design.gridshell import Design
 from shellform.design.problem import Problem
@@ -24,6 +27,15 @@ class Step:
     stage: float
     accepted: bool
     seconds: float
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Where an optimisation stood before a trial: `numbers` and words by name, `arrays` by name, and the `history` so far."""
+
+    numbers: Mapping[str, Any]
+    arrays: Mapping[str, np.ndarray]
+    history: tuple[Step, ...]
 
 
 @dataclass(frozen=True)

@@ -28,6 +28,7 @@ from shellform.structure.network import assemble
 from shellform.structure.sensitivity import by_rest_length, by_stiffness, gradients, predicted, respond
 from shellform.structure.sparse import NotPositiveDefinite
 from shellform.structure.state import State
+from shellform.structure.threads import side_by_side
 
 _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
 _LED = 0.5  # of an additional load, the steps by which it is led
@@ -314,18 +315,18 @@ def follow(
     """The documented path of a design: unloaded from the target shape by relaxation, then each load case on its own from there,
     step by step (loading.py). `shellform analyse` goes the same way.
 
-    With `stay` snap-through isn't followed. Raises NotConverged where no equilibrium is found.
+    The cases are solved side by side on the cores. With `stay` snap-through isn't followed. Raises NotConverged where no equilibrium is found.
     """
-    assembly = assemble(shell.network(design))
     none = np.zeros((len(shell.net.grid.flat), 6))
-    unloaded = find_equilibrium(assembly, shell.target, none)
-    result: dict[str, Loaded] = {}
-    for name, load in loads.items():
-        if load.any():
-            result[name] = apply_load(assembly, unloaded.state, none, load, stay=stay)
-        else:
-            result[name] = Loaded(unloaded, 1.0, unloaded.factorisations)
-    return result
+    unloaded = find_equilibrium(assemble(shell.network(design)), shell.target, none)
+
+    def loaded(load: Reals) -> Loaded:
+        if not load.any():
+            return Loaded(unloaded, 1.0, unloaded.factorisations)
+        # An assembly of its own: the cases go side by side, and an assembly keeps one factor.
+        return apply_load(assemble(shell.network(design)), unloaded.state, none, load, stay=stay)
+
+    return dict(zip(loads, side_by_side(loaded, list(loads.values())), strict=True))
 
 
 def taut(shell: Gridshell, design: Design, state: State) -> Flags:

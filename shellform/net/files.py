@@ -14,7 +14,7 @@ from shellform.net.grid import Grid, GridRod
 from shellform.net.net import Net
 from shellform.net.quality import MAPS, Quality
 from shellform.structure.state import State
-from shellform.written import whole
+from shellform.written import write_arrays
 
 
 def net_document(net: Net) -> dict[str, Any]:
@@ -74,8 +74,7 @@ def save_net(path: Path, net: Net) -> None:
         pieces = [getattr(rod, name) for rod in grid.rods]
         arrays[f"rod_{name}"] = np.concatenate(pieces)
         arrays[f"rod_{name}_ends"] = np.cumsum([len(piece) for piece in pieces])
-    with whole(path) as partial:
-        np.savez_compressed(partial, **arrays)
+    write_arrays(path, **arrays)
 
 
 def load_net(path: Path) -> Net:

@@ -7,12 +7,11 @@ than a page are made smaller. Films and drawings go in as they are. What would m
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from PIL import Image, UnidentifiedImageError
+from shellform.output.images import web_picture
 
 _WIDEST = 1600  # pixels
 _QUALITY = 82
@@ -38,7 +37,7 @@ def embed(files: Sequence[Path], *, budget: int) -> tuple[list[Picture], list[st
     for file in files:
         try:
             kind, data, (width, height) = _read(file)
-        except (OSError, UnidentifiedImageError, ValueError, Image.DecompressionBombError) as error:
+        except (OSError, ValueError) as error:
             left.append(f"The picture {file.name} can't be read: {error}")
             continue
         if len(data) > budget:
@@ -54,10 +53,5 @@ def _read(file: Path) -> tuple[str, bytes, tuple[int, int]]:
     ending = file.suffix.lower()
     if ending in _PLAIN:
         return _PLAIN[ending], file.read_bytes(), (0, 0)
-    with Image.open(file) as picture:
-        shown = picture.convert("RGBA" if picture.mode in ("RGBA", "LA", "P") else "RGB")
-    if shown.width > _WIDEST:
-        shown = shown.resize((_WIDEST, round(shown.height * _WIDEST / shown.width)), Image.Resampling.LANCZOS)
-    text = io.BytesIO()
-    shown.save(text, "WEBP", quality=_QUALITY, method=4)
-    return "image/webp", text.getvalue(), shown.size
+    data, size = web_picture(file, widest=_WIDEST, quality=_QUALITY)
+    return "image/webp", data, size

@@ -18,7 +18,7 @@ from shellform.output.marks import PENS
 from shellform.output.opensees import opensees_script
 from shellform.output.schedules import Built, cable_crossings, rod_names
 from shellform.surface.target import Surface
-from shellform.written import whole
+from shellform.written import whole, write_text
 
 SIDES = 8  # of a rod drawn as a tube
 THIN = 0.35  # of the rods' radius: a cable's
@@ -147,8 +147,7 @@ def write_script(path: str | Path, built: Built, load_forces: Reals, *, load: st
         name=target.name,
         case=load,
     )
-    with whole(target, ".py") as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(target, text, ".py")
 
 
 def _shade(layer: str, opacity: float = 1.0) -> tuple[float, float, float, float]:

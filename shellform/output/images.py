@@ -1,4 +1,4 @@
-"""Pictures as files (PNG) and films (GIF, MP4); the door to Pillow and to the ffmpeg that imageio-ffmpeg brings."""
+"""Pictures as files (PNG), in pages (WebP) and films (GIF, MP4); the door to Pillow and to the ffmpeg that imageio-ffmpeg brings."""
 
 from __future__ import annotations
 
@@ -33,6 +33,23 @@ def png_bytes(picture: NDArray[np.uint8]) -> bytes:
     content = io.BytesIO()
     Image.fromarray(picture).save(content, format="png", compress_level=4)
     return content.getvalue()
+
+
+def web_picture(file: Path, *, widest: int, quality: int) -> tuple[bytes, tuple[int, int]]:
+    """A picture's file as WebP of a `quality` up to 100, made smaller where it has more than `widest` pixels across, and its size in pixels.
+    Raises OSError or ValueError where the file is damaged, no picture, or one of absurdly many pixels."""
+    from PIL import Image
+
+    try:
+        with Image.open(file) as picture:
+            shown = picture.convert("RGBA" if picture.mode in ("RGBA", "LA", "P") else "RGB")
+    except (Image.DecompressionBombError, SyntaxError) as error:  # the latter for broken chunks of a PNG
+        raise ValueError(str(error)) from error
+    if shown.width > widest:
+        shown = shown.resize((widest, round(shown.height * widest / shown.width)), Image.Resampling.LANCZOS)
+    content = io.BytesIO()
+    shown.save(content, "WEBP", quality=quality, method=4)
+    return content.getvalue(), shown.size
 
 
 def write_film(path: str | Path, frames: Sequence[NDArray[np.uint8]], *, rate: int = 12) -> None:

@@ -29,6 +29,7 @@ _SAND = np.array(
     dtype=np.float64,
 )  # fmt: skip
 _NOTHING = 1e-6  # of the scale: what is smaller is rounding
+_TRUE = 0.01  # of the scale: how far a tick may lie from its number
 _STEPS = 4  # of a bar
 _WIDE = 0.6  # mean width of a letter over its height, generous
 
@@ -113,10 +114,12 @@ def key_height(size: tuple[int, int]) -> int:
 def _bar(quantity: str, name: str, limit: float, last: str, colours, ends, width: int, line: int) -> tuple[list[Word], Ramp]:  # type: ignore[no-untyped-def]
     left, right = round(ends[0] * width), round(ends[1] * width)
     steps = _STEPS if right - left > 20 * line else 2
-    decimals = max(0, int(np.ceil(-np.log10(limit / steps) + 0.7)))  # letters need a decimal only where the steps do
+    ticks = limit * np.arange(steps + 1) / steps
+    near = (places for places in range(12) if (np.abs(ticks.round(places) - ticks) <= _TRUE * limit).all())
+    decimals = next(near, 12)  # a number has to stand where it says
     words = []
     for k in range(steps + 1):
-        value = f"{limit * k / steps:.{decimals}f}"
+        value = f"{ticks[k]:.{decimals}f}"
         label = f"0 {name}".rstrip() if k == 0 else f"{last}{value} {name}".rstrip() if k == steps else value
         words.append(Word(label, (left + (right - left) * k / steps, 0.55 * line), line, justify="center"))
     words.append(Word(quantity, (0.5 * (left + right), 3.2 * line), line, QUIET, justify="center"))

@@ -10,6 +10,9 @@ taut: the clear length between its pins at a load is that of the loaded state, a
 erected grid before the pour. The turnbuckle has to reach from the length at which the cable is hung in without force, that between its pins
 in the grid before bracing, to the rest length, and `RESERVE` beyond both for what a survey asks for.
 
+Where the turnbuckles' range of adjustment is given, cables are cut to the fewest lengths that it allows (grouping.py): with the turnbuckle
+closed a cable has its cut length, and it is let out to its rest length.
+
 **Order of tensioning.** Round after round from the supports to the crown: a cable's round is the number of segments from its ends to the
 nearest rod end along the rods, the smaller of both. The grid is held at its feet and the curvature is set there first, so that each
 round pulls against a part that is braced already, and the crown, the softest part, stays free to settle until the end. Within a round
@@ -28,6 +31,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.design.catalogue import label
 from shellform.design.gridshell import Design, Gridshell
+from shellform.design.grouping import cut_lengths
 from shellform.errors import InputError
 from shellform.net.grid import Grid, crossing_points
 from shellform.output.nesting import Cutting
@@ -42,7 +46,8 @@ RESERVE = 0.02  # of the rest length, at both ends of a turnbuckle's range
 @dataclass(frozen=True)
 class Built:
     """A design to build: the `shell`, its `design`, its `states` by load case, "none" among them, and the state `hung` in which the cables
-    are hung in, the erected grid before bracing (left out: the target). `name` of the design and `title` of the job are for the heads."""
+    are hung in, the erected grid before bracing (left out: the target). `name` of the design and `title` of the job are for the heads; `adjustment`, m, is the range of the turnbuckles by which
+    cables are let out from the lengths that they are cut to (None: each is cut for itself)."""
 
     shell: Gridshell
     design: Design
@@ -50,6 +55,7 @@ class Built:
     hung: State | None = None
     name: str = ""
     title: str = ""
+    adjustment: float | None = None
 
     def __post_init__(self) -> None:
         if "none" not in self.states:
@@ -216,6 +222,7 @@ def cables(built: Built) -> Table:
         "tensioning round": rounds(shell, design),
         "tensioning order": order,
         "rest length [m]": ties.rest_length,
+        **({} if built.adjustment is None else {"cut length [m]": cut_lengths(ties.rest_length, built.adjustment)}),
         "hung in at [m]": hung,
         "turnbuckle shortest [m]": shortest,
         "turnbuckle longest [m]": longest,
@@ -227,8 +234,29 @@ def cables(built: Built) -> Table:
     rows = tuple((f"C{k}", *(values[k].item() for values in columns.values())) for k in range(len(pairs)))
     notes = (
         f"Lengths between the pins' axes. {len(pairs)} cables, EA = {shell.cable.stiffness:g} N. A force of 0: slack at that stage.",
+        *cutting_of_cables(built),
     )
     return Table("cables", ("cable", *columns), rows, notes)
+
+
+def cut_counts(built: Built) -> dict[str, int]:
+    """For the summary: how many different `rest_lengths` the cables have, and to how many `cut_lengths` they are cut, if turnbuckles' range is known."""
+    lengths = built.shell.cables(built.design).rest_length
+    found = {"rest_lengths": len(np.unique(lengths))}
+    if built.adjustment is not None:
+        found["cut_lengths"] = len(np.unique(cut_lengths(lengths, built.adjustment)))
+    return found
+
+
+def cutting_of_cables(built: Built) -> tuple[str, ...]:
+    """To how many lengths cables are cut, in words; nothing where each is cut for itself."""
+    counts = cut_counts(built)
+    if built.adjustment is None or "cut_lengths" not in counts:
+        return ()
+    return (
+        f"Cut to {counts['cut_lengths']} different lengths, the fewest for {counts['rest_lengths']} different rest lengths and turnbuckles that "
+        f"let a cable out by {1e3 * built.adjustment:g} mm from its cut length.",
+    )
 
 
 def supports(built: Built) -> Table:

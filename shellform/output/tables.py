@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import InputError
-from shellform.written import whole
+from shellform.written import whole, write_text
 
 Value = str | float | int | None
 
@@ -58,8 +58,7 @@ def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:
     files = []
     for table in tables:
         files.append(Path(folder) / f"{table.name}.csv")
-        with whole(files[-1]) as partial:
-            partial.write_text(table_text(table), encoding="utf-8")
+        write_text(files[-1], table_text(table))
     files.append(Path(folder) / "schedules.xlsx")
     with whole(files[-1]) as partial:
         _workbook(tables).save(partial)

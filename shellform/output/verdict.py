@@ -152,6 +152,23 @@ def checks(
         cell = _constraint(name, value)
         cells = {design: cell if design == "optimised" else Cell("–", None) for design in designs}
         found.append(Check(constraint_title(name), _constraint_limit(name), cells))
+    optimised = summary.get("optimisation") or {}
+    built = next((name for name in ("polished", "rounded", "optimised") if name in designs), "")
+    if "cables_max" in optimised:
+        least, kept = optimised["cables_max"], {"unloaded", "initial", "unbraced"}
+        each(
+            "Number of cables",
+            f"up to {least['asked']}, as far as the limits allow",
+            lambda design: Cell("–", None) if design in kept else Cell(f"{told[design]['cables']}", told[design]["cables"] <= least["asked"]),
+        )
+    if "symmetric" in optimised:
+        alike = optimised["symmetric"]
+        words = f"{alike['groups']} lengths" if alike["kept"] else optimised.get("not_polished", "not alike")
+        each(
+            "Symmetric cables have one length",
+            "asked for",
+            lambda design: Cell(words, bool(alike["kept"])) if design == built else Cell("–", None),
+        )
     for load in loads:
         each(
             f"In equilibrium under {load_title(load, factors[load])}",
@@ -260,10 +277,16 @@ def answers(
             "What to buy?",
             f"{number(float(rods.sum()))} m of rod{weight}",
             f"{len(rods)} rods, {len(grid.lattice)} connectors, {len(shell.net.supports)} supports, {len(cables.ends)} cables of "
-            f"{number(float(cables.rest_length.sum()))} m in all",
+            f"{number(float(cables.rest_length.sum()))} m in all{_lengths(summary)}",
         )
     )
     return found
+
+
+def _lengths(summary: Mapping[str, Any]) -> str:
+    """To how many lengths the cables are cut, where that is known."""
+    count = summary.get("documents", {}).get("cut_lengths")
+    return "" if count is None else f", cut to {count} different lengths"
 
 
 def _collapse(row: Mapping[str, Any]) -> str:

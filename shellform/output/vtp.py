@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from shellform.arrays import Reals, indices, reals
 from shellform.errors import InputError
 from shellform.output.panel import Panel
-from shellform.written import door, whole
+from shellform.written import door, write_text
 
 
 def write_vtp(path: str | Path, panel: Panel, cells: Mapping[str, ArrayLike] | None = None) -> None:
@@ -69,8 +69,7 @@ def _write(target: Path, nodes: Reals, pairs: NDArray[np.int64], points: Mapping
     writer.SetInputData(mesh)
     writer.WriteToOutputStringOn()  # Python tells of a full disc, VTK only by leaving no file
     writer.Write()
-    with whole(target) as partial:
-        partial.write_text(writer.GetOutputString(), encoding="ascii")  # arrays stand in base 64
+    write_text(target, writer.GetOutputString())  # arrays stand in base 64
 
 
 def _rows(name: str, given: ArrayLike, lengths: Sequence[int]) -> Reals:

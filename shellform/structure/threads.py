@@ -7,11 +7,14 @@ terms in BLAS come out otherwise on another number of threads, which an optimisa
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 _WORTH_SHARING = 500  # elements; below, starting the threads takes longer than the loop
 
@@ -45,6 +48,21 @@ def share(loop: Callable[..., Any], count: int, *arguments: Any) -> None:
     loop(0, bounds[1], *arguments)
     for each in running:
         each.result()
+
+
+def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """`work` on every item, on as many threads as there are cores; results in order. The first error that is raised ends the rest."""
+    number = min(cores(), len(items))
+    if number < 2:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(number, thread_name_prefix="shellform-case") as pool:
+        running = [pool.submit(work, item) for item in items]
+        try:
+            return [each.result() for each in running]
+        except BaseException:
+            for each in running:
+                each.cancel()
+            raise
 
 
 @cache

@@ -14,14 +14,15 @@ import shellform
 from shellform.errors import InputError
 from shellform.net.files import net_document, save_net
 from shellform.net.orient import oriented_net
-from shellform.study.case import SurfaceEntry, load_case, write_text
+from shellform.study.case import SurfaceEntry, load_case
 from shellform.study.folder import FORMAT, VERSION, Report, refuse_overwriting
 from shellform.study.pictures import pictures_possible
-from shellform.study.run import net_summary, surface_of, surface_summary, told_size
+from shellform.study.shape import net_summary, surface_of, surface_summary, told_size
 from shellform.study.shell import rod_material
 from shellform.surface.reading import FORMATS, kind_of
 from shellform.surface.target import largest_curvature
 from shellform.written import folder as made
+from shellform.written import write_text
 
 _GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
 

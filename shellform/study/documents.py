@@ -14,7 +14,9 @@ from shellform.study.folder import Report, Run
 def built_design(run: Run) -> Built:
     """The run's best design, a rounded one with the catalogue's rods; its cables are hung into the erected grid before bracing."""
     hung = run.states["unbraced"]["none"] if "unbraced" in run.states else None
-    return Built(run.shell_of(run.best), run.designs[run.best], run.states[run.best], hung, run.best, run.case.title)
+    return Built(
+        run.shell_of(run.best), run.designs[run.best], run.states[run.best], hung, run.best, run.case.title, run.case.cable.adjustment
+    )
 
 
 def stock_length(case: Case) -> float:
@@ -50,4 +52,5 @@ def write_documents(run: Run, *, report: Report = lambda stage, text: None) -> d
         "waste": cutting.waste,
         "spliced": list(cutting.spliced),
         "notes": list(notes),
+        **schedules.cut_counts(built),
     }

@@ -9,7 +9,6 @@ import csv
 import io
 import json
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -32,13 +31,13 @@ from shellform.study.case import Case, load_case
 from shellform.study.limits import shown
 from shellform.study.shell import gridshell, rounding_catalogue
 from shellform.surface.target import Surface
-from shellform.written import whole
+from shellform.written import write_arrays
 
 DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished")
 FORMAT, VERSION = "shellform-summary", 1  # of summary.json
 WRITTEN = (
     "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
-    "drawings", "schedules", "report.html", "log.txt",
+    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt",
 )  # fmt: skip
 
 Report = Callable[[str, str], None]
@@ -98,17 +97,17 @@ def read_run(folder: str | Path) -> Run:
     shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
     designs, states = {}, {}
     for name in ready:
-        with arrays_of(place / f"designs/{name}.npz") as data:
-            wanted = ["rest_length", "present", "radius", *(f"{each}_{what}" for each in loads for what in ("positions", "quaternions"))]
-            missing = [each for each in wanted if each not in data]
-            if missing or len(data["present"]) != len(shell.cable_ends):
-                raise InputError(
-                    "belongs to another state of the case: the run is half-finished",
-                    where=str(place / f"designs/{name}.npz"),
-                    remedy="Run shellform design on it again: it goes on.",
-                )
-            designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
-            states[name] = {each: State(data[f"{each}_positions"], data[f"{each}_quaternions"]) for each in loads}
+        data = read_arrays(place / f"designs/{name}.npz")
+        wanted = ["rest_length", "present", "radius", *(f"{each}_{what}" for each in loads for what in ("positions", "quaternions"))]
+        missing = [each for each in wanted if each not in data]
+        if missing or len(data["present"]) != len(shell.cable_ends):
+            raise InputError(
+                "belongs to another state of the case: the run is half-finished",
+                where=str(place / f"designs/{name}.npz"),
+                remedy="Run shellform design on it again: it goes on.",
+            )
+        designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
+        states[name] = {each: State(data[f"{each}_positions"], data[f"{each}_quaternions"]) for each in loads}
     return Run(place, case, surface, shell, loads, designs, states, summary)
 
 
@@ -154,13 +153,13 @@ def _number(version: str) -> tuple[int, ...]:
 
 def save_surface(path: Path, surface: Surface) -> None:
     """Writes the surface so that `load_surface` gives the same."""
-    save_arrays(path, vertices=surface.vertices, triangles=surface.triangles, normals=surface.normals)
+    write_arrays(path, vertices=surface.vertices, triangles=surface.triangles, normals=surface.normals)
 
 
 def load_surface(path: Path, source: str = "") -> Surface:
     """A saved surface."""
-    with arrays_of(path) as data:
-        return Surface(data["vertices"], data["triangles"], data["normals"], source)
+    data = read_arrays(path)
+    return Surface(data["vertices"], data["triangles"], data["normals"], source)
 
 
 def keep_design(
@@ -177,7 +176,7 @@ def keep_design(
     model = Model(network, {each: loads[each] for each in loads if loads[each].any()}, shell.target, supports)
     write_model(folder / f"designs/{name}.json", model)
     states = {each: loaded[each].equilibrium.state for each in loads}
-    save_arrays(
+    write_arrays(
         folder / f"designs/{name}.npz",
         rest_length=design.rest_length,
         present=design.present,
@@ -235,17 +234,6 @@ def utilisation(shell: Gridshell, design: Design, state: State) -> float:
     section = shell.rod.resized(design.radius).section
     forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
     return float(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]).max()) / section.material.strength
-
-
-def save_arrays(path: Path, **arrays: Any) -> None:
-    """Writes arrays by name into an .npz file."""
-    with whole(path) as partial:
-        np.savez_compressed(partial, **arrays)
-
-
-def arrays_of(path: Path) -> Any:
-    """The arrays of an .npz file, as a context manager. Raises InputError where it is missing or damaged."""
-    return nullcontext(read_arrays(path))
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -12,19 +12,20 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices, Reals, read_arrays
 from shellform.design import calibration, erection, site
 from shellform.design.gridshell import Design, Gridshell
 from shellform.design.scan import Scan, match, read_points
 from shellform.errors import InputError
 from shellform.structure.state import State
 from shellform.study import tables
-from shellform.study.case import load_case, write_text
-from shellform.study.folder import Run, arrays_of, read_run, save_arrays
-from shellform.study.run import net_of, surface_of
+from shellform.study.case import load_case
+from shellform.study.folder import Run, read_run
+from shellform.study.shape import net_of, surface_of
 from shellform.study.shell import gridshell
 from shellform.surface.units import METRES
 from shellform.written import folder as made
+from shellform.written import write_arrays, write_text
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     write_text(files[0], step.schedule(shell))
     write_text(files[1], _predicted(shell, learnt.state, step, goal))
     now = step.belief
-    save_arrays(
+    write_arrays(
         files[2],
         rest_length=now.design.rest_length,
         present=now.design.present,
@@ -211,7 +212,7 @@ def erect(
     where = made(output or run.folder / "schedules")
     files = [where / "erection.csv", where / "erection.npz"]
     write_text(files[0], done.table())
-    save_arrays(files[1], positions=np.stack([each.state.positions for each in done.steps]), stage=np.array([each.stage for each in done.steps]))
+    write_arrays(files[1], positions=np.stack([each.state.positions for each in done.steps]), stage=np.array([each.stage for each in done.steps]))
     worst, last = done.worst, done.steps[-1]
     return Told(
         [
@@ -236,15 +237,15 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, site.Belief]:
     design, state = run.designs[name], run.states[name][options.load]
     if options.after is None:
         return name, shell, site.drawn(shell, design, state, load, length_error=options.length_error)
-    with arrays_of(options.after) as data:
-        lacking = {"rest_length", "present", "radius", "covariance", "positions", "quaternions", "origin"} - set(data.files)
-        if lacking:
-            raise InputError("was not left by shellform survey", where=str(options.after), value=", ".join(sorted(lacking)))
-        if str(data["origin"]) != f"{name}/{options.load}" or not np.array_equal(data["present"], design.present):
-            raise InputError("belongs to another design or load case", where=str(options.after), value=str(data["origin"]))
-        known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
-        there = State(data["positions"], data["quaternions"])
-        return name, shell, site.Belief(known, data["covariance"], there, load)
+    data = read_arrays(options.after)
+    lacking = {"rest_length", "present", "radius", "covariance", "positions", "quaternions", "origin"} - data.keys()
+    if lacking:
+        raise InputError("was not left by shellform survey", where=str(options.after), value=", ".join(sorted(lacking)))
+    if str(data["origin"]) != f"{name}/{options.load}" or not np.array_equal(data["present"], design.present):
+        raise InputError("belongs to another design or load case", where=str(options.after), value=str(data["origin"]))
+    known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
+    there = State(data["positions"], data["quaternions"])
+    return name, shell, site.Belief(known, data["covariance"], there, load)
 
 
 def _surveyed(path: Path, shell: Gridshell, expected: State, options: Survey) -> tuple[Indices, Reals, list[str]]:

@@ -13,9 +13,9 @@ from shellform.errors import InputError
 from shellform.output.embed import KINDS, embed
 from shellform.output.report import GENERATOR, Entry, html
 from shellform.output.verdict import Bounds
-from shellform.study.case import write_text
 from shellform.study.folder import DESIGNS, Report, Run, read_json, read_run
 from shellform.study.run import stage_keys
+from shellform.written import write_text
 
 FILE = "report.html"
 _BUDGET = 9_000_000  # bytes of pictures in a page, before they become text, which adds a third
@@ -43,11 +43,7 @@ def write_page(runs: Sequence[Run], file: Path) -> Path:
     """As `write_report`, of runs that are read already."""
     _refuse_foreign(file)
     text = html([entry(run, _BUDGET // len(runs)) for run in runs], versions())
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_text(file, text)
-    except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(file), remedy="Choose another --output.") from error
+    write_text(file, text)
     return file
 
 
@@ -76,6 +72,8 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
         notes.append("The run is not optimised (yet): run shellform design without --until, and the optimised design is added.")
     if not pictures:
         notes.append("There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them.")
+    for stage, why in run.summary.get("failed", {}).items():
+        notes.append(f"The stage “{stage}” failed: {why}")
     limits = run.case.limits
     return Entry(
         run.case.title or run.folder.resolve().name,

@@ -17,8 +17,9 @@ from typing import Any
 
 from shellform.design.loads import pressure
 from shellform.errors import InputError
-from shellform.study.case import LoadEntry, write_text
+from shellform.study.case import LoadEntry
 from shellform.study.folder import Run
+from shellform.written import write_text
 
 STUDIES = ("fixed", "radius")
 _DATA = Path(__file__).with_name("published.toml")

@@ -75,6 +75,7 @@ def tried(
     *,
     evaluations: int,
     beside: int,
+    most_cables: int | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[Trial]:
     """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness, each with its cables optimised.
@@ -93,7 +94,7 @@ def tried(
     for other, design in neighbours(shell, best.design, catalogue, count=beside):
         name = label(other.rod.section)
         progress(f"cables for rods {name}")
-        optimum, why = _optimised(problem_of(other), [design, _whole(start, design)], best.stiffness, evaluations)
+        optimum, why = _optimised(problem_of(other), [design, _whole(start, design)], best.stiffness, evaluations, most_cables)
         found.append(_trial(name, other, optimum, why, weights, best.problem, other.rod.section == up))
     return found
 
@@ -128,13 +129,13 @@ def _whole(start: Design, design: Design) -> Design:
 
 
 def _optimised(
-    problem: Problem, starts: Sequence[Design], least: float, evaluations: int
+    problem: Problem, starts: Sequence[Design], least: float, evaluations: int, most_cables: int | None
 ) -> tuple[Optimum | None, str]:
     """The best design from the first of the starts that leads to a feasible one, or the last found; and why it isn't feasible."""
     optimum, why = None, ""
     for start in starts:
         try:
-            found = mma.optimize(problem, start, evaluations=evaluations, stiffness=_share(problem, start, least))
+            found = mma.optimize(problem, start, evaluations=evaluations, stiffness=_share(problem, start, least), most_cables=most_cables)
         except NotConverged as error:
             why = why or error.what
             continue

@@ -8,11 +8,11 @@ from typing import Any
 from shellform.design.problem import deviations
 from shellform.errors import InputError
 from shellform.output.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
-from shellform.study.case import write_text
 from shellform.study.folder import read_run
 from shellform.study.front import Front, signed
 from shellform.study.plan import Plan
 from shellform.study.store import read_table
+from shellform.written import write_text
 
 
 def write_study_page(folder: Path, plan: Plan) -> Path:

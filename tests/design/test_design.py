@@ -6,6 +6,7 @@ import pytest
 import shellform as sf
 from shellform import mma
 from shellform.design.problem import Evaluator, taut
+from shellform.design.search import Search
 from shellform.errors import InputError, NotConverged
 from shellform.structure.sensitivity import adjoint, by_rest_length, direct, respond
 
@@ -66,7 +67,7 @@ def test_direct_and_adjoint_sensitivities_are_the_same(shell, wet):
 
 
 def test_the_tension_model_predicts_the_next_equilibrium_to_second_order(shell, wet):
-    search = mma._Search(problem(shell, wet), shell.design(), 0.2, None)
+    search = Search(problem(shell, wet), shell.design(), 0.2, None)
     model = search._model()
     rng = np.random.default_rng(2)
     change = np.where(model.origin > 0.5, 0.05 * rng.normal(size=len(model.origin)), 0.0)

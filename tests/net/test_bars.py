@@ -7,8 +7,8 @@ import pytest
 
 import shellform as sf
 from shellform.net.grid import neighbours
-from shellform.study.case import SurfaceEntry
-from shellform.study.run import surface_of
+from shellform.study.entries import SurfaceEntry
+from shellform.study.shape import surface_of
 from shellform.surface.tree import Tree
 
 ROOT = Path(__file__).parent.parent.parent

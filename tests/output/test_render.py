@@ -336,6 +336,15 @@ def test_large_forces_are_told_in_kilonewtons_and_rounding_as_nothing():
     assert legend.title(panel(), scale_of([panel()], SMALL, SIZE), SIZE)[1].text.endswith("64 cables, 12 N at most")
 
 
+@pytest.mark.parametrize("force", [10.8, 16.4, 0.37, 3.0, 99.6, 1234.0])
+def test_a_number_of_the_key_lies_within_a_hundredth_of_the_scale_from_its_tick(force):
+    strong = replace(panel(), cable_forces=force / panel().cable_forces.max() * panel().cable_forces)
+    words = [word for word in legend.key(scale_of([strong], SMALL, SIZE), SIZE[0])[0] if word.at[0] > 0.6 * SIZE[0]]
+    ticks = [float(word.text.split()[0]) for word in sorted(words, key=lambda word: word.at[0]) if word.text[0].isdigit()]
+    largest = force / 1000.0 if force >= 1e3 else force
+    assert ticks == pytest.approx(np.linspace(0.0, largest, len(ticks)), abs=0.0101 * largest)
+
+
 def test_a_value_beyond_the_scale_is_told_at_its_end_and_long_titles_shrink():
     within, beyond = (legend.key(scale_of([bare(deviation=np.full(len(panel().positions), far))], SMALL, SIZE), 400)[0] for far in (0.01, 0.02))
     assert "≥ 10.0 mm" in [word.text for word in beyond]

@@ -201,6 +201,14 @@ def test_pictures_are_made_small_films_go_in_as_they_are(tmp_path):
     assert "none.png can't be read" in left[0]
 
 
+def test_a_picture_of_absurdly_many_pixels_is_left_out_and_named(tmp_path, monkeypatch):
+    Image.fromarray(np.zeros((90, 90, 3), np.uint8)).save(tmp_path / "huge.png")
+    monkeypatch.setattr(Image, "MAX_IMAGE_PIXELS", 1000)
+    found, left = embed([tmp_path / "huge.png"], budget=10**6)
+    assert not found
+    assert "huge.png can't be read" in left[0]
+
+
 def test_a_fine_surface_is_made_light_and_stays_where_it_is(vault, monkeypatch):
     assert report._light(vault)[1] is not None
     monkeypatch.setattr(report, "_MOST_TRIANGLES", 2000)

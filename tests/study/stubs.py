@@ -5,7 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-from shellform.study.case import write_text
+from shellform.written import write_text
 
 ROOT = Path(__file__).parent.parent.parent
 CASE = f"""

@@ -93,7 +93,7 @@ def test_what_a_changed_case_will_find_anew_is_forgotten_before_it_is_computed(c
         read_run(copy)
 
 
-@pytest.mark.parametrize("name", ["case.toml", "summary.json", "figures/mine.png"])
+@pytest.mark.parametrize("name", ["case.toml", "summary.json", "figures/mine.png", "models/gridshell.3dm"])
 def test_files_that_shellform_did_not_write_are_not_overwritten_without_fresh(tmp_path, name):
     own = tmp_path / name
     own.parent.mkdir(exist_ok=True)
