@@ -98,7 +98,7 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
             threads_per_worker=1,
             processes=processes,
             host="127.0.0.1" if processes else None,
-            security=processes,  # certificates of its own, in memory: nobody else on the machine can send it work
+            security=processes or None,  # certificates of its own, in memory: nobody else on the machine can send it work
             dashboard_address="127.0.0.1:0",
             worker_dashboard_address=None,
         )

@@ -398,3 +398,10 @@ def test_outcomes_come_as_they_are_ready_and_jobs_are_drawn_as_they_are_needed(t
         came += len(batch)
     assert came == 40
     assert most <= 8
+
+
+def test_workers_can_be_threads_of_one_process_to_try_out_the_engine(tmp_path):
+    case = load_case(study_file(tmp_path, "").with_name("dome.toml"))
+    with engine(workers=3, processes=False) as threads:
+        found = [each for batch in sweep(threads, (Job(f"{k:032d}", case, "net", str(tmp_path / f"{k}")) for k in range(9)), quick) for each in batch]
+    assert sorted(each["key"] for each in found) == [f"{k:032d}" for k in range(9)]
