@@ -173,18 +173,23 @@ def design(
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute every stage anew.")] = False,
     settings: Annotated[list[str] | None, typer.Option("--set", help="KEY=VALUE in place of an entry.")] = None,
     allow_scripts: Scripts = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Tell errors only; RUN/log.txt has the rest.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON and nothing else.")] = False,
 ) -> None:
     """Run the whole job; run again, it goes on where it stopped."""
     from shellform.study.case import load_case
     from shellform.study.run import run_case
 
-    report = _Progress()
+    report = _Progress(quiet=quiet)
     summary = run_case(
         load_case(case, settings or ()), output, until=until, fresh=fresh, allow_scripts=allow_scripts, report=report
     )
     report.close()
-    _tell(summary)
-    print(f"Everything is in {output}" + (f"; look at {output / 'report.html'} first" if until == "report" else ""))
+    if as_json:
+        print(json.dumps(summary, indent=1))
+    elif not quiet:
+        _tell(summary)
+        print(f"Everything is in {output}" + (f"; look at {output / 'report.html'} first" if until == "report" else ""))
 
 
 @app.command()
@@ -443,17 +448,17 @@ def verify() -> None:
 
 
 class _Progress:
-    """A spinner with the present step on a terminal; what is finished stays as a line, there and elsewhere."""
+    """A spinner with the present step on a terminal; what is finished stays as a line, there and elsewhere. Nothing if `quiet`."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, quiet: bool = False) -> None:
         from rich.console import Console
 
-        self.console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+        self.console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True, quiet=quiet)
         self.status = self.console.status("starting")
         self.status.start()
 
     def __call__(self, stage: str, text: str) -> None:
-        if text.startswith(("done", "kept", "loading", "no pictures", "note", "size")):
+        if text.startswith(("done", "kept", "loading", "no pictures", "note", "size", "going on")):
             self.console.print(f"{stage}: {text}")
         self.status.update(f"{stage}: {text}")
 

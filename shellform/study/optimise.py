@@ -36,10 +36,11 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
 
     def watch(step: mma.Step) -> None:
         said = "" if step.accepted else ", rejected"
+        left = step.seconds / max(step.evaluation, 1) * (entry.evaluations - step.evaluation)
         making.report(
             "optimise",
             f"evaluation {step.evaluation}/{entry.evaluations}: objective {step.objective:.4f}, {step.cables} cables, "
-            f"{100 * step.stage:.0f} % of the additional load{said}",
+            f"{100 * step.stage:.0f} % of the additional load{said}, {left:.0f} s left at most",
         )
 
     problem = case_problem(making.case, shell, loads, start)

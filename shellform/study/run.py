@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import platform
 import time
 from collections.abc import Mapping
 from functools import cache
@@ -33,6 +34,7 @@ from shellform.study.folder import (
     refuse_overwriting,
     save_surface,
 )
+from shellform.study.log import logged
 from shellform.study.pictures import draw_everything
 from shellform.study.shape import net_of, net_summary, surface_of, surface_summary, told_size
 from shellform.study.shell import catalogue_bytes, gridshell, rod_limits
@@ -79,6 +81,8 @@ def run_case(
     summary.setdefault("seconds", {})
     for part in ("designs", "states", "figures", "schedules"):
         made(folder / part)
+    report = logged(folder, report)
+    report("run", f"shellform {shellform.__version__}, Python {platform.python_version()}, up to {until}")
     making = Making(case, folder, report, keys)
     if fresh:
         drop_checkpoint(folder)
@@ -98,6 +102,7 @@ def run_case(
         try:
             results[stage] = steps[stage](making, results, summary, reusable)
         except Exception as error:
+            report(stage, f"ended: {error}")
             if stage not in _SHOWING:
                 raise
             failures[stage], results[stage] = error, False

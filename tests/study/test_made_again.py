@@ -140,3 +140,12 @@ def test_a_fresh_run_takes_no_checkpoint_up(file, tmp_path):
     lines = []
     run_case(case, tmp_path, until="optimise", fresh=True, report=lambda stage, text: lines.append(text))
     assert not any(line.startswith("going on") for line in lines)
+
+
+def test_the_log_tells_every_step_and_how_a_stage_ended(file, tmp_path):
+    with pytest.raises(NotConverged):
+        run_case(load_case(file, ["load.force=1e6"]), tmp_path, until="initial")
+    told = (tmp_path / "log.txt").read_text(encoding="utf-8")
+    assert " run: shellform " in told
+    assert " surface: done in " in told
+    assert " initial: ended: The initial design " in told

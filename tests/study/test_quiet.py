@@ -1,0 +1,49 @@
+"""What the command line prints, and what it completes."""
+
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+
+from tests.study.stubs import CASE
+from tests.study.test_commands import ROOT, shellform
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    place = tmp_path_factory.mktemp("quiet")
+    (place / "dome.toml").write_text(CASE, encoding="utf-8")
+    return place, shellform("design", place / "dome.toml", "--output", place / "run", "--until", "net", "--quiet")
+
+
+def test_quiet_prints_nothing_and_the_log_has_it(made):
+    place, result = made
+    assert (result.returncode, result.stdout, result.stderr) == (0, "", "")
+    assert " net: done in " in (place / "run/log.txt").read_text(encoding="utf-8")
+
+
+def test_json_prints_the_summary_and_nothing_else(made):
+    place, _ = made
+    result = shellform("design", place / "dome.toml", "--output", place / "run", "--until", "net", "--json")
+    assert json.loads(result.stdout) == json.loads((place / "run/summary.json").read_text(encoding="utf-8"))
+    assert "net: kept" in result.stderr
+
+
+def test_new_writes_a_case_that_check_reads(tmp_path):
+    file = tmp_path / "dome.toml"
+    result = shellform("new", ROOT / "surfaces/dome_mm.step", "--output", file)
+    assert result.returncode == 0, result.stderr
+    assert "rod radius" in result.stdout
+    assert shellform("check", file).returncode == 0
+    again = shellform("new", ROOT / "surfaces/dome_mm.step", "--output", file)
+    assert again.returncode == 2
+    assert "is not overwritten" in again.stderr
+
+
+def test_the_shell_completes_commands():
+    wanted = {**os.environ, "_SHELLFORM_COMPLETE": "complete_bash", "COMP_WORDS": "shellform des", "COMP_CWORD": "1"}
+    code = "import sys; sys.argv[0] = 'shellform'; from shellform.cli import main; main()"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=wanted, cwd=ROOT, timeout=60)
+    assert result.stdout.strip() == "design"
