@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import math
 import os
+import signal
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -38,6 +40,7 @@ def session() -> Iterator[None]:
     if gmsh.isInitialized():
         raise InputError("gmsh is already in use in this process", remedy="Call gmsh.finalize() first.")
     gmsh.initialize(argv=[], readConfigFiles=False, interruptible=False)
+    _ignore_broken_pipes()
     try:
         for name, value in [
             ("General.Terminal", 0),
@@ -53,6 +56,12 @@ def session() -> Iterator[None]:
         yield
     finally:
         gmsh.finalize()
+
+
+def _ignore_broken_pipes() -> None:
+    """As Python does from its start, until gmsh undoes it: else the first write to a socket whose other end is gone kills the process."""
+    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 @contextlib.contextmanager

@@ -293,3 +293,16 @@ def test_missing_system_libraries_are_named_in_one_line(tmp_path):
     assert "libGL.so.1" in run.stdout
     assert "apt-get install libgl1 libglu1-mesa" in run.stdout
     assert run.stdout.count("\n") == 1
+
+
+def test_a_broken_pipe_does_not_kill_the_process_after_gmsh_was_at_work():
+    """Gmsh gives SIGPIPE its deadly default back; a study's workers that went away then took the study with them."""
+    code = (
+        "import os; from shellform import cad; cad.build_surface('surfaces/dome.py', size=0.1); "
+        "out, into = os.pipe(); os.close(out)\n"
+        "try: os.write(into, b'x')\n"
+        "except BrokenPipeError: print('told')"
+    )
+    root = Path(__file__).parent.parent.parent
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
+    assert (result.returncode, result.stdout.strip()) == (0, "told")
