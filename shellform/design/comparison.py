@@ -30,12 +30,20 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.design.gridshell import Design
-from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
-from shellform.errors import InputError, NotConverged
+from shellform.design.problem import (
+    FEASIBLE,
+    Evaluator,
+    OffBranch,
+    Point,
+    Problem,
+    follow,
+    not_carried,
+    without_slack,
+)
+from shellform.errors import InputError
 from shellform.structure.loading import Loaded
 
 METHODS = ("trust-constr", "SLSQP")
-FEASIBLE = 1e-3  # largest violation, over the limit, of a design that counts as feasible, as in mma.py
 _KEPT = 12  # points on the branch that are remembered as starts: the last ones and the best
 _STEP = 2e-3  # SciPy's unit, in the variables: a fifth of the usual prestrain, as mma.py's first window is of the tension
 _INSIDE = 1e-6  # of the bounds' distance that an interior point starts away from them
@@ -52,12 +60,7 @@ class Plain:
         reached = self.evaluator.begin()
         for name in self.evaluator.used():
             if not reached[name].on_branch:
-                raise NotConverged(
-                    f"The initial design doesn't carry the load case {name!r}: it loses stability at "
-                    f"{reached[name].share:.2f} of it",
-                    state=reached[name].equilibrium.state,
-                    remedy="Lead it there by stages: mma.optimize.",
-                )
+                raise not_carried(name, reached[name], "Lead it there by stages: mma.optimize.")
         states = {name: reached[name].equilibrium.state for name in self.evaluator.used()}
         point = self.evaluator.seed(start, states, 1.0)
         self.start = point.variables

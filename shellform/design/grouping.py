@@ -19,7 +19,7 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.design.gridshell import Gridshell
 from shellform.errors import InputError
 
-_SYMMETRIES = {"mirror x": (-1.0, 1.0), "mirror y": (1.0, -1.0), "half turn": (-1.0, -1.0)}
+_SYMMETRIES = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))  # signs of x and y in two mirrors and the half turn
 _TOLERANCE = 0.02  # of the spacing, within which a cable's middle has to lie on its image's
 
 
@@ -29,7 +29,7 @@ def symmetric_groups(shell: Gridshell) -> Indices:
     plan = np.ptp(shell.net.crossings[:, :2], axis=0) / 2.0 + shell.net.crossings[:, :2].min(axis=0)
     tree, reach = cKDTree(middle), _TOLERANCE * shell.net.spacing
     count, joined = len(middle), []
-    for sign in _SYMMETRIES.values():
+    for sign in _SYMMETRIES:
         image = middle.copy()
         image[:, :2] = plan + np.array(sign) * (middle[:, :2] - plan)
         away, which = tree.query(image)

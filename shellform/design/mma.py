@@ -31,8 +31,8 @@ from shellform.design.convex import minimise
 from shellform.design.gridshell import Design
 from shellform.design.grouping import averaged
 from shellform.design.optimum import Checkpoint, Optimum, Step
-from shellform.design.problem import Problem
-from shellform.design.search import FEASIBLE, Keep, Search, Watch
+from shellform.design.problem import FEASIBLE, Problem
+from shellform.design.search import Keep, Search, Watch
 from shellform.design.terms import Misfit, Share
 from shellform.structure.threads import dense_on_one
 

@@ -34,6 +34,7 @@ _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five
 _LED = 0.5  # of an additional load, the steps by which it is led
 _FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed …
 _NEAR = 0.02  # … but for one whose root mean square distance is below this share of the target's size
+FEASIBLE = 1e-3  # largest violation, over the limit, of a design that counts as feasible
 _SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
 
 
@@ -115,12 +116,7 @@ class Evaluator:
         for each in reached.values():
             self._count(each.factorisations)
         if not reached[first].on_branch:
-            raise NotConverged(
-                f"The initial design doesn't carry the load case {first!r}: it loses stability at "
-                f"{reached[first].share:.2f} of it",
-                state=reached[first].equilibrium.state,
-                remedy="Choose a denser grid, thicker rods or stiffer cables.",
-            )
+            raise not_carried(first, reached[first], "Choose a denser grid, thicker rods or stiffer cables.")
         state = reached[first].equilibrium.state
         found = [each.equilibrium.state for each in reached.values() if each.on_branch]
         target = self.shell.target.positions
@@ -185,8 +181,8 @@ class Evaluator:
             self.wasted += self.factorisations - before
             raise
 
-    def predicted(self, point: Point, design: Design) -> dict[str, State]:
-        """Where a change of the point's design, with the same cables, takes its states, to first order."""
+    def predicted(self, point: Point, design: Design, *, but: str = "") -> dict[str, State]:
+        """Where a change of the point's design, with the same cables, takes its states, to first order; all `but` one load's."""
         shell, before = self.shell, point.design
         change = (design.rest_length - before.rest_length)[before.present]
         rates = []
@@ -195,6 +191,8 @@ class Evaluator:
             rates = [shell.beams_by_radius(before.radius)]
         assembly, cables, found = self.assembly(before), shell.cables(before), {}
         for name, state in point.states.items():
+            if name == but:
+                continue
             self.factorisations += 1
             columns = by_rest_length(assembly, state, cables), by_stiffness(assembly, state, *rates)
             found[name] = predicted(assembly, respond(assembly, state, *columns), change)
@@ -244,6 +242,15 @@ class Evaluator:
     def _count(self, factorisations: int) -> None:
         self.factorisations += factorisations
         self.equilibria += 1
+
+
+def not_carried(name: str, loaded: Loaded, remedy: str) -> NotConverged:
+    """What to say of an initial design that doesn't bear a load case."""
+    return NotConverged(
+        f"The initial design doesn't carry the load case {name!r}: it loses stability at {loaded.share:.2f} of it",
+        state=loaded.equilibrium.state,
+        remedy=remedy,
+    )
 
 
 def linearise(
@@ -318,13 +325,20 @@ def follow(
     The cases are solved side by side on the cores. With `stay` snap-through isn't followed. Raises NotConverged where no equilibrium is found.
     """
     none = np.zeros((len(shell.net.grid.flat), 6))
-    unloaded = find_equilibrium(assemble(shell.network(design)), shell.target, none)
+    network = shell.network(design)
+    idle = [assemble(network)]  # assemblies that no case is using: each keeps one factor, and the cases go side by side
+    unloaded = find_equilibrium(idle[0], shell.target, none)
 
     def loaded(load: Reals) -> Loaded:
         if not load.any():
             return Loaded(unloaded, 1.0, unloaded.factorisations)
-        # An assembly of its own: the cases go side by side, and an assembly keeps one factor.
-        return apply_load(assemble(shell.network(design)), unloaded.state, none, load, stay=stay)
+        try:
+            own = idle.pop()
+        except IndexError:
+            own = assemble(network)
+        found = apply_load(own, unloaded.state, none, load, stay=stay)
+        idle.append(own)
+        return found
 
     return dict(zip(loads, side_by_side(loaded, list(loads.values())), strict=True))
 

@@ -16,7 +16,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals
 from shellform.design.checks import Softness
 from shellform.design.convex import minimise, minimise_quadratic
-from shellform.design.guard import guard
+from shellform.design.guard import Guard
 from shellform.design.problem import Evaluator, Point, Problem
 from shellform.design.robust import RobustMisfit
 from shellform.design.tensions import TensionModel
@@ -32,8 +32,8 @@ _BRACE = 0.05  # least tension of the cables that are kept while thinning, in me
 @dataclass(frozen=True)
 class Task:
     """What a step is asked for: from the `point` and its `model`, within a `window`, N, `tension` being the start's mean, N, and `base` the
-    first load's name; limits `bounded` by that load's cable forces; cables (c,) that are `braces` and keep a least tension; whether cables
-    are `guarded` under the other loads; whether the softest modes stand in for the objective, `climbing`; `groups` (c,) of cables alike."""
+    first load's name; limits `bounded` by that load's cable forces; cables (c,) that are `braces` and keep a least tension; `guards` of
+    cables that may not go slack under the other loads, none where all may; whether the softest modes stand in for the objective, `climbing`; `groups` (c,) of cables alike."""
 
     evaluator: Evaluator
     point: Point
@@ -43,7 +43,7 @@ class Task:
     tension: float
     bounded: Sequence[AtMost]
     braces: Flags
-    guarded: bool
+    guards: Sequence[Guard]
     climbing: bool
     groups: Indices | None
 
@@ -84,7 +84,7 @@ def propose(task: Task) -> tuple[Reals, float]:
     u: Reals | None
     if task.groups is not None:
         u = _equal_steps(task, width, scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
-    elif task.guarded:
+    elif task.guards:
         u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
         if u is None:  # the guards ask for more than a step can give: they may keep what they have
             u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
@@ -132,9 +132,9 @@ def _equal_steps(
 
 def _stiffening(task: Task) -> Reals:
     """The gradient (s,) of the limits on the softest modes, each as a share of its own size."""
-    rows = split(np.arange(len(task.point.constraints), dtype=float), task.evaluator.problem)
-    own = [k for part, where in zip(task.evaluator.problem.limits, rows, strict=True) if isinstance(part.term, Softness) for k in where.astype(int)]
-    slopes = task.point.constraints_by_variables[own]
+    problem = task.evaluator.problem
+    own = [where for part, where in zip(problem.limits, places(problem), strict=True) if isinstance(part.term, Softness)]
+    slopes = np.vstack([task.point.constraints_by_variables[where] for where in own])
     return np.asarray((slopes / np.linalg.norm(slopes, axis=1)[:, None]).sum(axis=0))
 
 
@@ -144,13 +144,9 @@ def _guarding(task: Task, width: Reals) -> tuple[Reals, Reals]:
     rows, values = [np.zeros((0, len(width)))], [np.zeros(0)]
     shell, design = task.evaluator.problem.shell, task.point.design
     lengths = task.model.variables_by_y[np.flatnonzero(design.present)] * shell.cable_lengths[design.present, None]
-    rates = []
     if task.evaluator.problem.frees_radius:
         lengths = np.vstack([lengths, task.model.variables_by_y[-1] * design.radius / task.point.variables[-1]])
-        rates = [shell.beams_by_radius(design.radius)]
-    for name in task.evaluator.used()[1:] if task.guarded else []:
-        task.evaluator.factorisations += 1
-        held = guard(task.evaluator.assembly(design), task.point.states[name], shell.cables(design), task.tension, *rates)
+    for held in task.guards:
         falls = -(held.tension_by_design @ lengths) * width
         scale = np.abs(falls).sum(axis=1)
         asked = np.minimum((_BRACE * task.tension - held.tension) / scale, _RECOVERY)
@@ -195,12 +191,14 @@ def _box(task: Task) -> tuple[Reals, Reals]:
     return lower, upper
 
 
-def split(values: Reals, problem: Problem) -> list[Reals]:
-    """Constraint values limit by limit."""
-    sizes = []
+def places(problem: Problem) -> list[slice]:
+    """Where each limit's values stand among the constraints."""
+    count = len(problem.shell.cable_ends)
+    found, first = [], 0
     for part in problem.limits:
-        chosen = part.term.chosen if isinstance(part.term, CableForces) else ()
-        sizes.append(
-            1 if not isinstance(part.term, CableForces) else len(problem.shell.cable_ends) if chosen is None else len(chosen)
-        )
-    return np.split(values, np.cumsum(sizes)[:-1]) if sizes else []
+        size = 1
+        if isinstance(part.term, CableForces):
+            size = count if part.term.chosen is None else len(part.term.chosen)
+        found.append(slice(first, first + size))
+        first += size
+    return found

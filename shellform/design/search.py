@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.design.checks import Softness
 from shellform.design.gridshell import Design
 from shellform.design.grouping import averaged
+from shellform.design.guard import Guard, guard
 from shellform.design.optimum import Checkpoint, Optimum, Step
-from shellform.design.problem import Evaluator, OffBranch, Point, Problem, follow, without_slack
-from shellform.design.proposal import Task, propose, split
+from shellform.design.problem import FEASIBLE, Evaluator, OffBranch, Point, Problem, follow, without_slack
+from shellform.design.proposal import Task, places, propose
 from shellform.design.tensions import TensionModel, tension_model
 from shellform.design.terms import AtMost, CableForces, Term
 from shellform.design.thinning import kept_stiffness, spared
@@ -39,8 +40,6 @@ _KEPT = 0.4  # of the stiffness in any direction, at the additional load, that m
 _THINNING = 1.5  # of the objective that cables with little use may cost
 _IDLE = 0.2  # of the cables in a search that may be slack under all loads before they are left out of it
 _REPAIRS = 2  # steps after each batch
-FEASIBLE = 1e-3
-
 
 Watch = Callable[[Step], None]
 Keep = Callable[[Checkpoint], None]
@@ -62,6 +61,9 @@ class Track:
     batch: int = 0
     failures: int = 0
     needed: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+
+_TRACKED = tuple(each.name for each in fields(Track) if each.name != "needed")
 
 
 class Search:
@@ -95,6 +97,7 @@ class Search:
         self.least = 0.0
         self.smallest = SMALLEST
         self._modelled: TensionModel | None = None
+        self._guarded: tuple[Point, list[Guard]] | None = None
         self.most_cables: int | None = None
         self.groups: Indices | None = None  # of the present cables, with one rest length each
         self.climbing = False  # the softest modes stand in for the objective
@@ -123,10 +126,10 @@ class Search:
         """First the branch up to the additional loads, then the objective alone, then thinning."""
         self.most = evaluations
         if self.track.phase == "climb":
-            self._climb(evaluations)
+            self._climb()
             self.track = replace(self.track, phase="descend")
         if self.track.phase == "descend":
-            self._descend(evaluations)
+            self._descend()
             while self.accepted:
                 sound = self._sound(self.accepted[-1])
                 if sound is not None:
@@ -136,8 +139,12 @@ class Search:
             if self.accepted and thin:
                 self._begin_thinning()
         if self.track.phase == "thin":
-            self._thin(evaluations)
+            self._thin()
         return self._finish()
+
+    def _left(self) -> int:
+        """Design evaluations that are left."""
+        return self.most - self.evaluator.evaluations
 
     def _told(self) -> None:
         """Hands out where the search stands."""
@@ -148,7 +155,7 @@ class Search:
         counted = self.evaluator
         numbers = {name: getattr(self, name) for name in _NUMBERS}
         numbers |= {name: getattr(counted, name) for name in _COUNTS}
-        numbers |= {name: getattr(self.track, name) for name in ("phase", "first", "refused", "before", "thrifty", "batch", "failures")}
+        numbers |= {name: getattr(self.track, name) for name in _TRACKED}
         design = self.point.design
         arrays = {"rest_length": design.rest_length, "present": design.present, "braces": self.braces, "needed": self.track.needed}
         for name, state in self.point.states.items():
@@ -167,12 +174,11 @@ class Search:
         self.point = self.evaluator.seed(design, states, self.stage)
         for name in _COUNTS:
             setattr(self.evaluator, name, numbers[name])
-        own = ("phase", "first", "refused", "before", "thrifty", "batch", "failures")
-        self.track = Track(**{name: numbers[name] for name in own}, needed=np.array(arrays["needed"]))
+        self.track = Track(**{name: numbers[name] for name in _TRACKED}, needed=np.array(arrays["needed"]))
         self.accepted, self.history = [self.point], list(checkpoint.history)
         self.began -= self.history[-1].seconds
 
-    def _climb(self, evaluations: int) -> None:
+    def _climb(self) -> None:
         """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the additional loads are borne whole.
 
         Each goes along the gradient of the limits on it, with all cables kept taut; it counts where the stable branch reaches farther.
@@ -180,7 +186,7 @@ class Search:
         if self.stage == 1.0 or self.least == 0.0:
             return
         self.guarded = self.climbing = True
-        while self.stage < 1.0 and self.evaluator.evaluations < evaluations and self.window > self.smallest * self.tension:
+        while self.stage < 1.0 and self._left() > 0 and self.window > self.smallest * self.tension:
             self._told()
             model = self._model()
             y, _ = propose(self._task(model))
@@ -196,17 +202,18 @@ class Search:
             self.history.append(self._record(self.point, True))
         self.window, self.guarded, self.climbing = self.track.first, self.always_guarded, False
 
-    def _descend(self, evaluations: int) -> None:
+    def _descend(self) -> None:
         """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none may; and so in turns
         as long as a turn improves the objective."""
         track = self.track
-        while self.evaluator.evaluations < evaluations:
+        while self._left() > 0:
             self.track = track
             self._told()
             model = self._model()
             y, predicted = propose(self._task(model))
-            self.status = self._settled(predicted) or self.status
-            if self._settled(predicted):
+            settled = self._settled(predicted)
+            if settled:
+                self.status = settled
                 turned = self.guarded and self.point.objective > (1.0 - _SETTLED) * track.before
                 if self.always_guarded or turned or len(self.evaluator.used()) == 1:  # without additional loads there are no guards
                     return
@@ -246,14 +253,14 @@ class Search:
             needed=np.zeros(len(self.braces), dtype=bool),
         )
 
-    def _thin(self, evaluations: int) -> None:
+    def _thin(self) -> None:
         """Takes away cables that the shell can spare (thinning.py), in batches, and lets the others make up for them.
 
         Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or that costs too
         much of the objective, is cut; a single cable that can't go is kept for good.
         """
         track = self.track
-        while track.failures < _FAILURES and self.evaluator.evaluations < evaluations:
+        while track.failures < _FAILURES and self._left() > 0:
             self.track = self._without_slack(track)
             track = self.track
             self._told()
@@ -303,7 +310,7 @@ class Search:
     def _repair(self, point: Point, budget: float) -> Point:
         """A few steps with the cables that are left, none of which may go slack."""
         before, self.point = self.point, point
-        for _ in range(min(_REPAIRS, self.most - self.evaluator.evaluations)):
+        for _ in range(min(_REPAIRS, self._left())):
             model = self._model()
             y, _ = propose(self._task(model))
             trial = self._try(model, y)
@@ -371,6 +378,18 @@ class Search:
             frees_radius=self.problem.frees_radius,
         )
 
+    def _guards(self) -> list[Guard]:
+        """Of the present point under the additional loads, made once for each, and none while cables may go slack."""
+        if not self.guarded:
+            return []
+        if self._guarded is None or self._guarded[0] is not self.point:
+            shell, design = self.problem.shell, self.point.design
+            rates = [shell.beams_by_radius(design.radius)] if self.problem.frees_radius else []
+            assembly, cables = self.evaluator.assembly(design), shell.cables(design)
+            names = [name for name in self.evaluator.used() if name != self.base]
+            self._guarded = (self.point, [guard(assembly, self.point.states[name], cables, self.tension, *rates) for name in names])
+        return self._guarded[1]
+
     def _task(self, model: TensionModel) -> Task:
         return Task(
             self.evaluator,
@@ -381,7 +400,7 @@ class Search:
             self.tension,
             self.bounded,
             self.braces,
-            self.guarded,
+            self._guards(),
             self.climbing,
             self.groups,
         )
@@ -392,7 +411,7 @@ class Search:
             rest = design.rest_length.copy()
             rest[design.present] = averaged(rest[design.present], self.groups, np.ones(len(self.groups), dtype=bool))
             design = replace(design, rest_length=rest)
-        near = {**self.evaluator.predicted(self.point, design), self.base: model.predicted(y)}
+        near = {**self.evaluator.predicted(self.point, design, but=self.base), self.base: model.predicted(y)}
         try:
             return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage, lead=not self.guarded)
         except OffBranch:
@@ -459,13 +478,11 @@ class Search:
     def _record(self, point: Point, accepted: bool) -> Step:
         problem = self.evaluator.problem
         pull = self._tensions(point)
-        terms = {
-            self._name(part.term): float(value) for part, value in zip(problem.minimize, point.terms, strict=True)
-        }
+        terms = {self._name(part.term): float(value) for part, value in zip(problem.minimize, point.terms, strict=True)}
         constraints = {self._name(part.term): float(pull.max(initial=0.0)) / part.limit - 1.0 for part in self.bounded}
         constraints |= {
-            self._name(part.term): float(value.max())
-            for part, value in zip(problem.limits, split(point.constraints, problem), strict=True)
+            self._name(part.term): float(point.constraints[own].max())
+            for part, own in zip(problem.limits, places(problem), strict=True)
         }
         step = Step(
             self.evaluator.evaluations,
