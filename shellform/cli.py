@@ -243,7 +243,7 @@ def analyse(
     if output is None:
         print(text)
     else:
-        from shellform.study.case import write_text
+        from shellform.written import write_text
 
         write_text(output, text)
     if figures is not None:

@@ -9,6 +9,7 @@ PACKAGE = Path(__file__).parent.parent / "shellform"
 FLOORS = {"errors": -1, "compiled": -1, "arrays": 0, "written": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "notebook": 5, "study": 5, "cli": 6}
 DOORS = {
     "binpacking": {"output/nesting.py"},
+    "jinja2": {"output/template.py"},
     "ezdxf": {"output/drawings.py"},
     "openpyxl": {"output/tables.py"},
     "gmsh": {"surface/occ.py"},
@@ -28,7 +29,7 @@ DOORS = {
     "pyarrow": {"study/store.py"},
     "optuna": {"study/search.py"},
 }
-NOT_LOADED = ["ezdxf", "openpyxl", "gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "pyarrow", "optuna", "numba", "scipy", "numpy"]
+NOT_LOADED = ["jinja2", "ezdxf", "openpyxl", "gmsh", "meshio", "rhino3dm", "nlopt", "pyvista", "vtk", "matplotlib", "PIL", "IPython", "dask", "pyarrow", "optuna", "numba", "scipy", "numpy"]
 
 
 def imports(path: Path) -> list[str]:

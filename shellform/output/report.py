@@ -9,16 +9,13 @@ page's own policy refuses every script but its own and every request.
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 
 from shellform.arrays import Reals
 from shellform.design.catalogue import label
@@ -28,6 +25,7 @@ from shellform.errors import InputError
 from shellform.output import charts, verdict
 from shellform.output.colours import VIRIDIS
 from shellform.output.embed import Picture
+from shellform.output.template import filled, part
 from shellform.structure.state import State
 from shellform.surface.target import Surface
 
@@ -75,25 +73,20 @@ def html(entries: Sequence[Entry], versions: Mapping[str, str]) -> str:
     if not entries:
         raise InputError("there is no run to report", where="report", remedy="Name one or more run folders.")
     runs = [_told(entry, number) for number, entry in enumerate(entries)]
-    script = "(() => {\n" + "\n".join(_part(name) for name in _SCRIPTS) + "\n})();"
-    data = {"viridis": VIRIDIS, "runs": [_drawn(entry) for entry in entries]}
-    environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["number"] = verdict.number
-    return environment.from_string(_part("page.html")).render(
-        runs=runs,
-        differences=_differences(entries),
-        versions=versions,
+    return filled(
+        "page.html",
+        {
+            "runs": runs,
+            "differences": _differences(entries),
+            "versions": versions,
+            "gradient": ", ".join(f"rgb{colour}" for colour in VIRIDIS),
+        },
         generator=GENERATOR,
-        style=_part("style.css"),
-        script=script,
-        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
-        gradient=", ".join(f"rgb{colour}" for colour in VIRIDIS),
+        style=part("style.css"),
+        script="(() => {\n" + "\n".join(part(name) for name in _SCRIPTS) + "\n})();",
+        data={"viridis": VIRIDIS, "runs": [_drawn(entry) for entry in entries]},
+        number=verdict.number,
     )
-
-
-def _part(name: str) -> str:
-    return resources.files("shellform.output").joinpath("page", name).read_text(encoding="utf-8")
 
 
 def _told(entry: Entry, number: int) -> dict[str, Any]:

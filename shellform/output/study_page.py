@@ -6,21 +6,17 @@ elsewhere: the template escapes them, the JSON has no "<", and the page's own po
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from importlib import resources
 from typing import Any
 
 import numpy as np
-from jinja2 import Environment, StrictUndefined
 
 from shellform.arrays import Reals
 from shellform.design.gridshell import Gridshell
 from shellform.design.problem import deviations
+from shellform.output.template import filled, part
 from shellform.structure.state import State
 
 MOST_ROWS = 4000  # that are drawn; the front is always among them
@@ -76,27 +72,26 @@ def study_page(sheet: Sheet) -> str:
             str(row["number"]): sheet.links[row["key"]] for row in sheet.rows if row["key"] in sheet.links
         },
     }
-    script = _part("study.js")
-    environment = Environment(
-        autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
-    environment.filters["number"] = told
     shown = {row["key"]: row for row in reversed(sheet.rows)}
     failed: dict[str, int] = {}
     for row in sheet.rows:
         if row["status"] != "done":
             words = f"{row['status']}: {row['reason']}"
             failed[words] = failed.get(words, 0) + 1
-    return environment.from_string(_part("study.html")).render(
-        sheet=sheet,
-        cards=[shown[key] for key in sheet.best if key in shown],
-        names=names,
-        failed=sorted(failed.items(), key=lambda each: -each[1])[:20],
-        style=_part("study.css"),
-        script=script,
-        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        data=json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
-        shade=_shade,
+    return filled(
+        "study.html",
+        {
+            "sheet": sheet,
+            "cards": [shown[key] for key in sheet.best if key in shown],
+            "names": names,
+            "failed": sorted(failed.items(), key=lambda each: -each[1])[:20],
+            "shade": _shade,
+        },
+        generator="shellform study",
+        style=part("study.css"),
+        script=part("study.js"),
+        data=data,
+        number=told,
     )
 
 
@@ -191,7 +186,3 @@ def _number(value: Any) -> float | int | None:
 def _shade(value: float) -> str:
     """How strongly a correlation is coloured."""
     return f"{abs(value):.2f}"
-
-
-def _part(name: str) -> str:
-    return resources.files("shellform.output").joinpath("page", name).read_text(encoding="utf-8")

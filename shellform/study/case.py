@@ -42,7 +42,6 @@ from shellform.study.entries import (
     StockRodEntry,
     SurfaceEntry,
 )
-from shellform.written import write_text as write_text  # studies take it from here
 
 
 class Case(Section):

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError
-from shellform.study.case import write_text
 from shellform.study.check import surface_entry
 from shellform.study.run import surface_of, told_size
 from shellform.surface.target import largest_curvature
+from shellform.written import write_text
 
 _SPACING, _RADIUS = 0.055, 0.001  # m, of the paper's scale model
 _AREA = 0.56  # m², of its surface

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import InputError
-from shellform.study.case import write_text
+from shellform.written import write_text
 
 CRASHED = "crashed"
 """Status of a design that took its worker down: not final, a later call tries again."""

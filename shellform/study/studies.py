@@ -27,7 +27,7 @@ from typing import Any
 
 import shellform
 from shellform.errors import InputError, NotConverged
-from shellform.study.case import Case, check_script, write_text
+from shellform.study.case import Case, check_script
 from shellform.study.front import Front, signed
 from shellform.study.job import NO_ROOM, Job, Outcome, disk_is_full, locked, work
 from shellform.study.plan import Plan, Value, changes, length, read_study, resolved
@@ -35,6 +35,7 @@ from shellform.study.run import STAGES, stage_keys
 from shellform.study.sheet import write_study_page
 from shellform.study.store import Log, designs_of, flat, picked, write_table
 from shellform.study.sweep import Engine, Work, engine, sweep
+from shellform.written import write_text
 
 _SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
 _LATEST = 12  # rows shown
