@@ -77,6 +77,7 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.worker.preload": [_QUIET] if processes else [],
         "distributed.worker.daemon": False,  # surface readers are processes of their own
+        "distributed.worker.profile.enabled": False,  # it keeps some 0.6 MB for each second of work, for an hour
         "distributed.worker.memory.target": False,
         "distributed.worker.memory.spill": False,
         "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
