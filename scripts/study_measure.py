@@ -11,6 +11,7 @@ Ratios are taken between turns of the same run, since machines are shared: what 
 from __future__ import annotations
 
 import argparse
+import asyncio
 import random
 import statistics
 import sys
@@ -46,9 +47,10 @@ def nothing(job: Job, before: Outcome | None = None) -> Outcome:
     return {"key": job.key, "status": "done", "reason": "", "summary": summary, "seconds": {}, "worker": ""}
 
 
-def asleep(job: Job, before: Outcome | None = None) -> Outcome:
-    """As `nothing`, after the seconds that the case names its spacing."""
-    time.sleep(job.case.net.spacing)
+async def asleep(job: Job, before: Outcome | None = None) -> Outcome:
+    """As `nothing`, after about the seconds that the case names its spacing: a thread for each of a thousand workers would keep the
+    machine busy with handing the interpreter around."""
+    await asyncio.sleep(job.case.net.spacing * random.uniform(0.5, 1.5))
     return nothing(job)
 
 
@@ -146,7 +148,13 @@ def table(rows: int) -> None:
 
 
 def many(workers: int, seconds: float) -> None:
-    """Designs a second that the scheduler, the study's loop and the store can take from so many workers."""
+    """Designs a second that the scheduler, the study's loop and the store can take from so many workers.
+
+    What each worker does for itself several times a second, to look at its memory and its clock, would be done by this process for all.
+    """
+    import dask
+    import distributed  # noqa: F401 (it adds its own settings, before ours)
+
     from shellform.study.store import Log, flat
     from tests.study.stubs import study_file
 
@@ -154,19 +162,23 @@ def many(workers: int, seconds: float) -> None:
     case = load_case(study_file(place, "").with_name("dome.toml"))
     entry = case.net.model_copy(update={"spacing": seconds})
     case = case.model_copy(update={"net": entry})
-    with engine(workers=workers, processes=False) as on, Log(place / "results.jsonl") as log:
+    own = {"distributed.admin.system-monitor.interval": "1h", "distributed.admin.tick.interval": "10s"}
+    with dask.config.set(own), engine(workers=workers, processes=False) as on, Log(place / "results.jsonl") as log:
         count, began, used, store = 0, time.perf_counter(), time.process_time(), 0.0
-        total = max(300, 3 * workers)
+        total = max(300, 6 * workers)
+        came: list[float] = []
         for batch in sweep(on, (Job(f"{k:032d}", case, "net", "") for k in range(total)), asleep):
             before = time.perf_counter()
             log.add([{**outcome, "values": flat(outcome["summary"])} for outcome in batch])
             store += time.perf_counter() - before
             count += len(batch)
+            came += [time.perf_counter()] * len(batch)
         spent, used = time.perf_counter() - began, time.process_time() - used
+    middle = came[count // 4 : 3 * count // 4]  # all workers have begun, and none has run out of designs
     print(
-        f"{workers} workers, designs of {seconds:g} s: {count / spent:.0f} designs a second of {workers / seconds:.0f} possible; "
-        f"store {1e3 * store / count:.2f} ms a design, engine {1e3 * (spent - store) / count:.2f} ms, "
-        f"processor time of all {1e3 * used / count:.2f} ms"
+        f"{workers} workers, designs of {seconds:g} s: {len(middle) / (middle[-1] - middle[0]):.0f} designs a second in the middle half, of "
+        f"{workers / seconds:.0f} possible; {count} in {spent:.1f} s; store {1e3 * store / count:.2f} ms a design, "
+        f"processor time of engine and workers {1e3 * used / count:.2f} ms"
     )
 
 

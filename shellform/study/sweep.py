@@ -97,6 +97,7 @@ def engine(*, workers: int | None = None, scheduler: str | None = None, processe
         cluster = LocalCluster(
             n_workers=workers or _cores(),
             threads_per_worker=1,
+            memory_limit="auto" if processes else None,  # in one process each would take the whole one for its own
             processes=processes,
             host="127.0.0.1" if processes else None,
             security=processes or None,  # certificates of its own, in memory: nobody else on the machine can send it work
@@ -142,9 +143,10 @@ def _pass(engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, 
         if time.monotonic() > asked + _RECOUNT:
             threads, asked = max(1, sum(client.nthreads().values())), time.monotonic()
         room = _AHEAD * threads - len(running)
-        fresh = [(job, _submit(client, job, work, shared)) for job in itertools.islice(waiting, max(0, room))]
-        running |= {future.key: (job, future) for job, future in fresh}
-        finished.update([future for _, future in fresh])
+        fresh = list(itertools.islice(waiting, max(0, room)))
+        futures = _submit(client, fresh, work, shared)
+        running |= {future.key: (job, future) for job, future in zip(fresh, futures, strict=True)}
+        finished.update(futures)
         if not running:
             return
         batch = finished.next_batch(block=True)
@@ -171,15 +173,26 @@ def _gathered(client: Any, ended: list[tuple[Job, Any]], died: Callable[[Job, st
         return done
 
 
-def _submit(client: Any, job: Job, work: Work, shared: dict[str, list[Any]]) -> Any:
-    """Hands out a job. Each handing out has a name of its own: Dask remembers what failed by name."""
+def _submit(client: Any, jobs: list[Job], work: Work, shared: dict[str, list[Any]]) -> list[Any]:
+    """Hands out jobs, all in one message: what a message costs the client and the scheduler is the first limit of a large cluster.
+
+    Each handing out has a name of its own: Dask remembers what failed by name.
+    """
+    befores = [_begun(client, job, work, shared) for job in jobs]
+    names = [f"design-{job.key}-{uuid.uuid4().hex}" for job in jobs]
+    handed: list[Any] = client.map(work, jobs, befores, key=names, pure=False) if jobs else []
+    return handed
+
+
+def _begun(client: Any, job: Job, work: Work, shared: dict[str, list[Any]]) -> Any:
+    """The last job that a job builds on, handed out unless it already was."""
     before = None
     for each in job.before:
         if each.key not in shared:
             shared[each.key] = [client.submit(work, each, before, key=f"stage-{each.key}-{uuid.uuid4().hex}"), 0]
         shared[each.key][1] += 1
         before = shared[each.key][0]
-    return client.submit(work, job, before, key=f"design-{job.key}-{uuid.uuid4().hex}")
+    return before
 
 
 def _crashed(job: Job, reason: str) -> Outcome:
