@@ -1,6 +1,7 @@
 """What a study costs besides its designs: one command, a few numbers each.
 
     scripts/study_measure.py soak [--designs 200]     real small designs on two workers and on one, in turns: throughput, memory over time
+    scripts/study_measure.py thousand [--designs 1000] a whole study of a small dome, 1,500 freedoms, 15 evaluations each
     scripts/study_measure.py overhead                 the engine's time a design, with designs that take none
     scripts/study_measure.py table [--rows 100000]    a table of so many rows: written, opened, filtered
     scripts/study_measure.py many [--workers 1000]    so many workers in one process, with designs that sleep: what limits them
@@ -78,7 +79,7 @@ def soak(count: int) -> None:
         all_found: dict[str, list[Outcome]] = {"one": [], "two": []}
         first = 0
         while len(all_found["two"]) < count:
-            for name, on, number in (("one", one, 4), ("two", two, 16)):
+            for name, on, number in (("one", one, 8), ("two", two, 32)):  # long turns: at the end of each a worker waits for the other
                 rate, found = turn(on, first, number)
                 first += number
                 rates[name].append(rate)
@@ -93,6 +94,37 @@ def soak(count: int) -> None:
         quarter = len(memory) // 4
         early, late = statistics.median(memory[quarter : 2 * quarter]), statistics.median(memory[-quarter:])
         print(f"memory of a worker: {early:.0f} MB in the second quarter, {late:.0f} MB in the last, {max(memory):.0f} MB at most")
+
+
+def thousand(count: int) -> None:
+    """A study by its command's function, from the study file to the page."""
+    from shellform.study.store import read_table
+    from shellform.study.studies import run_study
+    from tests.study.stubs import study_file
+
+    place = Path(tempfile.mkdtemp(prefix="study_thousand"))
+    text = f"""
+method = "latin"
+count = {count}
+keep = "best"
+[set]
+net.spacing = 0.102
+optimise.evaluations = 15
+optimise.unloaded = false
+[vary]
+cable.stiffness = {{ low = 100, high = 400, scale = "log" }}
+load.force = {{ low = 1.6, high = 2.2 }}
+optimise.misfit = {{ low = 0.3, high = 0.9 }}
+[function]
+optimise.cable_force = "1 - optimise.misfit"
+"""
+    file = study_file(place, text)
+    began = time.perf_counter()
+    found = run_study(file, place / "out", workers=2)
+    spent = time.perf_counter() - began
+    rows = read_table(place / "out", ["model.freedoms"]).to_pydict()
+    freedoms = max(each for each in rows["model.freedoms"] if each)
+    print(f"{found.designs} designs of {freedoms:g} freedoms in {spent / 60:.1f} minutes, {found.failed} without a result: {place / 'out'}")
 
 
 def overhead() -> None:
@@ -185,14 +217,16 @@ def many(workers: int, seconds: float) -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs one of them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=["soak", "overhead", "table", "many"])
-    parser.add_argument("--designs", type=int, default=200)
+    parser.add_argument("what", choices=["soak", "thousand", "overhead", "table", "many"])
+    parser.add_argument("--designs", type=int, default=None)
     parser.add_argument("--rows", type=int, default=100_000)
     parser.add_argument("--workers", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=1.0)
     asked = parser.parse_args(arguments)
     if asked.what == "soak":
-        soak(asked.designs)
+        soak(asked.designs or 200)
+    elif asked.what == "thousand":
+        thousand(asked.designs or 1000)
     elif asked.what == "overhead":
         overhead()
     elif asked.what == "table":

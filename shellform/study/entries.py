@@ -205,6 +205,8 @@ class OptimiseEntry(Section):
     symmetric: bool = Field(False, description="cables that a symmetry of the net joins are polished to one length")
     polish: int = Field(20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none")
 
+    unloaded: bool = Field(True, description="also make the design without regard to the loads, to compare with (paper, section 4.1)")
+
     @model_validator(mode="after")
     def _whole(self) -> OptimiseEntry:
         total = self.misfit + self.cable_force + self.rod_radius + self.robust

@@ -25,7 +25,7 @@ from shellform.written import write_text
 
 
 def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summary: dict[str, Any]) -> None:
-    """Makes the designs "optimised", "rounded" and "polished", as the case asks for them, and "unloaded", and adds to the summary what came of it.
+    """Makes the designs "optimised", "rounded", "polished" and "unloaded", as the case asks for them, and adds to the summary what came of it.
 
     Raises InputError and NotConverged as `mma.optimize`.
     """
@@ -91,21 +91,9 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
         told = robustness(making.case.robust, found.problem.shell, found.design, found.states["design"], loads["design"])
         summary["robust"] = {"design": name, **told.summary()}
         write_text(making.path("schedules/robust.csv"), told.table())
-    making.report("optimise", "the design without regard to the loads")
-    unloaded = mma.optimize(
-        Problem(
-            shell,
-            {"none": loads["none"]},
-            [Share(1.0, Misfit("none"))],
-            [AtMost(cable.force_max, CableForces("none"))],
-            entry.rest_length_min,
-            entry.rest_length_max,
-        ),
-        start,
-        evaluations=15,
-        thin=False,
-    )
-    keep(making, shell, "unloaded", unloaded.design, followed(shell, unloaded.design, loads), loads, summary)
+    if entry.unloaded:
+        unloaded = _without_loads(making, shell, start, loads["none"])
+        keep(making, shell, "unloaded", unloaded, followed(shell, unloaded, loads), loads, summary)
     summary["optimisation"] = {
         "objective_start": best.objective_start,
         "objective_end": best.objective,
@@ -139,6 +127,23 @@ def _came_of(making: Making, design: Design, groups: Indices | None) -> dict[str
         alike = all(np.ptp(lengths[numbers == each]) <= 1e-9 for each in np.unique(numbers))
         found["symmetric"] = {"groups": len(np.unique(numbers)), "kept": alike}
     return found
+
+
+def _without_loads(making: Making, shell: Gridshell, start: Design, none: Reals) -> Design:
+    """The design of the best fit of the unloaded shape, with forces within the cables' limit."""
+    from shellform.design import mma
+
+    making.report("optimise", "the design without regard to the loads")
+    entry, cable = making.case.optimise, making.case.cable
+    problem = Problem(
+        shell,
+        {"none": none},
+        [Share(1.0, Misfit("none"))],
+        [AtMost(cable.force_max, CableForces("none"))],
+        entry.rest_length_min,
+        entry.rest_length_max,
+    )
+    return mma.optimize(problem, start, evaluations=15, thin=False).design
 
 
 def _rounded(making: Making, best: Optimum, start: Design, loads: Mapping[str, Reals], summary: dict[str, Any]) -> Optimum | None:
