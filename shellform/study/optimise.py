@@ -61,7 +61,7 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
     )
     forget(making, ("unloaded", "optimised", "rounded", "polished"), summary)
     built = {"optimised": best}
-    keep(making, shell, "optimised", best.design, followed(shell, best.design, loads), loads, summary)
+    keep(making, shell, "optimised", best.design, {each: best.loaded[each] for each in loads}, loads, summary)
     write_text(making.path("history.csv"), history_text(best.history))  # whatever comes after
     rounded = _rounded(making, best, start, loads, summary) if problem.frees_radius and entry.rounded else None
     if rounded is not None:

@@ -1,4 +1,4 @@
-"""The page of a study folder, from its table and the runs that were kept."""
+"""The page of a study folder, from its table and the runs that were kept; the best of these get a page of their own to be linked to."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from shellform.errors import InputError
 from shellform.output.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
 from shellform.study.folder import read_run
 from shellform.study.front import Front, signed
+from shellform.study.page import FILE, write_page
 from shellform.study.plan import Plan
 from shellform.study.store import read_table
 from shellform.written import write_text
@@ -69,13 +70,12 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
 
 
 def _link(folder: Path, key: str) -> str:
-    page = folder / "runs" / key / "report.html"
-    return f"runs/{key}/report.html" if page.is_file() else f"runs/{key}/"
+    return f"runs/{key}/{FILE}" if (folder / "runs" / key / FILE).is_file() else f"runs/{key}/"
 
 
 def _pictures(folder: Path, keys: list[str]) -> tuple[dict[str, str], float]:
     """A thumbnail of the last design of each kept run under its design load, all in the same colours, and the distance at which these
-    end, m; none of runs that stopped before."""
+    end, m; none of runs that stopped before. Runs that have no page yet get one."""
     seen: dict[str, tuple[Any, Any]] = {}
     limit = 0.0
     for key in keys:
@@ -83,6 +83,8 @@ def _pictures(folder: Path, keys: list[str]) -> tuple[dict[str, str], float]:
             run = read_run(folder / "runs" / key)
         except InputError:
             continue
+        if not (run.folder / FILE).exists():
+            write_page([run], run.folder / FILE)
         state = run.states[run.best]["design"]
         seen[key] = run.shell, state
         limit = max(limit, float(deviations(run.shell, state).max()))

@@ -4,6 +4,7 @@ import csv
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -348,6 +349,10 @@ def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(t
     run_study(alone, tmp_path / "alone/out")
     mine, theirs = rows(tmp_path / "out")[3], rows(tmp_path / "alone/out")[0]
     assert {name: mine[name] for name in ("key", "misfit", "cables")} == {name: theirs[name] for name in ("key", "misfit", "cables")}
+    # The page links to a page of each of the best.
+    linked = set(re.findall(r'href="(runs/[^"]+)"', (tmp_path / "out/study.html").read_text()))
+    assert linked
+    assert all("Optimised" in (tmp_path / "out" / page).read_text() for page in linked)
     kept = read_run(tmp_path / "out/runs" / mine["key"])
     assert kept.summary["designs"]["optimised"]["cables"] == int(mine["cables"])
     # A folder that a machine left damaged when it was switched off is done anew.

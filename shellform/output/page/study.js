@@ -121,6 +121,8 @@ function pick(row) {
   told.textContent = `Design ${row.number}${row.front ? ", on the front" : ""}: ` + data.names.map((name, k) => `${label(k)} ${number(row.values[k])}`).join(", ") + " ";
   const link = data.links[row.number];
   if (link) { const a = document.createElement("a"); a.href = link; a.textContent = "open it"; told.append(a); }
+  const picture = document.querySelector(`#design-${row.number} svg`);
+  if (picture) told.prepend(picture.cloneNode(true));
   mark();
 }
 
