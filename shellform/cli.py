@@ -316,7 +316,9 @@ def study(
     with Live() as live:
         found = run_study(file, output, workers=workers, scheduler=scheduler, allow_scripts=allow_scripts, show=live)
     failed = f", {found.failed} of them without a result (see status and reason)" if found.failed else ""
-    print(f"{found.designs} designs, {found.found} found from before{failed}: {found.table}")
+    for name in found.empty:
+        print(f"shellform: note: no design has a value for the column {name!r}: is its path in summary.json?", file=sys.stderr)
+    print(f"{found.designs} designs, {found.found} found from before{failed}: {found.table}, {found.page}")
 
 
 @app.command()

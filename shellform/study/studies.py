@@ -62,12 +62,15 @@ Show = Callable[[Progress], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """What a study ended with: counts of designs, those `found` in the folder from before, and the table."""
+    """What a study ended with: counts of designs, those `found` in the folder from before, the columns that are `empty` in all designs
+    with a result (a path that no summary has, perhaps misspelt), the table and the page."""
 
     designs: int
     failed: int
     found: int
+    empty: tuple[str, ...]
     table: Path
+    page: Path
 
 
 @dataclass(frozen=True)
@@ -299,16 +302,20 @@ def _drop(folder: Path) -> None:
 def _finish(study: _Studying) -> Finding:
     plan = study.plan
     write_table(study.folder, study.log, plan.study.column)
-    write_study_page(study.folder, plan)
+    page = write_study_page(study.folder, plan)
     if plan.study.keep == "none":
         _drop(study.folder / "stages")
     failed, reason, count = 0, "", 0
+    empty = set(plan.study.column)
     keys = [design["key"] for design in designs_of(study.folder / "designs.jsonl")]
     for row in study.log.rows(keys):
         count += 1
         if row is None or row["status"] != "done":
             failed += 1
             reason = reason or ("" if row is None else f"{row['status']}: {row['reason']}")
+        elif empty:
+            empty -= {name for name, value in picked(row["values"], plan.study.column).items() if value is not None}
     if failed == count:
         raise NotConverged(f"None of {count} designs has a result. The first was {reason}")
-    return Finding(count, failed, sum(study.log.old(key) for key in set(keys)), study.folder / "table.parquet")
+    found = sum(study.log.old(key) for key in set(keys))
+    return Finding(count, failed, found, tuple(name for name in plan.study.column if name in empty), study.folder / "table.parquet", page)

@@ -270,6 +270,13 @@ def test_two_studies_do_not_work_in_one_folder(tmp_path, on_two):
         run_study(file, tmp_path / "out", work=quick)
 
 
+def test_columns_that_no_summary_has_are_named(tmp_path, on_two):
+    text = '[vary]\nnet.spacing = [0.10, 0.12]\n[column]\ncables = "designs.best.cables"\nmisspelt = "designs.best.cablez"\n'
+    found = run_study(study_file(tmp_path, text), tmp_path / "out", work=quick)
+    assert found.empty == ("misspelt",)
+    assert found.page.is_file()
+
+
 def test_a_study_without_any_result_says_so(tmp_path, on_two):
     with pytest.raises(NotConverged, match=r"None of 1 designs.*it can't be built"):
         run_study(study_file(tmp_path, "[vary]\nnet.spacing = [0.3]\n"), tmp_path / "out", work=quick)
