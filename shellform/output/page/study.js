@@ -35,7 +35,7 @@ function ticks(low, high) {
 const number = (v) => (typeof v !== "number" ? "–" : String(Number(v.toPrecision(4))).replace("-", "−"));
 
 function scatter() {
-  const box = document.getElementById("scatter"), form = document.forms[0], W = 900, H = 460, L = 84, R = 16, T = 14, B = 48;
+  const box = document.getElementById("scatter"), form = document.forms[0], W = 900, H = 460, L = 84, R = 32, T = 14, B = 48;
   const kx = Number(form.x.value), ky = Number(form.y.value), [x0, x1] = pad(extent(kx)), [y0, y1] = pad(extent(ky));
   const x = (v) => L + ((v - x0) / (x1 - x0)) * (W - L - R), y = (v) => H - B - ((v - y0) / (y1 - y0)) * (H - T - B);
   const svg = node("svg", { viewBox: `0 0 ${W} ${H}`, role: "img", "aria-label": `${label(ky)} over ${label(kx)}` });
@@ -45,7 +45,7 @@ function scatter() {
   node("text", { class: "title", transform: `translate(14 ${(T + H - B) / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, label(ky));
   const drawn = rows.filter((row) => typeof row.values[kx] === "number" && typeof row.values[ky] === "number");
   const front = drawn.filter((row) => row.front).sort((a, b) => a.values[kx] - b.values[kx]);
-  if (front.length > 1 && data.goals.includes(data.names[kx]) && data.goals.includes(data.names[ky])) {
+  if (front.length > 1 && data.goals.length === 2 && data.goals.includes(data.names[kx]) && data.goals.includes(data.names[ky])) {
     node("polyline", { class: "step", points: front.map((row) => `${x(row.values[kx])},${y(row.values[ky])}`).join(" ") }, svg);
   }
   for (const row of [...drawn.filter((each) => !each.front), ...front]) {
