@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from shellform import cli
 from shellform.study.run import STAGES
 
 ROOT = Path(__file__).parent.parent.parent
@@ -160,6 +161,21 @@ def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
     assert "Traceback" not in said
     again = shellform("design", "scripts/scale_model.toml", "--output", tmp_path, "--until", "net")
     assert again.stderr.count("kept") == 2
+
+
+def test_ctrl_c_within_compiled_code_stops_as_anywhere_else(monkeypatch, capsys):
+    def interrupted(standalone_mode):
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise SystemError("CPUDispatcher returned a result with an exception set")  # what numba makes of it
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(cli, "app", interrupted)
+    with pytest.raises(SystemExit) as end:
+        cli.main()
+    assert end.value.code == 130
+    assert "the same command goes on from there" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
