@@ -30,6 +30,7 @@ from shellform.design.scatter import Scatter
 from shellform.design.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.errors import InputError, NotConverged
 from shellform.structure import results
+from shellform.structure.assembly import Assembly
 from shellform.structure.loading import forces
 from shellform.structure.network import assemble
 from shellform.structure.stability import critical_load, modes
@@ -165,17 +166,32 @@ def critical_factors(
     """For each load case the factor at which the design's path from the `unloaded` state loses stability: `critical_factor`, None where it doesn't up to
     `critical_sought`, and the `critical_kind` of point."""
     goal = max(_SOUGHT, 1.5 * (wanted or 0.0))
-    assembly, found = assemble(shell.network(design)), {}
-    for name, load in loads.items():
-        if not load.any():
-            continue
-        told: dict[str, Any] = {"critical_sought": goal, "critical_factor": None, "critical_kind": None}
-        try:
-            end = critical_load(assembly, unloaded, forces(load), goal=goal)
-        except NotConverged as error:  # the rest of the summary stands without it
-            told["critical_kind"] = f"not found: {error.what}"
+    assembly, found = assemble(shell.network(design)), dict[str, dict[str, Any]]()
+    sizes = {name: float(np.linalg.norm(load)) for name, load in loads.items()}
+    # The largest first: a load case that is a share of another one has the same path, and isn't followed again.
+    for name in sorted((name for name in loads if sizes[name]), key=lambda name: -sizes[name]):
+        larger = next((each for each in found if _is_share(loads[name], loads[each])), None)
+        if larger is None:
+            found[name] = _critical(assembly, unloaded, loads[name], goal)
         else:
-            if end is not None:
-                told |= {"critical_factor": end.factor, "critical_kind": end.kind}
-        found[name] = told
-    return found
+            factor = found[larger]["critical_factor"]
+            factor = None if factor is None else factor * sizes[larger] / sizes[name]
+            found[name] = {**found[larger], "critical_factor": factor} if factor is None or factor <= goal else _told(goal)
+    return {name: found[name] for name in loads if name in found}
+
+
+def _is_share(load: Reals, larger: Reals) -> bool:
+    share = float(np.vdot(load, larger) / np.vdot(larger, larger))
+    return share > 0.0 and bool(np.allclose(load, share * larger, rtol=0.0, atol=1e-12 * float(np.abs(larger).max())))
+
+
+def _told(goal: float) -> dict[str, Any]:
+    return {"critical_sought": goal, "critical_factor": None, "critical_kind": None}
+
+
+def _critical(assembly: Assembly, unloaded: State, load: Reals, goal: float) -> dict[str, Any]:
+    try:
+        end = critical_load(assembly, unloaded, forces(load), goal=goal)
+    except NotConverged as error:  # the rest of the summary stands without it
+        return _told(goal) | {"critical_kind": f"not found: {error.what}"}
+    return _told(goal) | ({} if end is None else {"critical_factor": end.factor, "critical_kind": end.kind})

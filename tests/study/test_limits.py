@@ -96,6 +96,14 @@ def test_the_critical_factor_told_is_where_the_loaded_path_ends(shell, loads):
     assert set(told) == {"design", "additional"}
     factor = told["design"]["critical_factor"]
     assert told["additional"]["critical_factor"] == pytest.approx(factor / 1.2, rel=1e-3)
+    # Alone, each case is followed itself; a share of another has its path, up to the factor sought; what is none is followed.
+    alone = critical_factors(shell, design, unloaded, {"design": loads["design"]}, wanted=None)
+    assert alone["design"] == {**told["design"], "critical_factor": pytest.approx(factor, rel=1e-3)}
+    light = critical_factors(shell, design, unloaded, {"light": 0.01 * loads["design"], "design": loads["design"]}, wanted=None)
+    assert list(light) == ["light", "design"]
+    assert light["light"] == {**told["design"], "critical_factor": None, "critical_kind": None}
+    lifted = critical_factors(shell, design, unloaded, {"up": -0.5 * loads["design"], "design": loads["design"]}, wanted=None)
+    assert lifted["up"]["critical_factor"] != pytest.approx(2.0 * factor)
     assert below_factor(told, 1.1 * factor, ["design"]) == ["design"]
     assert below_factor(told, 0.9 * factor, ["design"]) == []
     below = sf.follow(shell, design, {"near": 0.995 * factor * loads["design"]}, stay=True)["near"]
