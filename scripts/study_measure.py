@@ -111,6 +111,7 @@ keep = "best"
 net.spacing = 0.102
 optimise.evaluations = 15
 optimise.unloaded = false
+cable.without = false
 [vary]
 cable.stiffness = {{ low = 100, high = 400, scale = "log" }}
 load.force = {{ low = 1.6, high = 2.2 }}

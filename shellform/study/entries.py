@@ -117,6 +117,7 @@ class CableEntry(Section):
     stiffness: PositiveFloat = Field(description="EA, N")
     rest_ratio: float = Field(0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target")
     force_max: PositiveFloat = Field(description="largest allowed tension, N (constraint 5)")
+    without: bool = Field(True, description="also load the grid without cables, to compare with (paper, section 4.1)")
     adjustment: NonNegativeFloat | None = Field(None, description="range of the turnbuckles, m; given: cables are cut to the fewest lengths")
 
 

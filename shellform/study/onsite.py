@@ -288,9 +288,10 @@ def _predicted(shell: Gridshell, before: State, step: site.Adjustment, goal: Rea
 
 
 def _design(run: Run, name: str | None, usual: str) -> str:
-    if name is not None and name not in run.designs:
-        raise InputError("isn't there", where="--design", value=name, remedy=f"Known: {', '.join(run.designs)}.")
-    return name or usual
+    chosen = name or usual
+    if chosen not in run.designs:
+        raise InputError("isn't there", where="--design", value=chosen, remedy=f"Known: {', '.join(run.designs)}.")
+    return chosen
 
 
 def _mm(misfit: float, nodes: int) -> str:

@@ -207,7 +207,8 @@ def _initial(making: Making, results: Mapping[str, Any], summary: dict[str, Any]
     }
     summary["designs"] = {}
     designs.forget(making, ("unbraced", "initial"), summary)  # whose load cases may have had other names
-    for name, design in [("unbraced", shell.unbraced()), ("initial", shell.design(rest_ratio=case.cable.rest_ratio))]:
+    unbraced = {"unbraced": shell.unbraced()} if case.cable.without else {}
+    for name, design in {**unbraced, "initial": shell.design(rest_ratio=case.cable.rest_ratio)}.items():
         making.report("initial", f"loading the {name} design")
         designs.keep(making, shell, name, design, designs.followed(shell, design, loads), loads, summary)
     first = summary["designs"]["initial"]["loads"]["design"]

@@ -14,7 +14,9 @@ import pytest
 from shellform.errors import InputError
 from shellform.study.case import load_case
 from shellform.study.folder import read_run, refuse_overwriting
+from shellform.study.page import write_report
 from shellform.study.run import run_case
+from tests.study.small_run import begin, finish
 
 ROOT = Path(__file__).parent.parent.parent
 CASE = ROOT / "scripts/scale_model.toml"
@@ -41,6 +43,16 @@ def test_a_run_left_after_its_initial_design_is_read_as_far_as_it_came(begun):
     assert list(run.designs) == ["unbraced", "initial"]
     assert run.best == "initial"
     assert set(run.states["initial"]) == {"none", "design", "additional"}
+
+
+def test_what_is_made_to_compare_with_can_be_left_out(tmp_path):
+    folder = begin(ROOT, tmp_path / "run", "cable.without=false")
+    finish(folder)
+    assert list(read_run(folder).designs) == ["initial", "optimised"]
+    assert "Unbraced" not in write_report([folder]).read_text(encoding="utf-8")
+    refused = shellform("calibrate", folder, "points.csv=none")
+    assert refused.returncode == 2
+    assert "'unbraced'" in refused.stderr
 
 
 def test_folders_that_are_no_run_or_have_no_designs_yet_are_refused(tmp_path, copy):
