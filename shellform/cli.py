@@ -248,10 +248,10 @@ def analyse(
     from shellform.structure.model import read_model
     from shellform.structure.results import read_sections
 
-    if figures is None:  # pictures ask the graphics driver for memory on terms of its own
-        limit_to_free_memory()
     report = _Progress()
     try:
+        if figures is None:  # pictures ask the graphics driver for memory on terms of its own
+            limit_to_free_memory()
         known = read_sections(sections) if sections is not None else None
         analysis = solve(
             read_model(model),

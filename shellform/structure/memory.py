@@ -1,7 +1,8 @@
 """Running out of memory as an error that can be told, instead of being killed by the system.
 
 Linux promises more memory than there is and kills a process that takes it at its word. Under a limit on its data the process is refused the
-memory instead, and Python, NumPy and the solvers raise MemoryError.
+memory instead, and Python, NumPy and the solvers raise MemoryError. Libraries that are just being loaded don't: refused a few kilobytes
+they crash or end in errors that tell nothing, so a part is left to them in any case.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ import sys
 from pathlib import Path
 
 _SHARE = 0.95  # of what is free when the work begins
+_LOADING = 400_000_000  # bytes; a small model with all that it loads takes 60e6, and 200e6 where its loops are compiled too
 
 
 def limit_to_free_memory() -> None:
-    """Limits the data of this process to what is free now, where the system can (Linux)."""
+    """Limits the data of this process to what is free now, or to what loading takes if that is more, where the system can (Linux)."""
     if sys.platform != "linux":
         return
     import resource
@@ -22,7 +24,7 @@ def limit_to_free_memory() -> None:
     soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
     if free is None or soft != resource.RLIM_INFINITY:
         return  # somebody has set a limit already
-    resource.setrlimit(resource.RLIMIT_DATA, (_data_size() + int(_SHARE * free), hard))
+    resource.setrlimit(resource.RLIMIT_DATA, (_data_size() + max(int(_SHARE * free), _LOADING), hard))
 
 
 def free_memory() -> int | None:

@@ -192,14 +192,35 @@ def test_the_command_prints_notes_and_refuses_with_status_2(tmp_path):
     assert "NODE:AXIS:METRES" in bad.stderr
 
 
-def test_no_memory_is_a_message_and_status_3(tmp_path):
+def block(side):
+    """A cube of rods of side³ nodes: its factor fills up as no gridshell's does."""
+    rod = {"EA": 1e5, "GJ": 1.0, "EIy": 1.0, "EIz": 1.0}
+    number = np.arange(side**3).reshape(side, side, side)
+    along = [(number[:-1], number[1:]), (number[:, :-1], number[:, 1:]), (number[:, :, :-1], number[:, :, 1:])]
+    beams = [
+        {"nodes": [int(i), int(j)], **rod, "z_axis": [1, 0, 0] if axis == 2 else [0, 0, 1]}
+        for axis, (starts, ends) in enumerate(along)
+        for i, j in zip(starts.ravel(), ends.ravel(), strict=True)
+    ]
+    return {
+        "format": "shellform-model",
+        "version": 1,
+        "nodes": np.argwhere(number >= 0).tolist(),
+        "beams": beams,
+        "supports": [{"node": int(node), "fixed": [True] * 6} for node in number[:, :, 0].ravel()],
+        "loads": {"push": [{"node": side - 1, "force": [0, 0, -1.0]}]},
+    }
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux refuses memory under a limit")
+@pytest.mark.parametrize(("model", "status"), [(bow(), 0), (block(22), 3)], ids=["small", "large"])
+def test_without_free_memory_a_small_model_is_solved_and_a_large_one_ends_with_a_message_and_status_3(tmp_path, model, status):
     file = tmp_path / "m.json"
-    file.write_text(json.dumps(bow()), encoding="utf-8")
+    file.write_text(json.dumps(model), encoding="utf-8")
     code = (
         "import sys; from shellform.structure import memory; memory.free_memory = lambda: 0; "
         "from shellform.cli import main; sys.argv[1:] = ['analyse', sys.argv[1], '--load', 'push']; main()"
     )
     found = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=False)
-    if sys.platform == "linux":
-        assert found.returncode == 3, found.stderr
-        assert "memory is full" in found.stderr
+    assert found.returncode == status, found.stderr
+    assert ("memory is full" in found.stderr) == (status == 3)
