@@ -4,7 +4,7 @@ MMA replaces the problem by a sequence of convex ones that are solved exactly. I
 cables work together, and in the rest lengths it is kinked where a cable goes slack: on a prestressed gridshell its first trials snap
 the shell through and its later ones hardly move (README, "What was tried"). Here each convex problem is the model in tensions
 (tensions.py), exact in first order and with the misfit's Gauss-Newton curvature; NLopt's MMA solves it within a window round the
-present design (proposal.py), and the trial is then evaluated by its true equilibria (search.py):
+present design (proposal.py), and the trial is then evaluated by its true equilibria (search.py, phases.py):
 
 - it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
 - a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
@@ -31,6 +31,7 @@ from shellform.design.convex import minimise
 from shellform.design.gridshell import Design
 from shellform.design.grouping import averaged
 from shellform.design.optimum import Checkpoint, Optimum, Step
+from shellform.design.phases import run
 from shellform.design.problem import FEASIBLE, Problem
 from shellform.design.search import Keep, Search, Watch
 from shellform.design.terms import Misfit, Share
@@ -74,7 +75,7 @@ def optimize(
         search.keep = keep
         if resume is not None:
             search.resume(resume)
-        return search.run(evaluations, thin=thin)
+        return run(search, evaluations, thin=thin)
 
 
 def polish(
@@ -99,7 +100,7 @@ def polish(
         search.guarded = search.always_guarded = True
         search.groups = None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
         search.smallest = _FINEST
-        polished = search.run(evaluations, thin=False)
+        polished = run(search, evaluations, thin=False)
     better = polished.objective < polished.objective_start and polished.design.present.sum() == best.design.present.sum()
     if better or groups is not None:  # of averaged lengths the polished design is at least that one, in its own states
         return polished

@@ -68,7 +68,7 @@ def test_direct_and_adjoint_sensitivities_are_the_same(shell, wet):
 
 def test_the_tension_model_predicts_the_next_equilibrium_to_second_order(shell, wet):
     search = Search(problem(shell, wet), shell.design(), 0.2, None)
-    model = search._model()
+    model = search.model()
     rng = np.random.default_rng(2)
     change = np.where(model.origin > 0.5, 0.05 * rng.normal(size=len(model.origin)), 0.0)
     errors = []
