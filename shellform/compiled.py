@@ -1,10 +1,12 @@
 """Door to Numba: loops in machine code, compiled by the first process that needs them and kept in a cache for all later ones.
 
-The first compilation takes seconds in which nothing else would be seen to happen, so it is announced, once a process.
+The first compilation takes seconds in which nothing else would be seen to happen, so it is announced, once a process, unless the environment
+has SHELLFORM_QUIET, which processes hand on to those that they start.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Any
 
@@ -29,4 +31,5 @@ class _Announcement(event.Listener):  # type: ignore[misc]
         """Nothing to be told."""
 
 
-event.register("numba:compile", _Announcement())
+if "SHELLFORM_QUIET" not in os.environ:
+    event.register("numba:compile", _Announcement())

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent.parent / "shellform"
-FLOORS = {"errors": -1, "compiled": -1, "arrays": 0, "written": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "notebook": 5, "study": 5, "cli": 6}
+FLOORS = {"errors": -1, "compiled": -1, "arrays": 0, "written": 0, "surface": 1, "structure": 1, "net": 2, "design": 3, "output": 4, "notebook": 5, "study": 5, "terminal": 5, "commands": 6, "cli": 7}
 DOORS = {
     "binpacking": {"output/nesting.py"},
     "jinja2": {"output/template.py"},

@@ -25,40 +25,55 @@ from shellform.written import folder as made
 from shellform.written import write_text
 
 _GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
+_GFRP = 255e6 / 40e9  # strength over Young's modulus of the paper's rods
 
 
-def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> dict[str, str]:
-    """What a surface file or a case's surface is, as labelled lines; `options` are the entries of [surface] in a case.
+def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> dict[str, Any]:
+    """What a surface file or a case's surface is, in SI units; `options` are the entries of [surface] in a case.
 
-    For a case they take the place of its own.
+    For a case they take the place of its own, and what to expect of its net is told too.
     """
     case = load_case(file) if file.suffix.lower() == ".toml" else None
     entry = surface_entry(file, options) if case is None else surface_entry(None, {**case.surface.model_dump(), **options})
     path = Path(entry.file)
     surface = surface_of(entry, allow_scripts=allow_scripts)
     bent = largest_curvature(surface)
-    told = {
-        "surface": str(path),
+    material = rod_material(case.rod) if case else None
+    strain = material.strength / material.young if material else _GFRP
+    found = surface_summary(surface, str(path)) | {
         "format": "builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
         "unit": _unit(path, entry.unit),
-        "size": told_size(surface),
-        "area": f"{surface.area:.4g} m²",
-        "triangles": str(len(surface.triangles)),
-        "holes": str(surface.holes),
-        "mended": "nothing" if not surface.mended else surface.mended[0],
-        **{f"mended {k}": text for k, text in enumerate(surface.mended[1:], 2)},
-        "largest curvature": f"{bent:.3g} 1/m, radius {1.0 / bent:.3g} m" if bent > 0.0 else "none",
+        "curvature_max": bent,
+        "rod_radius_max": strain / bent if bent > 0.0 else None,
     }
     if case:
-        spacing = case.net.spacing
-        told["crossings to expect"] = f"about {surface.area / spacing**2:.0f} at {spacing:g} m"
-        told["freedoms to expect"] = f"about {48 * surface.area / spacing**2:.0f}"
-        material = rod_material(case.rod)
-        largest = material.strength / (material.young * bent) if bent > 0.0 else float("inf")
-        told["largest rod radius"] = f"at least {largest:.3g} m (equation 1, at the surface's largest curvature)"
-    else:
-        told["largest rod radius"] = f"{6.4e-3 / bent:.3g} m in GFRP (strength/E = 255 MPa/40 GPa)" if bent > 0.0 else "any"
-    return told
+        cells = surface.area / case.net.spacing**2
+        found["expected"] = {"spacing": case.net.spacing, "crossings": round(cells), "freedoms": round(48 * cells)}
+    return found
+
+
+def told(found: Mapping[str, Any]) -> dict[str, str]:
+    """What `check_file` found, as labelled lines."""
+    bent, largest = found["curvature_max"], found["rod_radius_max"]
+    lines = {
+        "surface": found["source"],
+        "format": found["format"],
+        "unit": found["unit"],
+        "size": told_size(found["size"]),
+        "area": f"{found['area']:.4g} m²",
+        "triangles": str(found["triangles"]),
+        "holes": str(found["holes"]),
+        "mended": "nothing" if not found["mended"] else found["mended"][0],
+        **{f"mended {k}": text for k, text in enumerate(found["mended"][1:], 2)},
+        "largest curvature": f"{bent:.3g} 1/m, radius {1.0 / bent:.3g} m" if bent > 0.0 else "none",
+    }
+    expected = found.get("expected")
+    if expected:
+        lines["crossings to expect"] = f"about {expected['crossings']} at {expected['spacing']:g} m"
+        lines["freedoms to expect"] = f"about {expected['freedoms']}"
+    source = "equation 1, at the surface's largest curvature" if expected else "in GFRP, strength/E = 255 MPa/40 GPa"
+    lines["largest rod radius"] = f"at least {largest:.3g} m ({source})" if largest else "any"
+    return lines
 
 
 def surface_entry(file: Path | None, options: Mapping[str, Any]) -> SurfaceEntry:
@@ -94,7 +109,7 @@ def net_alone(
     allow_scripts: bool,
     report: Report,
 ) -> dict[str, Any]:
-    """Writes net.json, net.npz and summary.json of the net on a surface file; returns the surface's size and the net's summary.
+    """Writes net.json, net.npz and summary.json of the net on a surface file; returns what summary.json says.
 
     `options` are the entries of [surface] in a case; `angle` degrees or "auto".
     """
@@ -102,20 +117,20 @@ def net_alone(
     if (folder / "stages.json").is_file():
         raise InputError("holds a run of shellform design", where=str(folder), remedy="Choose another --output for the net alone.")
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
-    report("surface", f"size {told_size(surface)}")
+    report("surface", f"size {told_size(surface.size)}")
     settings = {"spacing": spacing, "gap": gap or _GAP * spacing}
     net, found, offset = oriented_net(surface, settings, angle=_angle(angle), progress=lambda text: report("net", text))
-    told = net_summary(net) | {"angle": found, "offset": list(offset)}
+    summary = net_summary(net) | {"angle": found, "offset": list(offset)}
     made(folder)
     save_net(folder / "net.npz", net)
     write_text(folder / "net.json", json.dumps(net_document(net)))
-    document = {"format": FORMAT, "version": VERSION, "shellform": shellform.__version__, "surface": surface_summary(surface, str(file)), "net": told}
+    document = {"format": FORMAT, "version": VERSION, "shellform": shellform.__version__, "surface": surface_summary(surface, str(file)), "net": summary}
     write_text(folder / "summary.json", json.dumps(document, indent=1))
     if pictures_possible(report):
         from shellform.output.nets import draw_net
 
         draw_net(net, folder / "figures")
-    return {"size": told_size(surface), **told}
+    return document
 
 
 def _angle(text: str) -> float | Literal["auto"]:

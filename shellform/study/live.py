@@ -11,13 +11,13 @@ _EVERY = 10.0  # seconds between lines
 
 
 class Live:
-    """Shows a study's progress on standard error; use it as a context manager and call it with the progress."""
+    """Shows a study's progress on standard error; use it as a context manager and call it with the progress. Nothing if `quiet`."""
 
-    def __init__(self) -> None:
+    def __init__(self, *, quiet: bool = False) -> None:
         from rich.console import Console
         from rich.live import Live as Drawn
 
-        self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+        self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True, quiet=quiet)
         self._drawn = Drawn(console=self._console, refresh_per_second=4, transient=True) if self._console.is_terminal else None
         self._told = 0.0
         self._dashboard = ""

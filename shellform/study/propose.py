@@ -17,7 +17,7 @@ import numpy as np
 
 from shellform.errors import InputError
 from shellform.study.check import surface_entry
-from shellform.study.run import surface_of, told_size
+from shellform.study.shape import surface_of, told_size
 from shellform.surface.target import largest_curvature
 from shellform.written import write_text
 
@@ -51,7 +51,7 @@ def propose_case(file: Path, output: Path, options: Mapping[str, Any], *, allow_
     lines = "\n".join(f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in entries.items())
     thin = "" if radius >= _short(_RADIUS * k) else f"; thinner than the paper's × {k:.3g}, so look whether they bear the load"
     text = f"""\
-# Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {told_size(surface)}, {surface.area:.4g} m².
+# Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {told_size(surface.size)}, {surface.area:.4g} m².
 # If that size is wrong, the unit is: run `shellform new` again with --unit. Lengths are {k:.3g} × the paper's scale model's.
 title = {json.dumps(file.stem, ensure_ascii=False)}
 
@@ -93,7 +93,7 @@ limit = {_short(0.010 * k)!r}      # m, end of the colour scale
 """
     write_text(output, text)
     return {
-        "size": told_size(surface),
+        "size": told_size(surface.size),
         "spacing": f"{spacing:g} m",
         "rod radius": f"{radius:g} m (equation 1 allows {allowed:.3g}){thin}",
         "case": str(output),

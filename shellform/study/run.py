@@ -75,7 +75,7 @@ def run_case(
     if done.get("surface") != keys["surface"]:  # before anything is written: most bad input is a bad surface
         report("surface", f"reading {file}")
         results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
-        report("surface", f"size {told_size(results['surface'])}")
+        report("surface", f"size {told_size(results['surface'].size)}")
     summary = read_json(folder / "summary.json") if done else {}
     summary = {**summary, "format": FORMAT, "version": VERSION, "shellform": shellform.__version__}
     summary.setdefault("seconds", {})

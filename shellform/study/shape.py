@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.net.net import Net
 from shellform.net.orient import oriented_net
@@ -54,9 +55,9 @@ def surface_summary(surface: Surface, source: str) -> dict[str, Any]:
     }
 
 
-def told_size(surface: Surface) -> str:
-    """The extents in words, so that a wrong unit is seen."""
-    x, y, z = surface.size
+def told_size(size: Sequence[float] | Reals) -> str:
+    """The extents (3,), m, in words, so that a wrong unit is seen."""
+    x, y, z = size
     return f"{x:.4g} × {y:.4g} × {z:.4g} m (is the unit right?)"
 
 

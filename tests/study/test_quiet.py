@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from tests.study.stubs import CASE
+from tests.study.stubs import CASE, study_file
 from tests.study.test_commands import ROOT, shellform
 
 
@@ -29,6 +29,34 @@ def test_json_prints_the_summary_and_nothing_else(made):
     result = shellform("design", place / "dome.toml", "--output", place / "run", "--until", "net", "--json")
     assert json.loads(result.stdout) == json.loads((place / "run/summary.json").read_text(encoding="utf-8"))
     assert "net: kept" in result.stderr
+
+
+def test_check_tells_numbers_in_json_that_its_lines_tell_in_words(made):
+    place, _ = made
+    found = json.loads(shellform("check", place / "dome.toml", "--json").stdout)
+    lines = shellform("check", place / "dome.toml").stdout
+    x, y, z = found["size"]
+    assert f"{x:.4g} × {y:.4g} × {z:.4g} m" in lines
+    assert f"about {found['expected']['crossings']} at {found['expected']['spacing']:g} m" in lines
+    assert f"at least {found['rod_radius_max']:.3g} m" in lines
+
+
+def test_a_net_alone_is_told_in_json_or_not_at_all(tmp_path):
+    surface = ROOT / "surfaces/dome.py"
+    told = shellform("net", surface, "--spacing", "0.1", "--output", tmp_path / "told", "--json")
+    assert json.loads(told.stdout) == json.loads((tmp_path / "told/summary.json").read_text(encoding="utf-8"))
+    quiet = shellform("net", surface, "--spacing", "0.1", "--output", tmp_path / "quiet", "--quiet")
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+
+
+def test_a_study_is_told_in_json_or_not_at_all(tmp_path):
+    file = study_file(tmp_path, 'until = "net"\n[vary]\nnet.angle = [0.0, 45.0]\n[column]\ncrossings = "net.crossings"\n')
+    arguments = ("study", file, "--output", tmp_path / "out", "--workers", "1")
+    quiet = shellform(*arguments, "--quiet")
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+    found = json.loads(shellform(*arguments, "--json").stdout)
+    assert (found["designs"], found["found"], found["failed"], found["empty"]) == (2, 2, 0, [])
+    assert found["table"] == str(tmp_path / "out/table.parquet")
 
 
 def test_new_writes_a_case_that_check_reads(tmp_path):
