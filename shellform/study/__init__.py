@@ -1,11 +1,22 @@
-"""Cases, runs and studies. `run_study` and `read_table` are loaded when they are first used."""
+"""Cases, runs and studies. What a script needs of them is loaded when it is first used:
+
+    summary = study.run_case(study.load_case("case.toml", ["net.spacing=0.06"]), "runs/mine")
+    found = study.run_study("study.toml", "runs/study", workers=2)
+    table = study.read_table(found.table.parent, ["cables"])
+"""
 
 from __future__ import annotations
 
 import importlib
 from typing import Any
 
-_HOMES = {"run_study": "shellform.study.studies", "read_study": "shellform.study.plan", "read_table": "shellform.study.store"}
+_HOMES = {
+    "load_case": "shellform.study.case",
+    "run_case": "shellform.study.run",
+    "run_study": "shellform.study.studies",
+    "read_study": "shellform.study.plan",
+    "read_table": "shellform.study.store",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -48,7 +48,7 @@ _SHOWING = STAGES[4:]  # which show what was found: none of them needs another
 
 def run_case(
     case: Case,
-    folder: Path,
+    folder: str | Path,
     *,
     until: str = STAGES[-1],
     fresh: bool = False,
@@ -60,6 +60,7 @@ def run_case(
     Raises InputError for bad input and NotConverged where a stage finds no result; what was computed stays in the folder. Where pictures,
     documents or the page fail, the others are still made, `failed` in the summary says what was wrong, and then the first error is raised.
     """
+    folder = Path(folder)
     if until not in STAGES:
         raise InputError("is no stage", where="--until", value=until, remedy=f"Stages: {', '.join(STAGES)}.")
     file = Path(case.surface.file)

@@ -184,3 +184,12 @@ def test_pictures_that_could_not_be_made_are_made_by_the_next_run(copy, monkeypa
     run_case(load_case(CASE), copy, report=lambda stage, text: told.append(text))
     assert (copy / "figures/deviations.png").is_file()
     assert "figures" in json.loads((copy / "stages.json").read_text(encoding="utf-8"))
+
+
+def test_a_script_runs_a_case_by_the_public_names(tmp_path):
+    import shellform as sf
+
+    folder = str(tmp_path / "run")
+    summary = sf.study.run_case(sf.study.load_case(str(CASE), ["net.spacing=0.09"]), folder, until="net")
+    assert summary["net"]["spacing"] == 0.09
+    assert summary == json.loads((tmp_path / "run/summary.json").read_text(encoding="utf-8"))
