@@ -13,7 +13,7 @@ import sys
 from functools import partial
 from typing import Any
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "shellform.errors": ("InputError", "NotConverged", "ShellformError"),

@@ -149,7 +149,7 @@ def _thin(search: Search) -> None:
         search.braces = model.origin[: len(search.braces)] > 0.0
         search.braces[leaving] = False
         trial = search.attempt_without(model, leaving)
-        if trial is not None and search.merit(trial) < 2.0 * budget:
+        if trial is not None and trial.objective < 2.0 * budget:  # limits that it breaks are the repair's business
             trial = _repair(search, trial, budget)
         fits = trial is not None and search.merit(trial) <= budget and search.violation(trial) <= 0.0
         sound = search.sound(trial) if trial is not None and fits else None

@@ -1,9 +1,10 @@
 """The convex problem of one step: the model in tensions (tensions.py) within a window, and its solution.
 
-In windows u = (y - y0)/w the objective is slope'u + u'H u/2 with the misfit's Gauss-Newton matrix H, the constraints are linear, the bounds
-those of the window, of rest lengths (3), the radius (4) and cable forces (5) under the first load. NLopt's MMA solves it. Where cables are to
-stay taut under the additional loads (guard.py), or cables alike keep one length (grouping.py), it has hundreds of constraints and goes to the
-interior-point method (convex.py).
+In windows u = (y - y0)/w the objective is slope'u + u'H u/2 with the misfit's Gauss-Newton matrix H. The constraints are linear, held at a
+distance that covers what the last trial showed of their curvature (Svanberg's conservative approximations, 2002, are likewise corrected by their
+trials). The bounds are those of the window, of rest lengths (3), the radius (4) and cable forces (5) under the first load. NLopt's MMA solves
+it. Where cables are to stay taut under the additional loads (guard.py), or cables alike keep one length (grouping.py), it has hundreds of
+constraints and goes to the interior-point method (convex.py).
 """
 
 from __future__ import annotations
@@ -33,7 +34,8 @@ _BRACE = 0.05  # least tension of the cables that are kept while thinning, in me
 class Task:
     """What a step is asked for: from the `point` and its `model`, within a `window`, N, `tension` being the start's mean, N, and `base` the
     first load's name; limits `bounded` by that load's cable forces; cables (c,) that are `braces` and keep a least tension; `guards` of
-    cables that may not go slack under the other loads, none where all may; whether the softest modes stand in for the objective, `climbing`; `groups` (c,) of cables alike."""
+    cables that may not go slack under the other loads, none where all may; whether the softest modes stand in for the objective, `climbing`; `groups` (c,) of cables
+    alike; `excess` (k,) of the limits over their linear model in a whole window."""
 
     evaluator: Evaluator
     point: Point
@@ -46,6 +48,7 @@ class Task:
     guards: Sequence[Guard]
     climbing: bool
     groups: Indices | None
+    excess: Reals
 
 
 def propose(task: Task) -> tuple[Reals, float]:
@@ -68,7 +71,7 @@ def propose(task: Task) -> tuple[Reals, float]:
     if task.climbing:
         slope = _stiffening(task) @ model.variables_by_y
     rows = task.point.constraints_by_variables @ model.variables_by_y
-    values = task.point.constraints
+    values = task.point.constraints + task.excess
     falls, margins = _guarding(task, width)
     scaled_slope, scaled_rows = slope * width, np.vstack([rows * width, falls])
     values = np.append(values, margins)

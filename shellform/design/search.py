@@ -26,6 +26,7 @@ from shellform.structure.state import State
 _MARGIN = 0.15  # of the whole additional load that is left at first between a stage and the end of the stable branch …
 _NEAREST = 0.01  # … and at last
 SMALLEST = 0.03  # window, in mean tensions, at which no better design is to be found
+_NEAR = 0.5  # below a limit, as a share of it, from where on its curvature counts
 _PENALTY = 10.0  # of a violated constraint beside the objective, which is 1 at the start
 
 Watch = Callable[[Step], None]
@@ -87,6 +88,8 @@ class Search:
         self._guarded: tuple[Point, list[Guard]] | None = None
         self.most_cables: int | None = None
         self.groups: Indices | None = None  # of the present cables, with one rest length each
+        # What the limits' values at the last trial lay above their linear models, per square of the window: (k,), 1/N².
+        self.excess = np.zeros(len(self.point.constraints))
         self.climbing = False  # the softest modes stand in for the objective
         self.always_guarded = False
         self.guarded = False  # cables may not go slack under additional loads
@@ -107,6 +110,7 @@ class Search:
         limits = [*self.evaluator.problem.limits, *(AtMost(1.0, Softness(name, least)) for name in additional)]
         self.evaluator.problem = replace(self.evaluator.problem, limits=limits)
         self.point = self.evaluator.seed(self.point.design, self.point.states, self.stage)
+        self.excess = np.zeros(len(self.point.constraints))
         self.accepted, self.history = [self.point], [self._record(self.point, True)]
 
     def left(self) -> int:
@@ -125,6 +129,7 @@ class Search:
         numbers |= {name: getattr(self.track, name) for name in _TRACKED}
         design = self.point.design
         arrays = {"rest_length": design.rest_length, "present": design.present, "braces": self.braces, "needed": self.track.needed}
+        arrays["excess"] = self.excess
         for name, state in self.point.states.items():
             arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
         return Checkpoint(numbers | {"radius": design.radius}, arrays, tuple(self.history))
@@ -134,7 +139,7 @@ class Search:
         numbers, arrays = checkpoint.numbers, checkpoint.arrays
         for name in _NUMBERS:
             setattr(self, name, numbers[name])
-        self.braces = np.array(arrays["braces"])
+        self.braces, self.excess = np.array(arrays["braces"]), np.array(arrays["excess"])
         self.evaluator.start = replace(self.evaluator.start, present=np.array(arrays["present"]))
         design = Design(arrays["rest_length"], self.evaluator.start.present, numbers["radius"])
         states = {name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"]) for name in self.evaluator.used()}
@@ -218,10 +223,12 @@ class Search:
             self._guards(),
             self.climbing,
             self.groups,
+            self.excess * self.window**2,
         )
 
     def attempt(self, model: TensionModel, y: Reals) -> Point | None:
-        """The point with tensions, and radius, `y` (y,); None where its equilibrium leaves the stable branch."""
+        """The point with tensions, and radius, `y` (y,); None where its equilibrium leaves the stable branch.
+        What it shows of the limits' curvature is kept for the next step."""
         design = model.design(y, self.point.design.present)
         if self.groups is not None:
             rest = design.rest_length.copy()
@@ -229,9 +236,13 @@ class Search:
             design = replace(design, rest_length=rest)
         near = {**self.evaluator.predicted(self.point, design, but=self.base), self.base: model.predicted(y)}
         try:
-            return self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage, lead=not self.guarded)
+            trial = self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage, lead=not self.guarded)
         except OffBranch:
             return None
+        linear = self.point.constraints + self.point.constraints_by_variables @ (trial.variables - self.point.variables)
+        above = np.maximum(trial.constraints - linear, 0.0) / self.window**2
+        self.excess = np.where(trial.constraints > -_NEAR, above, 0.0)
+        return trial
 
     def attempt_without(self, model: TensionModel, leaving: Indices) -> Point | None:
         """The point without the cables `leaving`, the others at the rest lengths that they have: the shell moves less than at their tensions.

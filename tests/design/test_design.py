@@ -6,9 +6,11 @@ import pytest
 import shellform as sf
 from shellform import mma
 from shellform.design.problem import Evaluator, taut
+from shellform.design.proposal import propose
 from shellform.design.search import Search
 from shellform.errors import InputError, NotConverged
 from shellform.structure.sensitivity import adjoint, by_rest_length, direct, respond
+from shellform.structure.stability import modes
 
 TWELVE = [(np.cos(k * np.pi / 6), np.sin(k * np.pi / 6)) for k in range(12)]
 
@@ -163,3 +165,15 @@ def test_bad_rods_joints_cables_and_loads_are_refused(shell, net, vault):
         sf.Problem(shell, {"a": np.zeros(1)}, [sf.Share(0.5, sf.Misfit("a"))])
     with pytest.raises(InputError, match="no load case"):
         sf.Problem(shell, {"a": np.zeros(1)}, [sf.Share(1.0, sf.Misfit("b"))])
+
+
+def test_a_step_keeps_the_distance_from_a_limit_that_the_last_trial_asked_for(shell, wet):
+    search = Search(problem(shell, wet), shell.design(), 0.2, None)
+    under = search.evaluator.assembly(search.point.design)
+    softest = float(modes(under, search.point.states["wetter"], 1).stiffness[0])
+    search.keep_stiff(0.9 * softest)
+    model = search.model()
+    first = search.attempt(model, propose(search.task(model))[0])
+    again = search.attempt(model, propose(search.task(model))[0])
+    assert first.constraints.max() > 0.1  # the linear model of the softest mode said 0 at most
+    assert -0.2 < again.constraints.max() < 1e-3
