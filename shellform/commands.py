@@ -307,7 +307,7 @@ def study(
         raise InputError("the cluster has its own workers", where="--workers", remedy="Leave out --workers or --scheduler.")
     with Live(quiet=quiet) as live:
         found = run_study(file, output, workers=workers, scheduler=scheduler, allow_scripts=allow_scripts, show=live)
-    for name in found.empty:
+    for name in () if quiet else found.empty:
         print(f"shellform: note: no design has a value for the column {name!r}: is its path in summary.json?", file=sys.stderr)
     if as_json:
         print(json.dumps({name: str(value) if isinstance(value, Path) else value for name, value in asdict(found).items()}, indent=1))

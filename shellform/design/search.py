@@ -239,7 +239,8 @@ class Search:
             trial = self.evaluator.evaluate(self.evaluator.variables(design), near, self.stage, lead=not self.guarded)
         except OffBranch:
             return None
-        linear = self.point.constraints + self.point.constraints_by_variables @ (trial.variables - self.point.variables)
+        # Linear in y, as in the proposal: in the rest lengths a cable that dies leaps to the longest one.
+        linear = self.point.constraints + self.point.constraints_by_variables @ (model.variables_by_y @ (y - model.origin))
         above = np.maximum(trial.constraints - linear, 0.0) / self.window**2
         self.excess = np.where(trial.constraints > -_NEAR, above, 0.0)
         return trial

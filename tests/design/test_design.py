@@ -167,8 +167,9 @@ def test_bad_rods_joints_cables_and_loads_are_refused(shell, net, vault):
         sf.Problem(shell, {"a": np.zeros(1)}, [sf.Share(1.0, sf.Misfit("b"))])
 
 
-def test_a_step_keeps_the_distance_from_a_limit_that_the_last_trial_asked_for(shell, wet):
-    search = Search(problem(shell, wet), shell.design(), 0.2, None)
+@pytest.mark.parametrize("window", [0.2, 0.3])  # in the larger one eleven cables die, which leap in their rest lengths
+def test_a_step_keeps_the_distance_from_a_limit_that_the_last_trial_asked_for(shell, wet, window):
+    search = Search(problem(shell, wet), shell.design(), window, None)
     under = search.evaluator.assembly(search.point.design)
     softest = float(modes(under, search.point.states["wetter"], 1).stiffness[0])
     search.keep_stiff(0.9 * softest)
@@ -176,4 +177,4 @@ def test_a_step_keeps_the_distance_from_a_limit_that_the_last_trial_asked_for(sh
     first = search.attempt(model, propose(search.task(model))[0])
     again = search.attempt(model, propose(search.task(model))[0])
     assert first.constraints.max() > 0.1  # the linear model of the softest mode said 0 at most
-    assert -0.2 < again.constraints.max() < 1e-3
+    assert -0.2 < again.constraints.max() < 0.1 * first.constraints.max()
