@@ -1,10 +1,10 @@
 """The convex problem of one step: the model in tensions (tensions.py) within a window, and its solution.
 
 In windows u = (y - y0)/w the objective is slope'u + u'H u/2 with the misfit's Gauss-Newton matrix H. The constraints are linear, held at a
-distance that covers what the last trial showed of their curvature (Svanberg's conservative approximations, 2002, are likewise corrected by their
-trials). The bounds are those of the window, of rest lengths (3), the radius (4) and cable forces (5) under the first load. NLopt's MMA solves
-it. Where cables are to stay taut under the additional loads (guard.py), or cables alike keep one length (grouping.py), it has hundreds of
-constraints and goes to the interior-point method (convex.py).
+distance that covers what the last trial showed of their curvature (as Svanberg's approximations, 2002, are corrected by theirs, but by a
+constant, which shrinks with the window). The bounds are those of the window, of rest lengths (3), the radius (4) and cable forces (5) under
+the first load. NLopt's MMA solves it. Where cables are to stay taut under the additional loads (guard.py), or cables alike keep one length
+(grouping.py), it has hundreds of constraints and goes to the interior-point method (convex.py).
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def propose(task: Task) -> tuple[Reals, float]:
         u = _equal_steps(task, width, scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
     elif task.guards:
         u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
-        if u is None:  # the guards ask for more than a step can give: they may keep what they have
+        if u is None:  # more is asked for than a step can give: limits and guards may keep what they have
             u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high)
         if u is None:
             u = np.clip(np.zeros(len(width)), low, high)
