@@ -128,8 +128,7 @@ class Search:
         numbers |= {name: getattr(counted, name) for name in _COUNTS}
         numbers |= {name: getattr(self.track, name) for name in _TRACKED}
         design = self.point.design
-        arrays = {"rest_length": design.rest_length, "present": design.present, "braces": self.braces, "needed": self.track.needed}
-        arrays["excess"] = self.excess
+        arrays = {"rest_length": design.rest_length, "present": design.present, "braces": self.braces, "excess": self.excess, "needed": self.track.needed}
         for name, state in self.point.states.items():
             arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
         return Checkpoint(numbers | {"radius": design.radius}, arrays, tuple(self.history))

@@ -25,7 +25,7 @@ from shellform.written import folder as made
 from shellform.written import write_text
 
 _GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
-_GFRP = 255e6 / 40e9  # strength over Young's modulus of the paper's rods
+YOUNG, STRENGTH = 40e9, 255e6  # Pa, of the paper's GFRP rods
 
 
 def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> dict[str, Any]:
@@ -39,17 +39,22 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
     surface = surface_of(entry, allow_scripts=allow_scripts)
     bent = largest_curvature(surface)
     material = rod_material(case.rod) if case else None
-    strain = material.strength / material.young if material else _GFRP
+    young, strength = (material.young, material.strength) if material else (YOUNG, STRENGTH)
     found = surface_summary(surface, str(path)) | {
         "format": "builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
         "unit": _unit(path, entry.unit),
         "curvature_max": bent,
-        "rod_radius_max": strain / bent if bent > 0.0 else None,
+        "rod_radius_max": largest_radius(young, strength, bent),
     }
     if case:
         cells = surface.area / case.net.spacing**2
         found["expected"] = {"spacing": case.net.spacing, "crossings": round(cells), "freedoms": round(48 * cells)}
     return found
+
+
+def largest_radius(young: float, strength: float, curvature: float) -> float | None:
+    """Of rods on a surface, m, by equation (1) at its largest `curvature`, 1/m; None where it is flat. Moduli in Pa."""
+    return strength / (young * curvature) if curvature > 0.0 else None
 
 
 def told(found: Mapping[str, Any]) -> dict[str, str]:

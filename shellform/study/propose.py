@@ -16,14 +16,13 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError
-from shellform.study.check import surface_entry
+from shellform.study.check import STRENGTH, YOUNG, largest_radius, surface_entry
 from shellform.study.shape import surface_of, told_size
 from shellform.surface.target import largest_curvature
 from shellform.written import write_text
 
 _SPACING, _RADIUS = 0.055, 0.001  # m, of the paper's scale model
 _AREA = 0.56  # m², of its surface
-_YOUNG, _STRENGTH = 40e9, 255e6  # Pa, its GFRP rods
 _THICKER = 1.4  # than the paper's, whose openings carry nothing: loaded all over, a dome of its size collapses with 1.05 mm and bears with 1.5
 _MARGIN = 0.9  # of the radius by (1): rods curve a little more than the surface between its triangles' corners
 
@@ -44,7 +43,7 @@ def propose_case(file: Path, output: Path, options: Mapping[str, Any], *, allow_
     bent = largest_curvature(surface)
     spacing = _short(_SPACING * np.sqrt(surface.area / _AREA))
     k = spacing / _SPACING
-    allowed = _STRENGTH / (_YOUNG * bent) if bent > 0.0 else np.inf
+    allowed = largest_radius(YOUNG, STRENGTH, bent) or np.inf
     radius = _short(min(_THICKER * _RADIUS * k, _MARGIN * allowed))
     rods = radius / _RADIUS
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
