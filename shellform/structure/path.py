@@ -92,14 +92,14 @@ def follow(
     for _ in range(most):
         try:
             there = walk.step(here, size, led, last, direction)
+            crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
+            if lead is None and crossing:
+                there = walk.at_factor(here, there, goal)
         except _Missed:
             size *= _SHORTEST
             if abs(size) < smallest:
                 raise walk.gave_up(here, "The path could not be followed further") from None
             continue
-        crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
-        if lead is None and crossing:
-            there = walk.at_factor(here, there, goal)
         turned = there.negative != here.negative
         if events and turned:
             event = walk.located(here, size, led, last, direction, there)
@@ -214,7 +214,7 @@ class _Path:
         raise _Missed
 
     def at_factor(self, here: _Here, there: _Here, goal: float) -> _Here:
-        """The point at the factor `goal` between two points: Newton's steps from the nearer one."""
+        """The point at the factor `goal` between two points: Newton's steps from the nearer one. Raises _Missed where they turn too far."""
         near = here if abs(here.factor - goal) < abs(there.factor - goal) else there
         state = self._moved(near.state, (goal - near.factor) * near.tangent, goal - near.factor)
         for iteration in range(1, _ITERATIONS + 1):

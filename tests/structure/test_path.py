@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError, NotConverged
+from shellform.structure import path
 from shellform.structure.equilibrium import find_equilibrium, newton
 from shellform.structure.loading import Drive, advance, forces
 from shellform.structure.network import Network, assemble
@@ -93,6 +94,21 @@ def test_a_goal_between_two_points_is_met_exactly_and_a_point_short_path_says_so
         list(follow(assembly, start, forces(load), goal=0.0))
     with pytest.raises(InputError, match="can lead"):
         list(follow(assembly, start, forces(load), lead=(0, 0, 1.0)))
+
+
+def test_a_goal_that_lies_too_far_off_to_turn_to_is_met_by_smaller_steps(monkeypatch):
+    assembly, start, load, _ = lee()
+    whole, missed = path._Path.at_factor, []
+
+    def at_factor(walk, here, there, goal):
+        if not missed:
+            missed.append(there.factor)
+            raise path._Missed
+        return whole(walk, here, there, goal)
+
+    monkeypatch.setattr(path._Path, "at_factor", at_factor)
+    assert list(follow(assembly, start, forces(load), goal=1.0))[-1].factor == 1.0
+    assert missed[0] > 1.0
 
 
 def test_euler_s_column_loses_stability_at_its_load_both_linearised_and_on_the_path():
