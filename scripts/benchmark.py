@@ -1,9 +1,11 @@
-"""Speed and memory of the structural core, measured in one go on at most two cores; prints the ratios and whether the bars hold.
+"""Speed and memory of the structural core, measured in one go on at most two cores; prints the ratios and
+whether the bars hold.
 
     scripts/benchmark [--sizes 12 25 51] [--no-peers] [--million] [--peers-python PYTHON] [--output FILE.json]
 
-Times are medians, and what is compared is measured in turns, because other work on the machine slows both down. The models are
-gridshell_models.gridshell, from their stress-free curved shape to equilibrium under a load that grows with the size of a cell.
+Times are medians, and what is compared is measured in turns, because other work on the machine slows both
+down. The models are gridshell_models.gridshell, from their stress-free curved shape to equilibrium under a
+load that grows with the size of a cell.
 """
 
 from __future__ import annotations
@@ -30,19 +32,21 @@ import numpy as np  # noqa: E402
 from gridshell_models import gridshell  # noqa: E402
 from peers import environment  # noqa: E402
 
-from shellform.structure import pardiso, sensitivity, sparse  # noqa: E402
-from shellform.structure.assembly import Assembly  # noqa: E402
-from shellform.structure.equilibrium import _Walk, find_equilibrium  # noqa: E402
+from shellform.structure.answers import sensitivity  # noqa: E402
+from shellform.structure.elements.state import at_rest  # noqa: E402
 from shellform.structure.model import Model, write_model  # noqa: E402
 from shellform.structure.network import assemble  # noqa: E402
-from shellform.structure.residual import Measure, held  # noqa: E402
-from shellform.structure.state import at_rest  # noqa: E402
+from shellform.structure.solve import factorisation, pardiso  # noqa: E402
+from shellform.structure.solve.assembly import Assembly  # noqa: E402
+from shellform.structure.solve.equilibrium import _Walk, find_equilibrium  # noqa: E402
+from shellform.structure.solve.residual import Measure, held  # noqa: E402
 
 HERE = Path(__file__).parent
 SIZES = (12, 25, 51)  # rods in each direction: 7,488, 31,200 and 127,296 freedoms
 CABLES = 13  # rods, for 288 cables
 MULTIHALLE = (184, 3)  # rods and elements: 33,856 crossings
-TOLERANCE = 1e-7  # of the largest force, moments over the length of an element; the peers compute in that unit of length
+# of the largest force, moments over the length of an element; the peers compute in that unit of length
+TOLERANCE = 1e-7
 MATCH = 0.01  # of the largest and of the root mean square displacement of the crossings
 OPENSEES = ("SparseSYM", "UmfPack")  # BandSPD and ProfileSPD take 40 times as long
 
@@ -83,15 +87,17 @@ def walk(assembly: Assembly, model: Model) -> _Walk:
 
 
 def iterations(rods: int) -> tuple[list[Row], float, int]:
-    """One iteration beside the bare factorisations of its matrix: rows, the iteration's median time, and the number of freedoms."""
+    """One iteration beside the bare factorisations of its matrix: rows, the iteration's median time, and the
+    number of freedoms.
+    """
     model = model_of(rods)
     assembly = assemble(model.network)
     size = len(assembly.free)
     rounds = max(3, 200_000 // size)
     families = {}
-    for name in sparse.installed():
+    for name in factorisation.installed():
         os.environ["SHELLFORM_SOLVER"] = name
-        families[name] = sparse.Symmetric(assembly.matrix.indptr, assembly.matrix.indices)
+        families[name] = factorisation.Symmetric(assembly.matrix.indptr, assembly.matrix.indices)
     del os.environ["SHELLFORM_SOLVER"]
     if "mkl" in families:
         families["mkl, 2 threads"] = families["mkl"]
@@ -125,12 +131,24 @@ def iterations(rods: int) -> tuple[list[Row], float, int]:
     one = statistics.median(step)
     fastest = min((name for name in medians if not name.endswith("threads")), key=medians.__getitem__)
     rows = [Row(f"{size:,} freedoms: one iteration", 1e3 * one, "ms")]
-    rows += [Row(f"{size:,} freedoms: bare Cholesky, {name}", 1e3 * took, "ms") for name, took in medians.items()]
-    rows.append(Row(f"{size:,} freedoms: iteration over the fastest bare Cholesky ({fastest})", one / medians[fastest], "", 1.6))
-    # What the processors did, both threads added up: no other work on the machine gets into it, and two threads gain nothing.
+    rows += [
+        Row(f"{size:,} freedoms: bare Cholesky, {name}", 1e3 * took, "ms") for name, took in medians.items()
+    ]
+    rows.append(
+        Row(
+            f"{size:,} freedoms: iteration over the fastest bare Cholesky ({fastest})",
+            one / medians[fastest],
+            "",
+            1.6,
+        )
+    )
+    # What the processors did, both threads added up: no other work on the machine gets into it, and two
+    # threads gain nothing.
     ratio = statistics.median(work) / statistics.median(bare_work[fastest])
     rows.append(Row(f"{size:,} freedoms: the same in processor time", ratio))
-    rows.append(Row(f"{size:,} freedoms: assembly's share of an iteration", 100 * statistics.median(share), "%", 25.0))
+    rows.append(
+        Row(f"{size:,} freedoms: assembly's share of an iteration", 100 * statistics.median(share), "%", 25.0)
+    )
     return rows, one, size
 
 
@@ -164,19 +182,33 @@ def beside_peers(rods: int, python: str, missing: dict[str, str]) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         file, moved = Path(folder) / "model.json", Path(folder) / "moved.npy"
         write_model(file, model)
-        todo = [("opensees", solver) for solver in OPENSEES] * rounds + [("kratos", "sparse_lu")] * (1 if rods > 40 else 2)
+        todo = [("opensees", solver) for solver in OPENSEES] * rounds + [("kratos", "sparse_lu")] * (
+            1 if rods > 40 else 2
+        )
         for name, solver in todo:
             if name in missing:
                 continue
             ours()
             ours()
-            command = [python, str(HERE / "peers" / f"{name}.py"), str(file), str(moved), "--tolerance", str(TOLERANCE * scale), "--unit", str(unit)]
-            # Threads that wait for each other in a loop made Kratos ten times slower beside other work on the machine.
+            command = [
+                python,
+                str(HERE / "peers" / f"{name}.py"),
+                str(file),
+                str(moved),
+                "--tolerance",
+                str(TOLERANCE * scale),
+                "--unit",
+                str(unit),
+            ]
+            # Threads that wait for each other in a loop made Kratos ten times slower beside other work on the
+            # machine.
             quiet = {**os.environ, "OMP_WAIT_POLICY": "PASSIVE"}
             done = subprocess.run([*command, "--solver", solver], capture_output=True, text=True, env=quiet)
             lines = [line for line in done.stdout.splitlines() if line.startswith("{")]
             if not lines:
-                raise SystemExit(f"{name} with {solver} ended without a result:\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+                raise SystemExit(
+                    f"{name} with {solver} ended without a result:\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+                )
             answer = json.loads(lines[-1])
             if not answer["converged"]:
                 raise SystemExit(f"{answer['name']} found no equilibrium with {rods} rods")
@@ -188,14 +220,29 @@ def beside_peers(rods: int, python: str, missing: dict[str, str]) -> list[Row]:
         if not runs:
             continue
         for key, what, mine in (("iteration", "an iteration", step), ("seconds", "in total", total)):
-            times = {full: statistics.median(answer[key] for answer in answers) for full, answers in runs.items()}
+            times = {
+                full: statistics.median(answer[key] for answer in answers) for full, answers in runs.items()
+            }
             best = min(times, key=times.__getitem__)
             rows.append(Row(f"{len(assembly.free):,} freedoms: {best} {what}", times[best], "s"))
             rows.append(
-                Row(f"{len(assembly.free):,} freedoms: {name} over shellform {what}", times[best] / statistics.median(mine), "x", bar, False)
+                Row(
+                    f"{len(assembly.free):,} freedoms: {name} over shellform {what}",
+                    times[best] / statistics.median(mine),
+                    "x",
+                    bar,
+                    False,
+                )
             )
         apart = 100 * differences[name.lower()]
-        rows.append(Row(f"{len(assembly.free):,} freedoms: displacements differ from those of {name} by", apart, "%", 100 * MATCH))
+        rows.append(
+            Row(
+                f"{len(assembly.free):,} freedoms: displacements differ from those of {name} by",
+                apart,
+                "%",
+                100 * MATCH,
+            )
+        )
     return rows
 
 
@@ -207,7 +254,9 @@ def difference(own: np.ndarray, other: np.ndarray) -> float:
 
 
 def sensitivities() -> list[Row]:
-    """All cable forces and the misfit by all rest lengths, and one adjoint gradient, in iterations of the same model."""
+    """All cable forces and the misfit by all rest lengths, and one adjoint gradient, in iterations of the
+    same model.
+    """
     model = gridshell(CABLES, cable_rest=0.995)
     network, cables, load = model.network, model.network.cables, model.loads["design"]
     assembly = assemble(network)
@@ -228,7 +277,9 @@ def sensitivities() -> list[Row]:
             if turn:
                 step.append(took)
         began = time.perf_counter()
-        response = sensitivity.respond(assembly, found.state, sensitivity.by_rest_length(assembly, found.state, cables))
+        response = sensitivity.respond(
+            assembly, found.state, sensitivity.by_rest_length(assembly, found.state, cables)
+        )
         rows = sensitivity.tension_rows(assembly, found.state, cables)
         forces = sensitivity.direct(response, rows)
         forces[np.diag_indices(len(forces))] += cables.tension_by_rest_length(found.state)
@@ -267,7 +318,9 @@ def solve(rods: int, elements: int) -> dict[str, float]:
     model = gridshell(rods, elements, loaded=-0.4 * (12 / rods) ** 2)
     began = time.perf_counter()
     assembly = assemble(model.network)
-    found = find_equilibrium(assembly, at_rest(model.network.nodes), model.loads["design"], tolerance=TOLERANCE)
+    found = find_equilibrium(
+        assembly, at_rest(model.network.nodes), model.loads["design"], tolerance=TOLERANCE
+    )
     return {
         "seconds": time.perf_counter() - began,
         "memory": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024 / 1e9,
@@ -280,7 +333,14 @@ def solve(rods: int, elements: int) -> dict[str, float]:
 
 def memory(rods: int) -> list[Row]:
     told = alone("solve", str(rods), "4")
-    return [Row(f"peak memory with {told['freedoms']:,} freedoms, in a process of its own", told["memory"], "GB", 2.0)]
+    return [
+        Row(
+            f"peak memory with {told['freedoms']:,} freedoms, in a process of its own",
+            told["memory"],
+            "GB",
+            2.0,
+        )
+    ]
 
 
 def million() -> list[Row]:
@@ -318,7 +378,9 @@ def compilation() -> list[Row]:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--sizes", type=int, nargs="+", default=list(SIZES), help="rods in each direction")
     parser.add_argument("--no-peers", action="store_true", help="leave OpenSees and Kratos out")
     parser.add_argument("--peers-python", help="a Python 3.12 with the peers (also SHELLFORM_PEERS_PYTHON)")
@@ -339,7 +401,10 @@ def main() -> int:
             print(row, flush=True)
 
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-    print(f"{CORES} cores; load before the start {busy:.1f} (below 0.5 is quiet); factorised by {sparse.backend_name()}\n", flush=True)
+    print(
+        f"{CORES} cores; load before the start {busy:.1f} (below 0.5 is quiet); factorised by {factorisation.backend_name()}\n",
+        flush=True,
+    )
     measured = {}
     for rods in chosen.sizes:
         more, one, size = iterations(rods)
@@ -348,7 +413,16 @@ def main() -> int:
     low, high = min(measured), max(measured)
     if low < high:
         exponent = np.log(measured[high] / measured[low]) / np.log(high / low)
-        tell([Row(f"an iteration grows from {low:,} to {high:,} freedoms as n to the power", float(exponent), "", 1.3)])
+        tell(
+            [
+                Row(
+                    f"an iteration grows from {low:,} to {high:,} freedoms as n to the power",
+                    float(exponent),
+                    "",
+                    1.3,
+                )
+            ]
+        )
     tell(sensitivities())
     tell(compilation())
     tell(memory(max(chosen.sizes)))
@@ -364,7 +438,9 @@ def main() -> int:
         tell(million())
     if chosen.output:
         table = [asdict(row) | {"holds": row.holds} for row in rows]
-        chosen.output.write_text(json.dumps({"load_before": busy, "notes": notes, "rows": table}, indent=1), encoding="utf-8")
+        chosen.output.write_text(
+            json.dumps({"load_before": busy, "notes": notes, "rows": table}, indent=1), encoding="utf-8"
+        )
     failed = sum(row.holds is False for row in rows)
     print(f"\n{sum(row.holds is True for row in rows)} bars hold, {failed} don't")
     return 1 if failed else 0

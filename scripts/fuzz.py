@@ -1,10 +1,12 @@
-"""Thousands of damaged inputs for every reader: each is read or refused with a message, within 20 s, and leaves no torn file.
+"""Thousands of damaged inputs for every reader: each is read or refused with a message, within 20 s, and
+leaves no torn file.
 
     scripts/fuzz.py [--count 10000] [--seed 1] [--kind KIND …]
 
-Good files of each kind are damaged at random: bits turned, pieces cut, doubled, moved and filled with junk, numbers made huge, negative,
-not a number, values of JSON exchanged for others. A child process reads them, so that a crash or a hang costs nobody anything but is
-counted. What fails is kept in a folder that is named at the end.
+Good files of each kind are damaged at random: bits turned, pieces cut, doubled, moved and filled with junk,
+numbers made huge, negative, not a number, values of JSON exchanged for others. A child process reads them, so
+that a crash or a hang costs nobody anything but is counted. What fails is kept in a folder that is named at
+the end.
 """
 
 from __future__ import annotations
@@ -30,11 +32,65 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 _LONGEST = 20.0  # seconds
 _MEMORY = 6 * 1024**3
-_NUMBERS = [b"0", b"-1", b"nan", b"inf", b"-inf", b"1e308", b"1e-308", b"99999999999999999999", b"0.5", b"2147483648", b"1e5", b"3", b""]
-_VALUES = [None, True, -1, 0, 1e308, float("nan"), float("inf"), "", "x", [], {}, [[]], [None], {"a": 1}, 2**63, "9" * 5000]
-_FOREIGN = {"step", "igs", "brep", "3dm", "ply", "msh", "vtk", "vtp", "vtu"}  # read in a process of their own, a second each
-_SHARES = {"case": 16, "study": 10, "model": 16, "obj": 7, "off": 6, "stl": 7, "gltf": 7, "glb": 6, "json": 7, "scan": 6}
-_SHARES |= {"catalogue": 4, "sections": 3, "run": 4, "log": 4, "design": 1} | dict.fromkeys(sorted(_FOREIGN), 0.25)
+_NUMBERS = [
+    b"0",
+    b"-1",
+    b"nan",
+    b"inf",
+    b"-inf",
+    b"1e308",
+    b"1e-308",
+    b"99999999999999999999",
+    b"0.5",
+    b"2147483648",
+    b"1e5",
+    b"3",
+    b"",
+]
+_VALUES = [
+    None,
+    True,
+    -1,
+    0,
+    1e308,
+    float("nan"),
+    float("inf"),
+    "",
+    "x",
+    [],
+    {},
+    [[]],
+    [None],
+    {"a": 1},
+    2**63,
+    "9" * 5000,
+]
+_FOREIGN = {
+    "step",
+    "igs",
+    "brep",
+    "3dm",
+    "ply",
+    "msh",
+    "vtk",
+    "vtp",
+    "vtu",
+}  # read in a process of their own, a second each
+_SHARES = {
+    "case": 16,
+    "study": 10,
+    "model": 16,
+    "obj": 7,
+    "off": 6,
+    "stl": 7,
+    "gltf": 7,
+    "glb": 6,
+    "json": 7,
+    "scan": 6,
+}
+_SHARES |= {"catalogue": 4, "sections": 3, "run": 4, "log": 4, "design": 1} | dict.fromkeys(
+    sorted(_FOREIGN), 0.25
+)
 
 
 def damaged(data: bytes, chance: random.Random) -> bytes:
@@ -64,7 +120,18 @@ def _double(data: bytes, chance: random.Random) -> bytes:
 
 def _junk(data: bytes, chance: random.Random) -> bytes:
     at = chance.randrange(len(data) + 1)
-    junk = chance.choice([chance.randbytes(chance.randrange(1, 40)), b"\0" * 9, b"[" * 3000, b"{" * 90, b"\xff\xfe", "ü\u202e𝄞".encode(), b'"', b"\n"])
+    junk = chance.choice(
+        [
+            chance.randbytes(chance.randrange(1, 40)),
+            b"\0" * 9,
+            b"[" * 3000,
+            b"{" * 90,
+            b"\xff\xfe",
+            "ü\u202e𝄞".encode(),
+            b'"',
+            b"\n",
+        ]
+    )
     return data[:at] + junk + data[at:]
 
 
@@ -108,18 +175,28 @@ def _value(data: bytes, chance: random.Random) -> bytes:
     return json.dumps(tree).encode()
 
 
-_ACCIDENTS: list[Callable[[bytes, random.Random], bytes]] = [_bits, _cut, _double, _junk, _number, _number, _lines, _value, _value]
+_ACCIDENTS: list[Callable[[bytes, random.Random], bytes]] = [
+    _bits,
+    _cut,
+    _double,
+    _junk,
+    _number,
+    _number,
+    _lines,
+    _value,
+    _value,
+]
 
 
 def sound(folder: Path) -> dict[str, list[Path]]:
     """Good files of each kind; made in `folder`."""
     import pyvista
-
-    from shellform.study.case import load_case
-    from shellform.study.run import run_case
-    from shellform.study.store import Log
     from tests.study.stubs import study_file
-    from tests.study.test_commands import MODEL
+
+    from shellform.case.case import load_case
+    from shellform.run.run import run_case
+    from shellform.study.store import Log
+    from tests.cli.test_commands import MODEL
     from tests.surface.shells import cap
     from tests.surface.test_bad_files import every_format
 
@@ -135,7 +212,11 @@ def sound(folder: Path) -> dict[str, list[Path]]:
         '[function]\njoint.gap = "net.spacing / 60"\n[column]\ncables = "designs.best.cables"\n[objective]\ncables = "min"\n',
     )
     files["study"] = [study]
-    files["case"] = [study.with_name("dome.toml"), ROOT / "scripts/full_size_poured.toml", ROOT / "scripts/scale_model.toml"]
+    files["case"] = [
+        study.with_name("dome.toml"),
+        ROOT / "scripts/full_size_poured.toml",
+        ROOT / "scripts/scale_model.toml",
+    ]
     files["design"] = [study.with_name("dome.toml")]
     whole = {
         **MODEL,
@@ -143,19 +224,42 @@ def sound(folder: Path) -> dict[str, list[Path]]:
         "springs": [],
         "start": {"positions": MODEL["nodes"], "quaternions": [[1, 0, 0, 0]] * 3},
     }
-    for name, model in [("model.json", MODEL), ("whole.json", {k: v for k, v in whole.items() if k != "springs"})]:
+    for name, model in [
+        ("model.json", MODEL),
+        ("whole.json", {k: v for k, v in whole.items() if k != "springs"}),
+    ]:
         (folder / name).write_text(json.dumps(model))
         files["model"].append(folder / name)
-    (folder / "scan.csv").write_text("# x y z\n" + "\n".join(f"{k},{0.5 * k},{0.1 * k * k}" for k in range(30)))
+    (folder / "scan.csv").write_text(
+        "# x y z\n" + "\n".join(f"{k},{0.5 * k},{0.1 * k * k}" for k in range(30))
+    )
     files["scan"] = [folder / "scan.csv"]
-    (folder / "sections.toml").write_text('[rod]\nshape = "tube"\nradius = 0.02\nwall = 0.003\nyoung = 4e10\npoisson = 0.3\nstrength = 2e8\n')
+    (folder / "sections.toml").write_text(
+        '[rod]\nshape = "tube"\nradius = 0.02\nwall = 0.003\nyoung = 4e10\npoisson = 0.3\nstrength = 2e8\n'
+    )
     files["sections"] = [folder / "sections.toml"]
     files["catalogue"] = sorted((ROOT / "shellform").rglob("gfrp_*.toml"))
     run = folder / "run"
     run_case(load_case(study.with_name("dome.toml")), run, until="initial")
-    files["run"] = [file for file in run.rglob("*") if file.suffix in (".json", ".npz", ".toml") and "states" not in file.parts]
+    files["run"] = [
+        file
+        for file in run.rglob("*")
+        if file.suffix in (".json", ".npz", ".toml") and "states" not in file.parts
+    ]
     with Log(folder / "results.jsonl") as log:
-        log.add([{"key": f"{k:032d}", "status": "done", "reason": "", "values": {"x": k}, "seconds": {}, "worker": ""} for k in range(20)])
+        log.add(
+            [
+                {
+                    "key": f"{k:032d}",
+                    "status": "done",
+                    "reason": "",
+                    "values": {"x": k},
+                    "seconds": {},
+                    "worker": "",
+                }
+                for k in range(20)
+            ]
+        )
     files["log"] = [folder / "results.jsonl"]
     return dict(files)
 
@@ -195,7 +299,7 @@ def attempt(kind: str, number: int, files: dict[str, list[Path]], place: Path) -
 
 def _read(kind: str, bad: Path, place: Path) -> None:
     if kind == "case":
-        from shellform.study.case import dump_case, load_case
+        from shellform.case.case import dump_case, load_case
 
         dump_case(load_case(bad))
     elif kind == "study":
@@ -209,19 +313,19 @@ def _read(kind: str, bad: Path, place: Path) -> None:
 
         read_model(bad)
     elif kind == "scan":
-        from shellform.design.scan import read_points
+        from shellform.site.scans import read_points
 
         read_points(bad)
     elif kind == "sections":
-        from shellform.structure.results import read_sections
+        from shellform.structure.answers.results import read_sections
 
         read_sections(bad)
     elif kind == "catalogue":
-        from shellform.design.catalogue import read_catalogue
+        from shellform.gridshell.catalogue import read_catalogue
 
         read_catalogue(bad)
     elif kind == "run":
-        from shellform.study.folder import read_run
+        from shellform.run.folder import read_run
 
         read_run(place / "run")
     elif kind == "log":
@@ -231,14 +335,16 @@ def _read(kind: str, bad: Path, place: Path) -> None:
             for key in log:
                 log.get(key)
     elif kind == "design":
-        from shellform.study.case import load_case
-        from shellform.study.run import run_case
+        from shellform.case.case import load_case
+        from shellform.run.run import run_case
 
         case = load_case(bad)
-        if case.net.spacing > 0.05 and (case.surface.size or 1.0) > 0.01 and case.net.elements < 9:  # no larger jobs than the sound one
+        if (
+            case.net.spacing > 0.05 and (case.surface.size or 1.0) > 0.01 and case.net.elements < 9
+        ):  # no larger jobs than the sound one
             run_case(case, place / "out", until="surface")
     else:
-        from shellform.surface.reading import read_surface
+        from shellform.surface.readers.reading import read_surface
 
         read_surface(bad)
 
@@ -257,7 +363,9 @@ def child(folder: Path) -> None:
         print(attempt(kind, int(number), files, folder / "try"), file=said, flush=True)
 
 
-def fuzz(asks: list[tuple[str, int]], folder: Path, tell: Callable[[str], None] = lambda text: None) -> tuple[dict[str, collections.Counter[str]], list[str]]:
+def fuzz(
+    asks: list[tuple[str, int]], folder: Path, tell: Callable[[str], None] = lambda text: None
+) -> tuple[dict[str, collections.Counter[str]], list[str]]:
     """Has all attempts made; returns counts of answers by kind, and what went wrong."""
     counts: dict[str, collections.Counter[str]] = collections.defaultdict(collections.Counter)
     wrong: list[str] = []
@@ -265,7 +373,14 @@ def fuzz(asks: list[tuple[str, int]], folder: Path, tell: Callable[[str], None] 
     for done, (kind, number) in enumerate(asks):
         if process is None:
             command = [sys.executable, str(Path(__file__).resolve()), "--child", str(folder)]
-            process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=ROOT)
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                text=True,
+                cwd=ROOT,
+            )
             if _answer(process, 300.0) != "ready":
                 raise RuntimeError("the child didn't start")
         assert process.stdin is not None
@@ -300,14 +415,20 @@ def _answer(process: subprocess.Popen[str], longest: float) -> str | None:
 def asked(count: int, seed: int, kinds: list[str]) -> list[tuple[str, int]]:
     """What to try: kinds by their shares, in mixed order."""
     total = sum(_SHARES[kind] for kind in kinds)
-    asks = [(kind, 1_000_000 * seed + k) for kind in kinds for k in range(max(1, round(count * _SHARES[kind] / total)))]
+    asks = [
+        (kind, 1_000_000 * seed + k)
+        for kind in kinds
+        for k in range(max(1, round(count * _SHARES[kind] / total)))
+    ]
     random.Random(seed).shuffle(asks)
     return asks
 
 
 def main() -> int:
     """Status 0 where nothing went wrong."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--count", type=int, default=10_000)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--kind", nargs="*", default=list(_SHARES), choices=list(_SHARES))
@@ -318,7 +439,9 @@ def main() -> int:
         return 0
     folder = Path(tempfile.mkdtemp(prefix="fuzz"))
     began = time.monotonic()
-    counts, wrong = fuzz(asked(options.count, options.seed, options.kind), folder, lambda text: print(text, flush=True))
+    counts, wrong = fuzz(
+        asked(options.count, options.seed, options.kind), folder, lambda text: print(text, flush=True)
+    )
     for kind, each in sorted(counts.items()):
         print(f"{kind:>10}  " + ", ".join(f"{count} {what}" for what, count in sorted(each.items())))
     total = sum(sum(each.values()) for each in counts.values())

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 import shellform as sf
-from shellform.surface.target import make_surface
-from shellform.surface.tree import Tree
+from shellform.surface.shape.target import make_surface
+from shellform.surface.shape.tree import Tree
 
 SURFACES = Path(__file__).parent.parent / "surfaces"
 
@@ -42,7 +42,11 @@ def closest_points() -> None:
     for name, queries in (("near it", near), ("anywhere", rng.uniform(-2, 2, (100_000, 3)))):
         began = time.perf_counter()
         Tree(points[triangles]).nearest(queries)
-        row(f"closest points, {name}: 1e5 on {len(triangles)} triangles, with tree", time.perf_counter() - began, "1 s")
+        row(
+            f"closest points, {name}: 1e5 on {len(triangles)} triangles, with tree",
+            time.perf_counter() - began,
+            "1 s",
+        )
     for count in (225, 708):
         vertices, faces = wave(count)
         began = time.perf_counter()
@@ -64,7 +68,11 @@ def nets(large: bool) -> None:
         net = sf.pull_net(shell, spacing=spacing, gap=spacing / 27.5)
         times.append(time.perf_counter() - began)
         counts.append(len(net.grid.lattice))
-        row(f"18 × 11 m at {spacing:g} m, {counts[-1]} crossings, {net.quality.factorisations} factors", times[-1], bar)
+        row(
+            f"18 × 11 m at {spacing:g} m, {counts[-1]} crossings, {net.quality.factorisations} factors",
+            times[-1],
+            bar,
+        )
     slope = np.polyfit(np.log(counts[1:]), np.log(times[1:]), 1)[0]
     print(f"time grows with the number of crossings to the power {slope:.2f}   bar about 1.3")
 

@@ -1,5 +1,6 @@
-"""Draws the README's pictures of pages: `python scripts/page_picture.py DIR`, where DIR is a run with a report.html, or a study with a
-study.html whose picture is named as the folder; needs playwright and a Chromium."""
+"""Draws the README's pictures of pages: `python scripts/page_picture.py DIR`, where DIR is a run with a
+report.html, or a study with a study.html whose picture is named as the folder; needs playwright and a
+Chromium."""
 
 import io
 import shutil
@@ -17,7 +18,9 @@ def main(place: Path) -> None:
     study = place / "study.html"
     with sync_playwright() as player:
         own = player.chromium.executable_path
-        browser = player.chromium.launch(executable_path=own if Path(own).is_file() else shutil.which("chromium"))
+        browser = player.chromium.launch(
+            executable_path=own if Path(own).is_file() else shutil.which("chromium")
+        )
         page = browser.new_page(viewport={"width": 1280, "height": 1060})
         page.goto((study if study.is_file() else place / "report.html").resolve().as_uri())
         point_at_a_design(page) if study.is_file() else pick_a_cable(page)

@@ -1,6 +1,7 @@
-"""How long pictures of a run take: the first in a fresh process, with all imports and the reading of the run; those that follow; films' frames.
+"""How long pictures of a run take: the first in a fresh process, with all imports and the reading of the run;
+those that follow; films' frames.
 
-    python scripts/picture_speed.py runs/scale_model
+python scripts/picture_speed.py runs/scale_model
 """
 
 import os
@@ -13,21 +14,28 @@ from contextlib import contextmanager
 from pathlib import Path
 
 FIRST, NEXT = 8.0, 1.0  # s allowed, at paper scale on 2 cores without a graphics card
-ONE = "from shellform.study.pictures import Wish, draw_run; draw_run(sys.argv[1], Wish('initial', 'design'))"
+ONE = "from shellform.run.figures import Wish, draw_run; draw_run(sys.argv[1], Wish('initial', 'design'))"
 
 
 def main(run: str) -> None:
-    from shellform.output import render, scene
-    from shellform.output.panel import Look, Skin
-    from shellform.output.sheets import single
-    from shellform.study.folder import read_run
-    from shellform.study.pictures import panel_of
+    from shellform.output.pictures import render, scene
+    from shellform.output.pictures.panel import Look, Skin
+    from shellform.output.pictures.sheets import single
+    from shellform.run.figures import panel_of
+    from shellform.run.folder import read_run
 
-    print(f"{'':34} {'by the clock':>14} {'allowed':>8} {'of it':>6} {'processor':>10}   (load {os.getloadavg()[0]:.1f})")
+    print(
+        f"{'':34} {'by the clock':>14} {'allowed':>8} {'of it':>6} {'processor':>10}   (load {os.getloadavg()[0]:.1f})"
+    )
     with _timed("first picture, fresh process", FIRST):
-        subprocess.run([sys.executable, "-c", f"import sys; {ONE}", run], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            [sys.executable, "-c", f"import sys; {ONE}", run], check=True, stdout=subprocess.DEVNULL
+        )
     known = read_run(run)
-    panel, look = panel_of(known, known.best, "design"), Look(surface=Skin(known.surface.vertices, known.surface.triangles))
+    panel, look = (
+        panel_of(known, known.best, "design"),
+        Look(surface=Skin(known.surface.vertices, known.surface.triangles)),
+    )
     with tempfile.TemporaryDirectory() as folder:
         render.picture(Path(folder) / "warm.png", panel, look)
         with _timed("a further picture, alone", NEXT):

@@ -1,9 +1,10 @@
-"""SIGKILL to a study and to its workers at random moments, again and again, until it has ended; and the same study undisturbed.
+"""SIGKILL to a study and to its workers at random moments, again and again, until it has ended; and the same
+study undisturbed.
 
     scripts/study_faults.py [--kills 30] [--folder DIR] [--seed 1] [--until STAGE]
 
-Passes when both tables are the same to the byte, no design has two rows, and every file of the folders can be read. The designs are
-real ones: a dome of about 1,200 freedoms, from surface to optimised cables.
+Passes when both tables are the same to the byte, no design has two rows, and every file of the folders can be
+read. The designs are real ones: a dome of about 1,200 freedoms, from surface to optimised cables.
 """
 
 from __future__ import annotations
@@ -37,7 +38,9 @@ cable.stiffness = { low = 100, high = 400 }
 
 def main() -> int:
     """Runs the trial; status 0 where it passes."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--kills", type=int, default=30)
     parser.add_argument("--folder", type=Path, default=None)
     parser.add_argument("--seed", type=int, default=1)
@@ -60,7 +63,9 @@ def main() -> int:
     job: subprocess.Popen[bytes] | None = None
     while sum(kills.values()) < asked.kills:
         if job is None or job.poll() is not None:
-            if job is not None and job.returncode == 0:  # it has ended: its last rows are taken away, and it goes on
+            if (
+                job is not None and job.returncode == 0
+            ):  # it has ended: its last rows are taken away, and it goes on
                 forget(out, chance.randrange(2, 10))
             job = start(file, out)
         at_work(job, out)
@@ -85,13 +90,27 @@ def main() -> int:
 
 def start(file: Path, folder: Path) -> subprocess.Popen[bytes]:
     """The study in a process of its own."""
-    command = [sys.executable, "-m", "shellform", "study", str(file), "--output", str(folder), "--workers", "2"]
+    command = [
+        sys.executable,
+        "-m",
+        "shellform",
+        "study",
+        str(file),
+        "--output",
+        str(folder),
+        "--workers",
+        "2",
+    ]
     with open(folder.with_suffix(".log"), "ab") as log:
-        return subprocess.Popen(command, cwd=ROOT, stdout=log, stderr=log, env={**os.environ, "PYTHONPATH": str(ROOT)})
+        return subprocess.Popen(
+            command, cwd=ROOT, stdout=log, stderr=log, env={**os.environ, "PYTHONPATH": str(ROOT)}
+        )
 
 
 def design_time(folder: Path) -> float:
-    """Median seconds of a design's own stages: the first ones compile kernels, for a minute where none are kept from before."""
+    """Median seconds of a design's own stages: the first ones compile kernels, for a minute where none are
+    kept from before.
+    """
     lines = (folder / "results.jsonl").read_bytes().splitlines()
     return statistics.median(json.loads(line[9:])["seconds"]["here"] for line in lines)
 
@@ -110,7 +129,9 @@ def children(process: int) -> list[int]:
     found = []
     for each in Path("/proc").iterdir():
         try:
-            parent = int((each / "stat").read_text().rsplit(")", 1)[1].split()[1]) if each.name.isdigit() else -1
+            parent = (
+                int((each / "stat").read_text().rsplit(")", 1)[1].split()[1]) if each.name.isdigit() else -1
+            )
             if parent == process and b"spawn_main" in (each / "cmdline").read_bytes():
                 found.append(int(each.name))
         except OSError:  # it has ended meanwhile
@@ -119,7 +140,9 @@ def children(process: int) -> list[int]:
 
 
 def forget(folder: Path, rows: int) -> None:
-    """Takes away the last rows, and tears the one before, as a kill would have left it; and what these designs had computed."""
+    """Takes away the last rows, and tears the one before, as a kill would have left it; and what these
+    designs had computed.
+    """
     log = folder / "results.jsonl"
     lines = log.read_bytes().splitlines(keepends=True)
     for line in lines[-rows:]:
@@ -129,7 +152,7 @@ def forget(folder: Path, rows: int) -> None:
 
 def judge(out: Path, whole: Path) -> int:
     """Tells whether the disturbed study has what the undisturbed one has."""
-    from shellform.study.folder import read_run
+    from shellform.run.folder import read_run
     from shellform.study.store import Log, read_table
 
     failed = 0
@@ -158,7 +181,9 @@ def judge(out: Path, whole: Path) -> int:
         except Exception as error:  # whatever is wrong with it
             damaged += 1
             print(f"damaged: {file}: {error}")
-    runs = [read_run(folder) for folder in (out / "runs").iterdir() if (folder / "designs/initial.npz").exists()]
+    runs = [
+        read_run(folder) for folder in (out / "runs").iterdir() if (folder / "designs/initial.npz").exists()
+    ]
     print(f"{len(runs)} runs read back, {damaged} damaged files")
     failed += damaged
     print("FAIL" if failed else "pass")

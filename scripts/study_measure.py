@@ -25,9 +25,9 @@ ROOT = Path(__file__).resolve().parent.parent
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from shellform.study.case import load_case  # noqa: E402
-from shellform.study.job import Job, Outcome, work  # noqa: E402
-from shellform.study.sweep import Engine, engine, sweep  # noqa: E402
+from shellform.case.case import load_case  # noqa: E402
+from shellform.study.engine import Engine, engine, sweep  # noqa: E402
+from shellform.study.jobs import Job, Outcome, work  # noqa: E402
 
 
 def timed(job: Job, before: Outcome | None = None) -> Outcome:
@@ -38,7 +38,10 @@ def timed(job: Job, before: Outcome | None = None) -> Outcome:
 
     began = time.thread_time()
     outcome = work(job, before)
-    here = {"cpu": time.thread_time() - began, "memory": psutil.Process(os.getpid()).memory_info().rss / 1024**2}
+    here = {
+        "cpu": time.thread_time() - began,
+        "memory": psutil.Process(os.getpid()).memory_info().rss / 1024**2,
+    }
     return {**outcome, "seconds": {**outcome["seconds"], **here}}
 
 
@@ -65,7 +68,9 @@ def soak(count: int) -> None:
     def jobs(first: int, number: int) -> Iterator[Job]:
         for k in range(first, first + number):
             entry = case.cable.model_copy(update={"stiffness": 100.0 + k})
-            yield Job(f"{k:032d}", case.model_copy(update={"cable": entry}), "optimise", str(place / f"runs/{k}"))
+            yield Job(
+                f"{k:032d}", case.model_copy(update={"cable": entry}), "optimise", str(place / f"runs/{k}")
+            )
 
     def turn(on: Engine, first: int, number: int) -> tuple[float, list[Outcome]]:
         began = time.perf_counter()
@@ -79,28 +84,42 @@ def soak(count: int) -> None:
         all_found: dict[str, list[Outcome]] = {"one": [], "two": []}
         first = 0
         while len(all_found["two"]) < count:
-            for name, on, number in (("one", one, 8), ("two", two, 32)):  # long turns: at the end of each a worker waits for the other
+            for name, on, number in (
+                ("one", one, 8),
+                ("two", two, 32),
+            ):  # long turns: at the end of each a worker waits for the other
                 rate, found = turn(on, first, number)
                 first += number
                 rates[name].append(rate)
                 all_found[name] += found
         ratios = [b / a for a, b in zip(rates["one"], rates["two"], strict=True)]
         done = sum(outcome["status"] == "done" for outcome in all_found["two"])
-        print(f"{len(all_found['two'])} designs on two workers, {done} done: {statistics.median(rates['two']):.2f} a second")
-        print(f"throughput of two workers over one, turn by turn: median {statistics.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})")
-        cpu = {name: statistics.median(o["seconds"]["cpu"] for o in found) for name, found in all_found.items()}
-        print(f"processor time a design: {cpu['one']:.2f} s alone, {cpu['two']:.2f} s beside another: efficiency {cpu['one'] / cpu['two']:.2f}")
+        print(
+            f"{len(all_found['two'])} designs on two workers, {done} done: {statistics.median(rates['two']):.2f} a second"
+        )
+        print(
+            f"throughput of two workers over one, turn by turn: median {statistics.median(ratios):.2f} ({min(ratios):.2f} to {max(ratios):.2f})"
+        )
+        cpu = {
+            name: statistics.median(o["seconds"]["cpu"] for o in found) for name, found in all_found.items()
+        }
+        print(
+            f"processor time a design: {cpu['one']:.2f} s alone, {cpu['two']:.2f} s beside another: efficiency {cpu['one'] / cpu['two']:.2f}"
+        )
         memory = [outcome["seconds"]["memory"] for outcome in all_found["two"]]
         quarter = len(memory) // 4
         early, late = statistics.median(memory[quarter : 2 * quarter]), statistics.median(memory[-quarter:])
-        print(f"memory of a worker: {early:.0f} MB in the second quarter, {late:.0f} MB in the last, {max(memory):.0f} MB at most")
+        print(
+            f"memory of a worker: {early:.0f} MB in the second quarter, {late:.0f} MB in the last, {max(memory):.0f} MB at most"
+        )
 
 
 def thousand(count: int) -> None:
     """A study by its command's function, from the study file to the page."""
+    from tests.study.stubs import study_file
+
     from shellform.study.store import read_table
     from shellform.study.studies import run_study
-    from tests.study.stubs import study_file
 
     place = Path(tempfile.mkdtemp(prefix="study_thousand"))
     text = f"""
@@ -125,26 +144,41 @@ optimise.cable_force = "1 - optimise.misfit"
     spent = time.perf_counter() - began
     rows = read_table(place / "out", ["model.freedoms"]).to_pydict()
     freedoms = max(each for each in rows["model.freedoms"] if each)
-    print(f"{found.designs} designs of {freedoms:g} freedoms in {spent / 60:.1f} minutes, {found.failed} without a result: {place / 'out'}")
+    print(
+        f"{found.designs} designs of {freedoms:g} freedoms in {spent / 60:.1f} minutes, {found.failed} without a result: {place / 'out'}"
+    )
 
 
 def overhead() -> None:
     """Milliseconds a design that does nothing, through the engine alone and through a whole study."""
-    from shellform.study.studies import run_study
     from tests.study.stubs import study_file
 
+    from shellform.study.studies import run_study
+
     place = Path(tempfile.mkdtemp(prefix="study_overhead"))
-    file = study_file(place, 'keep = "none"\n[vary]\ncable.stiffness = { low = 100, high = 400, count = 1000 }\n')
+    file = study_file(
+        place, 'keep = "none"\n[vary]\ncable.stiffness = { low = 100, high = 400, count = 1000 }\n'
+    )
     case = load_case(file.with_name("dome.toml"))
     with engine(workers=2) as two:
         began, used = time.perf_counter(), time.process_time()
-        count = sum(len(batch) for batch in sweep(two, (Job(f"{k:032d}", case, "net", "") for k in range(1000)), nothing))
+        count = sum(
+            len(batch)
+            for batch in sweep(two, (Job(f"{k:032d}", case, "net", "") for k in range(1000)), nothing)
+        )
         spent, used = time.perf_counter() - began, time.process_time() - used
-        print(f"engine alone: {1e3 * spent / count:.1f} ms a design, {1e3 * used / count:.1f} ms of processor time")
-    for what in ("whole study of 1,000 designs, with starting and ending the workers and the page", "again, on the same folder"):
+        print(
+            f"engine alone: {1e3 * spent / count:.1f} ms a design, {1e3 * used / count:.1f} ms of processor time"
+        )
+    for what in (
+        "whole study of 1,000 designs, with starting and ending the workers and the page",
+        "again, on the same folder",
+    ):
         began, used = time.perf_counter(), time.process_time()
         run_study(file, place / "out", workers=2, work=nothing)
-        print(f"{what}: {time.perf_counter() - began:.1f} s, {time.process_time() - used:.1f} s of processor time")
+        print(
+            f"{what}: {time.perf_counter() - began:.1f} s, {time.process_time() - used:.1f} s of processor time"
+        )
 
 
 def table(rows: int) -> None:
@@ -161,20 +195,36 @@ def table(rows: int) -> None:
         for first in range(0, rows, 1000):
             keys = [f"{k:032d}" for k in range(first, min(first + 1000, rows))]
             log.add(
-                [{"key": k, "status": "done", "reason": "", "values": {n: chance.random() for n in names}, "seconds": {}, "worker": ""} for k in keys]
+                [
+                    {
+                        "key": k,
+                        "status": "done",
+                        "reason": "",
+                        "values": {n: chance.random() for n in names},
+                        "seconds": {},
+                        "worker": "",
+                    }
+                    for k in keys
+                ]
             )
-            designs.writelines(json.dumps({"key": k, "own": {"net.spacing": chance.random()}}) + "\n" for k in keys)
+            designs.writelines(
+                json.dumps({"key": k, "own": {"net.spacing": chance.random()}}) + "\n" for k in keys
+            )
         designs.flush()
         print(f"{rows} rows of {len(names)} columns logged in {time.perf_counter() - began:.1f} s")
         began = time.perf_counter()
         write_table(place, log, {"a": names[0], "b": names[1]})
-        print(f"table written in {time.perf_counter() - began:.1f} s, {(place / 'table.parquet').stat().st_size / 1024**2:.0f} MB")
+        print(
+            f"table written in {time.perf_counter() - began:.1f} s, {(place / 'table.parquet').stat().st_size / 1024**2:.0f} MB"
+        )
     began = time.perf_counter()
     with Log(place / "results.jsonl"):
         print(f"log opened in {time.perf_counter() - began:.1f} s")
     began = time.perf_counter()
     whole = read_table(place)
-    print(f"table opened in {time.perf_counter() - began:.2f} s: {whole.num_rows} rows, {whole.num_columns} columns")
+    print(
+        f"table opened in {time.perf_counter() - began:.2f} s: {whole.num_rows} rows, {whole.num_columns} columns"
+    )
     began = time.perf_counter()
     some = read_table(place, ["number", "a", "b", "case.net.spacing"], [("a", "<", 0.1), ("b", ">", 0.5)])
     print(f"filtered in {time.perf_counter() - began:.2f} s: {some.num_rows} rows")
@@ -187,16 +237,20 @@ def many(workers: int, seconds: float) -> None:
     """
     import dask
     import distributed  # noqa: F401 (it adds its own settings, before ours)
+    from tests.study.stubs import study_file
 
     from shellform.study.store import Log, flat
-    from tests.study.stubs import study_file
 
     place = Path(tempfile.mkdtemp(prefix="study_many"))
     case = load_case(study_file(place, "").with_name("dome.toml"))
     entry = case.net.model_copy(update={"spacing": seconds})
     case = case.model_copy(update={"net": entry})
     own = {"distributed.admin.system-monitor.interval": "1h", "distributed.admin.tick.interval": "10s"}
-    with dask.config.set(own), engine(workers=workers, processes=False) as on, Log(place / "results.jsonl") as log:
+    with (
+        dask.config.set(own),
+        engine(workers=workers, processes=False) as on,
+        Log(place / "results.jsonl") as log,
+    ):
         count, began, used, store = 0, time.perf_counter(), time.process_time(), 0.0
         total = max(300, 6 * workers)
         came: list[float] = []
@@ -217,7 +271,9 @@ def many(workers: int, seconds: float) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs one of them."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("what", choices=["soak", "thousand", "overhead", "table", "many"])
     parser.add_argument("--designs", type=int, default=None)
     parser.add_argument("--rows", type=int, default=100_000)

@@ -1,7 +1,8 @@
-"""Makes the README's pictures from a finished run of scripts/scale_model.toml, small enough to be kept beside the code.
+"""Makes the README's pictures from a finished run of scripts/scale_model.toml, small enough to be kept beside
+the code.
 
-    scripts/shellform design scripts/scale_model.toml --output runs/scale_model
-    python scripts/tour_pictures.py runs/scale_model
+scripts/shellform design scripts/scale_model.toml --output runs/scale_model
+python scripts/tour_pictures.py runs/scale_model
 """
 
 import sys
@@ -10,12 +11,12 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from shellform.output import render
-from shellform.output.images import few_colours, write_film
-from shellform.output.panel import Look, Skin
-from shellform.study.films import draw_film
-from shellform.study.folder import Run, read_run
-from shellform.study.pictures import Wish, look_of, panel_of
+from shellform.output.pictures import render
+from shellform.output.pictures.images import few_colours, write_film
+from shellform.output.pictures.panel import Look, Skin
+from shellform.run.figures import Wish, look_of, panel_of
+from shellform.run.films import draw_film
+from shellform.run.folder import Run, read_run
 
 HERE = Path(__file__).parent / "pictures"
 MAPS = ("utilisation", "curvature", "shear", "mode")
@@ -25,8 +26,14 @@ def main(folder: str) -> None:
     run = read_run(folder)
     skin = Skin(run.surface.vertices, run.surface.triangles)
     best = panel_of(run, run.best, "design")
-    _save("optimised-design", render.image(best, Look(limit=run.case.figures.limit, size=(1200, 750), surface=skin)))
-    rows = [[panel_of(run, name, load) for load in ("none", "design", "additional")] for name in ("unbraced", "initial", "unloaded", run.best)]
+    _save(
+        "optimised-design",
+        render.image(best, Look(limit=run.case.figures.limit, size=(1200, 750), surface=skin)),
+    )
+    rows = [
+        [panel_of(run, name, load) for load in ("none", "design", "additional")]
+        for name in ("unbraced", "initial", "unloaded", run.best)
+    ]
     look = look_of(run, Wish(size=(480, 330)), [panel for row in rows for panel in row])
     _save("deviations", render.sheet(None, rows, look, heading=run.case.title))
     _save("maps", _four(run))

@@ -17,37 +17,52 @@ __version__ = "0.2.0"
 
 _HOMES = {
     "shellform.errors": ("InputError", "NotConverged", "ShellformError"),
-    "shellform.surface.target": ("Surface", "make_surface"),
-    "shellform.surface.reading": ("read_surface",),
+    "shellform.surface.shape.target": ("Surface", "make_surface"),
+    "shellform.surface.readers.reading": ("read_surface",),
     "shellform.net.chebyshev": ("pull_net",),
     "shellform.net.net": ("Net",),
-    "shellform.design.gridshell": ("Rod", "Joint", "Cable", "Design", "Gridshell", "brace"),
-    "shellform.design.loads": ("Region",),
-    "shellform.design.catalogue": ("Catalogue", "read_catalogue", "rounded_up", "neighbours"),
-    "shellform.design.problem": ("Problem", "follow", "deviations"),
-    "shellform.design.terms": ("Share", "AtMost", "Misfit", "RmsMisfit", "CableForce", "CableForces", "RodRadius"),
-    "shellform.design.checks": ("RodUtilisation", "ConnectorTurn", "LargestCableForce", "Slackness", "Softness", "Uplift"),
-    "shellform.design.robust": ("RobustMisfit",),
-    "shellform.design.scatter": ("Scatter",),
+    "shellform.gridshell.gridshell": ("Rod", "Joint", "Cable", "Design", "Gridshell", "brace"),
+    "shellform.gridshell.loads": ("Region",),
+    "shellform.gridshell.catalogue": ("Catalogue", "read_catalogue", "rounded_up", "neighbours"),
+    "shellform.problem.problem": ("Problem", "follow", "deviations"),
+    "shellform.problem.terms": (
+        "Share",
+        "AtMost",
+        "Misfit",
+        "RmsMisfit",
+        "CableForce",
+        "CableForces",
+        "RodRadius",
+    ),
+    "shellform.problem.engineering": (
+        "RodUtilisation",
+        "ConnectorTurn",
+        "LargestCableForce",
+        "Slackness",
+        "Softness",
+        "Uplift",
+    ),
+    "shellform.problem.robust": ("RobustMisfit",),
+    "shellform.gridshell.scatter": ("Scatter",),
 }
 _ROOMS = {
     "cad": "shellform.surface.cad",
-    "meshes": "shellform.surface.meshes",
+    "meshes": "shellform.surface.readers.meshes",
     "funicular": "shellform.surface.funicular",
-    "mma": "shellform.design.mma",
-    "calibration": "shellform.design.calibration",
-    "comparison": "shellform.design.comparison",
-    "site": "shellform.design.site",
-    "erection": "shellform.design.erection",
-    "robust": "shellform.design.robust",
-    "render": "shellform.output.render",
-    "plots": "shellform.output.plots",
-    "nesting": "shellform.output.nesting",
-    "schedules": "shellform.output.schedules",
-    "drawings": "shellform.output.drawings",
-    "exports": "shellform.output.exports",
+    "mma": "shellform.optimiser.solver",
+    "calibration": "shellform.site.calibration",
+    "comparison": "shellform.optimiser.comparison",
+    "retensioning": "shellform.site.retensioning",
+    "erection": "shellform.site.erection",
+    "robust": "shellform.problem.robust",
+    "render": "shellform.output.pictures.render",
+    "plots": "shellform.output.pictures.plots",
+    "nesting": "shellform.output.workshop.nesting",
+    "schedules": "shellform.output.workshop.schedules",
+    "drawings": "shellform.output.workshop.drawings",
+    "exports": "shellform.output.exchange.exports",
     "model": "shellform.structure.model",
-    "analysis": "shellform.structure.analysis",
+    "analysis": "shellform.structure.answers.analysis",
     "study": "shellform.study",
 }
 _NAMES = {name: home for home, names in _HOMES.items() for name in names}
@@ -67,20 +82,22 @@ def __dir__() -> list[str]:
 
 _PICTURES = {
     ("shellform.net.net", "Net"): "net_png",
-    ("shellform.design.gridshell", "Gridshell"): "gridshell_png",
-    ("shellform.design.optimum", "Optimum"): "optimum_png",
+    ("shellform.gridshell.gridshell", "Gridshell"): "gridshell_png",
+    ("shellform.optimiser.optimum", "Optimum"): "optimum_png",
 }
 
 
 def load_ipython_extension(ipython: Any) -> None:
-    """Nets, gridshells and optima show their picture where they are displayed (`%load_ext shellform`; done by itself where IPython runs)."""
+    """Nets, gridshells and optima show their picture where they are displayed (`%load_ext shellform`; done by
+    itself where IPython runs).
+    """
     formatter = ipython.display_formatter.formatters["image/png"]
     for (home, name), function in _PICTURES.items():
         formatter.for_type_by_name(home, name, partial(_drawn, function))
 
 
 def _drawn(function: str, thing: Any) -> bytes:
-    picture: bytes = getattr(importlib.import_module("shellform.notebook"), function)(thing)
+    picture: bytes = getattr(importlib.import_module("shellform.output.notebook"), function)(thing)
     return picture
 
 

@@ -1,5 +1,5 @@
 """`python -m shellform`."""
 
-from shellform.cli import main
+from shellform.cli.program import main
 
 main()

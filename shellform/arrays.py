@@ -30,11 +30,15 @@ def reals(name: str, value: ArrayLike, shape: Shape, *, positive: bool = False) 
     try:
         raw = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be numbers", value=_short(value), remedy=f"Give {_wanted(shape)}.") from error
+        raise InputError(
+            f"{name} must be numbers", value=_short(value), remedy=f"Give {_wanted(shape)}."
+        ) from error
     raw = _shaped(name, raw, shape)
     if not np.isfinite(raw).all():
         where = _first(~np.isfinite(raw))
-        raise InputError(f"{name}{where} is not finite", value=float(raw[where]), remedy="Give finite numbers.")
+        raise InputError(
+            f"{name}{where} is not finite", value=float(raw[where]), remedy="Give finite numbers."
+        )
     if positive and not (raw > 0).all():
         where = _first(raw <= 0)
         raise InputError(f"{name}{where} must be above zero", value=float(raw[where]))
@@ -73,17 +77,30 @@ class Arrays(dict[str, Any]):
         self.path = path
 
     def __missing__(self, name: str) -> Any:
-        raise InputError(f"is damaged: {name} is missing", where=str(self.path), remedy="Run again with --fresh.")
+        raise InputError(
+            f"is damaged: {name} is missing", where=str(self.path), remedy="Run again with --fresh."
+        )
 
 
 def read_arrays(path: Path) -> Arrays:
-    """All arrays of an .npz file; no objects are unpacked. Raises InputError where it is missing or damaged."""
+    """All arrays of an .npz file; no objects are unpacked. Raises InputError where it is missing or
+    damaged.
+    """
     if not path.is_file():
         raise InputError("isn't there", where=str(path))
     try:
         with np.load(path, allow_pickle=False) as data:
             return Arrays(path, {name: data[name] for name in data.files})
-    except (OSError, EOFError, ValueError, TypeError, AttributeError, NotImplementedError, RuntimeError, MemoryError) as error:
+    except (
+        OSError,
+        EOFError,
+        ValueError,
+        TypeError,
+        AttributeError,
+        NotImplementedError,
+        RuntimeError,
+        MemoryError,
+    ) as error:
         cause: Exception = error
     except (KeyError, OverflowError, SyntaxError, zipfile.BadZipFile, zlib.error) as error:
         cause = error

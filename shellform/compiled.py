@@ -1,7 +1,8 @@
-"""Door to Numba: loops in machine code, compiled by the first process that needs them and kept in a cache for all later ones.
+"""Door to Numba: loops in machine code, compiled by the first process that needs them and kept in a cache for
+all later ones.
 
-The first compilation takes seconds in which nothing else would be seen to happen, so it is announced, once a process, unless the environment
-has SHELLFORM_QUIET, which processes hand on to those that they start.
+The first compilation takes seconds in which nothing else would be seen to happen, so it is announced, once a
+process, unless the environment has SHELLFORM_QUIET, which processes hand on to those that they start.
 """
 
 from __future__ import annotations
@@ -25,7 +26,11 @@ class _Announcement(event.Listener):  # type: ignore[misc]
     def on_start(self, event: Any) -> None:
         if not self._told:
             self._told = True
-            print("shellform: compiling its loops for this machine, once (about 15 s) ...", file=sys.stderr, flush=True)
+            print(
+                "shellform: compiling its loops for this machine, once (about 15 s) ...",
+                file=sys.stderr,
+                flush=True,
+            )
 
     def on_end(self, event: Any) -> None:
         """Nothing to be told."""

@@ -34,12 +34,18 @@ class InputError(ShellformError, ValueError):
 class NotConverged(ShellformError, RuntimeError):
     """A computation that ended without a usable result.
 
-    `state` is the last state reached (what kind depends on the computation), `residual` how far from the goal it
-    was, `iterations` the work spent, and `remedy` what to try next.
+    `state` is the last state reached (what kind depends on the computation), `residual` how far from the goal
+    it was, `iterations` the work spent, and `remedy` what to try next.
     """
 
     def __init__(
-        self, what: str, *, state: Any = None, residual: float = float("nan"), iterations: int = 0, remedy: str = ""
+        self,
+        what: str,
+        *,
+        state: Any = None,
+        residual: float = float("nan"),
+        iterations: int = 0,
+        remedy: str = "",
     ) -> None:
         self.what = what
         self.state = state

@@ -30,11 +30,14 @@ _REMEDIES = {
 def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     """The place to write to; what is there at the end of the block becomes `path`. Makes the folder.
 
-    Raises InputError for another `ending` and where the file can't be written; what stood there before is left as it was.
+    Raises InputError for another `ending` and where the file can't be written; what stood there before is
+    left as it was.
     """
     target = Path(path)
     if ending and target.suffix.lower() != ending:
-        raise InputError("has another ending", where=str(target), value=target.suffix, remedy=f"Use {ending}.")
+        raise InputError(
+            "has another ending", where=str(target), value=target.suffix, remedy=f"Use {ending}."
+        )
     partial = target.with_name(f"{target.stem}.part{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -79,7 +82,9 @@ def door(path: str | Path, *endings: str) -> Path:
     """The path of a file to write. Raises InputError for other endings and missing folders."""
     target = Path(path)
     if target.suffix.lower() not in endings:
-        raise InputError("has another ending", where=str(target), value=target.suffix, remedy=f"Use {', '.join(endings)}.")
+        raise InputError(
+            "has another ending", where=str(target), value=target.suffix, remedy=f"Use {', '.join(endings)}."
+        )
     if not target.parent.is_dir():
         raise InputError("the folder doesn't exist", where=str(target.parent), remedy="Make it first.")
     return target

@@ -2,7 +2,8 @@
 
 import math
 
-ROUNDNESS = 0.72  # how far up the sphere the ground cuts, as the sine of the latitude: 0 is half a sphere, steep at its foot
+# how far up the sphere the ground cuts, as the sine of the latitude: 0 is half a sphere, steep at its foot
+ROUNDNESS = 0.72
 
 
 def build(gmsh, *, length=0.90, width=0.70, height=0.20):

@@ -1,4 +1,5 @@
-"""A vault whose crown dips: saddle-shaped in the middle, dome-shaped towards both ends, 0.9 × 0.6 m and 0.18 m high.
+"""A vault whose crown dips: saddle-shaped in the middle, dome-shaped towards both ends, 0.9 × 0.6 m and 0.18
+m high.
 
 Its long edges stand on the ground, its ends are arches; rods are to be supported along the whole edge.
 """
@@ -18,7 +19,10 @@ def build(gmsh, *, length=0.90, width=0.60, height=0.18, dip=0.045):
     counts = [len(k) - DEGREE - 1 for k in knots]
     heights = surface.get_coeffs().reshape(counts)
     # With Greville's abscissae as coordinates, x and y are linear in the parameters.
-    x, y = (np.array([k[i + 1 : i + 1 + DEGREE].mean() for i in range(n)]) for k, n in zip(knots, counts, strict=True))
+    x, y = (
+        np.array([k[i + 1 : i + 1 + DEGREE].mean() for i in range(n)])
+        for k, n in zip(knots, counts, strict=True)
+    )
     points = [
         gmsh.model.occ.addPoint(0.5 * length * x[i], 0.5 * width * y[j], heights[i, j])
         for j in range(counts[1])

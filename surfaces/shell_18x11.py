@@ -1,4 +1,5 @@
-"""A full-size shell: 18 × 11 m in plan, 4.2 m high, the size that table 1 of the paper compares its scale model to.
+"""A full-size shell: 18 × 11 m in plan, 4.2 m high, the size that table 1 of the paper compares its scale
+model to.
 
 Funicular like vault.py, over a plan of its own, rounder at one end and straighter along one side.
 """

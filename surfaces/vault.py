@@ -1,7 +1,8 @@
 """A stand-in for the scale model of the paper's section 4.1, whose own surface is not public.
 
-A funicular vault over an irregular plan of about 0.90 × 0.55 m, 0.21 m high, closed to the ground all round: the shape in which a
-uniform weight of the surface is borne by thrust alone, form-found with the force density method.
+A funicular vault over an irregular plan of about 0.90 × 0.55 m, 0.21 m high, closed to the ground all round:
+the shape in which a uniform weight of the surface is borne by thrust alone, form-found with the force density
+method.
 """
 
 from shellform.surface.funicular import thrust_heights

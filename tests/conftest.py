@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.output.schedules import Built
-from shellform.structure.state import State
+from shellform.case.case import load_case
+from shellform.output.workshop.schedules import Built
+from shellform.run.run import run_case
+from shellform.structure.elements.state import State
 
 ROOT = Path(__file__).parent.parent
 
@@ -32,7 +34,9 @@ def shell(vault, net):
 
 @pytest.fixture(scope="session")
 def built(shell):
-    """The vault with every second cable, in states that stand for solved ones: nodes sink with their height."""
+    """The vault with every second cable, in states that stand for solved ones: nodes sink with their
+    height.
+    """
     present = np.arange(len(shell.cable_ends)) % 2 == 0
     design = replace(shell.design(rest_ratio=0.98), present=present)
     place = shell.target.positions
@@ -40,4 +44,19 @@ def built(shell):
     def sunk(share):
         return State(place * [1.0, 1.0, 1.0 - share], shell.target.quaternions)
 
-    return Built(shell, design, {"none": sunk(-0.01), "design": sunk(0.0), "additional": sunk(0.02)}, sunk(-0.02), "test", "The vault")
+    return Built(
+        shell,
+        design,
+        {"none": sunk(-0.01), "design": sunk(0.0), "additional": sunk(0.02)},
+        sunk(-0.02),
+        "test",
+        "The vault",
+    )
+
+
+@pytest.fixture(scope="session")
+def begun(tmp_path_factory):
+    """A run left after its initial design, made once for all tests of run folders."""
+    folder = tmp_path_factory.mktemp("begun") / "run"
+    run_case(load_case(ROOT / "scripts/scale_model.toml"), folder, until="initial")
+    return folder

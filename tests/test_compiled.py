@@ -4,16 +4,22 @@ import sys
 
 CODE = """
 import numpy as np
-from shellform.structure.rotation import matrix, turned
+from shellform.structure.elements.rotation import matrix, turned
 turned(np.zeros((1, 3)), np.eye(4)[:1])
 matrix(np.eye(4)[0], np.empty((3, 3)))
 """
 
 
-def test_compiling_is_announced_once_but_not_to_who_wants_quiet_and_what_the_cache_holds_is_not_compiled(tmp_path):
+def test_compiling_is_announced_once_but_not_to_who_wants_quiet_and_what_the_cache_holds_is_not_compiled(
+    tmp_path,
+):
     told = []
     for wish in ({}, {}, {"SHELLFORM_QUIET": "1", "NUMBA_CACHE_DIR": str(tmp_path / "other")}):
         variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), **wish}
-        told.append(subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True, env=variables).stderr)
+        told.append(
+            subprocess.run(
+                [sys.executable, "-c", CODE], capture_output=True, text=True, check=True, env=variables
+            ).stderr
+        )
     assert told[0].count("compiling its loops") == 1
     assert told[1:] == ["", ""]

@@ -20,8 +20,8 @@ PACKAGES = {
 def find(asked: str | None) -> tuple[str | None, dict[str, str]]:
     """A Python for the peers, and for each peer that doesn't run on it one sentence that says why.
 
-    `asked`, the environment variable SHELLFORM_PEERS_PYTHON, or a virtual environment of the user's cache, made with any
-    Python 3.12 that is found.
+    `asked`, the environment variable SHELLFORM_PEERS_PYTHON, or a virtual environment of the user's cache,
+    made with any Python 3.12 that is found.
     """
     python = asked or os.environ.get("SHELLFORM_PEERS_PYTHON")
     if python is None:
@@ -47,13 +47,21 @@ def _made() -> tuple[str | None, str]:
         return str(python), ""
     base = _python()
     if base is None:
-        return None, "The peers' wheels need Python 3.12, and there is none here; give one with --peers-python."
+        return (
+            None,
+            "The peers' wheels need Python 3.12, and there is none here; give one with --peers-python.",
+        )
     print(f"Installing the peers into {home} with {base}, once ...", file=sys.stderr)
     done = subprocess.run([base, "-m", "venv", str(home)], capture_output=True, text=True)
     if done.returncode:
-        return None, f"No virtual environment could be made with {base}: {done.stderr.strip() or done.stdout.strip()}"
+        return (
+            None,
+            f"No virtual environment could be made with {base}: {done.stderr.strip() or done.stdout.strip()}",
+        )
     for packages, _ in PACKAGES.values():  # each by itself: one may install where the other doesn't
-        done = subprocess.run([str(python), "-m", "pip", "install", "-q", *packages], capture_output=True, text=True)
+        done = subprocess.run(
+            [str(python), "-m", "pip", "install", "-q", *packages], capture_output=True, text=True
+        )
         if done.returncode:
             last = (done.stderr.strip().splitlines() or ["no message"])[-1]
             print(f"{packages[0]} doesn't install with {base}: {last}", file=sys.stderr)

@@ -1,4 +1,5 @@
-"""One load step of a model file in Kratos: co-rotational beams and cables, full Newton-Raphson. Prints one line of JSON.
+"""One load step of a model file in Kratos: co-rotational beams and cables, full Newton-Raphson. Prints one
+line of JSON.
 
     python kratos.py MODEL.json DISPLACEMENTS.npy --tolerance N [--unit M] [--solver sparse_lu]
 
@@ -18,7 +19,10 @@ import numpy as np
 from KratosMultiphysics import python_linear_solver_factory
 
 YOUNG = 1e6  # Pa; with Poisson's ratio 0 the shear modulus is half of it, and the section's sizes follow
-SOLVERS = ["sparse_lu", "skyline_lu_factorization"]  # those of the wheel that are direct; without MKL there is no pardiso_ldlt
+SOLVERS = [
+    "sparse_lu",
+    "skyline_lu_factorization",
+]  # those of the wheel that are direct; without MKL there is no pardiso_ldlt
 
 
 def build(model: models.Model) -> KM.ModelPart:
@@ -29,14 +33,26 @@ def build(model: models.Model) -> KM.ModelPart:
     kept = KM.Model()
     part = kept.CreateModelPart("Structure")
     part.ProcessInfo[KM.DOMAIN_SIZE] = 3
-    for variable in (KM.DISPLACEMENT, KM.ROTATION, KM.REACTION, KM.REACTION_MOMENT, KM.VOLUME_ACCELERATION, SMA.POINT_LOAD, SMA.POINT_MOMENT):
+    for variable in (
+        KM.DISPLACEMENT,
+        KM.ROTATION,
+        KM.REACTION,
+        KM.REACTION_MOMENT,
+        KM.VOLUME_ACCELERATION,
+        SMA.POINT_LOAD,
+        SMA.POINT_MOMENT,
+    ):
         part.AddNodalSolutionStepVariable(variable)
     for number, place in enumerate(model.nodes.tolist(), 1):
         part.CreateNewNode(number, *place)
     sections = np.unique(model.stiffness, axis=0)
     for number, (axial, torsion, bending, _) in enumerate(sections.tolist(), 1):
         own = part.CreateNewProperties(number)
-        own[KM.YOUNG_MODULUS], own[KM.POISSON_RATIO], own[KM.DENSITY] = YOUNG, 0.0, 1.0  # Kratos asks for one, and no weight is applied
+        own[KM.YOUNG_MODULUS], own[KM.POISSON_RATIO], own[KM.DENSITY] = (
+            YOUNG,
+            0.0,
+            1.0,
+        )  # Kratos asks for one, and no weight is applied
         own[SMA.CROSS_AREA], own[SMA.TORSIONAL_INERTIA] = axial / YOUNG, 2.0 * torsion / YOUNG
         own[SMA.I22] = own[SMA.I33] = bending / YOUNG
         own.SetValue(KM.CONSTITUTIVE_LAW, KM.KratosGlobals.GetConstitutiveLaw("BeamConstitutiveLaw").Clone())
@@ -44,11 +60,17 @@ def build(model: models.Model) -> KM.ModelPart:
     for number, (ends, one) in enumerate(zip((model.ends + 1).tolist(), section, strict=True), 1):
         part.CreateNewElement("CrBeamElement3D2N", number, ends, part.GetProperties()[one])
     length = np.linalg.norm(model.nodes[model.cable_ends[:, 1]] - model.nodes[model.cable_ends[:, 0]], axis=1)
-    if len(length) and (np.abs(model.cable_rest / length - 1.0).max() > 1e-9 or np.ptp(model.cable_stiffness) > 0.0):
+    if len(length) and (
+        np.abs(model.cable_rest / length - 1.0).max() > 1e-9 or np.ptp(model.cable_stiffness) > 0.0
+    ):
         raise ValueError("this script gives all cables one stiffness and no prestress")
     if len(length):
         own = part.CreateNewProperties(len(sections) + 1)
-        own[KM.YOUNG_MODULUS], own[KM.DENSITY], own[SMA.CROSS_AREA] = YOUNG, 1.0, model.cable_stiffness[0] / YOUNG
+        own[KM.YOUNG_MODULUS], own[KM.DENSITY], own[SMA.CROSS_AREA] = (
+            YOUNG,
+            1.0,
+            model.cable_stiffness[0] / YOUNG,
+        )
         own[SMA.TRUSS_PRESTRESS_PK2] = 0.0
         own.SetValue(KM.CONSTITUTIVE_LAW, KM.KratosGlobals.GetConstitutiveLaw("TrussConstitutiveLaw").Clone())
         for number, ends in enumerate((model.cable_ends + 1).tolist(), len(model.ends) + 1):
@@ -59,7 +81,14 @@ def build(model: models.Model) -> KM.ModelPart:
     KM.VariableUtils().AddDof(KM.ROTATION_X, KM.REACTION_MOMENT_X, part)
     KM.VariableUtils().AddDof(KM.ROTATION_Y, KM.REACTION_MOMENT_Y, part)
     KM.VariableUtils().AddDof(KM.ROTATION_Z, KM.REACTION_MOMENT_Z, part)
-    freedoms = [KM.DISPLACEMENT_X, KM.DISPLACEMENT_Y, KM.DISPLACEMENT_Z, KM.ROTATION_X, KM.ROTATION_Y, KM.ROTATION_Z]
+    freedoms = [
+        KM.DISPLACEMENT_X,
+        KM.DISPLACEMENT_Y,
+        KM.DISPLACEMENT_Z,
+        KM.ROTATION_X,
+        KM.ROTATION_Y,
+        KM.ROTATION_Z,
+    ]
     nodes = part.Nodes
     for node, axis in np.argwhere(model.fixed).tolist():
         nodes[node + 1].Fix(freedoms[axis])
@@ -78,7 +107,8 @@ def main() -> None:
     part = build(model)
     settings = KM.Parameters(json.dumps({"solver_type": chosen.solver}))
     solver = python_linear_solver_factory.ConstructSolver(settings)
-    # Kratos divides the norm by the number of freedoms: with this the root mean square is at most the tolerance.
+    # Kratos divides the norm by the number of freedoms: with this the root mean square is at most the
+    # tolerance.
     free = int((~model.fixed).sum())
     strategy = KM.ResidualBasedNewtonRaphsonStrategy(
         part,

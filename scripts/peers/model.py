@@ -1,4 +1,6 @@
-"""What the peers read of a model file (contracts/model-file.md): plain NumPy, for Pythons that don't have shellform."""
+"""What the peers read of a model file (contracts/model-file.md): plain NumPy, for Pythons that don't have
+shellform.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +13,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Model:
-    """`nodes` (n, 3); beams: `ends` (m, 2), `stiffness` (m, 4) EA, GJ, EIy, EIz, `z_axis` (m, 3); cables: `cable_ends` (c, 2),
-    `cable_stiffness` (c,), `cable_rest` (c,); `fixed` (n, 6); `load` (n, 6). Newtons and a length of the caller's choice. Imposed displacements are left out."""
+    """`nodes` (n, 3); beams: `ends` (m, 2), `stiffness` (m, 4) EA, GJ, EIy, EIz, `z_axis` (m, 3); cables:
+    `cable_ends` (c, 2), `cable_stiffness` (c,), `cable_rest` (c,); `fixed` (n, 6); `load` (n, 6). Newtons and
+    a length of the caller's choice. Imposed displacements are left out."""
 
     nodes: np.ndarray
     ends: np.ndarray
@@ -26,16 +29,25 @@ class Model:
 
 
 def read(path: str, unit: float) -> Model:
-    """The model with its only load case, lengths in `unit` metres. Raises ValueError for what the peers' elements can't say."""
+    """The model with its only load case, lengths in `unit` metres. Raises ValueError for what the peers'
+    elements can't say.
+    """
     with open(path, encoding="utf-8") as file:
         told = json.load(file)
     nodes = np.array(told["nodes"], dtype=float) / unit
     beams, cables, (case,) = told["beams"], told["cables"], told["loads"].values()
     ends = np.array([beam["nodes"] for beam in beams])
     length = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
-    rest = np.array([beam["rest_length"] / unit if "rest_length" in beam else own for beam, own in zip(beams, length, strict=True)])
+    rest = np.array(
+        [
+            beam["rest_length"] / unit if "rest_length" in beam else own
+            for beam, own in zip(beams, length, strict=True)
+        ]
+    )
     if told.get("start") or np.abs(rest / length - 1.0).max() > 1e-9:
-        raise ValueError("the peers' beams are free of stress where their nodes are given, and start from there")
+        raise ValueError(
+            "the peers' beams are free of stress where their nodes are given, and start from there"
+        )
     fixed, load = np.zeros((len(nodes), 6), dtype=bool), np.zeros((len(nodes), 6))
     for support in told["supports"]:
         fixed[support["node"]] = support["fixed"]
@@ -44,7 +56,8 @@ def read(path: str, unit: float) -> Model:
     return Model(
         nodes,
         ends,
-        np.array([[beam[name] for name in ("EA", "GJ", "EIy", "EIz")] for beam in beams]) / [1.0, unit**2, unit**2, unit**2],
+        np.array([[beam[name] for name in ("EA", "GJ", "EIy", "EIz")] for beam in beams])
+        / [1.0, unit**2, unit**2, unit**2],
         np.array([beam["z_axis"] for beam in beams]),
         np.array([cable["nodes"] for cable in cables]).reshape(-1, 2),
         np.array([cable["EA"] for cable in cables]),
@@ -59,7 +72,14 @@ def arguments(solvers: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser()
     parser.add_argument("model", help="model file")
     parser.add_argument("displacements", help="where the displacements (n, 3), m, are written (.npy)")
-    parser.add_argument("--tolerance", type=float, required=True, help="unbalanced force at which an iteration is done, N")
-    parser.add_argument("--unit", type=float, default=1.0, help="length, m, in which the peer computes: moments weigh as forces at that arm")
+    parser.add_argument(
+        "--tolerance", type=float, required=True, help="unbalanced force at which an iteration is done, N"
+    )
+    parser.add_argument(
+        "--unit",
+        type=float,
+        default=1.0,
+        help="length, m, in which the peer computes: moments weigh as forces at that arm",
+    )
     parser.add_argument("--solver", default=solvers[0], choices=solvers)
     return parser.parse_args()

@@ -1,9 +1,10 @@
-"""One load step of a model file in OpenSeesPy: co-rotational frames and trusses, full Newton-Raphson. Prints one line of JSON.
+"""One load step of a model file in OpenSeesPy: co-rotational frames and trusses, full Newton-Raphson. Prints
+one line of JSON.
 
     python opensees.py MODEL.json DISPLACEMENTS.npy --tolerance N [--unit M] [--solver SparseSYM]
 
-`seconds` is the time to equilibrium, with the numbering and the symbolic analysis, as the user waits for it; `iteration` is that of an
-iteration of a second, small load step, in which nothing is set up any more.
+`seconds` is the time to equilibrium, with the numbering and the symbolic analysis, as the user waits for it;
+`iteration` is that of an iteration of a second, small load step, in which nothing is set up any more.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ def build(model: models.Model) -> None:
     """The model in OpenSees' one global domain; tags are numbers from 1."""
     ops.wipe()
     ops.model("basic", "-ndm", 3, "-ndf", 6)
-    for tag, (place, fixed) in enumerate(zip(model.nodes.tolist(), model.fixed.astype(int).tolist(), strict=True), 1):
+    for tag, (place, fixed) in enumerate(
+        zip(model.nodes.tolist(), model.fixed.astype(int).tolist(), strict=True), 1
+    ):
         ops.node(tag, *place)
         if any(fixed):
             ops.fix(tag, *fixed)
@@ -39,7 +42,13 @@ def build(model: models.Model) -> None:
     ends = model.cable_ends
     length = np.linalg.norm(model.nodes[ends[:, 1]] - model.nodes[ends[:, 0]], axis=1)
     for k, (pair, own, stiffness, rest) in enumerate(
-        zip((ends + 1).tolist(), length.tolist(), model.cable_stiffness.tolist(), model.cable_rest.tolist(), strict=True)
+        zip(
+            (ends + 1).tolist(),
+            length.tolist(),
+            model.cable_stiffness.tolist(),
+            model.cable_rest.tolist(),
+            strict=True,
+        )
     ):
         elastic, strained = 2 * k + 1, 2 * k + 2
         # EA (l - l0) / l0 in terms of the strain over the distance of the nodes

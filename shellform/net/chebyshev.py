@@ -27,13 +27,17 @@ from shellform.net.pull import (
 )
 from shellform.net.quality import measure, refuse_distance, refuse_folds
 from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
-from shellform.surface.locate import Locator
-from shellform.surface.target import Surface, largest_curvature
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.target import Surface, largest_curvature
 
 MERGE = 0.2  # of the spacing
 ELEMENTS = 4  # a segment, as in section 4.1
 _SHARPEST = 1.0  # largest curvature times spacing
-_MARGINS = (1.5, 2.5, 4.0)  # spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
+_MARGINS = (
+    1.5,
+    2.5,
+    4.0,
+)  # spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
 _BEYOND = 1.5  # spacings that the surface goes on past the margin
 
 Method = Literal["pull", "compass"]
@@ -59,17 +63,20 @@ def pull_net(
     outline: ArrayLike | None = None,
     progress: Progress | None = None,
 ) -> Net:
-    """The Chebyshev net of rods `spacing` m apart along u (`spacing_v` along v), the two layers `gap` m apart, on the surface.
+    """The Chebyshev net of rods `spacing` m apart along u (`spacing_v` along v), the two layers `gap` m
+    apart, on the surface.
 
-    `angle`, rad: of the u rods against the x axis in plan, where the net's origin lies; `offset`: of the origin from the middle of
-    the plan, in spacings along u and v; or `guides`, two curves in plan, (k, 2) m each, that cross at the origin and along which
-    the u rod and the v rod through it run. `elements` of a segment. `method`: "pull" relaxes the grid on sliding springs, beginning
-    at the compass net or at the flat grid (`start`); "compass" leaves the compass net as it is. `spring_density` (EI/s³, rising) and
-    `shear_stiffness` (EI/s a radian) of the pulling (net/pull.py). Rods end at the surface's edge, at the `ground` level, m, and at
-    the closed curve `outline` (k, 2), m in plan; joints nearer to the end than `merge` spacings are left out.
+    `angle`, rad: of the u rods against the x axis in plan, where the net's origin lies; `offset`: of the
+    origin from the middle of the plan, in spacings along u and v; or `guides`, two curves in plan, (k, 2) m
+    each, that cross at the origin and along which the u rod and the v rod through it run. `elements` of a
+    segment. `method`: "pull" relaxes the grid on sliding springs, beginning at the compass net or at the flat
+    grid (`start`); "compass" leaves the compass net as it is. `spring_density` (EI/s³, rising) and
+    `shear_stiffness` (EI/s a radian) of the pulling (net/pull.py). Rods end at the surface's edge, at the
+    `ground` level, m, and at the closed curve `outline` (k, 2), m in plan; joints nearer to the end than
+    `merge` spacings are left out.
 
-    Raises InputError for settings that can't work on this surface and for surfaces too curved for one net, NotConverged where the
-    pull fails.
+    Raises InputError for settings that can't work on this surface and for surfaces too curved for one net,
+    NotConverged where the pull fails.
     """
     steps = (spacing, spacing if spacing_v is None else spacing_v)
     check_settings(surface, steps, gap, elements, merge)
@@ -112,7 +119,9 @@ def pull_net(
     )
 
 
-def check_settings(surface: Surface, steps: tuple[float, float], gap: float, elements: int, merge: float) -> None:
+def check_settings(
+    surface: Surface, steps: tuple[float, float], gap: float, elements: int, merge: float
+) -> None:
     """Raises InputError for settings that can't work on this surface."""
     extent = float(max(surface.size[:2]))
     narrow = float(min(surface.size[:2]))
@@ -156,7 +165,10 @@ def _densities(given: Sequence[float] | None, start: Start) -> Sequence[float]:
         return FROM_COMPASS if start == "compass" else FROM_FLAT
     if not given or any(not 0.0 < each < np.inf for each in given) or list(given) != sorted(given):
         raise InputError(
-            "must be positive and rising", where="net.spring_density", value=list(given), remedy="For example [0.05, 0.5, 5.0]."
+            "must be positive and rising",
+            where="net.spring_density",
+            value=list(given),
+            remedy="For example [0.05, 0.5, 5.0].",
         )
     return given
 
@@ -169,8 +181,8 @@ def _origin(
     offset: tuple[float, float],
     guides: tuple[ArrayLike, ArrayLike] | None,
 ) -> tuple[Reals, Reals, tuple[Guide, Guide, Guide, Guide]]:
-    """The lattice's origin (3,) on the surface, the frame (3, 3) of u, v and normal there, as columns, and the guides from it
-    forwards and backwards along u, then along v."""
+    """The lattice's origin (3,) on the surface, the frame (3, 3) of u, v and normal there, as columns, and
+    the guides from it forwards and backwards along u, then along v."""
     if guides is not None:
         along_u, along_v = (reals(f"net.guides[{k}]", each, (None, 2)) for k, each in enumerate(guides))
         plan, halves = _halves(along_u, along_v)
@@ -212,7 +224,9 @@ def _origin(
 
 
 def _halves(along_u: Reals, along_v: Reals) -> tuple[Reals, list[Reals]]:
-    """Where two polylines (k, 2) first cross, (2,), and their four halves from there: forwards and backwards along u, along v."""
+    """Where two polylines (k, 2) first cross, (2,), and their four halves from there: forwards and backwards
+    along u, along v.
+    """
     for i, (a, b) in enumerate(pairwise(along_u)):
         for j, (c, d) in enumerate(pairwise(along_v)):
             matrix = np.column_stack([b - a, c - d])
@@ -229,7 +243,9 @@ def _halves(along_u: Reals, along_v: Reals) -> tuple[Reals, list[Reals]]:
                 np.vstack([meet, along_v[j::-1]]),
             ]
             if all(np.linalg.norm(half[1] - meet) > 0.0 for half in halves):
-                if matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0] > 0.0:  # v runs to the right of u: turn it round
+                if (
+                    matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0] > 0.0
+                ):  # v runs to the right of u: turn it round
                     halves[2], halves[3] = halves[3], halves[2]
                 return meet, halves
     raise InputError(
@@ -244,14 +260,16 @@ def _net(surface: Surface, finder: Finder, oversized: Grid, pulled: Pulled, trim
     refuse_folds(finder, grid, state)
     own = trimmed.origin >= 0
     force = np.where(own, pulled.pull[trimmed.origin], 0.0)
-    quality = measure(surface, finder, grid, state, _curvature(oversized, pulled, trimmed), force, pulled.factorisations)
+    quality = measure(
+        surface, finder, grid, state, _curvature(oversized, pulled, trimmed), force, pulled.factorisations
+    )
     refuse_distance(quality, grid, state)
     return Net(grid, state, trimmed.supports, quality, trimmed.notes)
 
 
 def _curvature(oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Reals:
-    """Curvature (m, 2, 2) of the trimmed rods' elements, from those of the oversized grid at the same nodes; cut ends take
-    their inner neighbour's (the extension past the edge bends nothing)."""
+    """Curvature (m, 2, 2) of the trimmed rods' elements, from those of the oversized grid at the same nodes;
+    cut ends take their inner neighbour's (the extension past the edge bends nothing)."""
     at_node = np.zeros((len(oversized.flat), 2))
     for side in (0, 1):
         nodes, values = oversized.rod_ends[:, side], pulled.curvature[:, side]

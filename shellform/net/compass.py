@@ -1,13 +1,15 @@
 """The compass method (Frei Otto): the Chebyshev net that two guide curves determine.
 
-From an origin, the guide curves run over the surface, straight along the two lattice directions or along curves given in plan, one
-spacing a step. Every further crossing lies one spacing from its two neighbours nearer to the guides: the intersection of two
-circles with the surface, found by Newton's method for a whole diagonal of the lattice at once. On the extended surface it goes on past
-the edge, so that it tells which part of the lattice covers the surface.
+From an origin, the guide curves run over the surface, straight along the two lattice directions or along
+curves given in plan, one spacing a step. Every further crossing lies one spacing from its two neighbours
+nearer to the guides: the intersection of two circles with the surface, found by Newton's method for a whole
+diagonal of the lattice at once. On the extended surface it goes on past the edge, so that it tells which part
+of the lattice covers the surface.
 
-Where the two rods of a crossing come to run in one direction the net ends, whatever comes after. By Hazzidakis' formula the
-Gaussian curvature of a patch of a net adds up to 2 pi less the sum of its four angles, so that it lies between - 2 pi and
-2 pi: such a surface holds more than that, seen from this origin, and takes no single net.
+Where the two rods of a crossing come to run in one direction the net ends, whatever comes after. By
+Hazzidakis' formula the Gaussian curvature of a patch of a net adds up to 2 pi less the sum of its four
+angles, so that it lies between - 2 pi and 2 pi: such a surface holds more than that, seen from this origin,
+and takes no single net.
 """
 
 from __future__ import annotations
@@ -43,8 +45,8 @@ class Finder(Protocol):
 
 @dataclass(frozen=True)
 class Guide:
-    """A guide from the origin on: its first `direction` (3,) along the surface and, if it isn't to run straight, the corners of its
-    `plan` (k, 2), m, which begin at the origin."""
+    """A guide from the origin on: its first `direction` (3,) along the surface and, if it isn't to run
+    straight, the corners of its `plan` (k, 2), m, which begin at the origin."""
 
     direction: Reals
     plan: Reals | None = None
@@ -59,10 +61,12 @@ def covering_lattice(
     margin: float,
     most: int = 200_000,
 ) -> tuple[Indices, Reals]:
-    """Lattice places (c, 2) whose compass points (c, 3) lie on the surface or less than `margin` m past its edge.
+    """Lattice places (c, 2) whose compass points (c, 3) lie on the surface or less than `margin` m past its
+    edge.
 
-    `origin` (3,) is on the surface; the `guides` run from it forwards and backwards along u, then along v. Raises InputError where
-    more than `most` crossings would be needed, and where the net breaks down on the surface.
+    `origin` (3,) is on the surface; the `guides` run from it forwards and backwards along u, then along v.
+    Raises InputError where more than `most` crossings would be needed, and where the net breaks down on the
+    surface.
     """
     points: dict[tuple[int, int], Reals] = {(0, 0): origin}
     for number, guide in enumerate(guides):
@@ -91,8 +95,9 @@ def raised(finder: Finder, plan: Reals, near: Reals) -> Reals:
 
 
 def _guide(finder: Finder, origin: Reals, guide: Guide, spacing: float, margin: float) -> Iterator[Reals]:
-    """Points one spacing apart from the origin on, up to the first past the margin: along the plan as far as it goes, then
-    along the straightest line, in which each two chords lie in one plane with the normal between them."""
+    """Points one spacing apart from the origin on, up to the first past the margin: along the plan as far as
+    it goes, then along the straightest line, in which each two chords lie in one plane with the normal
+    between them."""
     here, heading = origin, guide.direction
     upright = finder.foot(origin[None]).normal[0]
     on_plan = guide.plan is not None
@@ -112,7 +117,9 @@ def _guide(finder: Finder, origin: Reals, guide: Guide, spacing: float, margin: 
             there = foot.point[0]
             reached = float(np.linalg.norm(there - here))
             height = float((there - here) @ upright)
-            if abs(reached - spacing) < _CLOSE * spacing and (on_plan or abs(height - lift) < _CLOSE * spacing):
+            if abs(reached - spacing) < _CLOSE * spacing and (
+                on_plan or abs(height - lift) < _CLOSE * spacing
+            ):
                 break
             step *= spacing / max(reached, 0.1 * spacing)
             lift = height
@@ -180,7 +187,9 @@ def _fill(
                 points[place], overshoot[place] = point, float(over)
         if len(points) > most:
             raise InputError(
-                f"more than {most} crossings would be needed", value=spacing[0], remedy="Choose a larger spacing."
+                f"more than {most} crossings would be needed",
+                value=spacing[0],
+                remedy="Choose a larger spacing.",
             )
         diagonal += 1
 
@@ -188,8 +197,8 @@ def _fill(
 def _corner(
     finder: Finder, a: Reals, b: Reals, c: Reals, spacing: tuple[float, float]
 ) -> tuple[Reals, Reals, Flags]:
-    """The crossings (k, 3) that lie a u spacing from `a` and a v spacing from `b`, across from `c`; their signed distances past
-    the outline; and where they exist."""
+    """The crossings (k, 3) that lie a u spacing from `a` and a v spacing from `b`, across from `c`; their
+    signed distances past the outline; and where they exist."""
     point = a + b - c
     good = np.ones(len(a), dtype=bool)
     area = spacing[0] * spacing[1]
@@ -202,7 +211,9 @@ def _corner(
         if np.abs(off[good]).max(initial=0.0) < _CLOSE * area:
             break
         # Newton in the tangent plane: J (s t1 + t t2) = -off with rows to_a, to_b.
-        first = np.cross(foot.normal, np.where(np.abs(foot.normal[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]))
+        first = np.cross(
+            foot.normal, np.where(np.abs(foot.normal[:, :1]) < 0.9, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+        )
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         second = np.cross(foot.normal, first)
         j11, j12 = np.sum(to_a * first, axis=1), np.sum(to_a * second, axis=1)
@@ -223,7 +234,11 @@ def _corner(
 
 
 def _broken(
-    finder: Finder, points: dict[tuple[int, int], Reals], place: tuple[int, int], at: Reals, spacing: tuple[float, float]
+    finder: Finder,
+    points: dict[tuple[int, int], Reals],
+    place: tuple[int, int],
+    at: Reals,
+    spacing: tuple[float, float],
 ) -> InputError:
     """What is said where the net can't go on at a lattice place, near the point `at`."""
     i, j = place

@@ -13,7 +13,7 @@ from shellform.errors import InputError
 from shellform.net.grid import Grid, GridRod
 from shellform.net.net import Net
 from shellform.net.quality import MAPS, Quality
-from shellform.structure.state import State
+from shellform.structure.elements.state import State
 from shellform.written import write_arrays
 
 

@@ -1,8 +1,9 @@
 """The flat grid: two layers of straight rods, pinned to each other where they cross.
 
-Crossing (i, j) of the lattice lies at i spacings along u and j spacings along v from the origin; rods "u" run along i and share j,
-rods "v" run along j and share i. The u rods lie half a gap below the plane of the grid, the v rods half a gap above it, so that every crossing
-has two nodes, which a short connector joins (section 3).
+Crossing (i, j) of the lattice lies at i spacings along u and j spacings along v from the origin; rods "u" run
+along i and share j, rods "v" run along j and share i. The u rods lie half a gap below the plane of the grid,
+the v rods half a gap above it, so that every crossing has two nodes, which a short connector joins (section
+3).
 """
 
 from __future__ import annotations
@@ -13,17 +14,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.structure.beam import Beams, make_beams
-from shellform.structure.state import State
+from shellform.structure.elements.beam import Beams, make_beams
+from shellform.structure.elements.state import State
 
 KINDS = ("rod", "connector")
 
 
 @dataclass(frozen=True)
 class GridRod:
-    """One straight rod: `direction` "u" or "v", lattice `index` it shares, `nodes` (k,) from end to end, their distances
-    `arc` (k,), m, from the first end, and the numbers of the `crossings` (c,) along it with their places `at` (c,) among the
-    nodes."""
+    """One straight rod: `direction` "u" or "v", lattice `index` it shares, `nodes` (k,) from end to end,
+    their distances `arc` (k,), m, from the first end, and the numbers of the `crossings` (c,) along it with
+    their places `at` (c,) among the nodes."""
 
     direction: str
     index: int
@@ -45,9 +46,9 @@ class GridRod:
 
 @dataclass(frozen=True)
 class Grid:
-    """`flat` (n, 3), m, all nodes in the stress-free state; `rods`; `lattice` (c, 2) places of the crossings and
-    `crossing_nodes` (c, 2) their nodes on the u rod and on the v rod; `spacing` of crossings along u rods and `spacing_v` along v
-    rods (0: the same), `gap`, m."""
+    """`flat` (n, 3), m, all nodes in the stress-free state; `rods`; `lattice` (c, 2) places of the crossings
+    and `crossing_nodes` (c, 2) their nodes on the u rod and on the v rod; `spacing` of crossings along u rods
+    and `spacing_v` along v rods (0: the same), `gap`, m."""
 
     flat: Reals
     rods: tuple[GridRod, ...]
@@ -62,7 +63,11 @@ class Grid:
         put(self, "spacing_v", self.spacing_v or self.spacing)
         put(self, "flat", reals("flat", self.flat, (None, 3)))
         count = len(self.lattice)
-        put(self, "crossing_nodes", indices("crossing_nodes", self.crossing_nodes, (count, 2), below=len(self.flat)))
+        put(
+            self,
+            "crossing_nodes",
+            indices("crossing_nodes", self.crossing_nodes, (count, 2), below=len(self.flat)),
+        )
 
     @property
     def scale(self) -> float:
@@ -85,7 +90,9 @@ class Grid:
 
     @property
     def layer(self) -> Reals:
-        """Signed distance (n,), m, of each node from the middle between the layers: -gap/2 for u rods, gap/2 for v rods."""
+        """Signed distance (n,), m, of each node from the middle between the layers: -gap/2 for u rods, gap/2
+        for v rods.
+        """
         level = np.empty(len(self.flat))
         for rod in self.rods:
             level[rod.nodes] = -0.5 * self.gap if rod.direction == "u" else 0.5 * self.gap
@@ -116,7 +123,8 @@ def grid_beams(
 
 
 def lattice_grid(lattice: Indices, *, spacing: tuple[float, float], gap: float, elements: int) -> Grid:
-    """The grid with crossings at the places `lattice` (c, 2), `spacing` m apart along u and v, `elements` elements a segment.
+    """The grid with crossings at the places `lattice` (c, 2), `spacing` m apart along u and v, `elements`
+    elements a segment.
 
     Neighbouring places of one row are joined; a place without neighbour in both directions is left out.
     """
@@ -145,7 +153,11 @@ def lattice_grid(lattice: Indices, *, spacing: tuple[float, float], gap: float, 
 
 def _joined(places: set[tuple[int, int]], place: tuple[int, int], axis: int) -> bool:
     i, j = place
-    return ((i + 1, j) in places or (i - 1, j) in places) if axis == 0 else ((i, j + 1) in places or (i, j - 1) in places)
+    return (
+        ((i + 1, j) in places or (i - 1, j) in places)
+        if axis == 0
+        else ((i, j + 1) in places or (i, j - 1) in places)
+    )
 
 
 def _runs(places: list[tuple[int, int]], axis: int) -> list[list[tuple[int, int]]]:

@@ -10,13 +10,13 @@ import numpy as np
 from shellform.arrays import Indices, Reals, indices
 from shellform.net.grid import Grid, crossing_points
 from shellform.net.quality import Quality
-from shellform.structure.state import State
+from shellform.structure.elements.state import State
 
 
 @dataclass(frozen=True)
 class Net:
-    """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes at the rods' ends; `quality`;
-    `notes`: what was left out or changed, a sentence each."""
+    """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes at the rods'
+    ends; `quality`; `notes`: what was left out or changed, a sentence each."""
 
     grid: Grid
     target: State

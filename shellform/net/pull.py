@@ -1,12 +1,14 @@
-"""Pulling an oversized flat grid onto a surface (operation 1 of the framework, after Kuijenhoven and Hoogenboom).
+"""Pulling an oversized flat grid onto a surface (operation 1 of the framework, after Kuijenhoven and
+Hoogenboom).
 
-The grid is the structural model of section 3, with fictitious stiffness: rods, connectors between their two layers that
-resist shear of the grid a little, and on every node a spring that slides on the surface (springs.py). Implicit
-dynamic relaxation finds the equilibrium for one spring density after the other: soft springs let the grid find its place
-without folding, stiff ones bring it close.
+The grid is the structural model of section 3, with fictitious stiffness: rods, connectors between their two
+layers that resist shear of the grid a little, and on every node a spring that slides on the surface
+(springs.py). Implicit dynamic relaxation finds the equilibrium for one spring density after the other: soft
+springs let the grid find its place without folding, stiff ones bring it close.
 
-Everything is measured in the rod's bending stiffness EI and the spacing s, so that the same settings suit a model of 0.9 m
-and a hall of 100 m: EI = s² (N·m² with s in m), EA = 4 EI (s/r)²/s² with a slenderness s/r = 50, spring densities in EI/s³.
+Everything is measured in the rod's bending stiffness EI and the spacing s, so that the same settings suit a
+model of 0.9 m and a hall of 100 m: EI = s² (N·m² with s in m), EA = 4 EI (s/r)²/s² with a slenderness s/r =
+50, spring densities in EI/s³.
 """
 
 from __future__ import annotations
@@ -22,15 +24,17 @@ from shellform.errors import NotConverged
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, grid_beams
 from shellform.net.springs import Distance, SlidingSprings
-from shellform.structure import rotation
-from shellform.structure.assembly import Assembly
-from shellform.structure.beam import Beams
-from shellform.structure.equilibrium import find_equilibrium
-from shellform.structure.state import State
+from shellform.structure.elements import rotation
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.state import State
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.equilibrium import find_equilibrium
 
 FROM_FLAT = (0.05, 0.5, 5.0)  # EI/s³; directly at 5 a flat grid folds (findings: 1e3 N/m at EI/s³ = 189 N/m)
 FROM_COMPASS = (5.0,)  # the compass net lies on the surface already
-SHEAR_STIFFNESS = 0.1  # of a connector against turning in the grid's plane, EI/s a radian; at 0.01 nets slide for ever
+SHEAR_STIFFNESS = (
+    0.1  # of a connector against turning in the grid's plane, EI/s a radian; at 0.01 nets slide for ever
+)
 _REACH = 1.0  # spacing a step
 _SLENDERNESS = 50.0  # s/r
 _TORSION = 1.0 / 1.3  # GJ/EI of a round rod with Poisson's ratio 0.3
@@ -44,8 +48,9 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class Pulled:
-    """The grid's state on the surface: `curvature` (m, 2, 2), 1/m, at the two ends of each rod element out of and in the surface's
-    tangent plane, `pull` (n,), the spring force on each node in EI/s², and the `factorisations` it took."""
+    """The grid's state on the surface: `curvature` (m, 2, 2), 1/m, at the two ends of each rod element out of
+    and in the surface's tangent plane, `pull` (n,), the spring force on each node in EI/s², and the
+    `factorisations` it took."""
 
     state: State
     curvature: Reals
@@ -60,8 +65,8 @@ def flat_start(grid: Grid, origin: Reals, frame: Reals) -> State:
 
 
 def compass_start(grid: Grid, finder: Finder, places: Indices, points: Reals) -> State:
-    """The grid laid along the compass net, `points` (c, 3) at lattice `places` (c, 2): each rod a cubic spline through its
-    crossings, its nodes on their layers and turned with the surface."""
+    """The grid laid along the compass net, `points` (c, 3) at lattice `places` (c, 2): each rod a cubic
+    spline through its crossings, its nodes on their layers and turned with the surface."""
     known = {(int(i), int(j)): point for (i, j), point in zip(places, points, strict=True)}
     through = np.array([known[(int(i), int(j))] for i, j in grid.lattice])
     place, tangent = np.empty((2, *grid.flat.shape))
@@ -71,7 +76,10 @@ def compass_start(grid: Grid, finder: Finder, places: Indices, points: Reals) ->
         if curve is None:
             ends = through[rod.crossings]
             share = (rod.arc / rod.length)[:, None]
-            place[rod.nodes], tangent[rod.nodes] = (1.0 - share) * ends[0] + share * ends[-1], ends[-1] - ends[0]
+            place[rod.nodes], tangent[rod.nodes] = (
+                (1.0 - share) * ends[0] + share * ends[-1],
+                ends[-1] - ends[0],
+            )
         else:
             place[rod.nodes], tangent[rod.nodes] = curve(rod.arc), curve(rod.arc, 1)
         across[rod.nodes] = rod.direction == "v"
@@ -80,7 +88,11 @@ def compass_start(grid: Grid, finder: Finder, places: Indices, points: Reals) ->
     along = tangent - np.sum(tangent * normal, axis=1, keepdims=True) * normal
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     side = np.cross(normal, along)
-    axes = np.where(across[:, None, None], np.stack([-side, along, normal], axis=2), np.stack([along, side, normal], axis=2))
+    axes = np.where(
+        across[:, None, None],
+        np.stack([-side, along, normal], axis=2),
+        np.stack([along, side, normal], axis=2),
+    )
     return State(foot.point + grid.layer[:, None] * normal, rotation.from_matrices(axes))
 
 
@@ -99,8 +111,9 @@ def pull(
 ) -> Pulled:
     """The state of the grid pulled onto the surface of `finder` from the state `start`.
 
-    `origin` (3,) and `frame` (3, 3) of u, v and normal are where the lattice's origin is to stay; where the start is `guided` by
-    a curve, the rod through the origin keeps to it instead of a plane. Raises NotConverged.
+    `origin` (3,) and `frame` (3, 3) of u, v and normal are where the lattice's origin is to stay; where the
+    start is `guided` by a curve, the rod through the origin keeps to it instead of a plane. Raises
+    NotConverged.
     """
     beams = fictitious_beams(grid, shear_stiffness)
     state = start
@@ -133,7 +146,9 @@ def pull(
             ) from error
         state, spent = found.state, spent + found.factorisations
     assert springs is not None
-    return Pulled(state, _curvature(grid, beams, state), density / grid.scale * np.abs(springs.stretch(state)), spent)
+    return Pulled(
+        state, _curvature(grid, beams, state), density / grid.scale * np.abs(springs.stretch(state)), spent
+    )
 
 
 def _named(progress: Progress | None, density: float) -> Callable[[int, float], None] | None:
@@ -143,14 +158,21 @@ def _named(progress: Progress | None, density: float) -> Callable[[int, float], 
 
 
 def fictitious_beams(grid: Grid, shear_stiffness: float) -> Beams:
-    """Rods with EI = s² and connectors that keep the two layers' normals together and resist shear a little."""
+    """Rods with EI = s² and connectors that keep the two layers' normals together and resist shear a
+    little.
+    """
     bending = grid.scale**2
     axial = 4.0 * _SLENDERNESS**2 * bending / grid.scale**2
     joint = bending * grid.gap / grid.scale
     return grid_beams(
         grid,
         rod=(axial, _TORSION * bending, bending, bending),
-        connector=(axial * grid.gap / grid.scale, shear_stiffness * joint, _CONNECTOR * joint, _CONNECTOR * joint),
+        connector=(
+            axial * grid.gap / grid.scale,
+            shear_stiffness * joint,
+            _CONNECTOR * joint,
+            _CONNECTOR * joint,
+        ),
     )
 
 
@@ -167,8 +189,8 @@ def sliding_springs(grid: Grid, finder: Finder, density: float) -> SlidingSpring
 
 
 def _curvature(grid: Grid, beams: Beams, state: State) -> Reals:
-    """Curvature (m, 2, 2), 1/m, at the two ends of each rod element, out of plane (positive over a crown) and in plane: M/EI of
-    equation (1), the end moments of an evenly bent element being opposite."""
+    """Curvature (m, 2, 2), 1/m, at the two ends of each rod element, out of plane (positive over a crown) and
+    in plane: M/EI of equation (1), the end moments of an evenly bent element being opposite."""
     count = len(grid.rod_ends)
     moments = beams.local_forces(state)[:count, [[2, 3], [5, 6]]]
     return np.asarray(moments * [[[1.0, 1.0], [-1.0, -1.0]]] / beams.bending_y[:count, None, None])
@@ -180,16 +202,23 @@ def laid(grid: Grid, state: State) -> Pulled:
     return Pulled(state, _curvature(grid, beams, state), np.zeros(len(grid.flat)), 0)
 
 
-def _tethers(grid: Grid, origin: Reals, frame: Reals, start: State | None) -> tuple[SlidingSprings, SlidingSprings]:
+def _tethers(
+    grid: Grid, origin: Reals, frame: Reals, start: State | None
+) -> tuple[SlidingSprings, SlidingSprings]:
     """Springs that keep the net from drifting and turning on the surface, where nothing else holds it.
 
-    The crossing at the lattice's origin is tied to the plane across u through `origin`; it and the crossings half-way out
-    on its u rod are tied to the plane along u. Two planes and a long arm: held at one node, a net that would rather lie at
-    another angle bends its rods sharply there. Of a given `start`, they keep their distance from the second plane.
+    The crossing at the lattice's origin is tied to the plane across u through `origin`; it and the crossings
+    half-way out on its u rod are tied to the plane along u. Two planes and a long arm: held at one node, a
+    net that would rather lie at another angle bends its rods sharply there. Of a given `start`, they keep
+    their distance from the second plane.
     """
 
     def plane(normal: Reals) -> Distance:
-        return lambda points: ((points - origin) @ normal, np.broadcast_to(normal, points.shape), np.zeros((len(points), 6)))
+        return lambda points: (
+            (points - origin) @ normal,
+            np.broadcast_to(normal, points.shape),
+            np.zeros((len(points), 6)),
+        )
 
     middle = int(np.argmin(np.abs(grid.lattice).sum(axis=1)))
     along = np.flatnonzero(grid.lattice[:, 1] == grid.lattice[middle, 1])
@@ -199,6 +228,8 @@ def _tethers(grid: Grid, origin: Reals, frame: Reals, start: State | None) -> tu
     strength = _TETHER / grid.scale
     level = np.zeros(len(held)) if start is None else (start.positions[held] - origin) @ frame[:, 1]
     return (
-        SlidingSprings(grid.crossing_nodes[[middle], 0], np.full(1, strength), np.zeros(1), plane(frame[:, 0])),
+        SlidingSprings(
+            grid.crossing_nodes[[middle], 0], np.full(1, strength), np.zeros(1), plane(frame[:, 0])
+        ),
         SlidingSprings(held, np.full(len(held), strength), level, plane(frame[:, 1])),
     )

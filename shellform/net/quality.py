@@ -1,7 +1,7 @@
 """How good a net is: numbers for the summary, values for maps, and what is refused.
 
-A net is refused where a cell is turned over or folded, where two parts of it lie on one another, and where it stays off the
-surface: too much curvature for the spacing. In each case the refusal says where.
+A net is refused where a cell is turned over or folded, where two parts of it lie on one another, and where it
+stays off the surface: too much curvature for the spacing. In each case the refusal says where.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from shellform.arrays import Reals, reals
 from shellform.errors import InputError
 from shellform.net.compass import Finder, gaussian
 from shellform.net.grid import Grid, cells, crossing_points, neighbours
-from shellform.structure.rotation import matrices
-from shellform.structure.state import State
-from shellform.surface.target import Surface
-from shellform.surface.tree import Tree
+from shellform.structure.elements.rotation import matrices
+from shellform.structure.elements.state import State
+from shellform.surface.shape.target import Surface
+from shellform.surface.shape.tree import Tree
 
 _FAR = 0.1  # of the spacing: a net farther from the surface is refused
 _OVERLAP = 0.4  # of the spacing: nearer to each other two crossings that aren't neighbours lie on one another
@@ -33,15 +33,17 @@ _SAMPLE = 0.25  # of the spacing, between points at which the cover is looked fo
 class Quality:
     """Lengths in m, angles in rad, curvature in 1/m. For the summary:
 
-    `distance_max`, `distance_mean`: of crossings (the middle between their two nodes) from the surface; `spacing_error_max`:
-    largest |chord between neighbouring crossings / spacing - 1|; `shear_angle_min`: smallest angle between the two rods of a
-    crossing; `curvature_max`: largest resultant curvature of a rod, and its parts out of and in the surface's tangent plane; `pull_max`,
-    `pull_mean`: what the springs still pull, in EI/s² of the rods, the paper's measure of how forced the grid is;
-    `uncovered_area`, m², farther from any rod than three quarters of the spacing; `gaussian_curvature`, rad, of the
-    surface added up over the net's cells; `factorisations` that the pulling took.
+    `distance_max`, `distance_mean`: of crossings (the middle between their two nodes) from the surface;
+    `spacing_error_max`: largest |chord between neighbouring crossings / spacing - 1|; `shear_angle_min`:
+    smallest angle between the two rods of a crossing; `curvature_max`: largest resultant curvature of a rod,
+    and its parts out of and in the surface's tangent plane; `pull_max`, `pull_mean`: what the springs still
+    pull, in EI/s² of the rods, the paper's measure of how forced the grid is; `uncovered_area`, m², farther
+    from any rod than three quarters of the spacing; `gaussian_curvature`, rad, of the surface added up over
+    the net's cells; `factorisations` that the pulling took.
 
-    For maps: `distance` (c,), signed, and `shear_angle` (c,) of crossings; `spacing_error` (p,), signed, of the pairs of
-    neighbours; `curvature` (m, 2, 2) of rod elements at their two ends, out of and in plane; `pull` (n,) of nodes.
+    For maps: `distance` (c,), signed, and `shear_angle` (c,) of crossings; `spacing_error` (p,), signed, of
+    the pairs of neighbours; `curvature` (m, 2, 2) of rod elements at their two ends, out of and in plane;
+    `pull` (n,) of nodes.
     """
 
     distance_max: float
@@ -76,8 +78,12 @@ class Quality:
 MAPS = ("distance", "shear_angle", "spacing_error", "curvature", "pull")
 
 
-def measure(surface: Surface, finder: Finder, grid: Grid, state: State, curvature: Reals, pull: Reals, spent: int) -> Quality:
-    """The quality of the trimmed grid in its state; `curvature` (m, 2, 2) of its rod elements, `pull` (n,) on its nodes."""
+def measure(
+    surface: Surface, finder: Finder, grid: Grid, state: State, curvature: Reals, pull: Reals, spent: int
+) -> Quality:
+    """The quality of the trimmed grid in its state; `curvature` (m, 2, 2) of its rod elements, `pull` (n,) on
+    its nodes.
+    """
     points = crossing_points(grid, state)
     distance = finder.foot(points).distance
     pairs, steps = neighbours(grid)
@@ -109,7 +115,9 @@ def measure(surface: Surface, finder: Finder, grid: Grid, state: State, curvatur
 
 def shear_angles(grid: Grid, state: State) -> Reals:
     """The angle (c,), rad, at most 90°, between the axes of the two rods of each crossing."""
-    first, second = (matrices(state.quaternions[grid.crossing_nodes[:, layer]])[:, :, layer] for layer in (0, 1))
+    first, second = (
+        matrices(state.quaternions[grid.crossing_nodes[:, layer]])[:, :, layer] for layer in (0, 1)
+    )
     cosine = np.abs(np.sum(first * second, axis=1))
     return np.asarray(np.arccos(np.clip(cosine, 0.0, 1.0)))
 
@@ -123,7 +131,10 @@ def uncovered(surface: Surface, grid: Grid, state: State) -> float:
     parts = int(np.clip(np.ceil(longest / (_SAMPLE * grid.scale)), 1, 32))
     i, j = (each.ravel() for each in np.meshgrid(np.arange(parts), np.arange(parts)))
     up, down = i + j < parts, i + j < parts - 1
-    shares = np.vstack([np.column_stack([i, j])[up] + 1.0 / 3.0, np.column_stack([i, j])[down] + 2.0 / 3.0]) / parts
+    shares = (
+        np.vstack([np.column_stack([i, j])[up] + 1.0 / 3.0, np.column_stack([i, j])[down] + 2.0 / 3.0])
+        / parts
+    )
     weights = np.column_stack([1.0 - shares.sum(axis=1), shares])
     area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     bare = 0.0

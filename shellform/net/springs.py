@@ -1,8 +1,8 @@
 """Fictitious springs that pull nodes to a surface and slide on it (operation 1 of the framework).
 
-A spring of density q, N/m, joins a node at x to its closest point on the surface, found anew at every state, so that it
-pulls along the normal n only. With the signed distance d(x), its gradient n and its Hessian H, and the level at which the node is to
-lie,
+A spring of density q, N/m, joins a node at x to its closest point on the surface, found anew at every state,
+so that it pulls along the normal n only. With the signed distance d(x), its gradient n and its Hessian H, and
+the level at which the node is to lie,
 
     U = q (d - level)² / 2,   f = q (d - level) n,   K = q (n n' + (d - level) H),
 
@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.structure.parts import Evaluation
-from shellform.structure.state import State
+from shellform.structure.elements.parts import Evaluation
+from shellform.structure.elements.state import State
 
 Distance = Callable[[Reals], tuple[Reals, Reals, Reals]]
 """From points (k, 3), m, to signed distances (k,), m, their gradients (k, 3) and packed lower Hessians (k, 6), 1/m."""
@@ -28,7 +28,9 @@ _LOWER = np.tril_indices(3)
 
 @dataclass(frozen=True)
 class SlidingSprings:
-    """`nodes` (k,) pulled with `density` (k,) N/m to lie at `level` (k,) m above the surface of `distance`."""
+    """`nodes` (k,) pulled with `density` (k,) N/m to lie at `level` (k,) m above the surface of
+    `distance`.
+    """
 
     nodes: Indices
     density: Reals
@@ -59,5 +61,7 @@ class SlidingSprings:
         if not tangent:
             return Evaluation(energy, force, None)
         packed = np.empty((len(energy), 6)) if into is None else into
-        packed[:] = self.density[:, None] * (normal[:, _LOWER[0]] * normal[:, _LOWER[1]] + stretch[:, None] * hessian)
+        packed[:] = self.density[:, None] * (
+            normal[:, _LOWER[0]] * normal[:, _LOWER[1]] + stretch[:, None] * hessian
+        )
         return Evaluation(energy, force, packed)

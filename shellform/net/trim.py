@@ -1,9 +1,9 @@
 """Trimming the pulled grid at the surface's edge, at the ground and at a curve.
 
-Each rod is cut where it leaves what is to be built; its parts inside become rods whose ends are supports. The cuts are found on the
-bent rod by the Illinois method, so that supports lie on the edge. A joint nearer to an end than a set fraction of the spacing is left
-out, so that no end piece is so short that its support and the joint fight; a rod on which fewer than two joints remain is left out
-too, with its joints.
+Each rod is cut where it leaves what is to be built; its parts inside become rods whose ends are supports. The
+cuts are found on the bent rod by the Illinois method, so that supports lie on the edge. A joint nearer to an
+end than a set fraction of the spacing is left out, so that no end piece is so short that its support and the
+joint fight; a rod on which fewer than two joints remain is left out too, with its joints.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
+from shellform.structure.elements.rotation import matrices
+from shellform.structure.elements.state import State
 from shellform.structure.network import connected
-from shellform.structure.rotation import matrices
-from shellform.structure.state import State
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
 _FEWEST = 2  # joints on a rod
@@ -38,8 +38,8 @@ class Uncovered(Exception):
 
 @dataclass(frozen=True)
 class _Piece:
-    """Part of a rod of the oversized grid on the surface: its inner nodes `first` to `last` (places on the rod) and the arc
-    lengths `start`, `end` at which it is cut."""
+    """Part of a rod of the oversized grid on the surface: its inner nodes `first` to `last` (places on the
+    rod) and the arc lengths `start`, `end` at which it is cut."""
 
     rod: GridRod
     first: int
@@ -50,13 +50,16 @@ class _Piece:
     def joints(self) -> list[tuple[int, float]]:
         """Crossing number and arc length of each joint."""
         on = (self.rod.at >= self.first) & (self.rod.at <= self.last)
-        return [(int(c), float(self.rod.arc[k])) for c, k in zip(self.rod.crossings[on], self.rod.at[on], strict=True)]
+        return [
+            (int(c), float(self.rod.arc[k]))
+            for c, k in zip(self.rod.crossings[on], self.rod.at[on], strict=True)
+        ]
 
 
 @dataclass(frozen=True)
 class Trimmed:
-    """`grid` and its `state`; `supports` (s,) end nodes; `origin` (n,) the node of the oversized grid that each node was (-1 for
-    cut ends); `notes`."""
+    """`grid` and its `state`; `supports` (s,) end nodes; `origin` (n,) the node of the oversized grid that
+    each node was (-1 for cut ends); `notes`."""
 
     grid: Grid
     state: State
@@ -67,8 +70,8 @@ class Trimmed:
 
 @dataclass(frozen=True)
 class Limits:
-    """Where rods end besides the surface's edge: the `ground`, m, below which nothing is built, and the corners of a closed curve
-    in `plan` (k, 2), m, outside which nothing is."""
+    """Where rods end besides the surface's edge: the `ground`, m, below which nothing is built, and the
+    corners of a closed curve in `plan` (k, 2), m, outside which nothing is."""
 
     ground: float | None = None
     plan: Reals | None = None
@@ -98,8 +101,8 @@ def _outside(plan: Reals, points: Reals) -> Reals:
 
 
 def trim(grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limits) -> Trimmed:
-    """The part of the pulled `grid` inside the surface's edge and the `limits`; joints nearer to them than `merge` spacings are
-    left out.
+    """The part of the pulled `grid` inside the surface's edge and the `limits`; joints nearer to them than
+    `merge` spacings are left out.
 
     Raises Uncovered where the grid isn't large enough, InputError where nothing useful remains.
     """
@@ -114,7 +117,10 @@ def trim(grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limi
 
 def bare_rods(grid: Grid, state: State, finder: Finder, limits: Limits) -> int:
     """How many pieces of rods end on the surface, short of any limit."""
-    return sum((first == 0) + (last + 1 == len(rod.nodes)) > 0 for rod, first, last in _runs(grid, limits.past(finder, state.positions)))
+    return sum(
+        (first == 0) + (last + 1 == len(rod.nodes)) > 0
+        for rod, first, last in _runs(grid, limits.past(finder, state.positions))
+    )
 
 
 def _runs(grid: Grid, past: Reals) -> list[tuple[GridRod, int, int]]:
@@ -122,7 +128,10 @@ def _runs(grid: Grid, past: Reals) -> list[tuple[GridRod, int, int]]:
     runs: list[tuple[GridRod, int, int]] = []
     for rod in grid.rods:
         inside = np.concatenate([[False], past[rod.nodes] < 0.0, [False]])
-        starts, stops = np.flatnonzero(inside[1:] & ~inside[:-1]), np.flatnonzero(~inside[1:] & inside[:-1]) - 1
+        starts, stops = (
+            np.flatnonzero(inside[1:] & ~inside[:-1]),
+            np.flatnonzero(~inside[1:] & inside[:-1]) - 1,
+        )
         runs += [(rod, first, last) for first, last in zip(starts.tolist(), stops.tolist(), strict=True)]
     return runs
 
@@ -280,9 +289,15 @@ def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], not
             nodes[number[crossing], layer] = numbers[k]
         along = np.array([number[c] for c in joints])
         rods.append(GridRod(rod.direction, rod.index, numbers, arcs - arcs[0], along, at))
-    trimmed = Grid(np.vstack(flat), tuple(rods), grid.lattice[crossings], nodes, grid.spacing, grid.gap, grid.spacing_v)
+    trimmed = Grid(
+        np.vstack(flat), tuple(rods), grid.lattice[crossings], nodes, grid.spacing, grid.gap, grid.spacing_v
+    )
     return Trimmed(
-        trimmed, State(np.vstack(positions), np.vstack(turns)), np.array(supports), np.array(origin), tuple(notes)
+        trimmed,
+        State(np.vstack(positions), np.vstack(turns)),
+        np.array(supports),
+        np.array(origin),
+        tuple(notes),
     )
 
 
@@ -298,13 +313,15 @@ def _between(points: Reals, a: Indices, b: Indices, share: Reals) -> Reals:
 
 
 def _curved(state: State, a: Indices, b: Indices, share: Reals, axis: Indices) -> Reals:
-    """Positions (k, 3) on bent elements from nodes a to nodes b: Hermite's cubic between their ends, its tangents the rods' axes
-    there, which are the nodes' x axis (0) or y axis (1)."""
+    """Positions (k, 3) on bent elements from nodes a to nodes b: Hermite's cubic between their ends, its
+    tangents the rods' axes there, which are the nodes' x axis (0) or y axis (1)."""
     p, q, t = state.positions[a], state.positions[b], share[:, None]
     length = np.linalg.norm(q - p, axis=1, keepdims=True)
     which = np.arange(len(a))
     m, n = (length * matrices(state.quaternions[each])[which, :, axis] for each in (a, b))
-    cubic = (1 + 2 * t) * (1 - t) ** 2 * p + t * t * (3 - 2 * t) * q + t * (1 - t) ** 2 * m + t * t * (t - 1) * n
+    cubic = (
+        (1 + 2 * t) * (1 - t) ** 2 * p + t * t * (3 - 2 * t) * q + t * (1 - t) ** 2 * m + t * t * (t - 1) * n
+    )
     return np.asarray(np.where(t == 0.0, p, np.where(t == 1.0, q, cubic)))
 
 

@@ -1,7 +1,8 @@
 """The model file: one structural model as a JSON document (contracts/model-file.md).
 
-msgspec reads and checks the document against the structures below in compiled code (a million nodes in about two seconds); what a type can't
-say, ranges, signs and references, is checked on whole arrays afterwards. Every refusal names the field and the element.
+msgspec reads and checks the document against the structures below in compiled code (a million nodes in about
+two seconds); what a type can't say, ranges, signs and references, is checked on whole arrays afterwards.
+Every refusal names the field and the element.
 """
 
 from __future__ import annotations
@@ -18,10 +19,10 @@ import numpy as np
 
 from shellform.arrays import Flags, Reals
 from shellform.errors import InputError
-from shellform.structure.beam import Beams, make_beams
-from shellform.structure.cable import Cables, make_cables
+from shellform.structure.elements.beam import Beams, make_beams
+from shellform.structure.elements.cable import Cables, make_cables
+from shellform.structure.elements.state import State, from_vectors
 from shellform.structure.network import Network
-from shellform.structure.state import State, from_vectors
 from shellform.written import whole
 
 _HUGE = 1e30  # squares and ratios of such numbers are still finite
@@ -74,12 +75,21 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
     start: _Start | None = None
 
 
-_PARTS = {"": _Document, "beams": _Beam, "cables": _Cable, "supports": _Support, "loads": _Load, "start": _Start}
+_PARTS = {
+    "": _Document,
+    "beams": _Beam,
+    "cables": _Cable,
+    "supports": _Support,
+    "loads": _Load,
+    "start": _Start,
+}
 
 
 @dataclass(frozen=True)
 class Model:
-    """`network`; `loads` by name, (n, 6) N and N·m; `start` state or None; `supported` (s,) nodes in the file's order."""
+    """`network`; `loads` by name, (n, 6) N and N·m; `start` state or None; `supported` (s,) nodes in the
+    file's order.
+    """
 
     network: Network
     loads: Mapping[str, Reals]
@@ -117,7 +127,9 @@ def parse_model(data: object) -> Model:
 
 
 def write_model(path: str | Path, model: Model) -> None:
-    """Writes the model; numbers are written so that they are read back exactly. The file appears whole or not at all."""
+    """Writes the model; numbers are written so that they are read back exactly. The file appears whole or not
+    at all.
+    """
     with whole(path) as partial:
         partial.write_bytes(msgspec.json.encode(_document(model)))
 
@@ -158,7 +170,11 @@ def _document(model: Model) -> dict[str, Any]:
             )
         ],
         "supports": [
-            {"node": node, "fixed": network.fixed[node].tolist(), "displacement": network.imposed[node].tolist()}
+            {
+                "node": node,
+                "fixed": network.fixed[node].tolist(),
+                "displacement": network.imposed[node].tolist(),
+            }
             for node in model.supported
         ],
         "loads": {
@@ -181,7 +197,9 @@ def _model(document: _Document) -> Model:
     if document.format != "shellform-model":
         raise InputError("must be 'shellform-model'", where="format", value=document.format)
     if document.version != 1:
-        raise InputError("is not known here", where="version", value=document.version, remedy="This reads version 1.")
+        raise InputError(
+            "is not known here", where="version", value=document.version, remedy="This reads version 1."
+        )
     nodes = _array(document.nodes, "nodes", 3)
     count = len(nodes)
     if count == 0:
@@ -194,7 +212,12 @@ def _model(document: _Document) -> Model:
         parts = []
         for name, rows in [("positions", document.start.positions), ("rotations", document.start.rotations)]:
             if len(rows) != count:
-                raise InputError("has the wrong shape", where=f"start.{name}", value=len(rows), remedy=f"One row a node: {count}.")
+                raise InputError(
+                    "has the wrong shape",
+                    where=f"start.{name}",
+                    value=len(rows),
+                    remedy=f"One row a node: {count}.",
+                )
             parts.append(_array(rows, f"start.{name}", 3))
         start = from_vectors(*parts)
     return Model(Network(nodes, beams, cables, fixed, imposed), loads, start, tuple(supported))
@@ -203,10 +226,17 @@ def _model(document: _Document) -> Model:
 def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
     names = ("EA", "GJ", "EIy", "EIz")
     ends = _pairs([each.nodes for each in entries], "beams", len(nodes))
-    stiffness = [_positive(np.array([getattr(each, name) for each in entries], dtype=float), "beams", name) for name in names]
+    stiffness = [
+        _positive(np.array([getattr(each, name) for each in entries], dtype=float), "beams", name)
+        for name in names
+    ]
     undefined = (np.nan, np.nan, np.nan)
-    z_axis = np.array([undefined if each.z_axis is None else each.z_axis for each in entries], dtype=float).reshape(-1, 3)
-    rest = np.array([np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float)
+    z_axis = np.array(
+        [undefined if each.z_axis is None else each.z_axis for each in entries], dtype=float
+    ).reshape(-1, 3)
+    rest = np.array(
+        [np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float
+    )
     _positive(rest, "beams", "rest_length")
     words: dict[str, int] = {"rod": 0}
     kind = np.array([words.setdefault(each.kind, len(words)) for each in entries], dtype=np.int64)
@@ -227,17 +257,23 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
 def _cables(entries: list[_Cable], nodes: Reals) -> Cables:
     ends = _pairs([each.nodes for each in entries], "cables", len(nodes))
     stiffness = _positive(np.array([each.EA for each in entries], dtype=float), "cables", "EA")
-    rest = np.array([np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float)
+    rest = np.array(
+        [np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float
+    )
     _positive(rest, "cables", "rest_length")
     looped = ends[:, 0] == ends[:, 1]
     if looped.any():
         cable = int(np.argmax(looped))
-        raise InputError("the cable joins a node to itself", where=f"cables[{cable}]", value=int(ends[cable, 0]))
+        raise InputError(
+            "the cable joins a node to itself", where=f"cables[{cable}]", value=int(ends[cable, 0])
+        )
     length = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
     meeting = np.isnan(rest) & (length == 0.0)
     if meeting.any():
         cable = int(np.argmax(meeting))
-        raise InputError("the two nodes of the cable coincide", where=f"cables[{cable}]", value=ends[cable].tolist())
+        raise InputError(
+            "the two nodes of the cable coincide", where=f"cables[{cable}]", value=ends[cable].tolist()
+        )
     return make_cables(ends, rest_length=np.where(np.isnan(rest), length, rest), stiffness=stiffness)
 
 
@@ -248,7 +284,9 @@ def _supports(entries: list[_Support], count: int) -> tuple[Flags, Reals, list[i
         where = f"supports[{k}]"
         _node(entry.node, f"{where}.node", count)
         if entry.node in nodes:
-            raise InputError("the node has a support already", where=where, value=entry.node, remedy="Join the two.")
+            raise InputError(
+                "the node has a support already", where=where, value=entry.node, remedy="Join the two."
+            )
         nodes[entry.node] = k
         fixed[entry.node] = entry.fixed
         if entry.displacement is not None:
@@ -279,7 +317,9 @@ def _array(rows: Any, where: str, width: int) -> Reals:
     wrong = ~(np.abs(array) <= _HUGE).all(axis=1)
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise InputError(f"holds a number beyond {_HUGE:g}", where=f"{where}[{row}]", value=array[row].tolist())
+        raise InputError(
+            f"holds a number beyond {_HUGE:g}", where=f"{where}[{row}]", value=array[row].tolist()
+        )
     return array
 
 
@@ -292,7 +332,10 @@ def _pairs(pairs: list[tuple[int, int]], name: str, count: int) -> np.ndarray:
     if outside.any():
         element = int(np.argmax(outside))
         raise InputError(
-            "is out of range", where=f"{name}[{element}].nodes", value=ends[element].tolist(), remedy=f"Nodes run from 0 to {count - 1}."
+            "is out of range",
+            where=f"{name}[{element}].nodes",
+            value=ends[element].tolist(),
+            remedy=f"Nodes run from 0 to {count - 1}.",
         )
     return ends
 
@@ -301,7 +344,10 @@ def _positive(values: Reals, part: str, name: str) -> Reals:
     """The values, NaN standing for those left out."""
     wrong = (values <= 0.0) | np.isinf(values)
     absurd = (values > _HUGE) | (values < 1.0 / _HUGE)
-    for which, what in ((wrong, "must be a positive number"), (absurd, f"is beyond what can be calculated with ({1 / _HUGE:g} to {_HUGE:g})")):
+    for which, what in (
+        (wrong, "must be a positive number"),
+        (absurd, f"is beyond what can be calculated with ({1 / _HUGE:g} to {_HUGE:g})"),
+    ):
         if which.any():
             element = int(np.argmax(which))
             raise InputError(what, where=f"{part}[{element}].{name}", value=float(values[element]))
@@ -310,7 +356,9 @@ def _positive(values: Reals, part: str, name: str) -> Reals:
 
 def _node(node: int, where: str, count: int) -> None:
     if not 0 <= node < count:
-        raise InputError("is out of range", where=where, value=node, remedy=f"Nodes run from 0 to {count - 1}.")
+        raise InputError(
+            "is out of range", where=where, value=node, remedy=f"Nodes run from 0 to {count - 1}."
+        )
 
 
 def _refuse(error: msgspec.ValidationError) -> NoReturn:
@@ -319,10 +367,18 @@ def _refuse(error: msgspec.ValidationError) -> NoReturn:
     where = path.rstrip("`").removeprefix(".").replace("[...]", "")
     field = re.search(r"(unknown|required) field `([^`]*)`", said)
     if field is None:
-        kinds = {"`float`": "a number", "`int`": "a whole number", "`bool`": "true or false", "`str`": "a word", "`object`": "an object"}
+        kinds = {
+            "`float`": "a number",
+            "`int`": "a whole number",
+            "`bool`": "true or false",
+            "`str`": "a word",
+            "`object`": "an object",
+        }
         for name, words in kinds.items():
             said = said.replace(name, words)
-        raise InputError(said.replace("`", "").lower(), where=where, remedy="See the model file's description.") from error
+        raise InputError(
+            said.replace("`", "").lower(), where=where, remedy="See the model file's description."
+        ) from error
     if field[1] == "required":
         raise InputError(f"the field {field[2]!r} is missing", where=where) from error
     part = next(key for key in ("beams", "cables", "supports", "loads", "start", "") if where.startswith(key))

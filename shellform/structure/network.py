@@ -10,9 +10,9 @@ from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Flags, Indices, Reals, flags, reals
 from shellform.errors import InputError
-from shellform.structure.assembly import Assembly
-from shellform.structure.beam import Beams
-from shellform.structure.cable import Cables
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.cable import Cables
+from shellform.structure.solve.assembly import Assembly
 
 _APART = 1e12  # ratio of stiffnesses of which double precision leaves four digits
 _MISFIT = 2.0  # ratio of a beam's rest length to the distance of its nodes
@@ -23,8 +23,8 @@ _STRAIGHT = 1e-9  # off the axis, over the rod's length
 class Network:
     """`nodes` (n, 3), m, of the stress-free state; `beams`; `cables`; supports.
 
-    `fixed` (n, 6): which translations and rotations along and about the global axes are held; `imposed` (n, 6), m and
-    rad (a rotation vector): the displacement that a held freedom is given at load factor 1.
+    `fixed` (n, 6): which translations and rotations along and about the global axes are held; `imposed` (n,
+    6), m and rad (a rotation vector): the displacement that a held freedom is given at load factor 1.
     """
 
     nodes: Reals
@@ -42,7 +42,9 @@ class Network:
         for name, ends in [("beams", self.beams.ends), ("cables", self.cables.ends)]:
             if ends.size and ends.max() >= count:
                 element = int(np.argmax(ends.max(axis=1) >= count))
-                raise InputError("a node number is out of range", where=f"{name}[{element}]", value=ends[element].tolist())
+                raise InputError(
+                    "a node number is out of range", where=f"{name}[{element}]", value=ends[element].tolist()
+                )
 
 
 def assemble(network: Network) -> Assembly:
@@ -52,7 +54,9 @@ def assemble(network: Network) -> Assembly:
 
 
 def check_restrained(network: Network) -> None:
-    """Raises InputError naming a node without elements, or a connected part that could drift off along an axis."""
+    """Raises InputError naming a node without elements, or a connected part that could drift off along an
+    axis.
+    """
     count = len(network.nodes)
     ends = np.vstack([network.beams.ends, network.cables.ends])
     alone = np.ones(count, dtype=bool)
@@ -60,7 +64,9 @@ def check_restrained(network: Network) -> None:
     alone &= ~network.fixed[:, :3].all(axis=1)
     if alone.any():
         node = int(np.argmax(alone))
-        raise InputError("no element touches this node", where=f"nodes[{node}]", remedy="Remove it or connect it.")
+        raise InputError(
+            "no element touches this node", where=f"nodes[{node}]", remedy="Remove it or connect it."
+        )
     parts, label = connected(count, ends)
     for axis, name in enumerate("xyz"):
         held = np.zeros(parts, dtype=bool)
@@ -76,15 +82,18 @@ def check_restrained(network: Network) -> None:
 
 
 def connected(count: int, ends: Indices) -> tuple[int, Indices]:
-    """The number of connected parts of `count` nodes joined by `ends` (k, 2), and each node's part (count,)."""
+    """The number of connected parts of `count` nodes joined by `ends` (k, 2), and each node's part
+    (count,).
+    """
     graph = sp.coo_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(count, count))
     parts, label = connected_components(graph, directed=False)
     return int(parts), np.asarray(label, dtype=np.int64)
 
 
 def doubts(network: Network) -> list[str]:
-    """What is allowed but rarely meant, a sentence each: nodes in one place, stiffnesses too far apart, rest lengths far from the distance
-    of their nodes, and straight rods that nothing keeps from spinning about their own axis (that spin is held in the solution)."""
+    """What is allowed but rarely meant, a sentence each: nodes in one place, stiffnesses too far apart, rest
+    lengths far from the distance of their nodes, and straight rods that nothing keeps from spinning about
+    their own axis (that spin is held in the solution)."""
     return [*_coincident(network), *_far_apart(network), *_misfitting(network), *_spinning(network)]
 
 
@@ -95,7 +104,9 @@ def _coincident(network: Network) -> list[str]:
         return []
     k = int(np.argmax(same))
     pair = sorted((int(order[k]), int(order[k + 1])))
-    return [f"{int(same.sum())} nodes lie where another one does, nodes[{pair[0]}] and nodes[{pair[1]}] the first; they don't touch."]
+    return [
+        f"{int(same.sum())} nodes lie where another one does, nodes[{pair[0]}] and nodes[{pair[1]}] the first; they don't touch."
+    ]
 
 
 def _far_apart(network: Network) -> list[str]:
@@ -156,11 +167,15 @@ def _spinning(network: Network) -> list[str]:
     np.logical_or.at(crooked, label[touched], off > _STRAIGHT * size[label[touched]])
     # A held rotation stops the spin where its axis has a part along the rod.
     held = np.zeros(parts, dtype=bool)
-    np.logical_or.at(held, label[touched], (network.fixed[touched, 3:] & (np.abs(own) > _STRAIGHT)).any(axis=1))
+    np.logical_or.at(
+        held, label[touched], (network.fixed[touched, 3:] & (np.abs(own) > _STRAIGHT)).any(axis=1)
+    )
     has_beam = np.zeros(parts, dtype=bool)
     has_beam[label[touched]] = True
     free = np.flatnonzero(has_beam & ~crooked & ~held)
     if not len(free):
         return []
     first = int(anchor[free[0]])
-    return [f"{len(free)} straight rods are free to spin about their own axis, the one at nodes[{first}] the first; the spin is held."]
+    return [
+        f"{len(free)} straight rods are free to spin about their own axis, the one at nodes[{first}] the first; the spin is held."
+    ]

@@ -1,8 +1,8 @@
 """Cases, runs and studies. What a script needs of them is loaded when it is first used:
 
-    summary = study.run_case(study.load_case("case.toml", ["net.spacing=0.06"]), "runs/mine")
-    found = study.run_study("study.toml", "runs/study", workers=2)
-    table = study.read_table(found.table.parent, ["cables"])
+summary = study.run_case(study.load_case("case.toml", ["net.spacing=0.06"]), "runs/mine")
+found = study.run_study("study.toml", "runs/study", workers=2)
+table = study.read_table(found.table.parent, ["cables"])
 """
 
 from __future__ import annotations
@@ -11,8 +11,8 @@ import importlib
 from typing import Any
 
 _HOMES = {
-    "load_case": "shellform.study.case",
-    "run_case": "shellform.study.run",
+    "load_case": "shellform.case.case",
+    "run_case": "shellform.run.run",
     "run_study": "shellform.study.studies",
     "read_study": "shellform.study.plan",
     "read_table": "shellform.study.store",

@@ -1,8 +1,8 @@
 """Arithmetic in study files: `joint.gap = "net.spacing / 27.5"`.
 
-An expression is data: its syntax tree is walked here, node by node, and only numbers, names of entries, + - * / // % **, comparisons,
-`a if c else b` and the functions below mean anything. Nothing is compiled or run; every number is a float, so that no power grows
-without end; length and depth are bounded.
+An expression is data: its syntax tree is walked here, node by node, and only numbers, names of entries, + - *
+/ // % **, comparisons, `a if c else b` and the functions below mean anything. Nothing is compiled or run;
+every number is a float, so that no power grows without end; length and depth are bounded.
 """
 
 from __future__ import annotations
@@ -53,7 +53,8 @@ _CONSTANTS = {"pi": math.pi}
 def evaluate(text: str, where: str, entry: Callable[[str], float]) -> float:
     """The value of an expression; `entry` gives the number of a case's entry by its dotted name.
 
-    Raises InputError naming `where` it stands for whatever is no arithmetic, and where the value isn't finite.
+    Raises InputError naming `where` it stands for whatever is no arithmetic, and where the value isn't
+    finite.
     """
     if len(text) > _LONGEST:
         raise InputError(f"is longer than {_LONGEST} characters", where=where)
@@ -87,10 +88,17 @@ def _value(node: ast.AST, where: str, entry: Callable[[str], float]) -> Any:
             raise ValueError("the root of a negative number")
         return found
     elif isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _COMPARE:
-        return _COMPARE[type(node.ops[0])](_value(node.left, where, entry), _value(node.comparators[0], where, entry))
+        return _COMPARE[type(node.ops[0])](
+            _value(node.left, where, entry), _value(node.comparators[0], where, entry)
+        )
     elif isinstance(node, ast.IfExp):
         return _value(node.body if _value(node.test, where, entry) else node.orelse, where, entry)
-    elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in _FUNCTIONS and not node.keywords:
+    elif (
+        isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Name)
+        and node.func.id in _FUNCTIONS
+        and not node.keywords
+    ):
         return float(_FUNCTIONS[node.func.id](*(_value(each, where, entry) for each in node.args)))
     raise InputError(
         "isn't arithmetic",

@@ -1,4 +1,6 @@
-"""The designs of a study that no other beats in all objectives at once (Pareto's front), kept up as results come."""
+"""The designs of a study that no other beats in all objectives at once (Pareto's front), kept up as results
+come.
+"""
 
 from __future__ import annotations
 
@@ -10,9 +12,11 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Front:
-    """The front so far: objectives by key, all to be small; `signs` are 1 for columns to be small and -1 to be large.
+    """The front so far: objectives by key, all to be small; `signs` are 1 for columns to be small and -1 to
+    be large.
 
-    Designs beyond a `limit` and those without a number for each objective have no place on it. Equal designs share theirs.
+    Designs beyond a `limit` and those without a number for each objective have no place on it. Equal designs
+    share theirs.
     """
 
     signs: Mapping[str, float]
@@ -20,7 +24,9 @@ class Front:
     found: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
     def add(self, key: str, row: Mapping[str, Any]) -> list[str]:
-        """Takes a design's columns into account; returns the keys that have no place on the front, perhaps its own."""
+        """Takes a design's columns into account; returns the keys that have no place on the front, perhaps
+        its own.
+        """
         goals = objectives(row, self.signs)
         if goals is None or not usable(row, self.limits):
             return [key]
@@ -41,7 +47,9 @@ def signed(objective: Mapping[str, str]) -> dict[str, float]:
 def objectives(row: Mapping[str, Any], signs: Mapping[str, float]) -> tuple[float, ...] | None:
     """A design's objectives, all to be small; None where one of them is missing or there are none."""
     found = [row.get(name) for name in signs]
-    if not found or any(value is None or isinstance(value, str) or not math.isfinite(value) for value in found):
+    if not found or any(
+        value is None or isinstance(value, str) or not math.isfinite(value) for value in found
+    ):
         return None
     return tuple(sign * float(value) for sign, value in zip(signs.values(), found, strict=True))  # type: ignore[arg-type]
 

@@ -11,14 +11,20 @@ _EVERY = 10.0  # seconds between lines
 
 
 class Live:
-    """Shows a study's progress on standard error; use it as a context manager and call it with the progress. Nothing if `quiet`."""
+    """Shows a study's progress on standard error; use it as a context manager and call it with the progress.
+    Nothing if `quiet`.
+    """
 
     def __init__(self, *, quiet: bool = False) -> None:
         from rich.console import Console
         from rich.live import Live as Drawn
 
         self._console = Console(stderr=True, highlight=False, markup=False, soft_wrap=True, quiet=quiet)
-        self._drawn = Drawn(console=self._console, refresh_per_second=4, transient=True) if self._console.is_terminal else None
+        self._drawn = (
+            Drawn(console=self._console, refresh_per_second=4, transient=True)
+            if self._console.is_terminal
+            else None
+        )
         self._told = 0.0
         self._dashboard = ""
 
@@ -45,7 +51,11 @@ class Live:
 def _line(progress: Progress) -> str:
     ready = progress.found + progress.done
     spent = time.perf_counter() - progress.began
-    rest = f", about {spent / progress.done * max(0, progress.total - ready):.0f} s to go" if progress.done else ""
+    rest = (
+        f", about {spent / progress.done * max(0, progress.total - ready):.0f} s to go"
+        if progress.done
+        else ""
+    )
     failed = f", {progress.failed} without a result" if progress.failed else ""
     return f"study: {ready} of {progress.total} designs{failed}{rest}"
 

@@ -1,4 +1,5 @@
-"""The study file: a base case, what varies, and which numbers are of interest; and the designs that this makes.
+"""The study file: a base case, what varies, and which numbers are of interest; and the designs that this
+makes.
 
     case = "scale_model.toml"        # beside the study file, or below it
     method = "latin"                 # grid, random, latin, sobol, search
@@ -16,7 +17,8 @@
     [objective]
     cables = "min"
 
-Samples are SciPy's (`scipy.stats.qmc`) from a seed, so that the same file always makes the same designs in the same order.
+Samples are SciPy's (`scipy.stats.qmc`) from a seed, so that the same file always makes the same designs in
+the same order.
 """
 
 from __future__ import annotations
@@ -38,8 +40,8 @@ from pydantic import (
     model_validator,
 )
 
+from shellform.case.case import Case, make_case, read_toml, set_entry, told
 from shellform.errors import InputError
-from shellform.study.case import Case, make_case, read_toml, set_entry, told
 from shellform.study.expressions import evaluate
 
 _MOST = 1_000_000  # designs
@@ -69,7 +71,9 @@ class VaryEntry(_Part):
     count: int | None = Field(None, ge=1, le=_MOST, description="of values that a grid takes from a range")
     scale: Literal["linear", "log"] = Field("linear", description="log: equal ratios")
     whole: bool = Field(False, description="whole numbers alone")
-    files: str | None = Field(None, description='pattern of files beside or below the study file, like "shells/*.step"')
+    files: str | None = Field(
+        None, description='pattern of files beside or below the study file, like "shells/*.step"'
+    )
 
     @model_validator(mode="after")
     def _one_way(self) -> VaryEntry:
@@ -90,17 +94,25 @@ class Study(_Part):
 
     title: str = ""
     case: str = Field(description="case file, beside or below the study file")
-    until: Literal["surface", "net", "initial", "optimise", "figures", "documents", "report"] = Field("optimise", description="last stage of each design")
+    until: Literal["surface", "net", "initial", "optimise", "figures", "documents", "report"] = Field(
+        "optimise", description="last stage of each design"
+    )
     keep: Literal["all", "best", "none"] = Field("best", description="run folders that stay")
-    method: Literal["grid", "random", "latin", "sobol", "search"] = Field("grid", description="how the varied entries combine")
+    method: Literal["grid", "random", "latin", "sobol", "search"] = Field(
+        "grid", description="how the varied entries combine"
+    )
     count: int | None = Field(None, ge=1, le=_MOST, description="of designs, for all methods but grid")
     population: int = Field(24, ge=2, le=10_000, description="of a search's generation")
     seed: int = Field(1, ge=0, lt=2**32)
     set: dict[str, Any] = Field({}, description="entries for all designs")
     vary: dict[str, VaryEntry] = Field({}, description="entries that vary")
-    designs: list[dict[str, Any]] = Field([], description="designs listed one by one; each is combined with all that varies")
+    designs: list[dict[str, Any]] = Field(
+        [], description="designs listed one by one; each is combined with all that varies"
+    )
     function: dict[str, str | float] = Field({}, description="entries that follow from others")
-    column: dict[str, str] = Field(_COLUMNS, description="name = path in summary.json; designs.best is the last one made")
+    column: dict[str, str] = Field(
+        _COLUMNS, description="name = path in summary.json; designs.best is the last one made"
+    )
     objective: dict[str, Literal["min", "max"]] = Field({}, description="columns to be small or large")
     limit: dict[str, float] = Field({}, description="largest value of a column in a usable design")
 
@@ -113,7 +125,11 @@ class Study(_Part):
     @classmethod
     def _ways(cls, value: Any) -> Any:
         found = _flat(value, _LEAVES)
-        return {k: {"values": v} if isinstance(v, list) else v for k, v in found.items()} if isinstance(found, dict) else found
+        return (
+            {k: {"values": v} if isinstance(v, list) else v for k, v in found.items()}
+            if isinstance(found, dict)
+            else found
+        )
 
     @field_validator("designs", mode="before")
     @classmethod
@@ -150,7 +166,9 @@ class Study(_Part):
 
 @dataclass(frozen=True)
 class Plan:
-    """A study read and checked: its entries, the file, the base case's tables and entries, and how each varied entry is drawn."""
+    """A study read and checked: its entries, the file, the base case's tables and entries, and how each
+    varied entry is drawn.
+    """
 
     study: Study
     file: Path
@@ -182,11 +200,16 @@ def make_plan(study: Study, file: Path) -> Plan:
             lists[name] = _files(file, entry.files, f"vary.{name}.files")
         elif entry.values is not None:
             lists[name] = [
-                str(_inside(file, str(each), f"vary.{name}")) if name == "surface.file" else each for each in entry.values
+                str(_inside(file, str(each), f"vary.{name}")) if name == "surface.file" else each
+                for each in entry.values
             ]
         elif study.method == "grid":
             if entry.count is None:
-                raise InputError("a grid needs the range's count", where=f"{file}: vary.{name}", remedy="For example count = 5.")
+                raise InputError(
+                    "a grid needs the range's count",
+                    where=f"{file}: vary.{name}",
+                    remedy="For example count = 5.",
+                )
             at = [k / max(1, entry.count - 1) for k in range(entry.count)]
             lists[name] = list(dict.fromkeys(ranged(entry, each) for each in at))
         else:
@@ -209,7 +232,11 @@ def ranged(entry: VaryEntry, at: float) -> Value:
 def length(plan: Plan) -> int:
     """How many designs a plan makes; for a search, at the most."""
     study = plan.study
-    sampled = math.prod(len(each) for each in plan.lists.values()) if study.method == "grid" else int(study.count or 0)
+    sampled = (
+        math.prod(len(each) for each in plan.lists.values())
+        if study.method == "grid"
+        else int(study.count or 0)
+    )
     return sampled * max(1, len(study.designs))
 
 
@@ -236,7 +263,9 @@ def _samples(plan: Plan) -> Iterator[dict[str, Value]]:
     elif study.method == "latin":
         points = qmc.LatinHypercube(len(names), rng=study.seed).random(count)
     else:
-        points = qmc.Sobol(len(names), rng=study.seed).random_base2(math.ceil(math.log2(max(count, 2))))[:count]
+        points = qmc.Sobol(len(names), rng=study.seed).random_base2(math.ceil(math.log2(max(count, 2))))[
+            :count
+        ]
     for point in points:
         yield {name: placed(plan, name, float(at)) for name, at in zip(names, point, strict=True)}
 
@@ -267,7 +296,11 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
                 raise InputError("follows from itself", where=f"{plan.file}: function.{name}")
             asked.append(name)
             text = study.function[name]
-            found[name] = float(text) if not isinstance(text, str) else evaluate(text, f"{plan.file}: function.{name}", entry)
+            found[name] = (
+                float(text)
+                if not isinstance(text, str)
+                else evaluate(text, f"{plan.file}: function.{name}", entry)
+            )
             return found[name]
         value = given[name] if name in given else _entry(plan.base, name)
         if isinstance(value, bool) or not isinstance(value, int | float):
@@ -313,7 +346,10 @@ def _inside(file: Path, name: str, where: str) -> Path:
     place = (root / name).resolve()
     if root != place and root not in place.parents:
         raise InputError(
-            "leads out of the study file's folder", where=f"{file}: {where}", value=name, remedy="Put the study file beside or above it."
+            "leads out of the study file's folder",
+            where=f"{file}: {where}",
+            value=name,
+            remedy="Put the study file beside or above it.",
         )
     return place
 
@@ -329,5 +365,3 @@ def _files(file: Path, pattern: str, where: str) -> list[str]:
     if not found:
         raise InputError("there is no such file", where=f"{file}: {where}", value=pattern)
     return found
-
-

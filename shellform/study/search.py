@@ -1,8 +1,9 @@
 """Search for the front of several objectives: the door to Optuna.
 
-NSGA-II (Deb et al., IEEE Trans. Evol. Comput. 6 (2002) 182) asks for one generation after the other; each is a batch of designs on the
-study's engine. Its random numbers come from the study's seed and it is told the results in the order in which it asked, so that the
-same study always asks for the same designs: a second call asks again, finds what is computed in the store, and goes on from there.
+NSGA-II (Deb et al., IEEE Trans. Evol. Comput. 6 (2002) 182) asks for one generation after the other; each is
+a batch of designs on the study's engine. Its random numbers come from the study's seed and it is told the
+results in the order in which it asked, so that the same study always asks for the same designs: a second call
+asks again, finds what is computed in the store, and goes on from there.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from shellform.study.front import objectives, signed
 from shellform.study.plan import Plan, Value
 
 
-def generations(plan: Plan) -> Generator[Callable[[], Iterable[Mapping[str, Value]]], list[dict[str, Any]], None]:
+def generations(
+    plan: Plan,
+) -> Generator[Callable[[], Iterable[Mapping[str, Value]]], list[dict[str, Any]], None]:
     """Generation after generation, each told the rows (with the study's columns) of the one before."""
     import optuna
 
@@ -24,7 +27,9 @@ def generations(plan: Plan) -> Generator[Callable[[], Iterable[Mapping[str, Valu
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # constraints_func is called experimental
         sampler = optuna.samplers.NSGAIISampler(
-            population_size=entry.population, seed=entry.seed, constraints_func=_excess if entry.limit else None
+            population_size=entry.population,
+            seed=entry.seed,
+            constraints_func=_excess if entry.limit else None,
         )
     search = optuna.create_study(directions=["minimize"] * len(signs), sampler=sampler)
     left = int(entry.count or 0)
@@ -39,7 +44,10 @@ def generations(plan: Plan) -> Generator[Callable[[], Iterable[Mapping[str, Valu
                 search.tell(trial, state=optuna.trial.TrialState.FAIL)
                 continue
             if entry.limit:
-                excess = [float(row[name]) - most if row[name] is not None else 1.0 for name, most in entry.limit.items()]
+                excess = [
+                    float(row[name]) - most if row[name] is not None else 1.0
+                    for name, most in entry.limit.items()
+                ]
                 trial.set_user_attr("excess", excess)
             search.tell(trial, goals)
 
@@ -53,7 +61,11 @@ def _excess(trial: Any) -> list[float]:
 def _asked(plan: Plan, trial: Any, name: str) -> Value:
     if name in plan.lists:
         values = plan.lists[name]
-        found: Value = values[trial.suggest_int(name, 0, len(values) - 1)] if _ordered(values) else trial.suggest_categorical(name, values)
+        found: Value = (
+            values[trial.suggest_int(name, 0, len(values) - 1)]
+            if _ordered(values)
+            else trial.suggest_categorical(name, values)
+        )
         return found
     entry = plan.study.vary[name]
     log = entry.scale == "log"

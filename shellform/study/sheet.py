@@ -1,16 +1,18 @@
-"""The page of a study folder, from its table and the runs that were kept; the best of these get a page of their own to be linked to."""
+"""The page of a study folder, from its table and the runs that were kept; the best of these get a page of
+their own to be linked to.
+"""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-from shellform.design.problem import deviations
 from shellform.errors import InputError
-from shellform.output.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
-from shellform.study.folder import read_run
+from shellform.output.page.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
+from shellform.problem.problem import deviations
+from shellform.run.folder import read_run
+from shellform.run.pages import FILE, write_page
 from shellform.study.front import Front, signed
-from shellform.study.page import FILE, write_page
 from shellform.study.plan import Plan
 from shellform.study.store import read_table
 from shellform.written import write_text
@@ -47,7 +49,9 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
     if entry.keep == "none":
         notes.append("No run was kept (keep), so that there are no pictures.")
     if pictures:
-        notes.append(f"Pictures: distance from the target under the design load, from 0 (dark) to {1e3 * limit:.3g} mm (yellow).")
+        notes.append(
+            f"Pictures: distance from the target under the design load, from 0 (dark) to {1e3 * limit:.3g} mm (yellow)."
+        )
     sheet = Sheet(
         title=entry.title or f"Study of {entry.case}",
         rows=[{name: values[k] for name, values in columns.items()} for k in rows],
@@ -74,8 +78,8 @@ def _link(folder: Path, key: str) -> str:
 
 
 def _pictures(folder: Path, keys: list[str]) -> tuple[dict[str, str], float]:
-    """A thumbnail of the last design of each kept run under its design load, all in the same colours, and the distance at which these
-    end, m; none of runs that stopped before. Runs that have no page yet get one."""
+    """A thumbnail of the last design of each kept run under its design load, all in the same colours, and the
+    distance at which these end, m; none of runs that stopped before. Runs that have no page yet get one."""
     seen: dict[str, tuple[Any, Any]] = {}
     limit = 0.0
     for key in keys:

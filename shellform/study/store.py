@@ -5,10 +5,10 @@
     DIR/table.csv       the same with the columns that were asked for
     DIR/seconds.csv     what each design took; apart, since it differs from run to run
 
-A line counts once its checksum and line end are on the disk; what a kill or a full disk leaves behind it is cut off at the next
-start. So a design is in the log entirely or not at all, and computed once. The table is written anew beside the old one and then put
-in its place. It depends on the log's content, not on the order of its lines, so that a study that was stopped ends with the same bytes
-as one that wasn't.
+A line counts once its checksum and line end are on the disk; what a kill or a full disk leaves behind it is
+cut off at the next start. So a design is in the log entirely or not at all, and computed once. The table is
+written anew beside the old one and then put in its place. It depends on the log's content, not on the order
+of its lines, so that a study that was stopped ends with the same bytes as one that wasn't.
 """
 
 from __future__ import annotations
@@ -34,7 +34,9 @@ _BUILT = ("polished", "rounded", "optimised", "initial")
 
 
 class Log:
-    """The results of a study by key, on the disk; in memory a place in the file for each, and the columns with their kinds."""
+    """The results of a study by key, on the disk; in memory a place in the file for each, and the columns
+    with their kinds.
+    """
 
     def __init__(self, file: Path) -> None:
         """Opens the log or begins one. Raises InputError where a line before the last is damaged."""
@@ -45,7 +47,9 @@ class Log:
         try:
             self._open = open(file, "a+b", buffering=0)  # noqa: SIM115 (it is open as long as the log)
         except OSError as error:
-            raise InputError(f"can't be written: {error}", where=str(file), remedy="Choose another --output.") from error
+            raise InputError(
+                f"can't be written: {error}", where=str(file), remedy="Choose another --output."
+            ) from error
         self._end = 0
         self._open.seek(0)
         with open(file, "rb") as lines:
@@ -54,7 +58,9 @@ class Log:
                 if row is None:
                     if lines.read(1):
                         self._open.close()
-                        raise InputError("is damaged", where=f"{file}, byte {self._end}", remedy="Choose another --output.")
+                        raise InputError(
+                            "is damaged", where=f"{file}, byte {self._end}", remedy="Choose another --output."
+                        )
                     break
                 self._enter(row, self._end)
                 self._end += len(line)
@@ -102,7 +108,9 @@ class Log:
         return row
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Adds rows with one write and one wait for the disk. Raises OSError, and holds none of them, where there is no room."""
+        """Adds rows with one write and one wait for the disk. Raises OSError, and holds none of them, where
+        there is no room.
+        """
         lines = [_line(row) for row in rows]
         block, told = b"".join(lines), 0
         try:
@@ -141,7 +149,9 @@ def _row(line: bytes) -> dict[str, Any] | None:
 
 
 def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
-    """The numbers, words and flags of a summary by dotted name; short lists of numbers by place, lists of words joined."""
+    """The numbers, words and flags of a summary by dotted name; short lists of numbers by place, lists of
+    words joined.
+    """
     found: dict[str, Any] = {}
     if isinstance(tree, Mapping):
         for key, value in tree.items():
@@ -159,7 +169,9 @@ def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
 def picked(values: Mapping[str, Any], columns: Mapping[str, str]) -> dict[str, Any]:
     """The columns that were asked for, of a row's values; None where a design has no such number."""
     best = next((name for name in _BUILT if f"designs.{name}.cables" in values), "initial")
-    return {name: values.get(path.replace("designs.best.", f"designs.{best}.")) for name, path in columns.items()}
+    return {
+        name: values.get(path.replace("designs.best.", f"designs.{best}.")) for name, path in columns.items()
+    }
 
 
 def designs_of(file: Path) -> Iterator[dict[str, Any]]:
@@ -221,7 +233,11 @@ def _cell(value: Any, kind: int) -> Any:
 
 
 def _kind_of_pick(path: str, kinds: Mapping[str, int]) -> int:
-    known = {kinds[name] for name in (path.replace("designs.best.", f"designs.{each}.") for each in _BUILT) if name in kinds}
+    known = {
+        kinds[name]
+        for name in (path.replace("designs.best.", f"designs.{each}.") for each in _BUILT)
+        if name in kinds
+    }
     return 2 if not known else known.pop() if len(known) == 1 else max(*known, 2)
 
 
@@ -257,7 +273,8 @@ def _array(pa: Any, rows: Sequence[Mapping[str, Any]], name: str, kind: int, for
 
 
 def read_table(folder: str | Path, columns: Sequence[str] | None = None, filters: Any = None) -> Any:
-    """A study's table as a `pyarrow.Table`, of some columns and rows if asked: `filters=[("cables", "<", 100)]`.
+    """A study's table as a `pyarrow.Table`, of some columns and rows if asked: `filters=[("cables", "<",
+    100)]`.
 
     Raises InputError where there is none, or a damaged one.
     """
@@ -270,6 +287,6 @@ def read_table(folder: str | Path, columns: Sequence[str] | None = None, filters
     try:
         return pq.read_table(file, columns=None if columns is None else list(columns), filters=filters)
     except (pa.ArrowException, OSError) as error:
-        raise InputError(f"is damaged: {error}", where=str(file), remedy="Run the study again; its results are kept.") from error
-
-
+        raise InputError(
+            f"is damaged: {error}", where=str(file), remedy="Run the study again; its results are kept."
+        ) from error

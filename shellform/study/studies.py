@@ -7,9 +7,9 @@
     DIR/stages/KEY       what several designs share: the surface, the net, the first equilibria
     DIR/study.html       the page
 
-A design's key is a hash of its resolved settings, the bytes of its files and the version of the package: the same design is computed
-once, whatever it is called, and a second call on a folder finds what is there. Killed in the middle, each worker repeats at most
-the stage that it was at.
+A design's key is a hash of its resolved settings, the bytes of its files and the version of the package: the
+same design is computed once, whatever it is called, and a second call on a folder finds what is there. Killed
+in the middle, each worker repeats at most the stage that it was at.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ from pathlib import Path
 from typing import Any
 
 import shellform
+from shellform.case.case import Case, check_script
 from shellform.errors import InputError, NotConverged
-from shellform.study.case import Case, check_script
+from shellform.run.run import STAGES, stage_keys
+from shellform.study.engine import Engine, Work, engine, sweep
 from shellform.study.front import Front, signed
-from shellform.study.job import NO_ROOM, Job, Outcome, disk_is_full, locked, work
+from shellform.study.jobs import NO_ROOM, Job, Outcome, disk_is_full, locked, work
 from shellform.study.plan import Plan, Value, changes, length, read_study, resolved
-from shellform.study.run import STAGES, stage_keys
 from shellform.study.sheet import write_study_page
 from shellform.study.store import Log, designs_of, flat, picked, write_table
-from shellform.study.sweep import Engine, Work, engine, sweep
 from shellform.written import write_text
 
 _SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
@@ -62,8 +62,9 @@ Show = Callable[[Progress], None]
 
 @dataclass(frozen=True)
 class Finding:
-    """What a study ended with: counts of designs, those `found` in the folder from before, the columns that are `empty` in all designs
-    with a result (a path that no summary has, perhaps misspelt), the table and the page."""
+    """What a study ended with: counts of designs, those `found` in the folder from before, the columns that
+    are `empty` in all designs with a result (a path that no summary has, perhaps misspelt), the table and the
+    page."""
 
     designs: int
     failed: int
@@ -105,8 +106,9 @@ def run_study(
 ) -> Finding:
     """Runs the designs of a study file in `folder` that aren't there yet, and writes its table and page.
 
-    `workers` processes on this machine, or those of a Dask `scheduler`, which have to see the folder by the same name. `show` is called
-    with the progress. Raises InputError for a bad study, NotConverged where the disk is full or no design has a result.
+    `workers` processes on this machine, or those of a Dask `scheduler`, which have to see the folder by the
+    same name. `show` is called with the progress. Raises InputError for a bad study, NotConverged where the
+    disk is full or no design has a result.
     """
     plan = read_study(file)
     place = Path(folder).resolve()
@@ -115,7 +117,9 @@ def run_study(
             (place / part).mkdir(parents=True, exist_ok=True)
         write_text(place / "study.toml", Path(file).read_text(encoding="utf-8"))
     except OSError as error:
-        raise InputError(f"can't be written: {error}", where=str(place), remedy="Choose another --output.") from error
+        raise InputError(
+            f"can't be written: {error}", where=str(place), remedy="Choose another --output."
+        ) from error
     try:
         with locked(place / "lock", wait=False), Log(place / "results.jsonl") as log:
             front = Front(signed(plan.study.objective), plan.study.limit)
@@ -127,7 +131,9 @@ def run_study(
         raise InputError("another study is at work here", where=str(place)) from error
     except OSError as error:
         what = "There is no room on the disk" if disk_is_full(error) else "The study was broken off"
-        raise NotConverged(f"{what}: {error}", remedy="Run the same command again: it goes on from here.") from error
+        raise NotConverged(
+            f"{what}: {error}", remedy="Run the same command again: it goes on from here."
+        ) from error
 
 
 def _go(study: _Studying, work: Work, workers: int | None, scheduler: str | None) -> None:
@@ -160,7 +166,9 @@ def _at_once(plan: Plan) -> Generator[Batch, list[dict[str, Any]], None]:
 
 
 def _list(study: _Studying, batch: Batch, listed: Any) -> tuple[list[str], Counter[str], int]:
-    """Lists a batch's designs; returns their keys, how often each stage is needed by those to be computed, and how many these are."""
+    """Lists a batch's designs; returns their keys, how often each stage is needed by those to be computed,
+    and how many these are.
+    """
     stages = STAGES[: STAGES.index(study.plan.study.until)]
     shared: Counter[str] = Counter()
     keys, fresh, refused = [], set(), []
@@ -196,7 +204,9 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
         check_script(file, allow_scripts=study.allow_scripts)
         keys = stage_keys(case)
     except InputError as error:
-        digest = hashlib.sha256(f"{shellform.__version__} refused {json.dumps(dict(values))} {error}".encode())
+        digest = hashlib.sha256(
+            f"{shellform.__version__} refused {json.dumps(dict(values))} {error}".encode()
+        )
         return _Design(digest.hexdigest()[:_SHORT], values, None, {}, str(error))
     until = study.plan.study.until
     # What a summary tells of a net depends on the rods as well.
@@ -221,7 +231,14 @@ def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]
                 key = design.keys[stage][:_SHORT]
                 folder = str(study.folder / "stages" / key)
                 before = (*before, Job(key, design.case, stage, folder, before, study.allow_scripts))
-        yield Job(design.key, design.case, until, str(study.folder / "runs" / design.key), before, study.allow_scripts)
+        yield Job(
+            design.key,
+            design.case,
+            until,
+            str(study.folder / "runs" / design.key),
+            before,
+            study.allow_scripts,
+        )
 
 
 def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) -> None:
@@ -246,8 +263,14 @@ def _row(key: str, status: str, reason: str) -> dict[str, Any]:
 
 def _row_of(outcome: Outcome) -> dict[str, Any]:
     if outcome["status"] == NO_ROOM:
-        raise NotConverged(f"A worker found no room: {outcome['reason']}", remedy="Make room and run the same command again.")
-    values = {name: value for name, value in outcome["summary"].items() if name not in ("format", "version", "seconds")}
+        raise NotConverged(
+            f"A worker found no room: {outcome['reason']}", remedy="Make room and run the same command again."
+        )
+    values = {
+        name: value
+        for name, value in outcome["summary"].items()
+        if name not in ("format", "version", "seconds")
+    }
     return {
         **_row(outcome["key"], outcome["status"], outcome["reason"]),
         "values": flat(values),
@@ -314,8 +337,17 @@ def _finish(study: _Studying) -> Finding:
             failed += 1
             reason = reason or ("" if row is None else f"{row['status']}: {row['reason']}")
         elif empty:
-            empty -= {name for name, value in picked(row["values"], plan.study.column).items() if value is not None}
+            empty -= {
+                name for name, value in picked(row["values"], plan.study.column).items() if value is not None
+            }
     if failed == count:
         raise NotConverged(f"None of {count} designs has a result. The first was {reason}")
     found = sum(study.log.old(key) for key in set(keys))
-    return Finding(count, failed, found, tuple(name for name in plan.study.column if name in empty), study.folder / "table.parquet", page)
+    return Finding(
+        count,
+        failed,
+        found,
+        tuple(name for name in plan.study.column if name in empty),
+        study.folder / "table.parquet",
+        page,
+    )

@@ -1,15 +1,17 @@
 """Surfaces built or imported in gmsh, through occ.py.
 
-A builder script is a Python file with one function `build(gmsh, *, name=default, ...)`, whose keyword arguments are the shell's
-named dimensions, m, and which makes the geometry in the current model. Where it has a second function `form(points, triangles,
-edge, *, ...)` with the same dimensions, the mesh of what was built is a plan, and `form` returns where its `points` (v, 3) go;
-`edge` (v,) tells which lie on its boundary. So a form-found shell is meshed before it is found.
+A builder script is a Python file with one function `build(gmsh, *, name=default, ...)`, whose keyword
+arguments are the shell's named dimensions, m, and which makes the geometry in the current model. Where it has
+a second function `form(points, triangles, edge, *, ...)` with the same dimensions, the mesh of what was built
+is a plan, and `form` returns where its `points` (v, 3) go; `edge` (v,) tells which lie on its boundary. So a
+form-found shell is meshed before it is found.
 
-CAD files (STEP, IGES, BREP) come through gmsh's OpenCASCADE, which converts the unit that STEP and IGES files state to metres;
-a BREP file has none. OpenCASCADE remembers the last unit asked for beyond gmsh's session, so that every session asks for metres
-anew.
+CAD files (STEP, IGES, BREP) come through gmsh's OpenCASCADE, which converts the unit that STEP and IGES files
+state to metres; a BREP file has none. OpenCASCADE remembers the last unit asked for beyond gmsh's session, so
+that every session asks for metres anew.
 
-Vertex normals are the CAD surface's own, summed over the faces that meet at a vertex; across a fold they are its bisector.
+Vertex normals are the CAD surface's own, summed over the faces that meet at a vertex; across a fold they are
+its bisector.
 """
 
 from __future__ import annotations
@@ -23,19 +25,20 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged
-from shellform.surface.draft import Draft
 from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence
-from shellform.surface.script import function_of, load_script, named_dimensions
+from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.script import function_of, load_script, named_dimensions
 from shellform.surface.units import turned_up, unit_factor
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
-    from shellform.surface.rhino import Patch
-    from shellform.surface.target import Surface
+    from shellform.surface.readers.rhino import Patch
+    from shellform.surface.shape.target import Surface
 
 FORMATS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep"}
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
 _SAMPLES = 33  # points on a curve that tell its extent
-_SEWN = 1e-6  # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
+# of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
+_SEWN = 1e-6
 _FITTED = 1000  # about as many vertices a fitted surface passes through
 _SEGMENTS = 100  # of a fitted B-spline along u and v
 _CORNER = np.cos(np.deg2rad(30.0))  # an edge that turns more has a corner there
@@ -67,7 +70,9 @@ def dimensions_of(script: str | Path) -> dict[str, float]:
     return named_dimensions(function_of(load_script(path), "build", path), {}, path)
 
 
-def import_surface(path: str | Path, *, unit: str | None = None, size: float | None = None, up: str = "z") -> Surface:
+def import_surface(
+    path: str | Path, *, unit: str | None = None, size: float | None = None, up: str = "z"
+) -> Surface:
     """The surface of a STEP, IGES or BREP file as `read_cad` reads it, in this process, and z up."""
     file = Path(path)
     if not file.is_file():
@@ -82,16 +87,27 @@ def import_surface(path: str | Path, *, unit: str | None = None, size: float | N
 
 
 def read_cad(
-    file: Path, kind: str, *, unit: str | None = None, size: float | None = None, up: str = "z", face: str | None = None
+    file: Path,
+    kind: str,
+    *,
+    unit: str | None = None,
+    size: float | None = None,
+    up: str = "z",
+    face: str | None = None,
 ) -> Draft:
-    """The faces of a "step", "iges" or "brep" file, in m, meshed at about `size`, m (a sixtieth of its plan if left out).
+    """The faces of a "step", "iges" or "brep" file, in m, meshed at about `size`, m (a sixtieth of its plan
+    if left out).
 
-    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis, and stays so; of a
-    solid its "upper" or "lower" `face` is taken. Raises InputError for unreadable files, and for solids without a `face`.
+    The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis,
+    and stays so; of a solid its "upper" or "lower" `face` is taken. Raises InputError for unreadable files,
+    and for solids without a `face`.
     """
     if kind != "brep" and unit is not None:
         raise InputError(
-            f"{kind.upper()} files carry their own unit", where="surface.unit", value=unit, remedy="Leave the unit out."
+            f"{kind.upper()} files carry their own unit",
+            where="surface.unit",
+            value=unit,
+            remedy="Leave the unit out.",
         )
     factor = 1.0 if kind != "brep" else unit_factor(unit or "m")
     with session(), errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
@@ -103,7 +119,9 @@ def read_cad(
         return _draft(file, size, up, face)
 
 
-def mesh_patches(patches: Sequence[Patch], *, size: float | None, up: str, face: str | None, where: Path) -> Draft:
+def mesh_patches(
+    patches: Sequence[Patch], *, size: float | None, up: str, face: str | None, where: Path
+) -> Draft:
     """NURBS patches, m, trimmed and sewn where they touch, meshed as CAD files are."""
     with session(), errors(where, "gmsh can't build its surfaces", "Export it as STEP, or as a mesh."):
         for patch in patches:
@@ -111,19 +129,24 @@ def mesh_patches(patches: Sequence[Patch], *, size: float | None, up: str, face:
         gmsh.model.occ.synchronize()
         if not _faces_connected():
             tolerance = _SEWN * float(extent().max())
-            gmsh.model.occ.healShapes(gmsh.model.occ.getEntities(2), tolerance, False, False, False, True, False)
+            gmsh.model.occ.healShapes(
+                gmsh.model.occ.getEntities(2), tolerance, False, False, False, True, False
+            )
             gmsh.model.occ.synchronize()
         return _draft(where, size, up, face)
 
 
 def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[Reals, Indices]:
-    """Points (k, 2) inside the first of the closed `outlines` (n, 2), m, and outside the others, and triangles (t, 3),
-    counterclockwise.
+    """Points (k, 2) inside the first of the closed `outlines` (n, 2), m, and outside the others, and
+    triangles (t, 3), counterclockwise.
 
-    The triangles number the outlines' points first, one outline after the other, then these. Edges are about `size`, m, long
-    (left out: as those of the outline nearby). Raises InputError where outlines cross.
+    The triangles number the outlines' points first, one outline after the other, then these. Edges are about
+    `size`, m, long (left out: as those of the outline nearby). Raises InputError where outlines cross.
     """
-    with session(), errors(Path("plan"), "its outline can't be meshed", "Check that it doesn't cross itself."):
+    with (
+        session(),
+        errors(Path("plan"), "its outline can't be meshed", "Check that it doesn't cross itself."),
+    ):
         geo = gmsh.model.geo
         loops, tags = [], []
         for outline in outlines:
@@ -142,7 +165,9 @@ def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[
         nodes, coordinates, _ = gmsh.model.mesh.getNodes()
         kinds, _, corners = gmsh.model.mesh.getElements(2)
     places = coordinates.reshape(-1, 3)[:, :2]
-    own = [int(np.flatnonzero(nodes == tag)[0]) for tag in tags]  # a mesh's vertex on a point has the point's number
+    own = [
+        int(np.flatnonzero(nodes == tag)[0]) for tag in tags
+    ]  # a mesh's vertex on a point has the point's number
     if not len(kinds) or not np.array_equal(places[own], np.vstack(outlines)):
         raise InputError("its outline can't be meshed", remedy="Check that it doesn't cross itself.")
     inside = np.setdiff1d(np.arange(len(nodes)), own)
@@ -187,13 +212,18 @@ def _knots(knots: Reals) -> tuple[Reals, Indices]:
 
 def _draft(where: Path, size: float | None, up: str, face: str | None) -> Draft:
     plan = np.delete(extent(), 1 if up == "y" else 2)
-    points, triangles, normals = mesh_faces(float(plan.max()) / _DEFAULT_EDGES if size is None else size, where, face, up)
-    notes = () if face is None or not gmsh.model.getEntities(3) else (f"the {face} face of a solid was taken",)
+    points, triangles, normals = mesh_faces(
+        float(plan.max()) / _DEFAULT_EDGES if size is None else size, where, face, up
+    )
+    notes = (
+        () if face is None or not gmsh.model.getEntities(3) else (f"the {face} face of a solid was taken",)
+    )
     return Draft(points, triangles, normals, 1.0, up, notes)
 
 
 def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None:
-    """Writes a builder script's geometry as STEP or IGES, in millimetres, or BREP, in metres, whichever the path's ending says.
+    """Writes a builder script's geometry as STEP or IGES, in millimetres, or BREP, in metres, whichever the
+    path's ending says.
 
     Raises InputError for other endings, and for a script with a `form`, whose shell has no CAD geometry.
     """
@@ -215,11 +245,11 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
 
 
 def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) -> float:
-    """Writes a B-spline surface through a surface's edge and vertices, by the path's ending as `write_cad`, and returns how far
-    it is off, m.
+    """Writes a B-spline surface through a surface's edge and vertices, by the path's ending as `write_cad`,
+    and returns how far it is off, m.
 
-    Raises InputError for other endings and for surfaces with openings, which one B-spline can't have, and NotConverged where
-    the vertices are further off than `within` of the size.
+    Raises InputError for other endings and for surfaces with openings, which one B-spline can't have, and
+    NotConverged where the vertices are further off than `within` of the size.
     """
     file = Path(path)
     kind = FORMATS.get(file.suffix.lower())
@@ -228,7 +258,9 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
     loops = surface.boundary
     if len(loops) > 1:
         raise InputError(
-            "has openings, which can't be fitted", where=surface.source, remedy="Close them (surface.fill), or write a mesh."
+            "has openings, which can't be fitted",
+            where=surface.source,
+            remedy="Close them (surface.fill), or write a mesh.",
         )
     inner = np.setdiff1d(np.arange(len(surface.vertices)), loops[0])
     # One vertex a cell of a grid in space: evenly spread, whatever the mesh.
@@ -243,13 +275,17 @@ def write_fitted(path: str | Path, surface: Surface, *, within: float = 1e-3) ->
             curves.append(occ.addSpline(ends) if len(ends) > 2 else occ.addLine(*ends))
         wire = occ.addWire(curves)
         points = [occ.addPoint(*surface.vertices[k]) for k in chosen]
-        face = occ.addSurfaceFilling(wire, pointTags=points, degree=3, numPointsOnCurves=_SAMPLES, maxSegments=_SEGMENTS)
+        face = occ.addSurfaceFilling(
+            wire, pointTags=points, degree=3, numPointsOnCurves=_SAMPLES, maxSegments=_SEGMENTS
+        )
         occ.remove([(0, point) for point in points])
         occ.synchronize()
         closest = np.reshape(gmsh.model.getClosestPoint(2, face, surface.vertices[inner].ravel())[0], (-1, 3))
         off = float(np.linalg.norm(closest - surface.vertices[inner], axis=1).max(initial=0.0))
         if off > within * float(surface.size.max()):
-            raise NotConverged(f"The fitted surface is {off:.2g} m off", residual=off, remedy="Write a mesh instead.")
+            raise NotConverged(
+                f"The fitted surface is {off:.2g} m off", residual=off, remedy="Write a mesh instead."
+            )
         if kind == "iges":
             occ.dilate(occ.getEntities(), 0.0, 0.0, 0.0, *3 * (_IGES_UNITS,))
             occ.synchronize()
@@ -265,7 +301,9 @@ def _stretches(edge: Reals) -> list[range]:
     corners = np.flatnonzero(np.sum(along * np.roll(along, 1, axis=0), axis=1) < _CORNER)
     if len(corners) < 2:
         corners = np.arange(4) * len(edge) // 4
-    return [range(a, b + 1) for a, b in zip(corners, np.append(corners[1:], corners[0] + len(edge)), strict=True)]
+    return [
+        range(a, b + 1) for a, b in zip(corners, np.append(corners[1:], corners[0] + len(edge)), strict=True)
+    ]
 
 
 def _read_shapes(file: Path, kind: str) -> None:
@@ -284,7 +322,9 @@ def _read_shapes(file: Path, kind: str) -> None:
 
 
 def _faces_connected() -> bool:
-    """Whether all faces hang together by curves that they share; sewing faces with a pole breaks them, so only the others are sewn."""
+    """Whether all faces hang together by curves that they share; sewing faces with a pole breaks them, so
+    only the others are sewn.
+    """
     groups: list[set[int]] = []
     for _, face in gmsh.model.getEntities(2):
         curves = set(gmsh.model.getAdjacencies(2, face)[1].tolist())
@@ -303,7 +343,9 @@ def _import(file: Path, kind: str) -> None:
 
 def _refuse_all_but_faces(file: Path, kind: str, face: str | None) -> None:
     if gmsh.model.getEntities(3) and face is None:
-        remedy = "Choose its upper or lower face (surface.face, --face), or export that face alone, as a surface."
+        remedy = (
+            "Choose its upper or lower face (surface.face, --face), or export that face alone, as a surface."
+        )
         raise InputError("holds a solid", where=str(file), remedy=remedy)
     if not gmsh.model.getEntities():
         raise InputError(
@@ -312,7 +354,9 @@ def _refuse_all_but_faces(file: Path, kind: str, face: str | None) -> None:
             remedy="Open it in a CAD program and export it anew.",
         )
     if not gmsh.model.getEntities(2):
-        raise InputError("holds no surface, only points or curves", where=str(file), remedy="Export the surface.")
+        raise InputError(
+            "holds no surface, only points or curves", where=str(file), remedy="Export the surface."
+        )
 
 
 def _on_edge(triangles: Indices, count: int) -> Flags:

@@ -1,13 +1,13 @@
 """Funicular shapes by the force density method (Schek 1974).
 
-A network whose branches carry forces proportional to their lengths, n = q l with force densities q, N/m, is in equilibrium
-under nodal loads p where
+A network whose branches carry forces proportional to their lengths, n = q l with force densities q, N/m, is
+in equilibrium under nodal loads p where
 
     C' diag(q) C x = p
 
-for each coordinate x, C being the branch-node matrix: one sparse symmetric system, definite where the network has one shape.
-Positive q is tension; a thrust shell is the same with the loads turned round, so a shell under its weight is the hanging net
-under loads p pointing up.
+for each coordinate x, C being the branch-node matrix: one sparse symmetric system, definite where the network
+has one shape. Positive q is tension; a thrust shell is the same with the loads turned round, so a shell under
+its weight is the hanging net under loads p pointing up.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
 from shellform.errors import InputError, NotConverged
 
 if TYPE_CHECKING:  # which load gmsh and numba
-    from shellform.surface.target import Surface
+    from shellform.surface.shape.target import Surface
 
 _ROUNDS = 200
 _SETTLED = 1e-10  # change of the heights in a round, of the rise
@@ -35,12 +35,15 @@ _NEAREST = 1e-9  # weight of being uniform in a fit, of the mean diagonal
 _SINGULAR = 1e-12  # of the diagonal: a pivot below that is rounding
 
 
-def force_density(nodes: ArrayLike, edges: ArrayLike, densities: ArrayLike, loads: ArrayLike, fixed: ArrayLike) -> Reals:
+def force_density(
+    nodes: ArrayLike, edges: ArrayLike, densities: ArrayLike, loads: ArrayLike, fixed: ArrayLike
+) -> Reals:
     """Node positions (n, 3), m, in equilibrium.
 
-    `nodes` (n, 3), m, give the places of the `fixed` (n,) ones; `edges` (m, 2) carry force `densities` (m,), N/m, tension
-    positive, and `loads` (n, 3), N, act on the nodes, along the axes' directions. Raises InputError where the free nodes aren't
-    held, or where tension and compression together leave no definite shape.
+    `nodes` (n, 3), m, give the places of the `fixed` (n,) ones; `edges` (m, 2) carry force `densities` (m,),
+    N/m, tension positive, and `loads` (n, 3), N, act on the nodes, along the axes' directions. Raises
+    InputError where the free nodes aren't held, or where tension and compression together leave no definite
+    shape.
     """
     place = reals("nodes", nodes, (None, 3))
     ends = indices("edges", edges, (None, 2), below=len(place))
@@ -62,14 +65,21 @@ def force_density(nodes: ArrayLike, edges: ArrayLike, densities: ArrayLike, load
 
 
 def thrust_heights(
-    plan: ArrayLike, triangles: ArrayLike, fixed: ArrayLike, *, rise: float, load: Literal["surface", "plan"] = "surface"
+    plan: ArrayLike,
+    triangles: ArrayLike,
+    fixed: ArrayLike,
+    *,
+    rise: float,
+    load: Literal["surface", "plan"] = "surface",
 ) -> Reals:
-    """Heights (v,), m, of the shell over a triangulated `plan` (v, 2), m, that bears a uniform weight by thrust alone.
+    """Heights (v,), m, of the shell over a triangulated `plan` (v, 2), m, that bears a uniform weight by
+    thrust alone.
 
-    Its `fixed` (v,) vertices stay at height 0 and its highest point is at `rise`, m, above them. The `load` is uniform per area
-    of the surface, which is found by iteration, or of the plan. The thrust is the same in all plan directions: the branches'
-    force densities are the cotangent weights of the triangles, with which the plan is in equilibrium with itself whatever the
-    mesh; the rise sets their scale. Raises InputError where nothing is free or fixed, and NotConverged.
+    Its `fixed` (v,) vertices stay at height 0 and its highest point is at `rise`, m, above them. The `load`
+    is uniform per area of the surface, which is found by iteration, or of the plan. The thrust is the same in
+    all plan directions: the branches' force densities are the cotangent weights of the triangles, with which
+    the plan is in equilibrium with itself whatever the mesh; the rise sets their scale. Raises InputError
+    where nothing is free or fixed, and NotConverged.
     """
     place = reals("plan", plan, (None, 2))
     faces = indices("triangles", triangles, (None, 3), below=len(place))
@@ -77,13 +87,19 @@ def thrust_heights(
     if held.all() or not held.any():
         which = "every" if held.all() else "no"
         raise InputError(
-            f"{which} vertex is fixed", where="fixed", remedy="Fix the edge, and mesh the plan finer if need be."
+            f"{which} vertex is fixed",
+            where="fixed",
+            remedy="Fix the edge, and mesh the plan finer if need be.",
         )
     return _raised(place, faces, held, *_isotropic_thrust(place, faces), rise, load)
 
 
-def _raised(place: Reals, faces: Indices, held: Flags, ends: Indices, density: Reals, rise: float, load: str) -> Reals:
-    """Heights (v,), m, over a plan in equilibrium with these force densities, for any scale of them: the rise sets it."""
+def _raised(
+    place: Reals, faces: Indices, held: Flags, ends: Indices, density: Reals, rise: float, load: str
+) -> Reals:
+    """Heights (v,), m, over a plan in equilibrium with these force densities, for any scale of them: the rise
+    sets it.
+    """
     if not (np.isfinite(rise) and rise > 0.0):
         raise InputError("must be positive", where="rise", value=rise)
     if load not in ("surface", "plan"):
@@ -120,19 +136,22 @@ def thrust_shell(
 ) -> Surface:
     """A shell over a plan that bears a uniform weight by thrust alone, meshed at about `size`, m.
 
-    The `outline` (k, 2), m, runs counterclockwise. It stands on the ground from corner i to corner j for each of the `supports`
-    (i, j), numbered from 0, or all along where they are left out. Between supports it is free: an arch along the edge bears the
-    thrust of the shell, and its plan draws inwards by about `sag` of its span; so do the edges of the `openings`, plan
-    polygons, which are rings. The plan's branches have the cotangent weights of its triangles as force densities, the arches
-    those that a cable of that sag has; all coordinates are then in equilibrium. `rise` and `load` as in `thrust_heights`.
-    Raises InputError for plans that carry no shell.
+    The `outline` (k, 2), m, runs counterclockwise. It stands on the ground from corner i to corner j for each
+    of the `supports` (i, j), numbered from 0, or all along where they are left out. Between supports it is
+    free: an arch along the edge bears the thrust of the shell, and its plan draws inwards by about `sag` of
+    its span; so do the edges of the `openings`, plan polygons, which are rings. The plan's branches have the
+    cotangent weights of its triangles as force densities, the arches those that a cable of that sag has; all
+    coordinates are then in equilibrium. `rise` and `load` as in `thrust_heights`. Raises InputError for plans
+    that carry no shell.
     """
     from shellform.surface import cad
-    from shellform.surface.target import make_surface
+    from shellform.surface.shape.target import make_surface
 
     corners = reals("outline", outline, (None, 2))
     if len(corners) < 3 or _turning(corners) <= 0.0:
-        raise InputError("must be at least three corners, counterclockwise", where="outline", value=corners.tolist())
+        raise InputError(
+            "must be at least three corners, counterclockwise", where="outline", value=corners.tolist()
+        )
     if not 0.0 < sag < 0.5:
         raise InputError("must be above 0 and below 0.5", where="sag", value=sag, remedy="0.1 is usual.")
     if not (np.isfinite(size) and size > 0.0):
@@ -163,13 +182,14 @@ def thrust_shell(
 
 
 def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least: float = 0.05) -> Surface:
-    """The thrust shell nearest to a wished-for `surface` under its own uniform weight, with the same plan of branches.
+    """The thrust shell nearest to a wished-for `surface` under its own uniform weight, with the same plan of
+    branches.
 
-    Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held. The force densities
-    are those that leave the least unbalanced force on the surface as it is, none below `least` of their mean, so that all stays
-    in compression. Raises InputError where nothing is held.
+    Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held.
+    The force densities are those that leave the least unbalanced force on the surface as it is, none below
+    `least` of their mean, so that all stays in compression. Raises InputError where nothing is held.
     """
-    from shellform.surface.target import make_surface
+    from shellform.surface.shape.target import make_surface
 
     points, faces = surface.vertices, surface.triangles
     level = float(points[:, 2].min()) if ground is None else ground
@@ -178,24 +198,33 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
     held[edge] = points[edge, 2] < level + 0.01 * (float(points[:, 2].max()) - level)
     if not held.any():
         raise InputError(
-            "nothing of its edge stands on the ground", where="ground", value=ground, remedy="State its height."
+            "nothing of its edge stands on the ground",
+            where="ground",
+            value=ground,
+            remedy="State its height.",
         )
-    edges = np.unique(np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0
+    )
     weight = np.column_stack([np.zeros((len(points), 2)), -_tributary_areas(points, faces)])
     density = fitted_densities(points, edges, weight, held, least=least)
     return make_surface(
-        force_density(points, edges, density, weight, held), faces, source=f"thrust shell near {surface.source}"
+        force_density(points, edges, density, weight, held),
+        faces,
+        source=f"thrust shell near {surface.source}",
     )
 
 
 def fitted_densities(
     nodes: ArrayLike, edges: ArrayLike, loads: ArrayLike, fixed: ArrayLike, *, least: float = 0.05
 ) -> Reals:
-    """Force densities (m,), N/m, all in compression (negative), with which the network as it stands is nearest to equilibrium.
+    """Force densities (m,), N/m, all in compression (negative), with which the network as it stands is
+    nearest to equilibrium.
 
-    They minimise the squared unbalanced forces on the free `nodes` (n, 3), m, under `loads` (n, 3), N, with the size of each at
-    least `least` times that of the uniform density that fits best; of many such, those nearest to uniform. Arguments as in
-    `force_density`. Raises InputError where no compression bears the loads better than none.
+    They minimise the squared unbalanced forces on the free `nodes` (n, 3), m, under `loads` (n, 3), N, with
+    the size of each at least `least` times that of the uniform density that fits best; of many such, those
+    nearest to uniform. Arguments as in `force_density`. Raises InputError where no compression bears the
+    loads better than none.
     """
     place = reals("nodes", nodes, (None, 3))
     ends = indices("edges", edges, (None, 2), below=len(place))
@@ -204,9 +233,12 @@ def fitted_densities(
     across = place[ends[:, 1]] - place[ends[:, 0]]
     columns = np.tile(np.arange(len(ends)), 2)
     rows = ends.T.ravel()
-    # Compression of size q pushes node a along x_a - x_b and node b the other way: the force on the nodes is B q + p.
+    # Compression of size q pushes node a along x_a - x_b and node b the other way: the force on the nodes is
+    # B q + p.
     blocks = [
-        sp.csr_array((np.concatenate([-across[:, k], across[:, k]]), (rows, columns)), shape=(len(place), len(ends)))
+        sp.csr_array(
+            (np.concatenate([-across[:, k], across[:, k]]), (rows, columns)), shape=(len(place), len(ends))
+        )
         for k in range(3)
     ]
     push = sp.vstack([block[free] for block in blocks]).tocsc()
@@ -215,7 +247,9 @@ def fitted_densities(
     uniform = float(even @ right / (even @ even)) if even.any() else 0.0
     if not uniform > 0.0:
         raise InputError(
-            "no compression bears the loads", where="loads", remedy="Check that they press on the shell from outside."
+            "no compression bears the loads",
+            where="loads",
+            remedy="Check that they press on the shell from outside.",
         )
     normal = push.T @ push
     nearest = _NEAREST * float(normal.diagonal().mean())
@@ -224,7 +258,9 @@ def fitted_densities(
 
 
 def _bounded(matrix: sp.csc_array, right: Reals, least: float) -> Reals:
-    """The minimum of x'Ax/2 - b'x with all x at least `least`, by a primal-dual interior-point method (Wright 1997)."""
+    """The minimum of x'Ax/2 - b'x with all x at least `least`, by a primal-dual interior-point method (Wright
+    1997).
+    """
     target = right - matrix @ np.full(len(right), least)
     x = np.full(len(right), least)
     push = np.full(len(right), np.abs(target).max())  # multipliers of x >= 0
@@ -280,7 +316,10 @@ def _standing(supports: Sequence[tuple[int, int]], corner: Indices, count: int) 
         held[(corner[i] + np.arange(length + 1)) % count] = True
     if held.sum() < 2:
         raise InputError(
-            "hold the shell in fewer than two points", where="supports", value=list(supports), remedy="Support more."
+            "hold the shell in fewer than two points",
+            where="supports",
+            value=list(supports),
+            remedy="Support more.",
         )
     return held
 
@@ -314,21 +353,29 @@ def _arches(line: Reals, stands: Flags, rings: Sequence[Reals], sag: float) -> t
 def _stiffness(count: int, ends: Indices, density: Reals) -> sp.csr_array:
     """C' diag(q) C (n, n), N/m."""
     rows = np.arange(len(ends))
-    branch = sp.csr_array((np.repeat([-1.0, 1.0], len(ends)), (np.tile(rows, 2), ends.T.ravel())), shape=(len(ends), count))
+    branch = sp.csr_array(
+        (np.repeat([-1.0, 1.0], len(ends)), (np.tile(rows, 2), ends.T.ravel())), shape=(len(ends), count)
+    )
     return sp.csr_array(branch.T @ sp.diags_array(density) @ branch)
 
 
 def _definite(matrix: sp.csr_array) -> SuperLU:
-    """The factors of a symmetric positive definite matrix, which has its pivots on the diagonal and all positive."""
+    """The factors of a symmetric positive definite matrix, which has its pivots on the diagonal and all
+    positive.
+    """
     remedy = "Check that every node is tied to a fixed one, and the signs of the force densities."
     try:
-        factors = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        factors = splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+        )
     except RuntimeError as error:  # exactly singular
         raise InputError("some free nodes hang on nothing", where="densities", remedy=remedy) from error
     pivots = factors.U.diagonal()
     weakest = float((pivots / matrix.diagonal()[np.argsort(factors.perm_c)]).min())
     if not np.array_equal(factors.perm_r, factors.perm_c) or weakest < -_SINGULAR:
-        raise InputError("tension and compression leave the network no definite shape", where="densities", remedy=remedy)
+        raise InputError(
+            "tension and compression leave the network no definite shape", where="densities", remedy=remedy
+        )
     if weakest < _SINGULAR:
         raise InputError("some free nodes hang on nothing", where="densities", remedy=remedy)
     return factors

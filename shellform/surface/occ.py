@@ -16,11 +16,11 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, ShellformError
-from shellform.surface.draft import MOST_TRIANGLES
+from shellform.surface.readers.draft import MOST_TRIANGLES
 from shellform.surface.units import turned_up
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
-    from shellform.surface.target import Surface
+    from shellform.surface.shape.target import Surface
 
 try:
     import gmsh
@@ -30,7 +30,9 @@ except (ImportError, OSError) as error:  # a shared library that gmsh's wheel ne
         remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
     ) from error
 
-_AGREES = 0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
+_AGREES = (
+    0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
+)
 _SAMPLES = 33  # points on a curve that tell its extent
 
 
@@ -59,14 +61,18 @@ def session() -> Iterator[None]:
 
 
 def _ignore_broken_pipes() -> None:
-    """As Python does from its start, until gmsh undoes it: else the first write to a socket whose other end is gone kills the process."""
+    """As Python does from its start, until gmsh undoes it: else the first write to a socket whose other end
+    is gone kills the process.
+    """
     if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGPIPE, signal.SIG_IGN)
 
 
 @contextlib.contextmanager
 def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
-    """Gmsh raises plain exceptions with its last message; scripts raise anything. The user gets a sentence."""
+    """Gmsh raises plain exceptions with its last message; scripts raise anything. The user gets a
+    sentence.
+    """
     try:
         yield
     except ShellformError:
@@ -77,7 +83,9 @@ def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
 
 
 def write_curves(path: Path, curves: Sequence[Reals]) -> None:
-    """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), a straight line where there are two."""
+    """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), a straight
+    line where there are two.
+    """
     with session(), errors(path, "gmsh can't write the curves", "Choose another folder."):
         occ = gmsh.model.occ
         for points in curves:
@@ -108,7 +116,9 @@ def silence() -> Iterator[None]:
 
 
 def extent() -> Reals:
-    """The extents (3,), m, of the model's curves along x, y and z: gmsh's own boxes are those of the control points."""
+    """The extents (3,), m, of the model's curves along x, y and z: gmsh's own boxes are those of the control
+    points.
+    """
     ends = [np.reshape(gmsh.model.getValue(0, point, []), (-1, 3)) for _, point in gmsh.model.getEntities(0)]
     for _, curve in gmsh.model.getEntities(1):
         low, high = (float(bound[0]) for bound in gmsh.model.getParametrizationBounds(1, curve))
@@ -118,8 +128,11 @@ def extent() -> Reals:
     return np.asarray(np.ptp(np.vstack(ends), axis=0))
 
 
-def mesh_faces(size: float, where: Path, side: str | None = None, up: str = "z") -> tuple[Reals, Indices, Reals | None]:
-    """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's faces.
+def mesh_faces(
+    size: float, where: Path, side: str | None = None, up: str = "z"
+) -> tuple[Reals, Indices, Reals | None]:
+    """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's
+    faces.
 
     Of a solid, only the triangles of its upper or lower `side`.
     """
@@ -147,7 +160,9 @@ def mesh_faces(size: float, where: Path, side: str | None = None, up: str = "z")
         _, nodes = gmsh.model.mesh.getElementsByType(2, face)
         triangles[face] = number[nodes.reshape(-1, 3)]
         if not len(triangles[face]):
-            raise InputError(f"gmsh made no triangles of its face {face}", where=str(where), remedy="Check the surface.")
+            raise InputError(
+                f"gmsh made no triangles of its face {face}", where=str(where), remedy="Check the surface."
+            )
     if side is not None and gmsh.model.getEntities(3):
         triangles = _on_side(points, triangles, side, up, where)
     for face, mine in triangles.items():
@@ -168,10 +183,12 @@ def mesh_faces(size: float, where: Path, side: str | None = None, up: str = "z")
     return points, faces, normals
 
 
-def _on_side(points: Reals, triangles: dict[int, Indices], side: str, up: str, where: Path) -> dict[int, Indices]:
+def _on_side(
+    points: Reals, triangles: dict[int, Indices], side: str, up: str, where: Path
+) -> dict[int, Indices]:
     """The triangles of a solid's skin on one side, by their CAD faces."""
-    from shellform.surface.mend import turned_alike
-    from shellform.surface.sides import side_of
+    from shellform.surface.readers.mend import turned_alike
+    from shellform.surface.readers.sides import side_of
 
     whole = np.vstack(list(triangles.values()))
     kept = side_of(turned_up(points, up), turned_alike(whole, str(where)), side, str(where))
@@ -181,7 +198,9 @@ def _on_side(points: Reals, triangles: dict[int, Indices], side: str, up: str, w
 
 
 def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, number: Indices) -> None:
-    """Adds the CAD normals at the face's nodes, turned to the side of its triangles or, where another face came first, to its."""
+    """Adds the CAD normals at the face's nodes, turned to the side of its triangles or, where another face
+    came first, to its.
+    """
     tags, _, parameters = gmsh.model.mesh.getNodes(2, face, includeBoundary=True, returnParametricCoord=True)
     if not len(triangles) or len(parameters) != 2 * len(tags):
         return
@@ -200,11 +219,12 @@ def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, n
     signed = np.where(good[:, None], exact * np.sign(agreement)[:, None], 0.0)
     rest, first = np.unique(rows, return_index=True)
     mine = signed[first]
-    # Two faces of a script need not turn the same way; make_surface turns all upwards, so only the sum has to agree.
+    # Two faces of a script need not turn the same way; make_surface turns all upwards, so only the sum has to
+    # agree.
     normals[rest] += np.where(np.sum(normals[rest] * mine, axis=1, keepdims=True) < 0.0, -mine, mine)
 
 
 def made(points: Reals, triangles: Indices, normals: Reals | None, source: str) -> Surface:
-    from shellform.surface.target import make_surface
+    from shellform.surface.shape.target import make_surface
 
     return make_surface(points, triangles, normals=normals, source=source)

@@ -13,7 +13,9 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 def unit_factor(unit: str) -> float:
     """Metres in one `unit`."""
     if unit not in METRES:
-        raise InputError("isn't a known unit", where="surface.unit", value=unit, remedy=f"Known: {', '.join(METRES)}.")
+        raise InputError(
+            "isn't a known unit", where="surface.unit", value=unit, remedy=f"Known: {', '.join(METRES)}."
+        )
     return METRES[unit]
 
 

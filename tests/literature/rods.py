@@ -1,13 +1,14 @@
-"""Exact rods for the references of `shellform verify`: the Kirchhoff rod with stretch, by initial value problems.
+"""Exact rods for the references of `shellform verify`: the Kirchhoff rod with stretch, by initial value
+problems.
 
-With r the axis, D = (d1, d2, d3) the section's triad (columns, d1 along the axis), n and m the internal force and moment in
-global axes, and s the length in the stress-free state,
+With r the axis, D = (d1, d2, d3) the section's triad (columns, d1 along the axis), n and m the internal force
+and moment in global axes, and s the length in the stress-free state,
 
     r' = (1 + n·d1/EA) d1,   D' = S(D u) D,   u = u0 + diag(1/GJ, 1/EIy, 1/EIz) D' m,   n' = 0,   m' = -r' x n
 
-in each piece between loads. Unknown start values are found by Newton's method on the far end (shooting); nothing here is
-shared with the package, so an error would have to be made twice. Runge-Kutta of fourth order, 200 steps a piece: halving
-them moves no digit that is quoted.
+in each piece between loads. Unknown start values are found by Newton's method on the far end (shooting);
+nothing here is shared with the package, so an error would have to be made twice. Runge-Kutta of fourth order,
+200 steps a piece: halving them moves no digit that is quoted.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,9 +23,9 @@ STEPS = 200
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of rod: before it starts, the triad turns by `turn` rad about global y (a rigid corner, right-handed, seen in
-    the undeformed state: a turn in the section's own x-z plane) and the dead `force` (3,) acts; `bend` is the stress-free
-    curvature about d2."""
+    """A stretch of rod: before it starts, the triad turns by `turn` rad about global y (a rigid corner,
+    right-handed, seen in the undeformed state: a turn in the section's own x-z plane) and the dead `force`
+    (3,) acts; `bend` is the stress-free curvature about d2."""
 
     length: float
     turn: float = 0.0
@@ -57,7 +58,9 @@ def integrate(
     position: Sequence[float] = (0.0, 0.0, 0.0),
 ) -> list[End]:
     """The ends of all pieces, from start values; stiffness (EA, GJ, EIy, EIz)."""
-    here = End(np.array(position, dtype=float), triad, np.array(force, dtype=float), np.array(moment, dtype=float))
+    here = End(
+        np.array(position, dtype=float), triad, np.array(force, dtype=float), np.array(moment, dtype=float)
+    )
     ends = []
     for piece in pieces:
         n = here.force - np.array(piece.force)
@@ -94,8 +97,12 @@ def _march(y, n, stiffness, bend, h):
         y += h / 6.0 * (k[0] + 2.0 * k[1] + 2.0 * k[2] + k[3])
 
 
-def solve(residual: Callable[[np.ndarray], np.ndarray], start: Sequence[float], scale: Sequence[float]) -> np.ndarray:
-    """The root of the residual near `start` by Newton's method; `scale` is the size of a change that matters in each unknown."""
+def solve(
+    residual: Callable[[np.ndarray], np.ndarray], start: Sequence[float], scale: Sequence[float]
+) -> np.ndarray:
+    """The root of the residual near `start` by Newton's method; `scale` is the size of a change that matters
+    in each unknown.
+    """
     x, scale = np.array(start, dtype=float), np.asarray(scale, dtype=float)
     for _ in range(30):
         now = np.asarray(residual(x))

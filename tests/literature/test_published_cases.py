@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
-from shellform import cli
-from shellform.structure import verification
+from shellform import verification
+from shellform.cli import program
 
 
 @pytest.mark.parametrize("case", verification.CASES, ids=lambda case: case.__name__)
@@ -28,15 +28,19 @@ def test_a_row_fails_beyond_its_tolerance_relative_to_its_reference():
     assert verification.Row("case", "quantity", 1e-9, 0.0, 1e-8, "nowhere").difference == 1e-9
 
 
-@pytest.mark.parametrize(("value", "status", "words"), [(1.0, 0, "all 1 numbers of 1 cases hold"), (1.2, 3, "FAIL")])
-def test_the_command_prints_each_row_and_its_status_says_whether_all_hold(value, status, words, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("value", "status", "words"), [(1.0, 0, "all 1 numbers of 1 cases hold"), (1.2, 3, "FAIL")]
+)
+def test_the_command_prints_each_row_and_its_status_says_whether_all_hold(
+    value, status, words, monkeypatch, capsys
+):
     def case():
         yield verification.Row("a case", "a quantity", value, 1.0, 0.1, "a source")
 
     monkeypatch.setattr(verification, "CASES", (case,))
     monkeypatch.setattr(sys, "argv", ["shellform", "verify"])
     with pytest.raises(SystemExit) as stop:
-        cli.main()
+        program.main()
     said = capsys.readouterr()
     assert stop.value.code == status
     assert words in said.out

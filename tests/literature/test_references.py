@@ -1,11 +1,13 @@
-"""The literal references of `shellform verify`, recomputed as exact rods (rods.py): to the last digit that is quoted."""
+"""The literal references of `shellform verify`, recomputed as exact rods (rods.py): to the last digit that is
+quoted.
+"""
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.optimize import brentq, minimize, root
 
-from shellform.structure.verification import beams, buckling, cables, exact, limits
+from shellform.verification import beams, buckling, cables, exact, limit_points
 from tests.literature.rods import Piece, about_y, extremum, integrate, solve
 
 
@@ -34,7 +36,11 @@ def exact_helix(share):
     rod, stiffness = [Piece(10.0)], (1e4, 100.0, 100.0, 100.0)
 
     def miss(m, part):
-        return integrate(rod, stiffness, np.eye(3), (0.0, 0.0, 50.0 * part), m)[-1].moment - [0.0, 0.0, 200.0 * np.pi * part]
+        return integrate(rod, stiffness, np.eye(3), (0.0, 0.0, 50.0 * part), m)[-1].moment - [
+            0.0,
+            0.0,
+            200.0 * np.pi * part,
+        ]
 
     start, before = np.zeros(3), 0.0
     for part in np.linspace(0.0, share, max(2, round(share / 0.005) + 1))[1:]:
@@ -54,7 +60,9 @@ def test_the_roll_up_out_of_its_plane_is_followed_to_whole_turns(share):
 
 
 class Lee:
-    """Lee's frame: unknown slope at the first pin and force there; the far end has to be at the other pin, without moment."""
+    """Lee's frame: unknown slope at the first pin and force there; the far end has to be at the other pin,
+    without moment.
+    """
 
     pieces = (Piece(120.0), Piece(24.0, turn=0.5 * np.pi))
     scale = (1.0, 0.1, 0.1, 1.0)
@@ -82,7 +90,9 @@ class Lee:
 
 @pytest.fixture(scope="module")
 def lee_path():
-    """States of Lee's frame from rest to its last branch: by load to 1.5, by the displacement along up to 90."""
+    """States of Lee's frame from rest to its last branch: by load to 1.5, by the displacement along up to
+    90.
+    """
     frame, x = Lee(), np.zeros(4)
     path = {}
     for load in np.arange(0.25, 1.51, 0.25):
@@ -103,7 +113,7 @@ def test_the_limits_of_lee_s_frame_are_those_of_the_elastica(lee_path):
         along = extremum(lambda u, x=lee_path[start]: frame.at(1, u, x)[3], low, high, 0.02)
         state = frame.at(1, along, lee_path[start])
         found.append((state[3], frame.place(state)[0]))
-    for (load, drop), (quoted_load, quoted_drop) in zip(found, limits.LEE_LIMITS, strict=True):
+    for (load, drop), (quoted_load, quoted_drop) in zip(found, limit_points.LEE_LIMITS, strict=True):
         agree(load, quoted_load, 5)
         agree(drop, quoted_drop, 3)
 
@@ -118,14 +128,18 @@ def test_williams_toggle_is_an_extensible_elastica():
             end = integrate(member, stiffness, about_y(-slope), (x[0], 0.0, x[1]), (0.0, x[2], 0.0))[-1]
             tangent = end.triad[:, 0]
             # The crown stays level with the rigid joint: the tangent keeps its slope there.
-            return [end.position[0] - 12.943, end.position[2] - (0.386 - drop), tangent[2] - np.tan(slope) * tangent[0]]
+            return [
+                end.position[0] - 12.943,
+                end.position[2] - (0.386 - drop),
+                tangent[2] - np.tan(slope) * tangent[0],
+            ]
 
         # Half the crown's load goes down each member.
         return -2.0 * solve(misses, [-300.0 * (drop > 0.0), -10.0, 0.0], [100.0, 10.0, 100.0])[1]
 
     first = extremum(load, 0.18, 0.28, 1e-3)
     second = extremum(load, 0.36, 0.43, 1e-3)
-    for drop, (quoted_load, quoted_drop) in zip((first, second), limits.TOGGLE, strict=True):
+    for drop, (quoted_load, quoted_drop) in zip((first, second), limit_points.TOGGLE, strict=True):
         agree(load(drop), quoted_load, 4)
         agree(drop, quoted_drop, 5)
 
@@ -150,7 +164,7 @@ def test_the_arch_of_215_degrees_is_an_extensible_elastica():
     for drop in np.arange(3.0, 114.1, 3.0):
         x = at(drop, x)
     drop = extremum(lambda v: at(v, x)[3], 112.0, 116.0, 0.02)
-    agree([at(drop, x)[3], drop], limits.ARCH, 3)
+    agree([at(drop, x)[3], drop], limit_points.ARCH, 3)
 
 
 def test_the_right_angle_frame_s_tip_load_makes_the_linearised_rod_singular():
@@ -166,7 +180,9 @@ def test_the_right_angle_frame_s_tip_load_makes_the_linearised_rod_singular():
         h = 0.1
         sides = [h * np.eye(3)[k] for k in (0, 2)]
         start = np.array([0.0, plane[0], 0.0])
-        slopes = [(tip_moment(load, start + d) - tip_moment(load, start - d))[[0, 2]] / (2.0 * h) for d in sides]
+        slopes = [
+            (tip_moment(load, start + d) - tip_moment(load, start - d))[[0, 2]] / (2.0 * h) for d in sides
+        ]
         return np.linalg.det(np.array(slopes))
 
     agree([brentq(singular, 0.9, 1.2), brentq(singular, -0.75, -0.6)], buckling.FRAME_TIP, 5)
@@ -200,7 +216,7 @@ def test_the_loaded_saddle_net_is_the_minimum_of_its_energy():
 
 
 def test_the_star_dome_s_limits_are_those_of_hooke_s_bars():
-    points, ends = limits.star_dome()
+    points, ends = limit_points.star_dome()
     (a, b), axial = ends.T, 3.03e5 * 3.17
     rest = np.linalg.norm(points[b] - points[a], axis=1)
     free = np.delete(np.arange(21), 2)  # all but the apex' height and the supports
@@ -235,8 +251,8 @@ def test_the_star_dome_s_limits_are_those_of_hooke_s_bars():
             # All that the apex' height doesn't hold is stable: the symmetric path is the one a load follows.
             slope = balance(place)[1][np.ix_(free, free)]
             assert np.linalg.eigvalsh(slope)[0] > 0.0
-    agree(np.array(found)[:, 0], [load for load, _ in limits.DOME], 3)
-    agree(np.array(found)[:, 1], [drop for _, drop in limits.DOME], 5)
+    agree(np.array(found)[:, 0], [load for load, _ in limit_points.DOME], 3)
+    agree(np.array(found)[:, 1], [drop for _, drop in limit_points.DOME], 5)
 
 
 def test_the_second_kind_s_integral_holds_also_where_scipy_s_jumps():

@@ -7,12 +7,14 @@ import shellform as sf
 from shellform.net.compass import Guide, _corner, covering_lattice
 from shellform.net.grid import cells
 from shellform.net.quality import gaussian
-from shellform.surface.locate import Foot, Locator
-from shellform.surface.target import make_surface
+from shellform.surface.shape.locate import Foot, Locator
+from shellform.surface.shape.target import make_surface
 
 
 class Implicit:
-    """A surface f = 0 with exact feet, by Newton's method on x = p + d n; without edge, but for a circle about the z axis."""
+    """A surface f = 0 with exact feet, by Newton's method on x = p + d n; without edge, but for a circle
+    about the z axis.
+    """
 
     def __init__(self, value, gradient, hessian, radius=np.inf):
         self.value, self.gradient, self.bend, self.radius = value, gradient, hessian, radius
@@ -24,7 +26,9 @@ class Implicit:
             matrix = np.zeros((len(points), 4, 4))
             matrix[:, :3, :3] = np.eye(3) + factor[:, None, None] * h
             matrix[:, :3, 3] = matrix[:, 3, :3] = g
-            right = np.concatenate([points - place - factor[:, None] * g, -self.value(place)[:, None]], axis=1)
+            right = np.concatenate(
+                [points - place - factor[:, None] * g, -self.value(place)[:, None]], axis=1
+            )
             step = np.linalg.solve(matrix, right[..., None])[..., 0]
             place, factor = place + step[:, :3], factor + step[:, 3]
             if np.abs(step).max() < 1e-15:
@@ -33,7 +37,14 @@ class Implicit:
         normal = g / np.linalg.norm(g, axis=1, keepdims=True)
         distance = np.sum((points - place) * normal, axis=1)
         count = len(points)
-        return Foot(place, normal, distance, np.zeros((count, 6)), np.zeros(count, dtype=int), np.zeros(count, dtype=bool))
+        return Foot(
+            place,
+            normal,
+            distance,
+            np.zeros((count, 6)),
+            np.zeros(count, dtype=int),
+            np.zeros(count, dtype=bool),
+        )
 
     def past_outline(self, foot):
         return np.hypot(foot.point[:, 0], foot.point[:, 1]) - self.radius
@@ -53,7 +64,9 @@ def test_the_compass_net_of_a_mesh_of_the_sphere_has_the_published_nodes():
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     i = np.arange(n * n).reshape(n, n)
     a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
-    sphere = make_surface(points, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]), normals=points)
+    sphere = make_surface(
+        points, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]), normals=points
+    )
     finder = Locator(sphere, reach=0.3)
     origin = np.array([0.0, 0.0, 1.0])
     guides = straight(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
@@ -126,7 +139,9 @@ def test_asymptotic_lines_of_the_pseudosphere_keep_the_sine_gordon_law_of_angles
             for k in range(1, steps + 1):
                 there = finder.foot((here + size * ahead)[None]).point[0]
                 for _ in range(30):
-                    there = finder.foot((here + size * (there - here) / np.linalg.norm(there - here))[None]).point[0]
+                    there = finder.foot(
+                        (here + size * (there - here) / np.linalg.norm(there - here))[None]
+                    ).point[0]
                 ahead = there - here
                 n = finder.foot(there[None]).normal[0]
                 ahead = ahead - (ahead @ n) * n
@@ -134,7 +149,9 @@ def test_asymptotic_lines_of_the_pseudosphere_keep_the_sine_gordon_law_of_angles
                 net[(k, 0) if axis == 0 else (0, k)] = there
         for i in range(1, steps + 1):
             for j in range(1, steps + 1):
-                point, _, good = _corner(finder, net[None, i - 1, j], net[None, i, j - 1], net[None, i - 1, j - 1], (size, size))
+                point, _, good = _corner(
+                    finder, net[None, i - 1, j], net[None, i, j - 1], net[None, i - 1, j - 1], (size, size)
+                )
                 assert good[0]
                 net[i, j] = point[0]
         u, v = np.gradient(net, size, axis=0, edge_order=2), np.gradient(net, size, axis=1, edge_order=2)
@@ -151,12 +168,19 @@ def test_asymptotic_lines_of_the_pseudosphere_keep_the_sine_gordon_law_of_angles
 
 def roof(radius, half_angle, length, n=50):
     """A strip of a cylinder about the y axis, with its true normals."""
-    turn, y = (each.ravel() for each in np.meshgrid(np.linspace(-half_angle, half_angle, n), np.linspace(0, length, n), indexing="ij"))
+    turn, y = (
+        each.ravel()
+        for each in np.meshgrid(
+            np.linspace(-half_angle, half_angle, n), np.linspace(0, length, n), indexing="ij"
+        )
+    )
     normals = np.column_stack([np.sin(turn), np.zeros(n * n), np.cos(turn)])
     points = radius * normals + np.column_stack([np.zeros(n * n), y, np.zeros(n * n)])
     i = np.arange(n * n).reshape(n, n)
     a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
-    return make_surface(points, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]), normals=normals)
+    return make_surface(
+        points, np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])]), normals=normals
+    )
 
 
 def unrolling_error(net):
@@ -204,6 +228,9 @@ def test_the_gaussian_curvature_of_cells_adds_up_to_the_solid_angle_of_a_cap():
     surface = make_surface(points, faces, normals=points / 2.0)
     net = sf.pull_net(surface, spacing=0.1, gap=1e-3, method="compass")
     corners = net.crossings[cells(net.grid)]
-    area = 0.5 * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1).sum()
+    area = (
+        0.5
+        * np.linalg.norm(np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]), axis=1).sum()
+    )
     assert gaussian(Locator(surface), corners).sum() == pytest.approx(area / 4.0, rel=0.01)
     assert net.quality.gaussian_curvature == pytest.approx(area / 4.0, rel=0.01)

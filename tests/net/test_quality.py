@@ -8,10 +8,10 @@ import pytest
 from shellform.errors import InputError
 from shellform.net import quality
 from shellform.net.grid import cells, lattice_grid
-from shellform.structure.rotation import matrices
-from shellform.structure.state import State, at_rest
-from shellform.surface.locate import Locator
-from shellform.surface.target import make_surface
+from shellform.structure.elements.rotation import matrices
+from shellform.structure.elements.state import State, at_rest
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.target import make_surface
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +28,13 @@ def grid():
 
 def test_a_flat_net_on_a_plane_is_perfect(plane, grid):
     found = quality.measure(
-        plane, Locator(plane), grid, at_rest(grid.flat), np.zeros((len(grid.rod_ends), 2, 2)), np.zeros(len(grid.flat)), 0
+        plane,
+        Locator(plane),
+        grid,
+        at_rest(grid.flat),
+        np.zeros((len(grid.rod_ends), 2, 2)),
+        np.zeros(len(grid.flat)),
+        0,
     )
     assert found.distance_max < 1e-15
     assert found.spacing_error_max < 1e-12
@@ -71,7 +77,13 @@ def test_a_net_that_lies_on_itself_is_refused(plane):
 def test_a_net_off_its_surface_is_refused(plane, grid):
     raised = grid.flat + np.array([0.0, 0.0, 0.2])
     found = quality.measure(
-        plane, Locator(plane), grid, at_rest(raised), np.zeros((len(grid.rod_ends), 2, 2)), np.zeros(len(grid.flat)), 0
+        plane,
+        Locator(plane),
+        grid,
+        at_rest(raised),
+        np.zeros((len(grid.rod_ends), 2, 2)),
+        np.zeros(len(grid.flat)),
+        0,
     )
     with pytest.raises(InputError, match=r"0\.2 m off the surface at \["):
         quality.refuse_distance(found, grid, at_rest(raised))
@@ -108,4 +120,3 @@ def test_hazzidakis_formula_holds_over_every_rectangle_of_the_net(vault, net):
             assert missing == pytest.approx(total, abs=0.01 + 0.03 * abs(total))
             tried += 1
     assert tried > 100
-

@@ -1,4 +1,6 @@
-"""Nets with other settings: two spacings, guides, the compass alone, the flat start, cuts at ground, curve and opening."""
+"""Nets with other settings: two spacings, guides, the compass alone, the flat start, cuts at ground, curve
+and opening.
+"""
 
 import numpy as np
 import pytest
@@ -6,8 +8,8 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError
 from shellform.net.grid import neighbours
-from shellform.surface.locate import Locator
-from shellform.surface.target import make_surface
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.target import make_surface
 
 
 def bowl(hole=None, count=41):
@@ -55,7 +57,9 @@ def test_the_compass_method_alone_keeps_crossings_on_the_surface_and_chords_exac
 
 
 def test_from_the_flat_grid_the_pull_finds_the_same_net_as_from_the_compass_net(surface):
-    first, second = (sf.pull_net(surface, spacing=0.2, gap=0.005, start=start) for start in ("compass", "flat"))
+    first, second = (
+        sf.pull_net(surface, spacing=0.2, gap=0.005, start=start) for start in ("compass", "flat")
+    )
     np.testing.assert_allclose(first.crossings, second.crossings, atol=1e-7)
 
 
@@ -83,7 +87,9 @@ def test_the_trimmed_flat_grid_bent_onto_the_surface_again_reproduces_the_net(su
 def test_guides_lead_the_rods_through_the_origin(surface):
     across = np.linspace(-1.3, 1.3, 80)
     guide = np.column_stack([across, 0.1 + 0.15 * across**2])
-    net = sf.pull_net(surface, spacing=0.2, gap=0.005, method="compass", guides=(guide, [[0.1, -1.3], [0.0, 1.3]]))
+    net = sf.pull_net(
+        surface, spacing=0.2, gap=0.005, method="compass", guides=(guide, [[0.1, -1.3], [0.0, 1.3]])
+    )
     at = net.crossings[net.grid.lattice[:, 1] == 0]
     np.testing.assert_allclose(at[:, 1], 0.1 + 0.15 * at[:, 0] ** 2, atol=2e-4)
     pulled = sf.pull_net(surface, spacing=0.2, gap=0.005, guides=(guide, [[0.1, -1.3], [0.0, 1.3]]))
@@ -94,7 +100,8 @@ def test_guides_lead_the_rods_through_the_origin(surface):
 def test_rods_end_at_the_surface_edge_at_the_ground_and_at_a_curve(surface):
     square = np.array([[-0.6, -0.7], [0.8, -0.5], [0.7, 0.6], [-0.5, 0.8]])
     edge, ground, curve = (
-        sf.pull_net(surface, spacing=0.15, gap=0.005, **kind) for kind in ({}, {"ground": 0.2}, {"outline": square})
+        sf.pull_net(surface, spacing=0.15, gap=0.005, **kind)
+        for kind in ({}, {"ground": 0.2}, {"outline": square})
     )
     ends = edge.target.positions[edge.supports]
     foot = Locator(surface, reach=0.3).foot(ends)
@@ -102,7 +109,12 @@ def test_rods_end_at_the_surface_edge_at_the_ground_and_at_a_curve(surface):
     np.testing.assert_allclose(ground.target.positions[ground.supports, 2], 0.2, atol=1e-9)
     for x, y, _ in curve.target.positions[curve.supports]:
         sides = np.roll(square, -1, axis=0) - square
-        off = np.abs(np.cross(np.column_stack([sides, np.zeros(4)]), [*(np.array([x, y])), 0] - np.column_stack([square, np.zeros(4)])))
+        off = np.abs(
+            np.cross(
+                np.column_stack([sides, np.zeros(4)]),
+                [*(np.array([x, y])), 0] - np.column_stack([square, np.zeros(4)]),
+            )
+        )
         assert (off[:, 2] / np.linalg.norm(sides, axis=1)).min() < 1e-8
     assert ground.quality.uncovered_area > 0.3
     assert edge.quality.uncovered_area < 0.01
@@ -135,7 +147,9 @@ def ball(opening):
     """The unit sphere but for a cap of `opening` degrees about its lowest point."""
     turn = np.linspace(0.0, np.pi - np.deg2rad(opening), 40)[1:]
     round_ = 2 * np.pi * np.arange(80) / 80
-    rings = np.array([[np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)] for t in turn for p in round_])
+    rings = np.array(
+        [[np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)] for t in turn for p in round_]
+    )
     faces = [[0, 1 + j, 1 + (j + 1) % 80] for j in range(80)]
     for i in range(38):
         for j in range(80):

@@ -1,4 +1,6 @@
-"""Drawings, read back with ezdxf and pypdf and compared with the net; what is written on them doesn't lie on top of each other."""
+"""Drawings, read back with ezdxf and pypdf and compared with the net; what is written on them doesn't lie on
+top of each other.
+"""
 
 from dataclasses import replace
 from itertools import combinations
@@ -10,8 +12,8 @@ from pypdf import PdfReader
 
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
-from shellform.output import drawings, layout, nesting
-from shellform.output.marks import PENS, Words, overlap
+from shellform.output.workshop import drawings, layout, nesting
+from shellform.output.workshop.marks import PENS, Words, overlap
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +34,9 @@ def test_each_dxf_file_is_sound_and_in_millimetres(folder, name):
     assert not audit.errors
     assert not audit.fixes
     assert document.units == ezdxf.units.MM
-    assert {entity.dxf.layer for entity in document.modelspace()} <= {layer.dxf.name for layer in document.layers}
+    assert {entity.dxf.layer for entity in document.modelspace()} <= {
+        layer.dxf.name for layer in document.layers
+    }
 
 
 def test_the_flat_grid_has_every_rod_and_crossing_at_real_scale(folder, net):
@@ -74,7 +78,10 @@ def test_supports_stand_on_the_plan_where_the_net_has_them(folder, built):
 def test_each_sheet_is_one_page_of_a_usual_size_with_title_and_numbers_as_text(folder, built, name):
     pages = PdfReader(folder / f"{name}.pdf").pages
     assert len(pages) == 1
-    size = sorted((float(pages[0].mediabox.width) / 72 * 25.4, float(pages[0].mediabox.height) / 72 * 25.4), reverse=True)
+    size = sorted(
+        (float(pages[0].mediabox.width) / 72 * 25.4, float(pages[0].mediabox.height) / 72 * 25.4),
+        reverse=True,
+    )
     assert any(size == pytest.approx(paper, abs=0.1) for paper in drawings.PAPERS.values())
     text = pages[0].extract_text()
     for word in ("The vault", "scale", "1 : 2", "mm", "test"):
@@ -103,7 +110,12 @@ def test_the_same_design_gives_the_same_files(folder, built, tmp_path):
 @pytest.fixture(scope="module")
 def sheets(built):
     cutting = nesting.cut(built.grid, stock=0.6)
-    return [layout.flat_grid(built), layout.cable_plan(built), layout.support_plan(built), layout.rod_strips(built, cutting)]
+    return [
+        layout.flat_grid(built),
+        layout.cable_plan(built),
+        layout.support_plan(built),
+        layout.rod_strips(built, cutting),
+    ]
 
 
 @pytest.mark.parametrize("which", range(4))
@@ -133,8 +145,12 @@ def test_the_gaps_between_lines_on_paper_are_to_scale(built):
     sheet = layout.flat_grid(built)
     _, scale = drawings.fitted(sheet)
     page = drawings.paper_page(sheet, built, "1 / 1")
-    lengths = sorted(abs(line.points[1][0] - line.points[0][0]) for line in page.lines if line.colour == "#0072b2")
-    assert lengths == pytest.approx(sorted(1e3 * rod.length / scale for rod in built.grid.rods if rod.direction == "u"))
+    lengths = sorted(
+        abs(line.points[1][0] - line.points[0][0]) for line in page.lines if line.colour == "#0072b2"
+    )
+    assert lengths == pytest.approx(
+        sorted(1e3 * rod.length / scale for rod in built.grid.rods if rod.direction == "u")
+    )
 
 
 def test_several_rods_in_one_row_are_told_apart(built):

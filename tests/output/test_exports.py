@@ -12,7 +12,7 @@ import trimesh
 
 import shellform.surface
 from shellform.errors import InputError
-from shellform.output import exports
+from shellform.output.exchange import exports
 from shellform.surface.occ import session
 
 
@@ -37,7 +37,9 @@ def test_the_vtu_file_has_every_element_with_displacements_and_forces(folder, bu
     assert mesh.n_cells == len(network.beams.ends) + len(ties.ends)
     assert np.asarray(mesh.points) == pytest.approx(built.shell.target.positions, abs=1e-12)
     for name, state in built.states.items():
-        assert mesh.points + mesh.point_data[f"displacement {name} [m]"] == pytest.approx(state.positions, abs=1e-9)
+        assert mesh.points + mesh.point_data[f"displacement {name} [m]"] == pytest.approx(
+            state.positions, abs=1e-9
+        )
         forces = mesh.cell_data[f"cable force {name} [N]"]
         assert forces[mesh.cell_data["kind"] == 2] == pytest.approx(ties.tension(state))
 
@@ -73,7 +75,11 @@ def test_the_glb_file_has_closed_tubes_of_the_rods_volume(folder, built):
         part = scene.geometry[f"rods {direction}"]
         part.merge_vertices(merge_norm=True, merge_tex=True)
         assert part.is_watertight
-        length = sum(np.linalg.norm(np.diff(place[rod.nodes], axis=0), axis=1).sum() for rod in built.grid.rods if rod.direction == direction)
+        length = sum(
+            np.linalg.norm(np.diff(place[rod.nodes], axis=0), axis=1).sum()
+            for rod in built.grid.rods
+            if rod.direction == direction
+        )
         assert part.volume == pytest.approx(area * length, rel=2e-3)
     assert set(scene.geometry) == {"rods u", "rods v", "cables", "supports", "target"}
     high = scene.geometry["rods v"].bounds[1][1]  # the format's y axis is upwards
@@ -114,13 +120,20 @@ def test_an_unknown_load_and_a_folder_in_the_way_are_refused(built, vault, loads
             write(tmp_path / "file")
 
 
-def test_without_gmsh_s_libraries_everything_but_the_step_file_is_written(built, vault, loads, tmp_path, monkeypatch):
+def test_without_gmsh_s_libraries_everything_but_the_step_file_is_written(
+    built, vault, loads, tmp_path, monkeypatch
+):
     monkeypatch.delitem(sys.modules, "shellform.surface.occ")
     monkeypatch.delattr(shellform.surface, "occ")
     monkeypatch.setitem(sys.modules, "gmsh", None)
     assert "gmsh can't be loaded" in exports.no_step()
     exports.write_exports(tmp_path, built, vault, loads)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["gridshell-opensees.py", "gridshell.3dm", "gridshell.glb", "gridshell.vtu"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "gridshell-opensees.py",
+        "gridshell.3dm",
+        "gridshell.glb",
+        "gridshell.vtu",
+    ]
 
 
 def test_what_a_library_can_not_write_is_said_plainly(built, vault, tmp_path):

@@ -7,8 +7,8 @@ from PIL import Image
 import shellform as sf
 from shellform import render
 from shellform.errors import InputError
-from shellform.output import maps
-from shellform.study.folder import utilisation
+from shellform.output.pictures import maps
+from shellform.run.folder import utilisation
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +35,9 @@ def test_each_map_shows_the_number_of_the_summary(shell, braced):
 
 
 def test_the_curvature_without_load_and_cables_is_about_the_net_s(shell):
-    state = sf.follow(shell, shell.unbraced(), {"none": np.zeros((len(shell.net.grid.flat), 6))})["none"].equilibrium.state
+    state = sf.follow(shell, shell.unbraced(), {"none": np.zeros((len(shell.net.grid.flat), 6))})[
+        "none"
+    ].equilibrium.state
     panel = maps.panel_of(shell, None, state, quantity="curvature")
     assert panel.deviation.max() == pytest.approx(shell.net.quality.curvature_max, rel=0.2)
     assert len(panel.cables) == 0
@@ -49,7 +51,9 @@ def test_the_user_s_function_writes_the_picture_and_returns_it(tmp_path, shell, 
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "wet.png")), plain)
     again = render.deviation(None, shell, state, limit=0.010, size=(480, 300))
     assert np.abs(plain.astype(int) - again).max() <= 1
-    full = render.deviation(None, shell, state, design, load=load, title="wet", size=(480, 300), view="top", transparent=True)
+    full = render.deviation(
+        None, shell, state, design, load=load, title="wet", size=(480, 300), view="top", transparent=True
+    )
     assert full.shape == (300, 480, 4)
     lines = render.deviation(tmp_path / "wet.svg", shell, state, size=(480, 300))
     assert lines.shape == (300, 480, 3)

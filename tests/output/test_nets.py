@@ -1,14 +1,19 @@
-"""Maps of nets."""
+"""Maps of net_maps."""
 
 import matplotlib.image
 import numpy as np
 
-from shellform.output import maps, nets
+from shellform.output.pictures import maps, net_maps
 
 
 def test_a_net_is_mapped_by_distance_curvature_skewness_and_springs(net, tmp_path):
-    files = nets.draw_net(net, tmp_path)
-    assert [file.name for file in files] == ["net-distance.png", "net-curvature.png", "net-skew.png", "net-springs.png"]
+    files = net_maps.draw_net(net, tmp_path)
+    assert [file.name for file in files] == [
+        "net-distance.png",
+        "net-curvature.png",
+        "net-skew.png",
+        "net-springs.png",
+    ]
     pictures = [matplotlib.image.imread(file) for file in files]
     assert all(np.ptp(picture) > 0.5 for picture in pictures)
     assert not np.array_equal(pictures[0], pictures[1])

@@ -13,13 +13,15 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError
-from shellform.output.opensees import opensees_script
+from shellform.output.exchange.opensees import opensees_script
 
 
 def lists(text):
     """The lists in the script by name."""
     tree = ast.parse(text)
-    assigned = [node for node in tree.body if isinstance(node, ast.Assign) and isinstance(node.value, ast.List)]
+    assigned = [
+        node for node in tree.body if isinstance(node, ast.Assign) and isinstance(node.value, ast.List)
+    ]
     return {node.targets[0].id: ast.literal_eval(node.value) for node in assigned}
 
 
@@ -27,7 +29,9 @@ def test_the_script_holds_the_network_the_start_and_the_load(shell):
     design = shell.design()
     load = shell.point_load(6.9, every=2)
     network = shell.network(design)
-    text = opensees_script(network, [shell.target, shell.target], load, title='A "vault" \\', name="vault.py", case="design")
+    text = opensees_script(
+        network, [shell.target, shell.target], load, title='A "vault" \\', name="vault.py", case="design"
+    )
     told = lists(text)
     assert np.array(told["NODES"]) == pytest.approx(network.nodes)
     assert len(told["BEAMS"]) == len(network.beams.ends)
@@ -45,15 +49,30 @@ def test_a_bow_bent_from_a_shorter_rod_is_refused(shell):
     network = shell.network(shell.design())
     beams = replace(network.beams, rest_length=0.9 * network.beams.rest_length)
     with pytest.raises(InputError, match=re.escape("beams[0].rest_length")):
-        opensees_script(replace(network, beams=beams), [shell.target] * 2, np.zeros((len(network.nodes), 6)), title="", name="", case="")
+        opensees_script(
+            replace(network, beams=beams),
+            [shell.target] * 2,
+            np.zeros((len(network.nodes), 6)),
+            title="",
+            name="",
+            case="",
+        )
 
 
 def opensees_python():
-    """A Python that has OpenSees: this one, that of SHELLFORM_PEERS_PYTHON, or that of the benchmark's cache."""
+    """A Python that has OpenSees: this one, that of SHELLFORM_PEERS_PYTHON, or that of the benchmark's
+    cache.
+    """
     cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    for python in [os.environ.get("SHELLFORM_PEERS_PYTHON"), cache / "shellform-peers/bin/python", sys.executable]:
+    for python in [
+        os.environ.get("SHELLFORM_PEERS_PYTHON"),
+        cache / "shellform-peers/bin/python",
+        sys.executable,
+    ]:
         if python and Path(python).is_file():
-            done = subprocess.run([python, "-c", "import openseespy.opensees"], capture_output=True, check=False)
+            done = subprocess.run(
+                [python, "-c", "import openseespy.opensees"], capture_output=True, check=False
+            )
             if done.returncode == 0:
                 return str(python)
     return None
@@ -65,12 +84,24 @@ def test_opensees_finds_our_displacements_with_it(tmp_path, shell):
     if python is None:
         pytest.skip("OpenSeesPy isn't installed (SHELLFORM_PEERS_PYTHON names a Python that has it)")
     design, load = shell.design(), shell.point_load(6.9, every=2)
-    loads = {"none": np.zeros_like(load), "design": 0.4 * load}  # well below where this one snaps, loaded to its edges
+    loads = {
+        "none": np.zeros_like(load),
+        "design": 0.4 * load,
+    }  # well below where this one snaps, loaded to its edges
     found = sf.follow(shell, design, loads)
     states = [found[name].equilibrium.state for name in loads]
-    text = opensees_script(shell.network(design), states, loads["design"], title="vault", name="vault.py", case="design")
+    text = opensees_script(
+        shell.network(design), states, loads["design"], title="vault", name="vault.py", case="design"
+    )
     (tmp_path / "vault.py").write_text(text, encoding="utf-8")
-    done = subprocess.run([python, "vault.py", "moved.csv"], cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(
+        [python, "vault.py", "moved.csv"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     moved = np.loadtxt(tmp_path / "moved.csv", delimiter=",", skiprows=1)
     ours = states[1].positions - states[0].positions

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.output import plots, render, vtp
-from shellform.output.panel import Look, Panel
+from shellform.output.exchange import vtp
+from shellform.output.pictures import plots, render
+from shellform.output.pictures.panel import Look, Panel
 
 
 @pytest.fixture(scope="module")
@@ -15,7 +16,10 @@ def panel():
     x, y = (each.ravel() for each in np.meshgrid(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9)))
     number = np.arange(81).reshape(9, 9)
     beams = np.vstack(
-        [np.column_stack([number[:, :-1].ravel(), number[:, 1:].ravel()]), np.column_stack([number[:-1].ravel(), number[1:].ravel()])]
+        [
+            np.column_stack([number[:, :-1].ravel(), number[:, 1:].ravel()]),
+            np.column_stack([number[:-1].ravel(), number[1:].ravel()]),
+        ]
     )
     place = np.column_stack([x, y, 0.5 - 0.2 * (x**2 + y**2)])
     cables = np.column_stack([number[:-1, :-1].ravel(), number[1:, 1:].ravel()])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.output import plots
+from shellform.output.pictures import plots
 
 ROWS = """evaluation,accepted,objective,term.misfit,term.cable_force,constraint.cable_force,constraint.misfit.additional,cables
 0,1,1.0,0.7,0.3,-0.7,23.4,293

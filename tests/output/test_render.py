@@ -15,15 +15,18 @@ import pyvista as pv
 from PIL import Image, ImageSequence
 
 from shellform.errors import InputError
-from shellform.output import images, legend, render, scene, sheets, vectors, view, vtp
-from shellform.output.panel import Look, Panel, Skin, scale_of
+from shellform.output.exchange import vtp
+from shellform.output.pictures import images, legend, render, scene, sheets, vectors, view
+from shellform.output.pictures.panel import Look, Panel, Skin, scale_of
 
 SIZE = (400, 300)
 SMALL = Look(size=SIZE)
 
 
 def dome(side=9, pieces=4):
-    """A square grid of rods on a dome 1 m wide and 0.3 m high, of `pieces` elements a segment, diagonals as cables."""
+    """A square grid of rods on a dome 1 m wide and 0.3 m high, of `pieces` elements a segment, diagonals as
+    cables.
+    """
     line = np.linspace(-0.5, 0.5, (side - 1) * pieces + 1)
     nodes, number, beams = [], {}, []
 
@@ -118,7 +121,12 @@ def test_supports_and_loads_are_marked():
     plain = above(render.image(bare(), Look(size=SIZE, frame=panel().positions)))
     supported = above(render.image(bare(supports=panel().supports), Look(size=SIZE, frame=panel().positions)))
     unloaded = above(render.image(bare(), Look(size=SIZE, frame=np.add(panel().positions, [0.0, 0.0, 0.04]))))
-    loaded = above(render.image(bare(load_points=panel().load_points), Look(size=SIZE, frame=np.add(panel().positions, [0.0, 0.0, 0.04]))))
+    loaded = above(
+        render.image(
+            bare(load_points=panel().load_points),
+            Look(size=SIZE, frame=np.add(panel().positions, [0.0, 0.0, 0.04])),
+        )
+    )
     assert (np.abs(plain - supported).max(axis=2) > 60).sum() > 50
     assert (np.abs(unloaded - loaded).max(axis=2) > 60).sum() > 50
 
@@ -139,14 +147,18 @@ def test_pictures_with_one_frame_share_their_camera():
     both = np.vstack([panel().positions, inverted.positions])
     first = above(render.image(bare(), Look(size=SIZE, frame=both, view="front")))
     second = above(render.image(inverted, Look(size=SIZE, frame=both, view="front")))
-    np.testing.assert_allclose(np.flatnonzero(ink(first, 0))[[0, -1]], np.flatnonzero(ink(second, 0))[[0, -1]], atol=1)
+    np.testing.assert_allclose(
+        np.flatnonzero(ink(first, 0))[[0, -1]], np.flatnonzero(ink(second, 0))[[0, -1]], atol=1
+    )
     assert np.flatnonzero(ink(first, 1))[0] < np.flatnonzero(ink(second, 1))[0]
 
 
 def test_a_target_surface_shows_through():
     corners = np.array([[-0.5, -0.5, 0.0], [0.5, -0.5, 0.0], [0.5, 0.5, 0.0], [-0.5, 0.5, 0.0]])
     plain = above(render.image(bare(), Look(size=SIZE, view="top", frame=corners)))
-    covered = above(render.image(bare(), Look(size=SIZE, view="top", surface=Skin(corners, [[0, 1, 2], [0, 2, 3]]))))
+    covered = above(
+        render.image(bare(), Look(size=SIZE, view="top", surface=Skin(corners, [[0, 1, 2], [0, 2, 3]])))
+    )
     assert (np.abs(plain - covered).max(axis=2) > 5).mean() > 0.2
     dark = plain.max(axis=2) < 120  # rods stand above it
     assert np.abs(plain - covered)[dark].mean() < 30
@@ -156,18 +168,26 @@ def test_elements_without_length_do_not_make_their_rods_vanish():
     positions = np.array(panel().positions)
     first, second = panel().beams[5]
     positions[second] = positions[first]
-    whole, pinched = ink(above(render.image(bare(), SMALL))), ink(above(render.image(bare(positions=positions), SMALL)))
+    whole, pinched = (
+        ink(above(render.image(bare(), SMALL))),
+        ink(above(render.image(bare(positions=positions), SMALL))),
+    )
     assert pinched > 0.95 * whole
 
 
 def test_a_sheet_has_the_size_of_its_panels_and_one_scale_and_camera(tmp_path):
-    good, bad = bare(deviation=np.zeros(len(panel().positions))), bare(deviation=np.full(len(panel().positions), 0.5))
+    good, bad = (
+        bare(deviation=np.zeros(len(panel().positions))),
+        bare(deviation=np.full(len(panel().positions), 0.5)),
+    )
     render.sheet(tmp_path / "sheet.png", [[good, bad], [good]], SMALL)
     page = np.flipud(pv.read(tmp_path / "sheet.png").point_data.active_scalars.reshape(-1, 800, 3))
     assert page.shape == (600 + legend.key_height(SIZE), 800, 3)
     upper, lower = page[45:300, :400].astype(int), page[345:600, :400].astype(int)
     assert np.abs(upper - lower).max() <= 1
-    np.testing.assert_array_equal(ink(page[45:300, :400], 0), ink(page[45:300, 400:], 0))  # yellow at the same pixels
+    np.testing.assert_array_equal(
+        ink(page[45:300, :400], 0), ink(page[45:300, 400:], 0)
+    )  # yellow at the same pixels
     assert ink(page[300:600, 400:]) == 0  # the short row's end stays white
     assert [path.name for path in tmp_path.iterdir()] == ["sheet.png"]
 
@@ -241,7 +261,7 @@ def test_panels_of_wrong_arrays_are_refused(name, value, message):
         ({"size": (64000, 400)}, "too large"),
         ({"thickness": -1.0}, "thickness: must be 0 or more"),
         ({"force": np.inf}, "force: must be 0 or more"),
-                ({"frame": [1.0, 2.0]}, "frame has the wrong shape"),
+        ({"frame": [1.0, 2.0]}, "frame has the wrong shape"),
     ],
 )
 def test_arguments_that_cannot_be_drawn_are_refused(given, message):
@@ -285,7 +305,7 @@ def test_where_vtk_s_library_is_missing_states_and_lines_are_still_written(tmp_p
         "import numpy as np\n"
         "from shellform.errors import InputError\n"
         "from shellform.output import render, vtp\n"
-        "from shellform.output.panel import Panel\n"
+        "from shellform.output.pictures.panel import Panel\n"
         "panel = Panel('a', np.eye(3), [[0, 1], [1, 2]], np.zeros(3), [[0, 2]], [1.0], [0], [], 0.01)\n"
         "vtp.write_vtp('a.vtp', panel); render.picture('a.svg', panel)\n"
         "try:\n    render.picture('a.png', panel)\n"
@@ -293,7 +313,12 @@ def test_where_vtk_s_library_is_missing_states_and_lines_are_still_written(tmp_p
     )
     root = str(Path(__file__).parent.parent.parent)
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, env={**os.environ, "PYTHONPATH": root}, capture_output=True, text=True, check=True
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": root},
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert "PyVista can't be loaded" in done.stdout
     assert "apt-get install libegl1" in done.stdout
@@ -302,13 +327,16 @@ def test_where_vtk_s_library_is_missing_states_and_lines_are_still_written(tmp_p
 
 @pytest.mark.skipif(sys.platform != "linux", reason="VTK chooses its window at run time on Linux")
 def test_a_window_without_a_context_is_found_out_before_vtk_crashes():
-    # OSMesa is asked for where it isn't installed, which leaves VTK with what it has on a machine without GL libraries
+    # OSMesa is asked for where it isn't installed, which leaves VTK with what it has on a machine without GL
+    # libraries
     code = (
         "import ctypes.util, sys; from shellform.output import scene\n"
         "sys.exit(0 if scene._window_works() is bool(ctypes.util.find_library('OSMesa')) else 1)"
     )
     asked = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
-    done = subprocess.run([sys.executable, "-c", code], env=asked, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=asked, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -321,41 +349,61 @@ def test_drawing_without_a_display_says_nothing_on_standard_error():
 
 def test_cables_have_a_scale_of_their_own_with_a_key_only_where_one_is_taut():
     none = replace(panel(), cable_forces=np.zeros(64))
-    taut, slack = (render.image(each, SMALL)[-legend.key_height(SIZE) :].astype(int) for each in (panel(), none))
+    taut, slack = (
+        render.image(each, SMALL)[-legend.key_height(SIZE) :].astype(int) for each in (panel(), none)
+    )
     brick = legend.cable_colours(np.array([0.999]))[0]
     assert (np.abs(taut - brick).max(axis=2) < 4).sum() > 5
     assert (np.abs(slack - brick).max(axis=2) < 4).sum() == 0
 
 
 def test_large_forces_are_told_in_kilonewtons_and_rounding_as_nothing():
-    strong = replace(panel(), cable_forces=1000.0 * panel().cable_forces, deviation=np.full(len(panel().positions), 1e-16))
+    strong = replace(
+        panel(), cable_forces=1000.0 * panel().cable_forces, deviation=np.full(len(panel().positions), 1e-16)
+    )
     scale = scale_of([strong], SMALL, SIZE)
     told = legend.title(strong, scale, SIZE)[1].text
     assert told == "deviation: maximum 0 mm, mean 0 mm; 64 cables, 12 kN at most"
     assert "12 kN" in [word.text for word in legend.key(scale, SIZE[0])[0]]
-    assert legend.title(panel(), scale_of([panel()], SMALL, SIZE), SIZE)[1].text.endswith("64 cables, 12 N at most")
+    assert legend.title(panel(), scale_of([panel()], SMALL, SIZE), SIZE)[1].text.endswith(
+        "64 cables, 12 N at most"
+    )
 
 
 @pytest.mark.parametrize("force", [10.8, 16.4, 0.37, 3.0, 99.6, 1234.0])
 def test_a_number_of_the_key_lies_within_a_hundredth_of_the_scale_from_its_tick(force):
     strong = replace(panel(), cable_forces=force / panel().cable_forces.max() * panel().cable_forces)
-    words = [word for word in legend.key(scale_of([strong], SMALL, SIZE), SIZE[0])[0] if word.at[0] > 0.6 * SIZE[0]]
-    ticks = [float(word.text.split()[0]) for word in sorted(words, key=lambda word: word.at[0]) if word.text[0].isdigit()]
+    words = [
+        word for word in legend.key(scale_of([strong], SMALL, SIZE), SIZE[0])[0] if word.at[0] > 0.6 * SIZE[0]
+    ]
+    ticks = [
+        float(word.text.split()[0])
+        for word in sorted(words, key=lambda word: word.at[0])
+        if word.text[0].isdigit()
+    ]
     largest = force / 1000.0 if force >= 1e3 else force
     assert ticks == pytest.approx(np.linspace(0.0, largest, len(ticks)), abs=0.0101 * largest)
 
 
 def test_a_value_beyond_the_scale_is_told_at_its_end_and_long_titles_shrink():
-    within, beyond = (legend.key(scale_of([bare(deviation=np.full(len(panel().positions), far))], SMALL, SIZE), 400)[0] for far in (0.01, 0.02))
+    within, beyond = (
+        legend.key(scale_of([bare(deviation=np.full(len(panel().positions), far))], SMALL, SIZE), 400)[0]
+        for far in (0.01, 0.02)
+    )
     assert "≥ 10.0 mm" in [word.text for word in beyond]
     assert "10.0 mm" in [word.text for word in within]
-    short, long = (legend.title(replace(panel(), title="A" * count), scale_of([panel()], SMALL, SIZE), SIZE)[0] for count in (10, 90))
+    short, long = (
+        legend.title(replace(panel(), title="A" * count), scale_of([panel()], SMALL, SIZE), SIZE)[0]
+        for count in (10, 90)
+    )
     assert long.pixels < short.pixels
 
 
 def test_both_scales_run_in_lightness_alone_evenly_enough_for_the_colour_blind():
     def lightness(colours):
-        linear = np.where(colours / 255.0 <= 0.04045, colours / 255.0 / 12.92, ((colours / 255.0 + 0.055) / 1.055) ** 2.4)
+        linear = np.where(
+            colours / 255.0 <= 0.04045, colours / 255.0 / 12.92, ((colours / 255.0 + 0.055) / 1.055) ** 2.4
+        )
         return 116.0 * np.cbrt(linear @ [0.2126, 0.7152, 0.0722]) - 16.0
 
     share = np.linspace(0.0, 1.0, 21)
@@ -366,7 +414,9 @@ def test_both_scales_run_in_lightness_alone_evenly_enough_for_the_colour_blind()
 
 
 def test_rods_are_drawn_as_thick_as_can_be_seen_or_as_they_are():
-    seen, true, twenty = (ink(above(render.image(bare(), Look(size=SIZE, thickness=times)))) for times in (0.0, 1.0, 20.0))
+    seen, true, twenty = (
+        ink(above(render.image(bare(), Look(size=SIZE, thickness=times)))) for times in (0.0, 1.0, 20.0)
+    )
     assert true < seen < twenty
 
 
@@ -398,7 +448,9 @@ def _fitted(positions):
 
 
 @pytest.mark.parametrize(("ending", "head"), [(".svg", b"<?xml"), (".pdf", b"%PDF")])
-def test_a_page_of_lines_is_small_repeats_to_the_byte_and_needs_no_opengl(tmp_path, ending, head, monkeypatch):
+def test_a_page_of_lines_is_small_repeats_to_the_byte_and_needs_no_opengl(
+    tmp_path, ending, head, monkeypatch
+):
     monkeypatch.setattr(scene, "_window_works", lambda: False)
     for name in "ab":
         render.picture(tmp_path / f"{name}{ending}", panel(), SMALL)
@@ -410,10 +462,15 @@ def test_a_page_of_lines_is_small_repeats_to_the_byte_and_needs_no_opengl(tmp_pa
 
 def test_lines_are_drawn_where_the_pixels_are():
     given = bare(supports=panel().supports)
-    lines, pixels = (above(each) for each in (vectors.rasterised(sheets.single([given], SMALL)[0]), render.image(given, SMALL)))
+    lines, pixels = (
+        above(each)
+        for each in (vectors.rasterised(sheets.single([given], SMALL)[0]), render.image(given, SMALL))
+    )
     assert np.mean((lines.min(axis=2) < 200) == (pixels.min(axis=2) < 200)) > 0.95
     flat = replace(given, positions=given.positions * [1.0, 1.0, 0.0], load_points=panel().load_points)
-    top = vectors.rasterised(sheets.single([flat], Look(size=SIZE, view="top", surface=Skin(np.eye(3), [[0, 1, 2]])))[0])
+    top = vectors.rasterised(
+        sheets.single([flat], Look(size=SIZE, view="top", surface=Skin(np.eye(3), [[0, 1, 2]])))[0]
+    )
     assert ink(above(top)) > 500
 
 
@@ -421,7 +478,12 @@ def test_pictures_drawn_one_after_the_other_are_those_drawn_alone(tmp_path):
     far = replace(panel(), deviation=np.full(len(panel().positions), 0.02))
     render.pictures([tmp_path / "a.png", tmp_path / "b.png"], [panel(), far], SMALL)
     for name, given in [("a", panel()), ("b", far)]:
-        assert np.abs(np.asarray(Image.open(tmp_path / f"{name}.png")).astype(int) - render.image(given, SMALL)).max() <= 1
+        assert (
+            np.abs(
+                np.asarray(Image.open(tmp_path / f"{name}.png")).astype(int) - render.image(given, SMALL)
+            ).max()
+            <= 1
+        )
     render.pictures([tmp_path / "a.svg"], [panel()], SMALL)
     assert (tmp_path / "a.svg").stat().st_size > 0
 

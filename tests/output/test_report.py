@@ -10,11 +10,11 @@ from PIL import Image
 
 import shellform as sf
 from shellform.errors import InputError
-from shellform.output import report
-from shellform.output.charts import line_chart
-from shellform.output.embed import embed
-from shellform.output.verdict import Bounds, answers, asked, checks, failed, number
-from shellform.structure.state import State
+from shellform.output.page import report
+from shellform.output.page.charts import line_chart
+from shellform.output.page.embed import embed
+from shellform.output.page.verdict import Bounds, answers, asked, checks, failed, number
+from shellform.structure.elements.state import State
 
 LOADS = {
     "none": {"factor": 0.0, "deviation_max": 0.002, "deviation_mean": 0.001, "deviation_rms": 0.0012},
@@ -26,13 +26,18 @@ SOUND = {"stable": True, "on_branch": True, "residual": 1e-10, "rod_utilisation_
 
 @pytest.fixture
 def designs(shell):
-    return {"initial": shell.design(), "optimised": shell.design(rest_ratio=0.98), "polished": shell.design(rest_ratio=0.97)}
+    return {
+        "initial": shell.design(),
+        "optimised": shell.design(rest_ratio=0.98),
+        "polished": shell.design(rest_ratio=0.97),
+    }
 
 
 def told(designs, load=None, constraints=None, **changes):
     """A summary with one load's row of the last design changed."""
     rows = {
-        name: {"cable_force_max": 7.0, "loads": {each: {**row, **SOUND} for each, row in LOADS.items()}} for name in designs
+        name: {"cable_force_max": 7.0, "loads": {each: {**row, **SOUND} for each, row in LOADS.items()}}
+        for name in designs
     }
     last = rows[list(designs)[-1]]
     (last["loads"][load] if load else last).update(changes)
@@ -66,7 +71,11 @@ def test_a_sound_design_holds_all_checks_those_of_the_optimiser_among_them(shell
         ("none", {"rod_utilisation_max": 1.01}, "Rods under no load"),
         ("additional", {"deviation_rms": 0.0051}, "Deviation under 1.2 × the load, root mean square (6)"),
         ("design", {"residual": float("nan")}, "In equilibrium under the design load"),
-        (None, {"cable_force_max": 20.1}, "Largest cable force under the design load and those beyond it (5)"),
+        (
+            None,
+            {"cable_force_max": 20.1},
+            "Largest cable force under the design load and those beyond it (5)",
+        ),
     ],
 )
 def test_each_check_fails_alone_where_its_number_is_past_the_limit(shell, designs, load, changes, name):
@@ -88,7 +97,15 @@ def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, de
         for check in checks(every(shell, designs), designs, summary, BOUNDS)
         if check.name.startswith("Optimiser")
     }
-    assert [cell.told for cell in found.values()] == ["35 %", "50 %", "0.90 ×", "1.50 ×", "beyond", "within", "not known"]
+    assert [cell.told for cell in found.values()] == [
+        "35 %",
+        "50 %",
+        "0.90 ×",
+        "1.50 ×",
+        "beyond",
+        "within",
+        "not known",
+    ]
     assert [cell.holds for cell in found.values()] == [True, True, False, True, False, True, False]
     assert {"Optimiser: uplift of supports, wind load", "Optimiser: other thing"} < set(found)
 
@@ -104,14 +121,20 @@ def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, de
         ({"force": 20.0}, "additional", {"cable_force_max": 21.0}, "21 N"),
     ],
 )
-def test_an_engineer_s_limits_are_checked_where_they_are_asked_for(shell, designs, bound, load, changes, words):
+def test_an_engineer_s_limits_are_checked_where_they_are_asked_for(
+    shell, designs, bound, load, changes, words
+):
     summary = told(designs, load, **changes)
     found = failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **bound)), "polished")
     assert [check.cells["polished"].told for check in found] == [words]
     if "force" not in bound:
-        assert failed(checks(every(shell, designs), designs, summary, BOUNDS), "polished") == [], "nobody asked"
+        assert failed(checks(every(shell, designs), designs, summary, BOUNDS), "polished") == [], (
+            "nobody asked"
+        )
     looser = {name: 0.5 * limit if name == "critical" else 2.0 * limit for name, limit in bound.items()}
-    assert failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **looser)), "polished") == []
+    assert (
+        failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **looser)), "polished") == []
+    )
 
 
 def test_the_polished_design_does_not_fail_by_what_only_the_optimised_one_broke(shell, designs):
@@ -193,8 +216,14 @@ def test_pictures_are_made_small_films_go_in_as_they_are(tmp_path):
     Image.fromarray(np.zeros((900, 3200, 3), np.uint8)).save(tmp_path / "wide.png")
     Image.fromarray(np.zeros((8, 9, 4), np.uint8)).save(tmp_path / "clear.png")
     (tmp_path / "pour.mp4").write_bytes(b"film")
-    found, left = embed([tmp_path / name for name in ("wide.png", "clear.png", "pour.mp4", "none.png")], budget=10**6)
-    assert [(each.width, each.height, each.film) for each in found] == [(1600, 450, False), (9, 8, False), (0, 0, True)]
+    found, left = embed(
+        [tmp_path / name for name in ("wide.png", "clear.png", "pour.mp4", "none.png")], budget=10**6
+    )
+    assert [(each.width, each.height, each.film) for each in found] == [
+        (1600, 450, False),
+        (9, 8, False),
+        (0, 0, True),
+    ]
     assert found[0].source.startswith("data:image/webp;base64,")
     assert found[2].source == "data:video/mp4;base64,ZmlsbQ=="
     assert len(left) == 1
@@ -259,6 +288,8 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
     found = drawn["designs"][0]["states"]["design"]
     assert found["length"] == pytest.approx(1e3 * shell.cables(design).lengths(moved), abs=1e-4)
     assert found["force"] == pytest.approx(shell.cables(design).tension(moved), rel=1e-5)
-    assert [row[0] for row in found["rods"]] == pytest.approx([math.sqrt(3.0)] * len(shell.net.grid.rods), abs=1e-3)
+    assert [row[0] for row in found["rods"]] == pytest.approx(
+        [math.sqrt(3.0)] * len(shell.net.grid.rods), abs=1e-3
+    )
     assert drawn["loads"][0]["points"] == []
     assert len(drawn["loads"][1]["points"]) == len(shell.net.grid.lattice)

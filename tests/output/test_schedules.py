@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from openpyxl import load_workbook
 
 import shellform as sf
+from shellform import tables
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
-from shellform.output import nesting, schedules, tables
+from shellform.output.workshop import nesting, schedules
 
 
 @pytest.fixture(scope="module")
@@ -31,8 +32,12 @@ def read(built, tmp_path_factory):
 
 def test_the_cut_list_has_every_rod_with_its_length_and_marks(read, net):
     rows = read["rods"]
-    assert [row["rod"] for row in rows] == [f"{rod.direction.upper()}{k}" for k, rod in enumerate(net.grid.rods)]
-    assert sum(float(row["length [m]"]) for row in rows) == pytest.approx(sum(rod.length for rod in net.grid.rods), abs=1e-4)
+    assert [row["rod"] for row in rows] == [
+        f"{rod.direction.upper()}{k}" for k, rod in enumerate(net.grid.rods)
+    ]
+    assert sum(float(row["length [m]"]) for row in rows) == pytest.approx(
+        sum(rod.length for rod in net.grid.rods), abs=1e-4
+    )
     for row, rod in zip(rows, net.grid.rods, strict=True):
         marks = [float(mark) for mark in row["marks from the first end [m]"].split()]
         assert marks == pytest.approx(rod.marks.tolist(), abs=5.1e-5)
@@ -96,12 +101,16 @@ def test_bars_yield_every_rod_whole_whatever_the_stock_and_the_saw(net, stock, k
 
 
 def test_as_many_bars_are_bought_as_must_be_where_that_is_known():
-    grid = lattice_grid(np.array([(i, j) for i in range(4) for j in range(5)]), spacing=(1.0, 1.0), gap=0.01, elements=1)
+    grid = lattice_grid(
+        np.array([(i, j) for i in range(4) for j in range(5)]), spacing=(1.0, 1.0), gap=0.01, elements=1
+    )
     # u rods of 3 m (5), v rods of 4 m (4): bars of 7 m take one of each, and the fifth u rod stands alone.
     cutting = nesting.cut(grid, stock=7.0, kerf=0.0)
     assert (len(cutting.bars), cutting.least) == (5, 5)
     assert cutting.waste == pytest.approx(1.0 - 31.0 / 35.0)
-    assert len(nesting.cut(grid, stock=7.0, kerf=0.001).bars) == 5 + 2  # with a saw cut no two of a 3 and a 4 fit, but two of 3 do
+    assert (
+        len(nesting.cut(grid, stock=7.0, kerf=0.001).bars) == 5 + 2
+    )  # with a saw cut no two of a 3 and a 4 fit, but two of 3 do
 
 
 def test_bars_are_filled_as_full_as_can_be_where_the_library_buys_too_many():
@@ -121,7 +130,9 @@ def test_no_packing_at_all_needs_fewer_bars_than_the_bound(sizes):
         if not left:
             return len(bars)
         one, *others = left
-        tried = [best(others, [*bars[:k], bar - one, *bars[k + 1 :]]) for k, bar in enumerate(bars) if bar >= one]
+        tried = [
+            best(others, [*bars[:k], bar - one, *bars[k + 1 :]]) for k, bar in enumerate(bars) if bar >= one
+        ]
         return min([*tried, best(others, [*bars, 8.0 - one])])
 
     fewest = best(sizes, [])
@@ -129,9 +140,15 @@ def test_no_packing_at_all_needs_fewer_bars_than_the_bound(sizes):
 
 
 def test_splicing_is_said_in_the_list_and_neighbours_are_divided_from_opposite_ends():
-    grid = lattice_grid(np.array([(i, j) for i in range(8) for j in range(3)]), spacing=(1.0, 1.0), gap=0.01, elements=1)
+    grid = lattice_grid(
+        np.array([(i, j) for i in range(8) for j in range(3)]), spacing=(1.0, 1.0), gap=0.01, elements=1
+    )
     cutting = nesting.cut(grid, stock=5.0, kerf=0.0)
-    starts = [sorted(start for start, *_ in pieces)[1] for rod, pieces in sorted(covered(cutting, grid).items()) if rod < 3]
+    starts = [
+        sorted(start for start, *_ in pieces)[1]
+        for rod, pieces in sorted(covered(cutting, grid).items())
+        if rod < 3
+    ]
     assert starts == [4.5, 2.5, 4.5]
     (told, warned) = schedules.cutting_notes(cutting, schedules.rod_names(grid))
     assert "bars of 5 m" in told
@@ -140,7 +157,8 @@ def test_splicing_is_said_in_the_list_and_neighbours_are_divided_from_opposite_e
 
 
 @pytest.mark.parametrize(
-    ("stock", "kerf", "word"), [(0.05, 0.0, "can't be spliced"), (-1.0, 0.0, "rod.stock_length"), (1.0, 1.0, "rod.kerf")]
+    ("stock", "kerf", "word"),
+    [(0.05, 0.0, "can't be spliced"), (-1.0, 0.0, "rod.stock_length"), (1.0, 1.0, "rod.kerf")],
 )
 def test_stock_that_can_not_be_used_is_refused(net, stock, kerf, word):
     with pytest.raises(InputError, match=word):
@@ -152,8 +170,12 @@ def test_the_cable_schedule_gives_lengths_and_forces_of_the_states(read, built):
     assert len(rows) == built.design.present.sum()
     for name, head in [("none", "erected"), ("design", "design"), ("additional", "additional")]:
         state = built.states[name]
-        assert [float(row[f"{head}: force [N]"]) for row in rows] == pytest.approx(ties.tension(state).tolist(), abs=1e-6)
-        assert [float(row[f"{head}: clear length [m]"]) for row in rows] == pytest.approx(ties.lengths(state).tolist(), abs=1e-6)
+        assert [float(row[f"{head}: force [N]"]) for row in rows] == pytest.approx(
+            ties.tension(state).tolist(), abs=1e-6
+        )
+        assert [float(row[f"{head}: clear length [m]"]) for row in rows] == pytest.approx(
+            ties.lengths(state).tolist(), abs=1e-6
+        )
     for row in rows:
         ends = [int(row["from crossing"]), int(row["to crossing"])]
         lattice = built.grid.lattice[ends]
@@ -165,7 +187,13 @@ def test_the_cable_schedule_gives_lengths_and_forces_of_the_states(read, built):
 def test_stages_of_the_pour_come_between_the_erected_and_the_poured_grid(built):
     poured = replace(built, states={**built.states, "pour 1": built.hung, "pour 2": built.hung})
     heads = [head for head in schedules.cables(poured).columns if head.endswith("force [N]")]
-    assert [head.partition(":")[0] for head in heads] == ["erected", "pour 1", "pour 2", "design", "additional"]
+    assert [head.partition(":")[0] for head in heads] == [
+        "erected",
+        "pour 1",
+        "pour 2",
+        "design",
+        "additional",
+    ]
 
 
 def test_turnbuckles_reach_from_the_length_hung_in_to_the_rest_length(read):
@@ -181,30 +209,41 @@ def test_cables_are_tightened_from_the_supports_to_the_crown(read, built):
     rounds = [int(row["tensioning round"]) for row in rows]
     assert rounds == sorted(rounds)
     height = built.shell.net.crossings[:, 2]
-    mean = [np.mean([height[int(row["from crossing"])] for row in rows if int(row["tensioning round"]) == k]) for k in (1, max(rounds))]
+    mean = [
+        np.mean([height[int(row["from crossing"])] for row in rows if int(row["tensioning round"]) == k])
+        for k in (1, max(rounds))
+    ]
     assert mean[0] < mean[1]
 
 
 def test_supports_and_survey_targets_stand_where_the_net_has_them(read, built):
     net = built.shell.net
     for number, row in enumerate(read["supports"]):
-        assert [float(row[f"{axis} [m]"]) for axis in "xyz"] == pytest.approx(net.target.positions[net.supports[number]].tolist(), abs=1e-6)
+        assert [float(row[f"{axis} [m]"]) for axis in "xyz"] == pytest.approx(
+            net.target.positions[net.supports[number]].tolist(), abs=1e-6
+        )
         rod = net.grid.rods[int(row["rod"][1:])]
         assert rod.nodes[0 if row["end"] == "first" else -1] == net.supports[number]
         assert float(row["rise of the rod [rad]"]) > 0.0  # every rod of the vault goes up from its foot
     assert len(read["survey"]) == len(net.grid.lattice)
     for k, row in enumerate(read["survey"]):
-        assert [float(row[f"target: {axis} [m]"]) for axis in "xyz"] == pytest.approx(net.crossings[k].tolist(), abs=1e-6)
+        assert [float(row[f"target: {axis} [m]"]) for axis in "xyz"] == pytest.approx(
+            net.crossings[k].tolist(), abs=1e-6
+        )
         assert float(row["design: off the target [m]"]) == pytest.approx(0.0, abs=1e-6)
         assert float(row["erected: z [m]"]) == pytest.approx(1.01 * net.crossings[k, 2], abs=1e-6)
-        assert float(row["additional: off the target [m]"]) == pytest.approx(0.02 * abs(net.crossings[k, 2]), abs=1e-6)
+        assert float(row["additional: off the target [m]"]) == pytest.approx(
+            0.02 * abs(net.crossings[k, 2]), abs=1e-6
+        )
 
 
 def test_the_rods_press_on_their_supports_with_the_load(shell):
     load = 0.3 * shell.point_load(6.9, every=2)
     loads = {"none": np.zeros_like(load), "design": load}
     found = sf.follow(shell, shell.design(), loads)
-    built = schedules.Built(shell, shell.design(), {name: each.equilibrium.state for name, each in found.items()})
+    built = schedules.Built(
+        shell, shell.design(), {name: each.equilibrium.state for name, each in found.items()}
+    )
     table = schedules.supports(built)
     for name, weight in (("erected", 0.0), ("design", float(load[:, 2].sum()))):
         total = [sum(table.column(f"{name}: on the support along {axis} [N]")) for axis in "xyz"]
@@ -220,12 +259,15 @@ def test_splices_are_told_with_the_moment_that_they_bear(built, net):
     stiffness = built.shell.rod.stiffness[2]
     first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in net.grid.rods])])
     moments = table.column("design: bending moment [N m]")
-    for name, at, before, after, moment in zip(*(table.column(head) for head in table.columns[:4]), moments, strict=True):
+    for name, at, before, after, moment in zip(
+        *(table.column(head) for head in table.columns[:4]), moments, strict=True
+    ):
         number = int(name[1:])
         rod = net.grid.rods[number]
         marks = rod.marks[[rod.crossings.tolist().index(before), rod.crossings.tolist().index(after)]]
         assert at == pytest.approx(marks.mean())
-        # In the state on the target the moment is EI times the net's curvature, here at the splice's own element and its neighbours.
+        # In the state on the target the moment is EI times the net's curvature, here at the splice's own
+        # element and its neighbours.
         near = first[number] + int(np.searchsorted(rod.arc, at)) - 1
         around = stiffness * net.curvature[near - 1 : near + 2]
         assert around.min() * 0.99 <= moment <= around.max() * 1.01
@@ -248,7 +290,13 @@ def test_the_workbook_holds_the_same_tables(read, built):
         assert list(rows[notes]) == list(table.columns)
         for row, found in zip(table.rows, rows[notes + 1 :], strict=True):
             for value, cell in zip(row, found, strict=True):
-                assert cell == (pytest.approx(value, rel=1e-14) if isinstance(value, float) else None if value == "" else value)
+                assert cell == (
+                    pytest.approx(value, rel=1e-14)
+                    if isinstance(value, float)
+                    else None
+                    if value == ""
+                    else value
+                )
 
 
 def test_a_folder_that_can_not_be_written_to_is_named(tmp_path):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from shellform.output.states import draw_analysis
-from shellform.structure.analysis import analyse
+from shellform.output.pictures.model_states import draw_analysis
+from shellform.structure.answers.analysis import analyse
 from shellform.structure.model import parse_model
 
 

@@ -5,15 +5,28 @@ import re
 
 import pytest
 
-from shellform.output.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
+from shellform.output.page.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
 
 
 def sheet(**changes):
     rows = [
-        {"number": k, "key": f"k{k}", "status": "done", "reason": "", "case.net.spacing": 0.1 + 0.01 * k, "misfit": 1e-3 * k, "cables": 9 - k}
+        {
+            "number": k,
+            "key": f"k{k}",
+            "status": "done",
+            "reason": "",
+            "case.net.spacing": 0.1 + 0.01 * k,
+            "misfit": 1e-3 * k,
+            "cables": 9 - k,
+        }
         for k in range(5)
     ]
-    rows[3] |= {"status": "refused", "reason": "</script><script>alert(1)</script>", "misfit": None, "cables": None}
+    rows[3] |= {
+        "status": "refused",
+        "reason": "</script><script>alert(1)</script>",
+        "misfit": None,
+        "cables": None,
+    }
     rows[4] |= {"misfit": float("nan")}
     given = {
         "title": "Weights <b>",
@@ -49,7 +62,11 @@ def test_the_page_asks_for_nothing_and_escapes_what_comes_from_elsewhere():
 
 def test_rank_correlation_is_spearmans():
     given = {"a": [1, 2, 3, 4, None, "x"], "same": 6 * [1.0], "word": list("abcdef")}
-    found = {"up": [1.0, 10.0, 100.0, 1000.0, 5.0, 6.0], "down": [4, 3, 2, 1, 7, 8], "other": [1, 3, 2, 4, 9, 9]}
+    found = {
+        "up": [1.0, 10.0, 100.0, 1000.0, 5.0, 6.0],
+        "down": [4, 3, 2, 1, 7, 8],
+        "other": [1, 3, 2, 4, 9, 9],
+    }
     told = rank_correlations(given, found)
     assert list(told) == ["a"]
     assert told["a"] == pytest.approx({"up": 1.0, "down": -1.0, "other": 0.8})

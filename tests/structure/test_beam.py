@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.structure.beam import make_beams
-from shellform.structure.state import at_rest, from_vectors, moved
-from shellform.structure.verification import turned_forces
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.state import at_rest, from_vectors, moved
+from shellform.verification import turned_forces
 
 NODES = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.1]])
 
 
 def beam():
-    return make_beams(NODES, [[0, 1]], axial=50.0, torsion=2.0, bending_y=3.0, bending_z=5.0, z_axis=[[0.1, 0.2, 1.0]])
+    return make_beams(
+        NODES, [[0, 1]], axial=50.0, torsion=2.0, bending_y=3.0, bending_z=5.0, z_axis=[[0.1, 0.2, 1.0]]
+    )
 
 
 def bent(size=0.4, seed=0):
@@ -35,8 +37,11 @@ def test_end_forces_are_the_gradient_of_the_energy(seed):
     state, h = bent(seed=seed), 1e-5
     force = beam().evaluate(state, tangent=False).force[0]
     energy = [
-        (beam().evaluate(moved(state, unit(k, h)), tangent=False).energy[0]
-         - beam().evaluate(moved(state, unit(k, -h)), tangent=False).energy[0]) / (2 * h)
+        (
+            beam().evaluate(moved(state, unit(k, h)), tangent=False).energy[0]
+            - beam().evaluate(moved(state, unit(k, -h)), tangent=False).energy[0]
+        )
+        / (2 * h)
         for k in range(12)
     ]
     np.testing.assert_allclose(energy, force, atol=1e-7 * np.abs(force).max())
@@ -52,8 +57,11 @@ def test_the_tangent_is_the_derivative_of_the_end_forces(seed):
     for block in (slice(3, 6), slice(9, 12)):  # spins don't commute: the module's docstring
         tangent[block, block] -= 0.5 * skew(result.force[0, block])
     columns = [
-        (beam().evaluate(moved(state, unit(k, h)), tangent=False).force[0]
-         - beam().evaluate(moved(state, unit(k, -h)), tangent=False).force[0]) / (2 * h)
+        (
+            beam().evaluate(moved(state, unit(k, h)), tangent=False).force[0]
+            - beam().evaluate(moved(state, unit(k, -h)), tangent=False).force[0]
+        )
+        / (2 * h)
         for k in range(12)
     ]
     np.testing.assert_allclose(np.array(columns).T, tangent, atol=1e-7 * np.abs(tangent).max())

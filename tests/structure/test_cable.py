@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.structure.cable import make_cables
-from shellform.structure.state import at_rest, moved
-from shellform.structure.verification import slack_pair
-from shellform.structure.verification.models import line, ropes, solved
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import at_rest, moved
+from shellform.verification import slack_pair
+from shellform.verification.models import line, ropes, solved
 
 NODES = np.array([[0.0, 0.0, 0.0], [1.0, 0.3, -0.2]])
 LENGTH = float(np.linalg.norm(NODES[1]))

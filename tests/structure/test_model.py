@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.structure.analysis import analyse, result
+from shellform.structure.answers.analysis import analyse, result
 from shellform.structure.model import parse_model, read_model, write_model
 from shellform.structure.network import doubts
 
@@ -27,7 +27,10 @@ def bow():
             {"node": 0, "fixed": [True, True, True, False, True, True]},
             {"node": 8, "fixed": [True, True, False, False, True, True]},
         ],
-        "loads": {"push": [{"node": 8, "force": [0, 0, -4.0]}, {"node": 4, "force": [0, 0.01, 0]}], "none": []},
+        "loads": {
+            "push": [{"node": 8, "force": [0, 0, -4.0]}, {"node": 4, "force": [0, 0.01, 0]}],
+            "none": [],
+        },
     }
 
 
@@ -56,7 +59,10 @@ def bow():
         (lambda m: m["supports"][1].update(node=0), r"supports\[1\].*already"),
         (lambda m: m["supports"][1].update(fixed=[1, 1, 1, 1, 1, 1]), r"supports\[1\].fixed.*true or false"),
         (lambda m: m["loads"]["push"][0].update(node=-1), r"loads.push\[0\].node.*out of range"),
-        (lambda m: m.update(start={"positions": [[0, 0, 0]], "rotations": []}), "start.positions.*One row a node"),
+        (
+            lambda m: m.update(start={"positions": [[0, 0, 0]], "rotations": []}),
+            "start.positions.*One row a node",
+        ),
         (lambda m: m.update(supports=[]), "nothing restrains"),
     ],
 )
@@ -95,7 +101,17 @@ def test_a_model_comes_back_from_its_file_bit_by_bit(tmp_path):
 def test_what_is_rarely_meant_is_told_by_element():
     model = bow()
     model["nodes"].append([0, 0, 0.5])
-    model["beams"].append({"nodes": [8, 9], "EA": 1e5, "GJ": 1.0, "EIy": 1.0, "EIz": 1e-14, "rest_length": 5.0, "z_axis": [0, 1, 0]})
+    model["beams"].append(
+        {
+            "nodes": [8, 9],
+            "EA": 1e5,
+            "GJ": 1.0,
+            "EIy": 1.0,
+            "EIz": 1e-14,
+            "rest_length": 5.0,
+            "z_axis": [0, 1, 0],
+        }
+    )
     told = " ".join(doubts(parse_model(model).network))
     assert "nodes[4] and nodes[9]" in told
     assert "beams[8]" in told
@@ -184,10 +200,17 @@ def test_the_command_prints_notes_and_refuses_with_status_2(tmp_path):
     file = tmp_path / "m.json"
     file.write_text(json.dumps(bow()), encoding="utf-8")
     call = [sys.executable, "-m", "shellform", "analyse", str(file)]
-    good = subprocess.run([*call, "--load", "push", "--path", "--lead", "4:y:0.001"], capture_output=True, text=True, check=False)
+    good = subprocess.run(
+        [*call, "--load", "push", "--path", "--lead", "4:y:0.001"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert good.returncode == 0, good.stderr
     assert json.loads(good.stdout)["converged"]
-    bad = subprocess.run([*call, "--load", "push", "--lead", "four"], capture_output=True, text=True, check=False)
+    bad = subprocess.run(
+        [*call, "--load", "push", "--lead", "four"], capture_output=True, text=True, check=False
+    )
     assert bad.returncode == 2
     assert "NODE:AXIS:METRES" in bad.stderr
 
@@ -196,7 +219,11 @@ def block(side):
     """A cube of rods of side³ nodes: its factor fills up as no gridshell's does."""
     rod = {"EA": 1e5, "GJ": 1.0, "EIy": 1.0, "EIz": 1.0}
     number = np.arange(side**3).reshape(side, side, side)
-    along = [(number[:-1], number[1:]), (number[:, :-1], number[:, 1:]), (number[:, :, :-1], number[:, :, 1:])]
+    along = [
+        (number[:-1], number[1:]),
+        (number[:, :-1], number[:, 1:]),
+        (number[:, :, :-1], number[:, :, 1:]),
+    ]
     beams = [
         {"nodes": [int(i), int(j)], **rod, "z_axis": [1, 0, 0] if axis == 2 else [0, 0, 1]}
         for axis, (starts, ends) in enumerate(along)
@@ -214,13 +241,17 @@ def block(side):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux refuses memory under a limit")
 @pytest.mark.parametrize(("model", "status"), [(bow(), 0), (block(22), 3)], ids=["small", "large"])
-def test_without_free_memory_a_small_model_is_solved_and_a_large_one_ends_with_a_message_and_status_3(tmp_path, model, status):
+def test_without_free_memory_a_small_model_is_solved_and_a_large_one_ends_with_a_message_and_status_3(
+    tmp_path, model, status
+):
     file = tmp_path / "m.json"
     file.write_text(json.dumps(model), encoding="utf-8")
     code = (
         "import sys; from shellform.structure import memory; memory.free_memory = lambda: 0; "
-        "from shellform.cli import main; sys.argv[1:] = ['analyse', sys.argv[1], '--load', 'push']; main()"
+        "from shellform.cli.program import main; sys.argv[1:] = ['analyse', sys.argv[1], '--load', 'push']; main()"
     )
-    found = subprocess.run([sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=False)
+    found = subprocess.run(
+        [sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=False
+    )
     assert found.returncode == status, found.stderr
     assert ("memory is full" in found.stderr) == (status == 3)

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError, NotConverged
-from shellform.structure import path
-from shellform.structure.equilibrium import find_equilibrium, newton
-from shellform.structure.loading import Drive, advance, forces
+from shellform.structure.answers.stability import critical_load, linearised_factor, modes
+from shellform.structure.elements.state import at_rest
 from shellform.structure.network import Network, assemble
-from shellform.structure.path import follow
-from shellform.structure.stability import critical_load, linearised_factor, modes
-from shellform.structure.state import at_rest
-from shellform.structure.verification.models import chain
+from shellform.structure.solve import path
+from shellform.structure.solve.equilibrium import find_equilibrium, newton
+from shellform.structure.solve.loading import Drive, advance, forces
+from shellform.structure.solve.path import follow
+from shellform.verification.models import chain
 
 PIN = [True, True, True, False, False, False]
 
@@ -36,7 +36,9 @@ def lee(elements=20):
 def column(elements=20, length=1.0):
     points = np.column_stack([np.zeros((elements + 1, 2)), np.linspace(0, length, elements + 1)])
     roller = [True, True, False, False, False, True]
-    network = chain(points, (1e6, 1.0, 1.0, 1.0), {0: [True, True, True, False, False, True], elements: roller})
+    network = chain(
+        points, (1e6, 1.0, 1.0, 1.0), {0: [True, True, True, False, False, True], elements: roller}
+    )
     load = np.zeros((elements + 1, 6))
     load[-1, 2] = -1.0
     return assemble(network), at_rest(points), load
@@ -62,11 +64,14 @@ def test_a_led_displacement_gives_the_same_limit_as_the_arc_length():
     points = list(follow(assembly, start, forces(load), lead=(node, 2, -55.0), first=0.02))
     by_lead = next(p for p in points if p.event == "limit point")
     assert by_lead.factor == pytest.approx(by_arc.factor, rel=1e-6)
-    assert points[-1].equilibrium.state.positions[node, 2] == pytest.approx(start.positions[node, 2] - 55.0, abs=1e-6)
+    assert points[-1].equilibrium.state.positions[node, 2] == pytest.approx(
+        start.positions[node, 2] - 55.0, abs=1e-6
+    )
 
 
 def test_imposed_displacements_drive_the_path_as_forces_do():
-    # Williams-like toggle pushed down by its support-led crown; the reaction at the crown is the load that leads it there.
+    # Williams-like toggle pushed down by its support-led crown; the reaction at the crown is the load that
+    # leads it there.
     points = np.vstack([np.linspace([-1, 0, 0], [0, 0, 0.1], 9), np.linspace([0, 0, 0.1], [1, 0, 0], 9)[1:]])
     network = plane(chain(points, (1e4, 1.0, 0.2, 0.2), {0: PIN, 16: PIN}))
     load = np.zeros((17, 6))
@@ -169,7 +174,13 @@ def test_newton_and_relaxation_find_the_same_equilibrium_and_newton_gives_up_wit
 def test_increments_are_halved_near_the_end_of_the_branch_and_grow_again():
     assembly, start, load, _ = lee()
     steps = []
-    advance(assembly, start, forces(load), end=2.4, report=lambda share, found: steps.append((share, found.stable)))
+    advance(
+        assembly,
+        start,
+        forces(load),
+        end=2.4,
+        report=lambda share, found: steps.append((share, found.stable)),
+    )
     widths = np.diff([0.0] + [share for share, _ in steps])
     assert widths.max() == pytest.approx(0.25)
     assert widths[:-1].min() < 0.1

@@ -1,17 +1,19 @@
-"""What must hold of every network: objectivity, forces as gradient and tangent as derivative, and exact model files."""
+"""What must hold of every network: objectivity, forces as gradient and tangent as derivative, and exact model
+files.
+"""
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shellform.structure import rotation
-from shellform.structure.assembly import Assembly
-from shellform.structure.beam import make_beams
-from shellform.structure.cable import make_cables
+from shellform.structure.elements import rotation
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import State, from_vectors, moved
 from shellform.structure.model import Model, read_model, write_model
 from shellform.structure.network import Network
-from shellform.structure.state import State, from_vectors, moved
+from shellform.structure.solve.assembly import Assembly
 
 few = settings(max_examples=15, deadline=None)
 seeds = st.integers(0, 2**32 - 1)
@@ -21,17 +23,27 @@ vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array)
 
 @st.composite
 def networks(draw):
-    """Beams along a chain and across it, cables taut and slack, bent and turned: beams, cables, all freedoms free, a state."""
+    """Beams along a chain and across it, cables taut and slack, bent and turned: beams, cables, all freedoms
+    free, a state.
+    """
     chance, count, bend = np.random.default_rng(draw(seeds)), draw(st.integers(3, 9)), draw(sizes)
-    nodes = np.column_stack([np.arange(count), np.zeros((count, 2))]) + 0.3 * chance.uniform(-1.0, 1.0, (count, 3))
+    nodes = np.column_stack([np.arange(count), np.zeros((count, 2))]) + 0.3 * chance.uniform(
+        -1.0, 1.0, (count, 3)
+    )
     ends = [[k, k + 1] for k in range(count - 1)] + [[k, k + 2] for k in range(0, count - 2, 2)]
-    stiffness = {name: chance.uniform(0.5, 20.0, len(ends)) for name in ("axial", "torsion", "bending_y", "bending_z")}
+    stiffness = {
+        name: chance.uniform(0.5, 20.0, len(ends)) for name in ("axial", "torsion", "bending_y", "bending_z")
+    }
     beams = make_beams(nodes, ends, z_axis=[[0.1, 0.2, 1.0]] * len(ends), **stiffness)
-    state = from_vectors(nodes + 0.1 * bend * chance.normal(size=nodes.shape), 0.4 * bend * chance.normal(size=nodes.shape))
+    state = from_vectors(
+        nodes + 0.1 * bend * chance.normal(size=nodes.shape), 0.4 * bend * chance.normal(size=nodes.shape)
+    )
     tied = np.array([[0, count - 1], [0, 2], [1, count - 1]])
     lengths = np.linalg.norm(np.diff(state.positions[tied], axis=1)[:, 0], axis=1)
     # Well taut or well slack: at the corner between them there is no derivative.
-    rest = lengths * np.where(chance.random(3) < 0.5, chance.uniform(0.6, 0.95, 3), chance.uniform(1.05, 1.4, 3))
+    rest = lengths * np.where(
+        chance.random(3) < 0.5, chance.uniform(0.6, 0.95, 3), chance.uniform(1.05, 1.4, 3)
+    )
     cables = make_cables(tied, rest_length=rest, stiffness=chance.uniform(1.0, 50.0, 3))
     return nodes, beams, cables, state
 
@@ -53,7 +65,10 @@ def test_a_rigid_body_motion_leaves_energy_and_local_forces_and_turns_the_nodal_
     turn = rotation.matrices(rotation.from_vectors(spin[None]))[0]
     spins = np.hstack([np.zeros_like(state.positions), np.tile(spin, (len(state.positions), 1))])
     other = State(state.positions @ turn.T + shift, moved(state, spins).quaternions)
-    before, after = assembly(network).evaluate(state, tangent=False), assembly(network).evaluate(other, tangent=False)
+    before, after = (
+        assembly(network).evaluate(state, tangent=False),
+        assembly(network).evaluate(other, tangent=False),
+    )
     scale = max(before.largest, 1.0)
     assert after.energy == pytest.approx(before.energy, rel=1e-10, abs=1e-12)
     np.testing.assert_allclose(beams.local_forces(other), beams.local_forces(state), atol=1e-11 * scale)
@@ -89,7 +104,9 @@ def test_the_tangent_of_the_network_is_symmetric_and_the_derivative_of_its_force
     state, whole = network[-1], assembly(network)
     one, two = np.random.default_rng(seed).uniform(-1.0, 1.0, (2, len(state.positions), 6))
     along = whole.force_along(state, one)
-    assert (two * along).sum() == pytest.approx((one * whole.force_along(state, two)).sum(), rel=1e-10, abs=1e-9)
+    assert (two * along).sum() == pytest.approx(
+        (one * whole.force_along(state, two)).sum(), rel=1e-10, abs=1e-9
+    )
     # Spins don't commute: the module's docstring of beams.
     expected = along.copy()
     expected[:, 3:] -= 0.5 * np.cross(whole.evaluate(state, tangent=False).force[:, 3:], one[:, 3:])
@@ -110,13 +127,20 @@ def test_model_files_give_back_every_number(tmp_path_factory, network, seed, nam
     file = tmp_path_factory.mktemp("model") / "model.json"
     write_model(file, model)
     again = read_model(file)
-    for part, names in (("beams", ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length")), ("cables", ("ends", "stiffness", "rest_length"))):
+    for part, names in (
+        ("beams", ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length")),
+        ("cables", ("ends", "stiffness", "rest_length")),
+    ):
         for each in names:
-            np.testing.assert_array_equal(getattr(getattr(again.network, part), each), getattr(getattr(model.network, part), each), each)
+            np.testing.assert_array_equal(
+                getattr(getattr(again.network, part), each), getattr(getattr(model.network, part), each), each
+            )
     for each in ("nodes", "fixed", "imposed"):
         np.testing.assert_array_equal(getattr(again.network, each), getattr(model.network, each), each)
     np.testing.assert_array_equal(again.loads[name], load)
     np.testing.assert_array_equal(again.start.positions, state.positions)
-    np.testing.assert_allclose(again.network.beams.frames, beams.frames, atol=1e-15)  # made orthonormal as they are read
+    np.testing.assert_allclose(
+        again.network.beams.frames, beams.frames, atol=1e-15
+    )  # made orthonormal as they are read
     np.testing.assert_allclose(again.start.rotations, state.rotations, atol=1e-14)
     assert again.supported == (0,)

@@ -4,26 +4,8 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.structure import sparse
-from shellform.structure.beam import make_beams
-from shellform.structure.cable import make_cables
-from shellform.structure.equilibrium import find_equilibrium
-from shellform.structure.network import Network, assemble
-from shellform.structure.results import end_stress, end_stress_by_force, read_sections, utilisation
-from shellform.structure.sections import (
-    Material,
-    Rectangle,
-    Round,
-    Tube,
-    isotropic,
-    mass_per_length,
-    stiffness,
-    stiffness_by_size,
-    stress,
-    stress_by_force,
-    stress_by_size,
-)
-from shellform.structure.sensitivity import (
+from shellform.structure.answers.results import end_stress, end_stress_by_force, read_sections, utilisation
+from shellform.structure.answers.sensitivity import (
     by_load,
     by_rest_length,
     by_stiffness,
@@ -37,7 +19,25 @@ from shellform.structure.sensitivity import (
     stress_rows,
     tension_rows,
 )
-from shellform.structure.state import at_rest
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.sections import (
+    Material,
+    Rectangle,
+    Round,
+    Tube,
+    isotropic,
+    mass_per_length,
+    stiffness,
+    stiffness_by_size,
+    stress,
+    stress_by_force,
+    stress_by_size,
+)
+from shellform.structure.elements.state import at_rest
+from shellform.structure.network import Network, assemble
+from shellform.structure.solve import factorisation
+from shellform.structure.solve.equilibrium import find_equilibrium
 
 GFRP = isotropic(young=40e9, poisson=0.25, density=1900.0, strength=255e6)
 
@@ -57,7 +57,12 @@ def test_a_tube_without_a_hole_is_a_round_rod():
 
 @pytest.mark.parametrize(
     "make",
-    [lambda r: Round(r, GFRP), lambda r, t: Tube(r, t, GFRP), lambda b, h: Rectangle(b, h, GFRP), lambda h, b: Rectangle(b, h, GFRP)],
+    [
+        lambda r: Round(r, GFRP),
+        lambda r, t: Tube(r, t, GFRP),
+        lambda b, h: Rectangle(b, h, GFRP),
+        lambda h, b: Rectangle(b, h, GFRP),
+    ],
     ids=["round", "tube", "wide", "tall"],
 )
 def test_the_derivatives_of_stiffness_pass_the_taylor_test(make):
@@ -118,14 +123,19 @@ def test_bad_section_files_are_refused(tmp_path, text, message):
 
 def test_section_files_are_read(tmp_path):
     file = tmp_path / "sections.toml"
-    file.write_text("[rod]\nshape='tube'\nradius=0.02\nthickness=0.003\nyoung=40e9\nshear=4e9\nstrength=2e8\n", encoding="utf-8")
+    file.write_text(
+        "[rod]\nshape='tube'\nradius=0.02\nthickness=0.003\nyoung=40e9\nshear=4e9\nstrength=2e8\n",
+        encoding="utf-8",
+    )
     assert read_sections(file)["rod"] == Tube(0.02, 0.003, Material(40e9, 4e9, 0.0, 2e8))
 
 
 def frame(radius=0.012, connector=50.0, ratio=0.98):
     """A clamped, bent cantilever of rods with a connector in the middle and two prestressed cables."""
     angle = np.linspace(0.0, 1.0, 9)
-    points = np.vstack([np.column_stack([np.sin(angle), 0.1 * angle**2, 1.0 - np.cos(angle)]), [[0.8, -0.6, 0.0]]])
+    points = np.vstack(
+        [np.column_stack([np.sin(angle), 0.1 * angle**2, 1.0 - np.cos(angle)]), [[0.8, -0.6, 0.0]]]
+    )
     ends = [[k, k + 1] for k in range(8)]
     section = Round(radius, GFRP)
     rod, joint = stiffness(section), (1e6, 40.0, connector, connector)
@@ -182,7 +192,9 @@ def test_sensitivities_to_rest_length_radius_connector_and_load_match_solved_nei
     partial[8:, 3] = by_connector.local_forces(state).ravel()
     picked = rows(assembly, network, state)
     total = gradients(response, picked, partial)
-    np.testing.assert_allclose(partial + direct(response, picked), total, rtol=1e-9, atol=1e-9 * np.abs(total).max())
+    np.testing.assert_allclose(
+        partial + direct(response, picked), total, rtol=1e-9, atol=1e-9 * np.abs(total).max()
+    )
 
     length = network.cables.rest_length
     variations = [
@@ -191,11 +203,14 @@ def test_sensitivities_to_rest_length_radius_connector_and_load_match_solved_nei
     ]
     for step, build, column in variations:
         ahead, behind = build(step), build(-step)
-        slope = (measured(ahead, solved(ahead, load), section) - measured(behind, solved(behind, load), section)) / (2 * step)
+        slope = (
+            measured(ahead, solved(ahead, load), section) - measured(behind, solved(behind, load), section)
+        ) / (2 * step)
         np.testing.assert_allclose(total[:, column], slope, rtol=1e-4, atol=1e-6 * np.abs(slope).max())
     step = 1e-3
     slope = (
-        measured(network, solved(network, (1 + step) * load), section) - measured(network, solved(network, (1 - step) * load), section)
+        measured(network, solved(network, (1 + step) * load), section)
+        - measured(network, solved(network, (1 - step) * load), section)
     ) / (2 * step)
     np.testing.assert_allclose(total[:, 4], slope, rtol=1e-4, atol=1e-6 * np.abs(slope).max())
     for k in range(2):
@@ -205,7 +220,11 @@ def test_sensitivities_to_rest_length_radius_connector_and_load_match_solved_nei
             rest = length.copy()
             rest[k] += sign * step
             other = Network(
-                network.nodes, network.beams, make_cables(network.cables.ends, rest_length=rest, stiffness=2000.0), network.fixed, network.imposed
+                network.nodes,
+                network.beams,
+                make_cables(network.cables.ends, rest_length=rest, stiffness=2000.0),
+                network.fixed,
+                network.imposed,
             )
             found.append(measured(other, solved(other, load), section))
         slope = (found[0] - found[1]) / (2 * step)
@@ -224,7 +243,9 @@ def test_stresses_answer_to_the_radius_and_the_load_as_solved_neighbours_do():
     for end in range(2):
         rates = stress_by_size(section, forces[:, 0], forces[:, 2 + 3 * end], forces[:, 3 + 3 * end])[0]
         partial[end::2, 0] += np.where(network.beams.kind == 0, rates, 0.0)
-    total = gradients(response, stress_rows(assembly, state, network.beams, {"rod": section}).toarray(), partial)
+    total = gradients(
+        response, stress_rows(assembly, state, network.beams, {"rod": section}).toarray(), partial
+    )
 
     def stresses(model, shape, under):
         return end_stress(model.beams, model.beams.local_forces(solved(model, under)), {"rod": shape}).ravel()
@@ -238,7 +259,11 @@ def test_stresses_answer_to_the_radius_and_the_load_as_solved_neighbours_do():
     np.testing.assert_allclose(total[rods, 1], slope[rods], rtol=1e-4, atol=1e-5 * np.abs(slope[rods]).max())
 
 
-@pytest.mark.parametrize("section", [Round(0.01, GFRP), Tube(0.01, 0.002, GFRP), Rectangle(0.02, 0.007, GFRP)], ids=lambda s: type(s).__name__)
+@pytest.mark.parametrize(
+    "section",
+    [Round(0.01, GFRP), Tube(0.01, 0.002, GFRP), Rectangle(0.02, 0.007, GFRP)],
+    ids=lambda s: type(s).__name__,
+)
 def test_the_derivatives_of_stress_pass_the_taylor_test(section):
     at = np.array([120.0, -3.0, 2.0])
     by_force = np.array(stress_by_force(section, *at))
@@ -251,7 +276,9 @@ def test_the_derivatives_of_stress_pass_the_taylor_test(section):
     for k, size in enumerate(section.sizes):
         sizes = list(section.sizes)
         sizes[k] = size * (1 + 1e-6)
-        assert stress(type(section)(*sizes, GFRP), *at) - value == pytest.approx(by_size[k] * size * 1e-6, rel=1e-4)
+        assert stress(type(section)(*sizes, GFRP), *at) - value == pytest.approx(
+            by_size[k] * size * 1e-6, rel=1e-4
+        )
 
 
 def test_the_predicted_state_is_right_to_first_order():
@@ -270,14 +297,19 @@ def test_stress_and_utilisation_follow_the_section_of_each_kind():
     forces = network.beams.local_forces(solved(network, load))
     found = end_stress(network.beams, forces, {"rod": section})
     assert np.isnan(found[4]).all()
-    assert found[0, 0] == pytest.approx(abs(forces[0, 0]) / section.constants[0] + np.hypot(forces[0, 2], forces[0, 3]) * 0.012 / section.constants[2])
+    assert found[0, 0] == pytest.approx(
+        abs(forces[0, 0]) / section.constants[0]
+        + np.hypot(forces[0, 2], forces[0, 3]) * 0.012 / section.constants[2]
+    )
     used = utilisation(network.beams, forces, {"rod": section})
     assert used[0] == pytest.approx(found[0].max() / 255e6)
     assert np.isnan(used[4])
 
 
-@pytest.mark.parametrize("solver", sparse.installed())
-def test_tensions_by_rest_lengths_through_the_freedoms_they_touch_are_those_of_the_whole_solution(solver, monkeypatch):
+@pytest.mark.parametrize("solver", factorisation.installed())
+def test_tensions_by_rest_lengths_through_the_freedoms_they_touch_are_those_of_the_whole_solution(
+    solver, monkeypatch
+):
     monkeypatch.setenv("SHELLFORM_SOLVER", solver)
     network, load, _ = frame()
     state, assembly = solved(network, load), assemble(network)
@@ -285,5 +317,7 @@ def test_tensions_by_rest_lengths_through_the_freedoms_they_touch_are_those_of_t
     picked = tension_rows(assembly, state, network.cables)
     whole = picked @ state_by_design(response)
     for _ in range(2):  # the second time with the same freedoms
-        np.testing.assert_allclose(direct(response, picked), whole, rtol=1e-9, atol=1e-10 * np.abs(whole).max())
+        np.testing.assert_allclose(
+            direct(response, picked), whole, rtol=1e-9, atol=1e-10 * np.abs(whole).max()
+        )
     np.testing.assert_allclose(direct(response, picked.toarray()), whole, rtol=1e-12)

@@ -7,14 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from shellform.errors import InputError, NotConverged
-from shellform.structure import rotation, sparse
-from shellform.structure.beam import make_beams
-from shellform.structure.cable import make_cables
-from shellform.structure.equilibrium import LostBranch, find_equilibrium
-from shellform.structure.loading import apply_load, limit_factor
+from shellform.structure.elements import rotation
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import at_rest
 from shellform.structure.network import Network, assemble
-from shellform.structure.state import at_rest
-from shellform.structure.verification import chain
+from shellform.structure.solve import factorisation
+from shellform.structure.solve.equilibrium import LostBranch, find_equilibrium
+from shellform.structure.solve.loading import apply_load, limit_factor
+from shellform.verification import chain
 
 small = st.floats(-3.0, 3.0)
 
@@ -37,7 +38,7 @@ def test_no_rotation_is_exactly_none_and_tiny_ones_lose_no_digit():
 def family(matrix):
     lower = sp.csc_array(sp.tril(sp.csc_array(matrix)))
     lower.sort_indices()
-    return sparse.Symmetric(lower.indptr.astype(np.int64), lower.indices.astype(np.int64)), lower.data
+    return factorisation.Symmetric(lower.indptr.astype(np.int64), lower.indices.astype(np.int64)), lower.data
 
 
 def random_matrix(shift):
@@ -45,19 +46,25 @@ def random_matrix(shift):
     return a + a.T + shift * np.eye(30)
 
 
-@pytest.mark.parametrize("backend", sparse.installed())
+@pytest.mark.parametrize("backend", factorisation.installed())
 def test_every_solver_solves_and_counts_negative_eigenvalues(backend, monkeypatch):
     monkeypatch.setenv("SHELLFORM_SOLVER", backend)
     definite, indefinite = random_matrix(30.0), random_matrix(0.0)
     symmetric, values = family(definite)
     right = np.arange(60.0).reshape(30, 2)
-    np.testing.assert_allclose(symmetric.factor(values).solve(right), np.linalg.solve(definite, right), atol=1e-10)
+    np.testing.assert_allclose(
+        symmetric.factor(values).solve(right), np.linalg.solve(definite, right), atol=1e-10
+    )
     symmetric, values = family(indefinite)
-    with pytest.raises(sparse.NotPositiveDefinite):
+    with pytest.raises(factorisation.NotPositiveDefinite):
         symmetric.factor(values)
     factor = symmetric.factor_indefinite(values)
     np.testing.assert_allclose(factor.solve(right), np.linalg.solve(indefinite, right), atol=1e-9)
-    assert factor.negative == symmetric.negative_eigenvalues(values) == (np.linalg.eigvalsh(indefinite) < 0).sum()
+    assert (
+        factor.negative
+        == symmetric.negative_eigenvalues(values)
+        == (np.linalg.eigvalsh(indefinite) < 0).sum()
+    )
 
 
 def test_a_factor_that_was_replaced_refuses_to_solve():
@@ -117,7 +124,9 @@ def test_a_loose_straight_rope_under_load_is_solved():
     fixed[[0, 4], :3] = True
     load = np.zeros((5, 6))
     load[1:4, 2] = -1.0
-    found = find_equilibrium(assemble(Network(points, beams, cables, fixed, np.zeros((5, 6)))), at_rest(points), load)
+    found = find_equilibrium(
+        assemble(Network(points, beams, cables, fixed, np.zeros((5, 6)))), at_rest(points), load
+    )
     assert found.residual < 1e-8
     assert found.state.positions[2, 2] < -0.05
 
@@ -145,24 +154,26 @@ def test_what_nothing_restrains_is_refused_by_name():
 @pytest.mark.parametrize("library", [True, False])
 def test_a_thin_factor_solves_as_the_whole_matrix_does_and_refuses_what_is_not_definite(library, monkeypatch):
     if not library:
-        monkeypatch.setattr(sparse, "cholmod", None)
+        monkeypatch.setattr(factorisation, "cholmod", None)
     count = 40
     rng = np.random.default_rng(1)
-    chain = sp.diags_array([np.full(count, 2.1), -np.ones(count - 1)], offsets=[0, -1], shape=(count, count)).tolil()
+    chain = sp.diags_array(
+        [np.full(count, 2.1), -np.ones(count - 1)], offsets=[0, -1], shape=(count, count)
+    ).tolil()
     chain[30, 3] = -0.05
     lower = sp.csc_array(chain)
     lower.sort_indices()
-    symmetric = sparse.Symmetric(lower.indptr.astype(np.int64), lower.indices.astype(np.int64))
+    symmetric = factorisation.Symmetric(lower.indptr.astype(np.int64), lower.indices.astype(np.int64))
     factor = symmetric.factor_thin(lower.data)
     right = rng.normal(size=(count, 3))
     symmetric.factor_thin(2.0 * lower.data)  # the first one still serves
     assert np.allclose(symmetric.full(lower.data) @ factor.solve(right), right, atol=1e-12)
     assert np.allclose(factor.solve(right[:, 0]), factor.solve(right)[:, 0], atol=1e-14)
-    with pytest.raises(sparse.NotPositiveDefinite):
+    with pytest.raises(factorisation.NotPositiveDefinite):
         symmetric.factor_thin(np.where(lower.data > 1.0, 0.5, lower.data))
 
 
-@pytest.mark.skipif("mkl" not in sparse.installed(), reason="only PARDISO condenses")
+@pytest.mark.skipif("mkl" not in factorisation.installed(), reason="only PARDISO condenses")
 def test_what_is_solved_on_kept_freedoms_is_the_whole_solution_there_and_needs_a_definite_matrix(monkeypatch):
     monkeypatch.setenv("SHELLFORM_SOLVER", "mkl")
     symmetric, values = family(random_matrix(30.0))
@@ -172,6 +183,9 @@ def test_what_is_solved_on_kept_freedoms_is_the_whole_solution_there_and_needs_a
     whole = symmetric.factor(values)
     found = symmetric.solve_kept(values, kept, right[kept])
     assert np.allclose(found, whole.solve(right)[kept], rtol=1e-10)  # the factor still serves
-    for broken in (-values, np.where(np.arange(len(values)) == symmetric.diagonal[5], -1e6, values)):  # among the others, and on the kept
-        with pytest.raises(sparse.NotPositiveDefinite):
+    for broken in (
+        -values,
+        np.where(np.arange(len(values)) == symmetric.diagonal[5], -1e6, values),
+    ):  # among the others, and on the kept
+        with pytest.raises(factorisation.NotPositiveDefinite):
             symmetric.solve_kept(broken, kept, right[kept])

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from shellform.structure import threads
+from shellform.structure.elements import threads
 
 
 @pytest.fixture(params=["1", "2"])
@@ -38,5 +38,9 @@ def test_dense_algebra_within_the_block_runs_on_one_thread():
     np.ones((4, 4)) @ np.ones((4, 4))
     with threads.dense_on_one():
         assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {1}
-    if (os.cpu_count() or 1) > 1 and "OMP_NUM_THREADS" not in os.environ and "OPENBLAS_NUM_THREADS" not in os.environ:
+    if (
+        (os.cpu_count() or 1) > 1
+        and "OMP_NUM_THREADS" not in os.environ
+        and "OPENBLAS_NUM_THREADS" not in os.environ
+    ):
         assert max(each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas") > 1

@@ -4,14 +4,14 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shellform.design.grouping import cut_lengths
+from shellform.case.case import dump_case, load_case
+from shellform.gridshell.grouping import cut_lengths
 from shellform.net.files import load_net, save_net
 from shellform.net.grid import lattice_grid
 from shellform.net.net import Net
 from shellform.net.quality import Quality
-from shellform.structure.state import from_vectors
-from shellform.study.case import dump_case, load_case
-from tests.study.stubs import study_file
+from shellform.structure.elements.state import from_vectors
+from tests.stubs import study_file
 
 few = settings(max_examples=15, deadline=None)
 above = st.floats(1e-6, 1e6)
@@ -21,16 +21,42 @@ lengths = st.lists(st.floats(1e-3, 1e3), min_size=1, max_size=40).map(np.array)
 @st.composite
 def nets(draw):
     """A net of a rectangle of the lattice, at places and with a quality drawn at random."""
-    chance, (rows, columns) = np.random.default_rng(draw(st.integers(0, 2**32 - 1))), draw(st.tuples(*[st.integers(2, 5)] * 2))
+    chance, (rows, columns) = (
+        np.random.default_rng(draw(st.integers(0, 2**32 - 1))),
+        draw(st.tuples(*[st.integers(2, 5)] * 2)),
+    )
     lattice = np.array([[i, j] for i in range(-1, rows - 1) for j in range(columns)])
-    grid = lattice_grid(lattice, spacing=(draw(above), draw(above)), gap=draw(st.floats(1e-9, 1.0)), elements=draw(st.integers(1, 3)))
+    grid = lattice_grid(
+        lattice,
+        spacing=(draw(above), draw(above)),
+        gap=draw(st.floats(1e-9, 1.0)),
+        elements=draw(st.integers(1, 3)),
+    )
     count = len(grid.flat)
     target = from_vectors(chance.normal(size=(count, 3)), chance.normal(size=(count, 3)))
-    scalars = dict(zip(("distance_max", "spacing_error_max", "shear_angle_min", "uncovered_area"), chance.random(4).tolist(), strict=True))
-    others = ("distance_mean", "curvature_max", "curvature_out_of_plane_max", "curvature_in_plane_max", "pull_max", "pull_mean", "gaussian_curvature")
+    scalars = dict(
+        zip(
+            ("distance_max", "spacing_error_max", "shear_angle_min", "uncovered_area"),
+            chance.random(4).tolist(),
+            strict=True,
+        )
+    )
+    others = (
+        "distance_mean",
+        "curvature_max",
+        "curvature_out_of_plane_max",
+        "curvature_in_plane_max",
+        "pull_max",
+        "pull_mean",
+        "gaussian_curvature",
+    )
     maps = {name: chance.normal(size=count) for name in ("distance", "shear_angle", "spacing_error", "pull")}
     quality = Quality(
-        **scalars, **dict.fromkeys(others, draw(st.floats(-1e300, 1e300))), factorisations=3, curvature=chance.normal(size=(4, 2, 2)), **maps
+        **scalars,
+        **dict.fromkeys(others, draw(st.floats(-1e300, 1e300))),
+        factorisations=3,
+        curvature=chance.normal(size=(4, 2, 2)),
+        **maps,
     )
     ends = np.unique(np.concatenate([rod.nodes[[0, -1]] for rod in grid.rods]))
     return Net(grid, target, ends, quality, tuple(draw(st.lists(st.text(max_size=20), max_size=3))))
@@ -44,8 +70,17 @@ def test_net_files_give_back_every_number_and_word(tmp_path_factory, net):
     again = load_net(file)
     assert again.notes == net.notes
     assert again.quality.summary() == net.quality.summary()
-    assert (again.grid.spacing, again.grid.spacing_v, again.grid.gap) == (net.grid.spacing, net.grid.spacing_v, net.grid.gap)
-    for one, two in ((again.target, net.target), (again.grid, net.grid), (again.quality, net.quality), (again, net)):
+    assert (again.grid.spacing, again.grid.spacing_v, again.grid.gap) == (
+        net.grid.spacing,
+        net.grid.spacing_v,
+        net.grid.gap,
+    )
+    for one, two in (
+        (again.target, net.target),
+        (again.grid, net.grid),
+        (again.quality, net.quality),
+        (again, net),
+    ):
         for name, value in vars(two).items():
             if isinstance(value, np.ndarray):
                 np.testing.assert_array_equal(getattr(one, name), value, name)
@@ -66,7 +101,9 @@ def test_case_files_give_back_every_number(tmp_path_factory, data):
         "load": {"force": data.draw(above)},
         "rod": {"radius": data.draw(st.floats(1e-5, 1.0))},
     }
-    changed = case.model_copy(update={name: getattr(case, name).model_copy(update=values) for name, values in drawn.items()})
+    changed = case.model_copy(
+        update={name: getattr(case, name).model_copy(update=values) for name, values in drawn.items()}
+    )
     file = folder / "again.toml"
     file.write_text(dump_case(changed), encoding="utf-8")
     assert load_case(file) == changed

@@ -12,16 +12,16 @@ import time
 
 import pytest
 
+from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
-from shellform.study import run
-from shellform.study.case import load_case
-from shellform.study.folder import read_run
+from shellform.run import run
+from shellform.run.folder import read_run
+from shellform.study.engine import engine, sweep
 from shellform.study.front import Front
-from shellform.study.job import Job, work
+from shellform.study.jobs import Job, work
 from shellform.study.store import Log, flat, read_table
 from shellform.study.studies import run_study
-from shellform.study.sweep import engine, sweep
-from tests.study.stubs import ROOT, deadly, quick, study_file
+from tests.stubs import ROOT, deadly, quick, study_file
 
 GRID = """
 [vary]
@@ -87,7 +87,9 @@ def test_a_study_has_a_row_a_design_and_a_second_call_computes_nothing(tmp_path,
     assert (again.designs, again.failed, again.found) == (12, 3, 12)
     assert set(calls(tmp_path / "out").values()) == {1}
     assert table(tmp_path / "out") == before
-    few = read_table(tmp_path / "out", ["number", "case.net.spacing", "cables"], [("cables", "<", 46), ("cables", ">", 42)])
+    few = read_table(
+        tmp_path / "out", ["number", "case.net.spacing", "cables"], [("cables", "<", 46), ("cables", ">", 42)]
+    )
     assert few.to_pydict() == {"number": [1], "case.net.spacing": [0.1], "cables": [44]}
     seconds = (tmp_path / "out/seconds.csv").read_text()
     assert seconds.count(",here,here,0.01\n") == 12
@@ -115,7 +117,10 @@ def test_equal_designs_are_computed_once_and_new_ones_alone_are_added(tmp_path, 
 
 
 def test_designs_that_are_refused_have_a_row_with_the_reason(tmp_path, on_two):
-    file = study_file(tmp_path, "[vary]\nnet.spacing = [0.1, 0.003]\nsurface.dimensions.height = [0.2, 0.1]\nrod.wall = [0.0005, 0.02]\n")
+    file = study_file(
+        tmp_path,
+        "[vary]\nnet.spacing = [0.1, 0.003]\nsurface.dimensions.height = [0.2, 0.1]\nrod.wall = [0.0005, 0.02]\n",
+    )
     found = run_study(file, tmp_path / "out", work=quick)
     assert (found.designs, found.failed) == (8, 6)
     reasons = {row["reason"] for row in rows(tmp_path / "out")}
@@ -162,7 +167,9 @@ def study_process(file, folder, work):
     script = folder.parent / "go.py"
     script.write_text(code)
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.Popen([sys.executable, str(script)], env=environment, start_new_session=True, stderr=subprocess.DEVNULL)
+    return subprocess.Popen(
+        [sys.executable, str(script)], env=environment, start_new_session=True, stderr=subprocess.DEVNULL
+    )
 
 
 def wait_for_rows(folder, count):
@@ -193,8 +200,20 @@ def test_a_study_killed_in_the_middle_goes_on_and_ends_with_the_same_bytes(tmp_p
 
 
 def test_ctrl_c_stops_a_study_with_130_and_keeps_its_table(tmp_path):
-    file = study_file(tmp_path, "until = 'net'\n[vary]\nnet.spacing = { low = 0.11, high = 0.13, count = 200 }\n")
-    command = [sys.executable, "-m", "shellform", "study", str(file), "--output", str(tmp_path / "out"), "--workers", "2"]
+    file = study_file(
+        tmp_path, "until = 'net'\n[vary]\nnet.spacing = { low = 0.11, high = 0.13, count = 200 }\n"
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "shellform",
+        "study",
+        str(file),
+        "--output",
+        str(tmp_path / "out"),
+        "--workers",
+        "2",
+    ]
     job = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT, start_new_session=True)
     wait_for_rows(tmp_path / "out", 3)
     os.killpg(job.pid, signal.SIGINT)
@@ -262,11 +281,14 @@ def test_a_study_stops_where_the_disk_is_full_and_goes_on_once_there_is_room(tmp
 
 
 def test_two_studies_do_not_work_in_one_folder(tmp_path, on_two):
-    from shellform.study.job import locked
+    from shellform.study.jobs import locked
 
     file = study_file(tmp_path, GRID)
     (tmp_path / "out").mkdir()
-    with locked(tmp_path / "out/lock", wait=False), pytest.raises(InputError, match="another study is at work here"):
+    with (
+        locked(tmp_path / "out/lock", wait=False),
+        pytest.raises(InputError, match="another study is at work here"),
+    ):
         run_study(file, tmp_path / "out", work=quick)
 
 
@@ -318,7 +340,14 @@ def test_the_front_holds_what_nothing_beats_and_keeps_limits():
 
 
 def test_summaries_become_columns():
-    tree = {"a": {"b": 1, "c": [1.0, 2.0]}, "d": ["x", "y"], "e": None, "f": [[1]], "g": True, "h": list(range(9))}
+    tree = {
+        "a": {"b": 1, "c": [1.0, 2.0]},
+        "d": ["x", "y"],
+        "e": None,
+        "f": [[1]],
+        "g": True,
+        "h": list(range(9)),
+    }
     assert flat(tree) == {"a.b": 1, "a.c.0": 1.0, "a.c.1": 2.0, "d": "x; y", "g": True}
 
 
@@ -335,7 +364,7 @@ def test_dashboard_and_scheduler_listen_on_loopback_alone(two):
 
 def test_workers_have_one_thread_each(two):
     def threads():
-        from shellform.structure.threads import cores
+        from shellform.structure.elements.threads import cores
 
         return cores(), {os.environ[f"{name}_NUM_THREADS"] for name in ("OMP", "MKL", "OPENBLAS", "NUMBA")}
 
@@ -352,10 +381,15 @@ def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(t
     assert [row["status"] for row in told] == 4 * ["done"], [row["reason"] for row in told]
     # The surface is shared by all, the first equilibria by two each; nets go with these.
     assert len(list((tmp_path / "out/stages").iterdir())) == 3
-    alone = study_file(tmp_path / "alone", 'designs = [{ optimise.misfit = 0.4, optimise.cable_force = 0.6, net.spacing = 0.13 }]')
+    alone = study_file(
+        tmp_path / "alone",
+        "designs = [{ optimise.misfit = 0.4, optimise.cable_force = 0.6, net.spacing = 0.13 }]",
+    )
     run_study(alone, tmp_path / "alone/out")
     mine, theirs = rows(tmp_path / "out")[3], rows(tmp_path / "alone/out")[0]
-    assert {name: mine[name] for name in ("key", "misfit", "cables")} == {name: theirs[name] for name in ("key", "misfit", "cables")}
+    assert {name: mine[name] for name in ("key", "misfit", "cables")} == {
+        name: theirs[name] for name in ("key", "misfit", "cables")
+    }
     # The page links to a page of each of the best.
     linked = set(re.findall(r'href="(runs/[^"]+)"', (tmp_path / "out/study.html").read_text()))
     assert linked
@@ -366,7 +400,9 @@ def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(t
     damaged = tmp_path / "out/runs" / mine["key"]
     (damaged / "net.npz").write_bytes(b"")
     stages = json.loads((damaged / "stages.json").read_text())
-    (damaged / "stages.json").write_text(json.dumps({name: stages[name] for name in ("surface", "net", "initial")}))
+    (damaged / "stages.json").write_text(
+        json.dumps({name: stages[name] for name in ("surface", "net", "initial")})
+    )
     outcome = work(Job(mine["key"], kept.case, "optimise", str(damaged)))
     assert outcome["status"] == "done", outcome["reason"]
     assert outcome["summary"]["designs"]["optimised"]["cables"] == int(mine["cables"])
@@ -415,5 +451,11 @@ def test_outcomes_come_as_they_are_ready_and_jobs_are_drawn_as_they_are_needed(t
 def test_workers_can_be_threads_of_one_process_to_try_out_the_engine(tmp_path):
     case = load_case(study_file(tmp_path, "").with_name("dome.toml"))
     with engine(workers=3, processes=False) as threads:
-        found = [each for batch in sweep(threads, (Job(f"{k:032d}", case, "net", str(tmp_path / f"{k}")) for k in range(9)), quick) for each in batch]
+        found = [
+            each
+            for batch in sweep(
+                threads, (Job(f"{k:032d}", case, "net", str(tmp_path / f"{k}")) for k in range(9)), quick
+            )
+            for each in batch
+        ]
     assert sorted(each["key"] for each in found) == [f"{k:032d}" for k in range(9)]

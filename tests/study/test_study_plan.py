@@ -6,7 +6,7 @@ import pytest
 from shellform.errors import InputError
 from shellform.study.expressions import evaluate
 from shellform.study.plan import changes, length, read_study, resolved
-from tests.study.stubs import study_file
+from tests.stubs import study_file
 
 ENTRIES = {"net.spacing": 0.055, "rod.radius": 1e-3}
 
@@ -145,8 +145,14 @@ def test_designs_can_be_listed_and_surfaces_taken_from_a_folder(tmp_path):
         ("[vary]\nnet.spacing = [0.1]\n[set]\nnet.spacing = 0.1", "more than one of"),
         ("method = 'latin'\n[vary]\nnet.spacing = [0.1]", "needs a count"),
         ("method = 'latin'\ncount = 3", "needs entries under [vary]"),
-        ("method = 'search'\ncount = 3\n[vary]\nnet.spacing = [0.1]\n[column]\na = 'b'", "needs an [objective]"),
-        ("method = 'search'\ncount = 3\ndesigns = [{}]\n[vary]\nnet.spacing = [0.1]", "makes its own designs"),
+        (
+            "method = 'search'\ncount = 3\n[vary]\nnet.spacing = [0.1]\n[column]\na = 'b'",
+            "needs an [objective]",
+        ),
+        (
+            "method = 'search'\ncount = 3\ndesigns = [{}]\n[vary]\nnet.spacing = [0.1]",
+            "makes its own designs",
+        ),
         ("[objective]\ndepth = 'min'", "'depth' is no column"),
         ("[function]\njoint.gap = 'cable.force'", "no number of the case"),
         ("[function]\njoint.gap = 'net.spacing'\nnet.spacing = 'joint.gap'", "follows from itself"),
@@ -156,8 +162,14 @@ def test_designs_can_be_listed_and_surfaces_taken_from_a_folder(tmp_path):
         ("[vary]\nsurface.file = { files = '*.step' }", "no such file"),
         ("[vary]\nsurface.file = { files = '**x' }", "surface.file"),
         ("[vary]\nsurface.file = ['../other.obj']", "leads out of"),
-        ("[vary]\ncable.stiffness = { low = 1, high = 2, count = 99999999999999999999 }", "less than or equal to 1000000"),
-        ("[vary]\ncable.stiffness = { low = 1, high = 2, count = 2000 }\ncable.force_max = { low = 1, high = 2, count = 2000 }", "designs; up to"),
+        (
+            "[vary]\ncable.stiffness = { low = 1, high = 2, count = 99999999999999999999 }",
+            "less than or equal to 1000000",
+        ),
+        (
+            "[vary]\ncable.stiffness = { low = 1, high = 2, count = 2000 }\ncable.force_max = { low = 1, high = 2, count = 2000 }",
+            "designs; up to",
+        ),
     ],
 )
 def test_bad_study_files_are_refused_by_entry(tmp_path, text, words):

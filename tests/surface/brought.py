@@ -1,5 +1,5 @@
-"""Files as designers bring them, written by other programs and libraries than shellform: in mm, cm, feet and m, y up and z up,
-clean and dirty.
+"""Files as designers bring them, written by other programs and libraries than shellform: in mm, cm, feet and
+m, y up and z up, clean and dirty.
 """
 
 import json
@@ -24,7 +24,9 @@ DATA, SURFACES = ROOT / "tests/data", ROOT / "surfaces"
 
 @dataclass(frozen=True)
 class Brought:
-    """A file, `make`-n in a folder; what has to be stated of it; the `spacing`, m, of a net on it and its `angle`, degrees."""
+    """A file, `make`-n in a folder; what has to be stated of it; the `spacing`, m, of a net on it and its
+    `angle`, degrees.
+    """
 
     make: Callable[[Path], Path]
     spacing: float
@@ -90,13 +92,20 @@ def barrel_brep(folder):
     """An extrusion: a flat arc drawn out, millimetres, as a Rhino brep of one face."""
     model = rhino_model("Millimeters")
     points = [rhino3dm.Point3d(*p) for p in [(-4000, 0, 0), (0, 0, 1800), (4000, 0, 0)]]
-    rhino_add(model, "Shell", rhino3dm.Extrusion.Create(rhino3dm.Arc(*points).ToNurbsCurve(), 6000.0, False), "barrel")
+    rhino_add(
+        model,
+        "Shell",
+        rhino3dm.Extrusion.Create(rhino3dm.Arc(*points).ToNurbsCurve(), 6000.0, False),
+        "barrel",
+    )
     model.Write(str(folder / "barrel.3dm"), 7)
     return folder / "barrel.3dm"
 
 
 def dirty_stl(folder):
-    """The paper-scale vault in millimetres and y up, as loose triangles in single precision, every seventh turned over, some twice."""
+    """The paper-scale vault in millimetres and y up, as loose triangles in single precision, every seventh
+    turned over, some twice.
+    """
     vault = cad.build_surface(SURFACES / "vault.py", size=0.02)
     faces = vault.triangles.copy()
     faces[::7] = faces[::7, ::-1]
@@ -116,7 +125,9 @@ def ply_in_centimetres(folder):
 
 
 def clipped_vtp(folder):
-    """The top of an ellipsoid as PyVista clips it: slivers along the cut, a pole of many triangles, several points at one place."""
+    """The top of an ellipsoid as PyVista clips it: slivers along the cut, a pole of many triangles, several
+    points at one place.
+    """
     whole = pyvista.ParametricEllipsoid(4.0, 3.0, 2.0, u_res=40, v_res=40, w_res=40)
     cut = whole.clip("z", origin=(0, 0, 1.03), invert=False).triangulate()
     cut.extract_surface(algorithm="dataset_surface").save(folder / "half.vtp")
@@ -132,7 +143,11 @@ def second_order_msh(folder):
         grid = np.linspace(-2.0, 2.0, 4)
         # Control points of x² on four uniform Bernstein abscissae over [-2, 2]: 4, -4/3, -4/3, 4.
         square = np.array([4.0, -4 / 3, -4 / 3, 4.0])
-        tags = [occ.addPoint(x, y, (square[i] - square[j]) / 8) for j, y in enumerate(grid) for i, x in enumerate(grid)]
+        tags = [
+            occ.addPoint(x, y, (square[i] - square[j]) / 8)
+            for j, y in enumerate(grid)
+            for i, x in enumerate(grid)
+        ]
         occ.addBSplineSurface(tags, 4)
         occ.synchronize()
         gmsh.option.setNumber("Mesh.MeshSizeMax", 0.25)
@@ -157,7 +172,9 @@ def off_in_millimetres(folder):
 
 
 def two_patches_obj(folder):
-    """Two patches of one paraboloid in centimetres, meshed apart, with a gap of half a millimetre and T-junctions."""
+    """Two patches of one paraboloid in centimetres, meshed apart, with a gap of half a millimetre and
+    T-junctions.
+    """
 
     def patch(x0, x1, columns, rows):
         x, y = np.meshgrid(np.linspace(x0, x1, columns + 1), np.linspace(-300, 300, rows + 1), indexing="ij")
@@ -187,7 +204,9 @@ def solid_step(folder):
 
 
 def arched_step(folder):
-    """A thrust shell on four corners 2.8 m wide, as a fitted B-spline in STEP; its arches are to be closed."""
+    """A thrust shell on four corners 2.8 m wide, as a fitted B-spline in STEP; its arches are to be
+    closed.
+    """
     outline = [(-3, -5), (3, -5), (5, -3), (5, 3), (3, 5), (-3, 5), (-5, 3), (-5, -3)]
     shell = thrust_shell(outline, supports=[(1, 2), (3, 4), (5, 6), (7, 0)], rise=2.5, size=0.4)
     cad.write_fitted(folder / "arches.step", shell)
@@ -200,15 +219,20 @@ def compas_y_up(folder):
     return folder / "mesh.json"
 
 
-# Spacings: the chord of a segment s under a curvature κ is shorter by (κs)²/24, so that κs has to stay below 0.3 for half a per cent.
+# Spacings: the chord of a segment s under a curvature κ is shorter by (κs)²/24, so that κs has to stay below
+# 0.3 for half a per cent.
 BROUGHT = {
     "compas_fd hypar, OBJ, m": Brought(lambda folder: SURFACES / "hypar.obj", 0.35),
-    "RhinoVAULT with a hole, JSON, filled": Brought(lambda folder: DATA / "rhinovault_holes.json", 0.6, {"fill": "all"}),
+    "RhinoVAULT with a hole, JSON, filled": Brought(
+        lambda folder: DATA / "rhinovault_holes.json", 0.6, {"fill": "all"}
+    ),
     "RhinoVAULT pillow, JSON": Brought(lambda folder: DATA / "rhinovault_pillow_vault.json", 0.7),
     "dome, STEP, mm": Brought(lambda folder: DATA / "dome_mm.step", 0.055),
     "dome, IGES, mm": Brought(lambda folder: DATA / "dome_mm.igs", 0.055),
     "dome, BREP, mm stated": Brought(lambda folder: DATA / "dome_mm.brep", 0.055, {"unit": "mm"}),
-    "compas_tna plate, Rhino 3DM, mm": Brought(lambda folder: DATA / "tna_tutorial.3dm", 0.001, {"object": "mesh 1"}),
+    "compas_tna plate, Rhino 3DM, mm": Brought(
+        lambda folder: DATA / "tna_tutorial.3dm", 0.001, {"object": "mesh 1"}
+    ),
     "NURBS by layer, Rhino 3DM, cm": Brought(nurbs_in_centimetres, 0.8, {"layer": "shell"}),
     "mesh, Rhino 3DM, ft": Brought(mesh_in_feet, 0.6),
     "barrel, Rhino 3DM, mm, y up": Brought(barrel_brep, 0.5),

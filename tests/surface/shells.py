@@ -1,5 +1,5 @@
-"""One shell, a saddle-free cap over an oblong plan, as meshes for tests, and files of it written in other ways than shellform's
-own.
+"""One shell, a saddle-free cap over an oblong plan, as meshes for tests, and files of it written in other
+ways than shellform's own.
 """
 
 import base64
@@ -11,7 +11,9 @@ import numpy as np
 def cap(columns=12, rows=8, length=6.0, width=4.0, rise=1.5):
     """Vertices (v, 3), m, and quadrilaterals (q, 4) of a paraboloid on its four corners."""
     x, y = np.meshgrid(np.linspace(-1, 1, columns + 1), np.linspace(-1, 1, rows + 1), indexing="ij")
-    points = np.column_stack([length / 2 * x.ravel(), width / 2 * y.ravel(), rise * (1 - (x**2 + y**2).ravel() / 2)])
+    points = np.column_stack(
+        [length / 2 * x.ravel(), width / 2 * y.ravel(), rise * (1 - (x**2 + y**2).ravel() / 2)]
+    )
     at = np.arange(len(points)).reshape(columns + 1, rows + 1)
     quads = np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
     return points, quads
@@ -40,7 +42,9 @@ def write_off(file, points, faces):
     rows = [f"{x!r} {y!r} {z!r}" for x, y, z in points.tolist()] + [
         f"{len(f)} " + " ".join(map(str, f)) for f in faces.tolist()
     ]
-    file.write_text("\n".join(["OFF", f"# a comment\n{len(points)} {len(faces)} 0", *rows]) + "\n", encoding="utf-8")
+    file.write_text(
+        "\n".join(["OFF", f"# a comment\n{len(points)} {len(faces)} 0", *rows]) + "\n", encoding="utf-8"
+    )
     return file
 
 
@@ -62,7 +66,9 @@ def write_stl(file, points, triangles, text=False):
 
 
 def write_gltf(file, points, triangles, translation=(0.0, 0.0, 0.0)):
-    """A glTF with its buffer inside, or a GLB, of y-up points that a node turns a quarter about y and moves."""
+    """A glTF with its buffer inside, or a GLB, of y-up points that a node turns a quarter about y and
+    moves.
+    """
     data = points.astype("<f4").tobytes() + triangles.astype("<u2").tobytes()
     tree = {
         "asset": {"version": "2.0"},
@@ -91,7 +97,9 @@ def write_gltf(file, points, triangles, translation=(0.0, 0.0, 0.0)):
     text += b" " * (-len(text) % 4)
     data += b"\0" * (-len(data) % 4)
     size = 12 + 8 + len(text) + 8 + len(data)
-    chunks = np.uint32(len(text)).tobytes() + b"JSON" + text + np.uint32(len(data)).tobytes() + b"BIN\0" + data
+    chunks = (
+        np.uint32(len(text)).tobytes() + b"JSON" + text + np.uint32(len(data)).tobytes() + b"BIN\0" + data
+    )
     file.write_bytes(b"glTF" + np.array([2, size], "<u4").tobytes() + chunks)
     return file
 

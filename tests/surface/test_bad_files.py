@@ -1,5 +1,5 @@
-"""What no shell can be read from is refused with a message that says what is wrong and what to do; foreign readers can't take
-us down.
+"""What no shell can be read from is refused with a message that says what is wrong and what to do; foreign
+readers can't take us down.
 """
 
 import json
@@ -12,8 +12,9 @@ import pytest
 import pyvista
 
 from shellform.errors import InputError
-from shellform.surface import cad, draft, foreign, reading
-from shellform.surface.reading import read_surface
+from shellform.surface import cad
+from shellform.surface.readers import draft, foreign, reading
+from shellform.surface.readers.reading import read_surface
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl
 
 ROOT = Path(__file__).parent.parent.parent
@@ -101,7 +102,11 @@ def test_files_of_points_or_curves_alone_hold_no_faces(tmp_path):
         refused(tmp_path / name, "holds no faces")
     for name in ("lines.vtk", "lines.ply", "lines.msh"):
         kind = {"vtk": "vtk", "ply": "ply", "msh": "gmsh"}[name[-3:]]
-        cells = [("line", np.array([[0, 1], [1, 2]]))] if kind != "ply" else [("triangle", np.zeros((0, 3), dtype=int))]
+        cells = (
+            [("line", np.array([[0, 1], [1, 2]]))]
+            if kind != "ply"
+            else [("triangle", np.zeros((0, 3), dtype=int))]
+        )
         meshio.Mesh(POINTS[:3], cells).write(tmp_path / name, file_format=kind)
         refused(tmp_path / name, "no faces")
     (tmp_path / "none.json").write_text(json.dumps(compas_mesh(POINTS, QUADS[:0])))
@@ -241,12 +246,17 @@ def test_files_beyond_the_stated_limits_are_refused_before_they_are_read(tmp_pat
         ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", ["meshio crashed on it (SIGSEGV)"]),
         ("import os; os._exit(3)", ["meshio failed on it: without a word"]),
         ("raise RuntimeError('no such luck')", ["meshio failed on it: RuntimeError: no such luck"]),
-        ("import numpy; read = lambda *a, **k: numpy.ones(10**15)", ["can't be read as PLY", "Unable to allocate"]),
+        (
+            "import numpy; read = lambda *a, **k: numpy.ones(10**15)",
+            ["can't be read as PLY", "Unable to allocate"],
+        ),
         ("raise MemoryError", ["needs more memory"]),
         ("import time; time.sleep(60)", ["meshio hadn't read it after 2 s"]),
     ],
 )
-def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(tmp_path, monkeypatch, code, words):
+def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(
+    tmp_path, monkeypatch, code, words
+):
     file = tmp_path / "a.ply"
     meshio.Mesh(POINTS, [("quad", QUADS)]).write(file)
     (tmp_path / "meshio.py").write_text(code)
@@ -265,7 +275,11 @@ def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(tmp_
 def test_a_refusal_in_the_reader_s_process_comes_back_whole():
     with pytest.raises(InputError) as caught:
         foreign.read_foreign(DATA / "dome_mm.step", "step", {**SETTINGS, "unit": "mm"})
-    assert (caught.value.where, caught.value.value, caught.value.remedy) == ("surface.unit", "mm", "Leave the unit out.")
+    assert (caught.value.where, caught.value.value, caught.value.remedy) == (
+        "surface.unit",
+        "mm",
+        "Leave the unit out.",
+    )
 
 
 def test_a_file_that_may_not_be_read_is_refused(tmp_path, monkeypatch):

@@ -1,5 +1,5 @@
-"""Files as designers bring them go to a net unattended, by the functions of the command line; what they must say of themselves
-they say.
+"""Files as designers bring them go to a net unattended, by the functions of the command line; what they must
+say of themselves they say.
 """
 
 import json
@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from shellform.study.check import check_file, net_alone
+from shellform.run.first_look import check_file, net_alone
 from tests.surface.brought import BROUGHT
 
 SPACING_ERROR, DISTANCE = 0.005, 0.01  # of the spacing
@@ -77,7 +77,9 @@ def test_every_file_brought_goes_to_a_net_unattended(tmp_path, name):
 
 
 def folded_cells(net):
-    """Cells of the lattice whose two triangles don't look the same way, or that turn against their neighbours."""
+    """Cells of the lattice whose two triangles don't look the same way, or that turn against their
+    neighbours.
+    """
     place = {tuple(each["lattice"]): np.array(each["target"]) for each in net["crossings"]}
     folded = []
     for (i, j), corner in place.items():

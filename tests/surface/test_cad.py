@@ -108,13 +108,17 @@ def test_a_fresh_process_reads_iges_first_and_prints_nothing():
 @pytest.mark.parametrize("ending", ["step", "igs", "brep"])
 def test_written_geometry_comes_back_with_its_size(tmp_path, ending):
     cad.write_cad(tmp_path / f"dome.{ending}", DOME, height=0.25)
-    np.testing.assert_allclose(cad.import_surface(tmp_path / f"dome.{ending}").size, [0.9, 0.7, 0.25], rtol=1e-3)
+    np.testing.assert_allclose(
+        cad.import_surface(tmp_path / f"dome.{ending}").size, [0.9, 0.7, 0.25], rtol=1e-3
+    )
 
 
 def test_a_file_may_stand_on_its_y_axis(tmp_path):
     text = "def build(gmsh, *, side=1.0):\n    gmsh.model.occ.addRectangle(0, 0, 0, side, 2 * side)\n"
     cad.write_cad(tmp_path / "wall.step", script(tmp_path, text))
-    np.testing.assert_allclose(cad.import_surface(tmp_path / "wall.step", up="y").size, [1.0, 0.0, 2.0], atol=1e-9)
+    np.testing.assert_allclose(
+        cad.import_surface(tmp_path / "wall.step", up="y").size, [1.0, 0.0, 2.0], atol=1e-9
+    )
     with pytest.raises(InputError, match=r"surface\.up"):
         cad.import_surface(tmp_path / "wall.step", up="x")
 
@@ -194,7 +198,10 @@ def test_a_mesh_of_millions_of_triangles_is_refused_before_it_is_made():
         ("build = 3\n", r"has no function build\(gmsh"),
         ("def build(gmsh, *, length): pass\n", "its dimension 'length' has no positive default"),
         ("def build(gmsh, *, length=1.0): 1 / 0\n", "the script fails: ZeroDivisionError"),
-        ("def build(gmsh, *, length=1.0): gmsh.model.occ.addPlaneSurface([7])\n", "the script fails: .*Unknown.* 7"),
+        (
+            "def build(gmsh, *, length=1.0): gmsh.model.occ.addPlaneSurface([7])\n",
+            "the script fails: .*Unknown.* 7",
+        ),
         ("def build(gmsh, *, length=1.0): pass\n", "makes no surface"),
         ("def build(gmsh, *, length=1.0): gmsh.model.occ.addBox(0, 0, 0, 1, 1, 1)\n", "closed"),
     ],
@@ -230,7 +237,9 @@ def test_empty_and_garbage_files_are_refused(tmp_path, ending, capfd):
     file = tmp_path / f"shell.{ending}"
     for content in ("", "this is no CAD file\n" * 5):
         file.write_text(content)
-        with pytest.raises(InputError, match=r"shell\.\w+: (gmsh can't read it|holds nothing).*Open it in a CAD program"):
+        with pytest.raises(
+            InputError, match=r"shell\.\w+: (gmsh can't read it|holds nothing).*Open it in a CAD program"
+        ):
             cad.import_surface(file)
     assert capfd.readouterr().out == ""
 
@@ -288,7 +297,11 @@ def test_missing_system_libraries_are_named_in_one_line(tmp_path):
     code = "import shellform.errors as e\ntry:\n    import shellform.surface.cad\nexcept e.InputError as error:\n    print(error)"
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
     run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": path}
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "PYTHONPATH": path},
     )
     assert "libGL.so.1" in run.stdout
     assert "apt-get install libgl1 libglu1-mesa" in run.stdout
@@ -296,7 +309,9 @@ def test_missing_system_libraries_are_named_in_one_line(tmp_path):
 
 
 def test_a_broken_pipe_does_not_kill_the_process_after_gmsh_was_at_work():
-    """Gmsh gives SIGPIPE its deadly default back; a study's workers that went away then took the study with them."""
+    """Gmsh gives SIGPIPE its deadly default back; a study's workers that went away then took the study with
+    them.
+    """
     code = (
         "import os; from shellform import cad; cad.build_surface('surfaces/dome.py', size=0.1); "
         "out, into = os.pipe(); os.close(out)\n"

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from shellform.surface.extend import extended
-from shellform.surface.locate import Locator
-from shellform.surface.target import make_surface
+from shellform.surface.shape.extension import extended
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.target import make_surface
 
 
 def plate(inside, height, step=0.08):
-    """The surface z = height(x, y) over the grid points for which `inside` holds, with triangles between them."""
+    """The surface z = height(x, y) over the grid points for which `inside` holds, with triangles between
+    them.
+    """
     line = np.arange(-2.0, 2.0 + step / 2, step)
     x, y = (each.ravel() for each in np.meshgrid(line, line))
     keep = inside(x, y)
@@ -31,7 +33,9 @@ def upright(whole, first):
 @pytest.mark.parametrize("waist", [0.3, 0.8])
 @pytest.mark.filterwarnings("ignore:Arrays of 2-dimensional vectors:DeprecationWarning")
 def test_the_strip_past_an_edge_that_turns_inwards_does_not_fold(waist):
-    surface = plate(lambda x, y: np.abs(y) < 1.8 - waist * (1.0 + np.cos(2.0 * x)), lambda x, y: 0.3 * np.cos(x))
+    surface = plate(
+        lambda x, y: np.abs(y) < 1.8 - waist * (1.0 + np.cos(2.0 * x)), lambda x, y: 0.3 * np.cos(x)
+    )
     whole, closed = extended(surface, 0.6)
     assert closed == len(surface.triangles)
     assert upright(whole, closed).min() > 0.0

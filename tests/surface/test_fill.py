@@ -1,4 +1,6 @@
-"""Fills continue the surface with its slope, reproduce what they cut out, and bring open edges down to the ground."""
+"""Fills continue the surface with its slope, reproduce what they cut out, and bring open edges down to the
+ground.
+"""
 
 import numpy as np
 import pytest
@@ -6,12 +8,12 @@ from scipy.spatial import Delaunay
 
 from shellform.errors import InputError
 from shellform.surface import cad
-from shellform.surface.draft import Draft
-from shellform.surface.fill import filled, loops_of
 from shellform.surface.funicular import thrust_shell
-from shellform.surface.mend import mended
-from shellform.surface.plate import bent_heights
-from shellform.surface.reading import surface_of
+from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.fills import filled, loops_of
+from shellform.surface.readers.mend import mended
+from shellform.surface.readers.reading import surface_of
+from shellform.surface.shape.plate import bent_heights
 
 
 def disc(rings, radius=1.0):
@@ -38,10 +40,14 @@ def test_quadratic_heights_have_the_least_bending_exactly():
     middle = plan[edges].mean(axis=1)
     along = plan[edges[:, 1]] - plan[edges[:, 0]]
     normal = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1, keepdims=True)
-    slope = np.column_stack([0.2 + middle[:, 0] - 0.7 * middle[:, 1], -0.1 - 0.7 * middle[:, 0] - 0.4 * middle[:, 1]])
+    slope = np.column_stack(
+        [0.2 + middle[:, 0] - 0.7 * middle[:, 1], -0.1 - 0.7 * middle[:, 0] - 0.4 * middle[:, 1]]
+    )
     found, slopes = bent_heights(plan, faces, known, edges, np.sum(slope * normal, axis=1))
     np.testing.assert_allclose(found, heights, atol=1e-12)
-    np.testing.assert_allclose(slopes, np.column_stack([0.2 + x - 0.7 * y, -0.1 - 0.7 * x - 0.4 * y]), atol=1e-11)
+    np.testing.assert_allclose(
+        slopes, np.column_stack([0.2 + x - 0.7 * y, -0.1 - 0.7 * x - 0.4 * y]), atol=1e-11
+    )
 
 
 @pytest.mark.parametrize(("rings", "bound"), [(6, 0.02), (12, 0.005)])
@@ -97,7 +103,9 @@ def test_the_fill_of_a_hole_in_a_sphere_is_the_sphere_within_a_hundredth_of_its_
 
 
 def folds(draft, closed):
-    """The largest angle, degrees, between triangles of the fill and of the surface that share an edge of the rim, away from feet."""
+    """The largest angle, degrees, between triangles of the fill and of the surface that share an edge of the
+    rim, away from feet.
+    """
     corner = closed.points[closed.triangles]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -141,7 +149,9 @@ def turns(edge):
     """Angles, degrees, by which a closed line in plan turns at its points."""
     along = np.roll(edge, -1, axis=0) - edge
     before = np.roll(along, 1, axis=0)
-    return np.degrees(np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.sum(before * along, axis=1)))
+    return np.degrees(
+        np.arctan2(before[:, 0] * along[:, 1] - before[:, 1] * along[:, 0], np.sum(before * along, axis=1))
+    )
 
 
 def test_the_footprint_turns_little_at_the_feet():
@@ -150,7 +160,9 @@ def test_the_footprint_turns_little_at_the_feet():
     closed = filled(draft, "shell", what="edges")
     footprint = turns(closed.points[loops_of(closed.triangles)[0], :2])
     assert np.abs(corners).max() > 60.0
-    assert np.abs(footprint).max() < 35.0  # not quite in line, where that would reach too far out for the arch's height
+    assert (
+        np.abs(footprint).max() < 35.0
+    )  # not quite in line, where that would reach too far out for the arch's height
 
 
 def test_the_ground_may_lie_lower_than_the_edge():
@@ -184,4 +196,6 @@ def test_what_can_not_be_closed_smoothly_is_refused():
     after = np.roll(at, -1, axis=1)
     quads = np.stack([at[:-1], after[:-1], after[1:], at[1:]], axis=-1).reshape(-1, 4)
     with pytest.raises(InputError, match="too steep to be continued"):
-        surface_of(Draft(points, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])), "chimney", fill="all")
+        surface_of(
+            Draft(points, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])), "chimney", fill="all"
+        )

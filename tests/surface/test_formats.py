@@ -1,4 +1,6 @@
-"""Every format comes out as the same shell, in metres and z up, and what a file holds besides can be chosen from."""
+"""Every format comes out as the same shell, in metres and z up, and what a file holds besides can be chosen
+from.
+"""
 
 import base64
 import json
@@ -11,9 +13,10 @@ import pyvista
 import rhino3dm
 
 from shellform.errors import InputError
-from shellform.surface import cad, rhino
-from shellform.surface.meshes import write_mesh
-from shellform.surface.reading import read_surface
+from shellform.surface import cad
+from shellform.surface.readers import rhino
+from shellform.surface.readers.meshes import write_mesh
+from shellform.surface.readers.reading import read_surface
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
 
 ROOT = Path(__file__).parent.parent.parent
@@ -47,7 +50,9 @@ def test_obj_off_and_both_kinds_of_stl_give_the_same_shell(tmp_path):
         same_shell(read_surface(file))
 
 
-@pytest.mark.parametrize(("name", "binary"), [("a.ply", True), ("a.ply", False), ("a.msh", True), ("a.msh", False)])
+@pytest.mark.parametrize(
+    ("name", "binary"), [("a.ply", True), ("a.ply", False), ("a.msh", True), ("a.msh", False)]
+)
 def test_meshio_s_own_files_come_back(tmp_path, name, binary):
     kind = {"ply": "ply", "msh": "gmsh"}[name[-3:]]
     meshio.Mesh(POINTS, [("quad", QUADS)]).write(tmp_path / name, file_format=kind, binary=binary)
@@ -104,7 +109,11 @@ def test_compas_meshes_of_both_versions_are_read(tmp_path):
         "datatype": "compas.datastructures.Mesh",
         "value": {**new["data"], "dva": new["data"]["default_vertex_attributes"]},
     }
-    del old["value"]["default_vertex_attributes"], old["value"]["facedata"], old["value"]["default_face_attributes"]
+    del (
+        old["value"]["default_vertex_attributes"],
+        old["value"]["facedata"],
+        old["value"]["default_face_attributes"],
+    )
     for name, tree in [("new.json", new), ("old.json", old), ("bare.json", new["data"])]:
         (tmp_path / name).write_text(json.dumps(tree))
         same_shell(read_surface(tmp_path / name))
@@ -128,7 +137,8 @@ def test_faces_without_load_in_a_compas_mesh_are_openings(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("unit", "up", "factor"), [("mm", "z", 1000.0), ("cm", "y", 100.0), ("m", "y", 1.0), ("ft", "z", 1 / 0.3048)]
+    ("unit", "up", "factor"),
+    [("mm", "z", 1000.0), ("cm", "y", 100.0), ("m", "y", 1.0), ("ft", "z", 1 / 0.3048)],
 )
 def test_units_and_axes_are_as_stated(tmp_path, unit, up, factor):
     points = factor * (y_up(POINTS) if up == "y" else POINTS)
@@ -199,7 +209,9 @@ def nurbs_cap(scale=1.0):
         for j in range(3):
             # Bernstein coefficients of 1 - (x² + y²)/2 over [-1, 1]²: x² has 1, -1, 1.
             z = 1.5 * (1 - ((1, -1, 1)[i] + (1, -1, 1)[j]) / 2)
-            surface.Points[i, j] = rhino3dm.Point4d(scale * 3.0 * (i - 1), scale * 2.0 * (j - 1), scale * z, 1.0)
+            surface.Points[i, j] = rhino3dm.Point4d(
+                scale * 3.0 * (i - 1), scale * 2.0 * (j - 1), scale * z, 1.0
+            )
     for knots in (surface.KnotsU, surface.KnotsV):
         for k, value in enumerate((0.0, 0.0, 1.0, 1.0)):
             knots[k] = value
@@ -224,13 +236,17 @@ def test_rhino_s_nurbs_surfaces_keep_their_exact_normals(tmp_path):
     x, y, z = surface.vertices.T
     np.testing.assert_allclose(z, 1.5 * (1 - (x**2 / 9 + y**2 / 4) / 2), atol=1e-9)
     normal = np.column_stack([x / 6, 3 * y / 8, np.ones_like(x)])
-    np.testing.assert_allclose(surface.normals, normal / np.linalg.norm(normal, axis=1, keepdims=True), atol=1e-9)
+    np.testing.assert_allclose(
+        surface.normals, normal / np.linalg.norm(normal, axis=1, keepdims=True), atol=1e-9
+    )
 
 
 def test_rhino_s_rational_surfaces_are_round(tmp_path):
     # The upper half of a sphere's revolution, a brep with poles, on a solid that asks for a face.
     file = rhino_file(
-        tmp_path / "a.3dm", [(rhino3dm.Extrusion.Create(half_circle(2.0), 5.0, False), "Shell", "barrel")], "Meters"
+        tmp_path / "a.3dm",
+        [(rhino3dm.Extrusion.Create(half_circle(2.0), 5.0, False), "Shell", "barrel")],
+        "Meters",
     )
     surface = read_surface(file, size=0.2)
     np.testing.assert_allclose(np.hypot(surface.vertices[:, 0], surface.vertices[:, 2]), 2.0, atol=1e-9)
@@ -250,7 +266,9 @@ def test_a_rhino_sphere_is_closed_and_refused(tmp_path):
 
 def test_rhino_s_trimmed_breps_are_trimmed(tmp_path):
     plane = rhino3dm.Plane(rhino3dm.Point3d(0, 0, 0), rhino3dm.Vector3d(0, 0, 1))
-    disc = rhino3dm.Brep.CreateTrimmedPlane(plane, rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 2.0).ToNurbsCurve())
+    disc = rhino3dm.Brep.CreateTrimmedPlane(
+        plane, rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 2.0).ToNurbsCurve()
+    )
     surface = read_surface(rhino_file(tmp_path / "a.3dm", [(disc, "Shell", "disc")], "Meters"), size=0.05)
     assert surface.area == pytest.approx(np.pi * 4.0, rel=1e-3)
 
@@ -258,7 +276,9 @@ def test_rhino_s_trimmed_breps_are_trimmed(tmp_path):
 def test_rhino_s_patches_that_touch_are_one_surface(tmp_path):
     left, right = nurbs_cap(), nurbs_cap()
     right.Translate(rhino3dm.Vector3d(0, 4.0, 0))
-    surface = read_surface(rhino_file(tmp_path / "a.3dm", [(left, "Shell", ""), (right, "Shell", "")], "Meters"))
+    surface = read_surface(
+        rhino_file(tmp_path / "a.3dm", [(left, "Shell", ""), (right, "Shell", "")], "Meters")
+    )
     np.testing.assert_allclose(surface.size, [6.0, 8.0, 1.5], atol=2e-4)
     assert len(surface.boundary) == 1
 
@@ -270,7 +290,9 @@ def test_layers_and_names_of_a_rhino_file_are_listed_to_choose_from(tmp_path):
         (half_circle(1.0), "Shell", "edge"),
     ]
     file = rhino_file(tmp_path / "a.3dm", shapes, "Meters")
-    with pytest.raises(InputError, match="both meshes and surfaces: 'roof' on layer 'Shell', 'mesh 1' on layer 'Old'"):
+    with pytest.raises(
+        InputError, match="both meshes and surfaces: 'roof' on layer 'Shell', 'mesh 1' on layer 'Old'"
+    ):
         read_surface(file)
     with pytest.raises(InputError, match="There are 'Shell', 'Old'"):
         read_surface(file, layer="Shells")
@@ -287,10 +309,18 @@ def test_rhino_s_blocks_stand_where_their_instances_are(tmp_path):
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
     model.InstanceDefinitions.Add(
-        "roof", "", "", "", rhino3dm.Point3d(0, 0, 0), (rhino_mesh(POINTS, QUADS),), (rhino3dm.ObjectAttributes(),)
+        "roof",
+        "",
+        "",
+        "",
+        rhino3dm.Point3d(0, 0, 0),
+        (rhino_mesh(POINTS, QUADS),),
+        (rhino3dm.ObjectAttributes(),),
     )
     block = model.InstanceDefinitions[0]
-    model.Objects.AddInstanceObject(rhino3dm.InstanceReference(block.Id, rhino3dm.Transform.Translation(50.0, 0.0, 0.0)))
+    model.Objects.AddInstanceObject(
+        rhino3dm.InstanceReference(block.Id, rhino3dm.Transform.Translation(50.0, 0.0, 0.0))
+    )
     model.Write(str(tmp_path / "a.3dm"), 7)
     surface = read_surface(tmp_path / "a.3dm")
     same_shell(surface, atol=1e-5)
@@ -326,7 +356,9 @@ def test_a_surface_written_as_a_mesh_comes_back(tmp_path, ending):
 
 
 def ellipse_on_the_cap(share):
-    """Where the paraboloid of `nurbs_cap` is cut level, as a Rhino curve: the ellipse of half axes 3 and 2 times `share`."""
+    """Where the paraboloid of `nurbs_cap` is cut level, as a Rhino curve: the ellipse of half axes 3 and 2
+    times `share`.
+    """
     circle = rhino3dm.Circle(rhino3dm.Point3d(0, 0, 0), 1.0).ToNurbsCurve()
     circle.Transform(rhino3dm.Transform.Scale(rhino3dm.Plane.WorldXY(), 3.0 * share, 2.0 * share, 1.0))
     circle.Translate(rhino3dm.Vector3d(0, 0, 1.5 * (1 - share**2 / 2)))
@@ -345,7 +377,9 @@ def test_curved_patches_are_cut_at_their_trims_and_holes():
 
 
 def test_a_surface_of_revolution_closes_over_its_seam_and_pole(tmp_path):
-    quarter = rhino3dm.Arc(*[rhino3dm.Point3d(*p) for p in [(3, 0, 0), (3 * 0.5**0.5, 0, 3 * 0.5**0.5), (0, 0, 3)]])
+    quarter = rhino3dm.Arc(
+        *[rhino3dm.Point3d(*p) for p in [(3, 0, 0), (3 * 0.5**0.5, 0, 3 * 0.5**0.5), (0, 0, 3)]]
+    )
     axis = rhino3dm.Line(rhino3dm.Point3d(0, 0, 0), rhino3dm.Point3d(0, 0, 1))
     turned = rhino3dm.RevSurface.Create(quarter.ToNurbsCurve(), axis, 0.0, 2 * np.pi)
     brep = rhino3dm.Brep.CreateFromRevSurface(turned, False, False)

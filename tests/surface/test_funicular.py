@@ -1,4 +1,6 @@
-"""Force densities against closed forms (verification.md, E), and shells that bear a uniform weight by thrust alone."""
+"""Force densities against closed forms (verification.md, E), and shells that bear a uniform weight by thrust
+alone.
+"""
 
 from pathlib import Path
 
@@ -16,7 +18,7 @@ from shellform.surface.funicular import (
     thrust_heights,
     thrust_shell,
 )
-from shellform.surface.reading import read_surface
+from shellform.surface.readers.reading import read_surface
 
 SURFACES = Path(__file__).parent.parent.parent / "surfaces"
 
@@ -64,7 +66,9 @@ def test_every_free_node_of_an_uneven_network_is_in_equilibrium():
     rng = np.random.default_rng(1)
     plan, triangles, fixed = disc(6)
     nodes = np.column_stack([plan, rng.normal(size=len(plan))])
-    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0
+    )
     densities, loads = rng.uniform(0.1, 10.0, len(edges)), rng.normal(size=nodes.shape)
     found = force_density(nodes, edges, densities, loads, fixed)
     pull = densities[:, None] * (found[edges[:, 1]] - found[edges[:, 0]])
@@ -77,7 +81,9 @@ def test_every_free_node_of_an_uneven_network_is_in_equilibrium():
 
 def test_fixed_nodes_alone_stay_where_they_are():
     nodes, edges, loads, _ = line(3, 1.0)
-    np.testing.assert_array_equal(force_density(nodes, edges, np.ones(3), loads, np.ones(4, dtype=bool)), nodes)
+    np.testing.assert_array_equal(
+        force_density(nodes, edges, np.ones(3), loads, np.ones(4, dtype=bool)), nodes
+    )
 
 
 def test_networks_that_have_no_shape_are_refused():
@@ -203,7 +209,9 @@ def test_an_opening_stays_open_on_its_ring():
 
 
 def test_a_load_of_the_plan_needs_no_rounds_and_gives_a_flatter_foot():
-    by_surface, by_plan = (thrust_shell(SQUARE, rise=3.0, size=0.5, load=load) for load in ("surface", "plan"))
+    by_surface, by_plan = (
+        thrust_shell(SQUARE, rise=3.0, size=0.5, load=load) for load in ("surface", "plan")
+    )
     assert by_plan.vertices[:, 2].mean() != pytest.approx(by_surface.vertices[:, 2].mean(), rel=1e-4)
 
 
@@ -229,7 +237,9 @@ def test_plans_for_a_shell_that_make_no_sense_are_refused(change, words):
 def test_fitted_densities_bear_a_shape_that_some_densities_bear():
     rng = np.random.default_rng(3)
     plan, triangles, fixed = disc(6)
-    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0
+    )
     loads = np.column_stack([np.zeros((len(plan), 2)), -rng.uniform(0.5, 1.0, len(plan))])
     flat = np.column_stack([plan, np.zeros(len(plan))])
     shape = force_density(flat, edges, -rng.uniform(1.0, 3.0, len(edges)), loads, fixed)
@@ -245,7 +255,9 @@ def test_no_density_falls_below_the_least_where_the_shape_asks_for_tension():
     plan, triangles, fixed = disc(6)
     radius = np.hypot(*plan.T)
     shape = np.column_stack([plan, (1 - radius**2) * (0.4 + radius**2)])
-    edges = np.unique(np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0)
+    edges = np.unique(
+        np.sort(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1), axis=0
+    )
     loads = np.column_stack([np.zeros((len(plan), 2)), -np.ones(len(plan))])
     found = fitted_densities(shape, edges, loads, fixed, least=0.1)
     least = -found.max()
@@ -254,7 +266,7 @@ def test_no_density_falls_below_the_least_where_the_shape_asks_for_tension():
 
 
 def test_densities_that_do_not_settle_are_not_given_out(monkeypatch):
-    monkeypatch.setattr(funicular, "_ROUNDS", 2)
+    monkeypatch.setattr(thrust_shell, "_ROUNDS", 2)
     plan, triangles, fixed = disc(4)
     shape = np.column_stack([plan, 1 - (plan**2).sum(axis=1)])
     loads = np.column_stack([np.zeros((len(plan), 2)), -np.ones(len(plan))])

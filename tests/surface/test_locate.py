@@ -4,16 +4,18 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from shellform.surface.locate import Locator
-from shellform.surface.patch import controls, evaluate
-from shellform.surface.target import Surface, curvature, make_surface
-from shellform.surface.tree import Tree
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.patch import controls, evaluate
+from shellform.surface.shape.target import Surface, curvature, make_surface
+from shellform.surface.shape.tree import Tree
 
 LOWER = np.tril_indices(3)
 
 
 def wave(count, given=True):
-    """A wavy surface over 2 × 2 m with `count` vertices a side, with its true normals or those of its jets."""
+    """A wavy surface over 2 × 2 m with `count` vertices a side, with its true normals or those of its
+    jets.
+    """
     line = np.linspace(-1.0, 1.0, count)
     x, y = (each.ravel() for each in np.meshgrid(line, line, indexing="ij"))
     normals = np.column_stack(
@@ -41,7 +43,9 @@ def ball_cap(step):
 
 
 def plain_distance(point, corner):
-    """The distance of a point from triangles (t, 3, 3): the plane where it falls inside, else the nearest side."""
+    """The distance of a point from triangles (t, 3, 3): the plane where it falls inside, else the nearest
+    side.
+    """
     a, b, c = corner[:, 0], corner[:, 1], corner[:, 2]
     normal = np.cross(b - a, c - a)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -63,7 +67,9 @@ def test_the_tree_finds_what_a_plain_search_finds():
     triangle, closest, distance = Tree(corner).nearest(points)
     np.testing.assert_allclose(distance, [plain_distance(p, corner) for p in points], atol=1e-14)
     np.testing.assert_allclose(np.linalg.norm(points - closest, axis=1), distance, atol=1e-14)
-    assert [plain_distance(p, corner[[t]]) for p, t in zip(closest, triangle, strict=True)] == pytest.approx([0.0] * 300)
+    assert [plain_distance(p, corner[[t]]) for p, t in zip(closest, triangle, strict=True)] == pytest.approx(
+        [0.0] * 300
+    )
 
 
 def test_what_the_tree_finds_does_not_depend_on_the_other_queries():
@@ -98,10 +104,15 @@ def at(C, v, w):
 def test_neighbouring_patches_share_one_normal_along_their_edge():
     rng = np.random.default_rng(2)
     for _ in range(20):
-        points = np.array([[0, 0, 0], [1, 0, 0], [0.3, 1, 0], [0.4, -0.9, 0]]) + 0.15 * rng.normal(size=(4, 3))
+        points = np.array([[0, 0, 0], [1, 0, 0], [0.3, 1, 0], [0.4, -0.9, 0]]) + 0.15 * rng.normal(
+            size=(4, 3)
+        )
         normals = np.array([0.0, 0.0, 1.0]) + 0.3 * rng.normal(size=(4, 3))
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        left, right = patch_of(points[[0, 1, 2]], normals[[0, 1, 2]]), patch_of(points[[1, 0, 3]], normals[[1, 0, 3]])
+        left, right = (
+            patch_of(points[[0, 1, 2]], normals[[0, 1, 2]]),
+            patch_of(points[[1, 0, 3]], normals[[1, 0, 3]]),
+        )
         for s in np.linspace(0.0, 1.0, 7):
             (here, n), (there, m) = at(left, s, 0.0), at(right, 1.0 - s, 0.0)
             np.testing.assert_allclose(here[0], there[0], atol=1e-14)
@@ -155,8 +166,12 @@ def test_the_normal_is_the_gradient_of_the_distance_and_the_hessian_its_derivati
     for axis in range(3):
         step = h * np.eye(3)[axis]
         ahead, behind = finder.foot(points + step), finder.foot(points - step)
-        np.testing.assert_allclose((ahead.distance - behind.distance) / (2 * h), foot.normal[:, axis], atol=1e-5)
-        same = (ahead.triangle == foot.triangle) & (behind.triangle == foot.triangle)  # curvature jumps between patches
+        np.testing.assert_allclose(
+            (ahead.distance - behind.distance) / (2 * h), foot.normal[:, axis], atol=1e-5
+        )
+        same = (ahead.triangle == foot.triangle) & (
+            behind.triangle == foot.triangle
+        )  # curvature jumps between patches
         turning = (ahead.normal - behind.normal) / (2 * h)
         np.testing.assert_allclose(turning[same], hessians(foot)[same, :, axis], atol=1e-6)
 
@@ -169,7 +184,9 @@ def test_feet_and_their_distance_from_the_edge_move_on_steadily_over_the_edge_an
     foot = finder.foot(np.column_stack([x, 0.123 + 0.1 * x, np.full_like(x, 0.3)]))
     assert 0.1 < foot.past.mean() < 0.3
     for value in (foot.point, foot.normal, finder.past_edge(foot)[:, None]):
-        assert (np.linalg.norm(np.diff(value, axis=0), axis=1) / np.diff(x)).max() < 4.0  # a jump of 0.1 mm would be 10
+        assert (
+            np.linalg.norm(np.diff(value, axis=0), axis=1) / np.diff(x)
+        ).max() < 4.0  # a jump of 0.1 mm would be 10
 
 
 def test_normals_from_jets_converge_also_at_the_edge():
@@ -186,7 +203,10 @@ def test_jets_of_few_or_collinear_neighbours_fall_back_to_what_these_determine()
     np.testing.assert_allclose(surface.normals, np.tile([0.0, 0.0, 1.0], (4, 1)), atol=1e-12)
     assert (curvature(surface) == 0.0).all()
     long = np.column_stack([np.repeat(np.arange(8.0), 2), np.tile([0.0, 1.0], 8), np.zeros(16)])
-    strip = np.array([[2 * k, 2 * k + 2, 2 * k + 1] for k in range(7)] + [[2 * k + 2, 2 * k + 3, 2 * k + 1] for k in range(7)])
+    strip = np.array(
+        [[2 * k, 2 * k + 2, 2 * k + 1] for k in range(7)]
+        + [[2 * k + 2, 2 * k + 3, 2 * k + 1] for k in range(7)]
+    )
     np.testing.assert_allclose(make_surface(long, strip).normals[:, 2], 1.0)
 
 

@@ -1,12 +1,14 @@
-"""Each defect is mended and told, and the mended surface is the clean one; what can't be mended is refused by name."""
+"""Each defect is mended and told, and the mended surface is the clean one; what can't be mended is refused by
+name.
+"""
 
 import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.surface.draft import Draft
-from shellform.surface.reading import surface_of
-from shellform.surface.seams import open_edges
+from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.reading import surface_of
+from shellform.surface.readers.seams import open_edges
 from tests.surface.shells import cap, split
 
 POINTS, QUADS = cap()
@@ -48,7 +50,8 @@ def test_loose_triangles_are_joined_even_where_their_corners_differ_in_the_last_
 
 def test_points_of_no_face_and_faces_given_twice_are_dropped():
     surface = mended(
-        np.vstack([POINTS, [[99.0, 0, 0]]]), np.vstack([TRIANGLES, TRIANGLES[:3, [1, 2, 0]], TRIANGLES[:2, ::-1]])
+        np.vstack([POINTS, [[99.0, 0, 0]]]),
+        np.vstack([TRIANGLES, TRIANGLES[:3, [1, 2, 0]], TRIANGLES[:2, ::-1]]),
     )
     as_clean(surface)
     told(surface, "1 points of no face", "5 faces given twice")
@@ -100,7 +103,9 @@ def test_patches_of_different_meshes_are_sewn_along_their_common_edge():
 def test_a_curved_seam_between_patches_of_unrelated_meshes_closes():
     # Quarter cylinders whose straight edges match and whose arcs are divided 7 and 16 times.
     def barrel(arcs, x0, x1, columns):
-        angle, x = np.meshgrid(np.linspace(0.3, np.pi - 0.3, arcs + 1), np.linspace(x0, x1, columns + 1), indexing="ij")
+        angle, x = np.meshgrid(
+            np.linspace(0.3, np.pi - 0.3, arcs + 1), np.linspace(x0, x1, columns + 1), indexing="ij"
+        )
         points = np.column_stack([x.ravel(), 2 * np.cos(angle.ravel()), 2 * np.sin(angle.ravel())])
         at = np.arange(len(points)).reshape(arcs + 1, columns + 1)
         return points, np.stack([at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]], axis=-1).reshape(-1, 4)
@@ -139,7 +144,10 @@ def test_slivers_are_collapsed_flipped_or_dropped():
 def heights(surface):
     corner = surface.vertices[surface.triangles]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    return np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / longest**2
+    return (
+        np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+        / longest**2
+    )
 
 
 def test_of_several_pieces_one_has_to_be_chosen():
@@ -198,9 +206,15 @@ def test_a_solid_gives_its_upper_or_lower_face_when_asked(inside_out):
 
 
 def test_a_ball_has_no_edge_that_sets_off_a_face():
-    turn, height = np.meshgrid(np.linspace(0, 2 * np.pi, 24, endpoint=False), np.linspace(-1.3, 1.3, 13), indexing="ij")
+    turn, height = np.meshgrid(
+        np.linspace(0, 2 * np.pi, 24, endpoint=False), np.linspace(-1.3, 1.3, 13), indexing="ij"
+    )
     rows = np.column_stack(
-        [(np.cos(height) * np.cos(turn)).ravel(), (np.cos(height) * np.sin(turn)).ravel(), np.sin(height).ravel()]
+        [
+            (np.cos(height) * np.cos(turn)).ravel(),
+            (np.cos(height) * np.sin(turn)).ravel(),
+            np.sin(height).ravel(),
+        ]
     )
     at = np.arange(24 * 13).reshape(24, 13)
     nxt = np.roll(at, -1, axis=0)

@@ -1,4 +1,6 @@
-"""The surfaces under surfaces/ are the shells that their docstrings promise, smooth, and bent no more than rods can follow."""
+"""The surfaces under surfaces/ are the shells that their docstrings promise, smooth, and bent no more than
+rods can follow.
+"""
 
 import ast
 from pathlib import Path
@@ -8,8 +10,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from shellform.surface import cad
-from shellform.surface.reading import read_surface
-from shellform.surface.target import curvature
+from shellform.surface.readers.reading import read_surface
+from shellform.surface.shape.target import curvature
 
 SURFACES = Path(__file__).parent.parent.parent / "surfaces"
 SCRIPTS = sorted(SURFACES.glob("*.py"))

@@ -10,9 +10,9 @@ from scipy.spatial import Delaunay
 from shellform.errors import InputError
 from shellform.surface import cad
 from shellform.surface.funicular import force_density
-from shellform.surface.locate import Locator
-from shellform.surface.reading import read_surface
-from shellform.surface.target import curvature, make_surface
+from shellform.surface.readers.reading import read_surface
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.target import curvature, make_surface
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -60,7 +60,9 @@ def test_the_closest_facet_point_agrees_with_a_plain_search():
 
 def test_the_foot_moves_continuously_across_triangles_and_past_the_edge():
     x = np.linspace(-0.9, 0.9, 40001)
-    foot = Locator(cap(0.1), reach=0.4).foot(np.column_stack([x, np.full_like(x, 0.123), np.full_like(x, 0.85)]))
+    foot = Locator(cap(0.1), reach=0.4).foot(
+        np.column_stack([x, np.full_like(x, 0.123), np.full_like(x, 0.85)])
+    )
     assert foot.past.any()
     speed = np.linalg.norm(np.diff(foot.point, axis=0), axis=1) / np.diff(x)
     assert speed.max() < 1.5
@@ -144,7 +146,9 @@ def test_meshes_that_no_shell_can_be_are_refused():
 
 
 def test_duplicate_vertices_and_flipped_faces_are_mended_and_said():
-    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]], dtype=float)
+    points = np.array(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [9, 9, 9]], dtype=float
+    )
     surface = make_surface(points, [[0, 1, 2], [3, 5, 4]])
     assert len(surface.vertices) == 4
     assert len(surface.mended) == 2

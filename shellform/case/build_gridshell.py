@@ -1,0 +1,175 @@
+"""From a case to the gridshell and its loads."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.case.case import (
+    Case,
+    ConcreteEntry,
+    JointsWeightEntry,
+    LoadEntry,
+    OwnRodEntry,
+    PointsEntry,
+    SheetEntry,
+    StockRodEntry,
+)
+from shellform.errors import InputError
+from shellform.gridshell import loads
+from shellform.gridshell.catalogue import Catalogue, largest, named, radius_bounds, read_catalogue
+from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace, max_radius
+from shellform.gridshell.loads import Region
+from shellform.net.net import Net
+from shellform.structure.elements.sections import Material, Rectangle, Round, Section, Tube, isotropic
+from shellform.surface.shape.target import Surface
+
+
+def gridshell(case: Case, net: Net, surface: Surface) -> tuple[Gridshell, dict[str, Reals]]:
+    """The case's gridshell and its load cases (n, 6): "none", "design", "additional", then the others as they
+    are listed.
+    """
+    joint = Joint(case.joint.axial, case.joint.torsion, case.joint.bending, case.joint.gap)
+    shell = brace(net, rod_of(case.rod, net), joint, Cable(case.cable.stiffness), below=surface)
+    return shell, load_cases(case, shell, surface)
+
+
+def rod_material(entry: OwnRodEntry | StockRodEntry) -> Material:
+    """What the case's rods are made of."""
+    if isinstance(entry, StockRodEntry):
+        return read_catalogue(entry.catalogue).material
+    if entry.shear is not None:
+        return Material(entry.young, entry.shear, entry.density, entry.strength)
+    return isotropic(young=entry.young, poisson=entry.poisson, density=entry.density, strength=entry.strength)
+
+
+def given_section(entry: OwnRodEntry | StockRodEntry) -> Section | None:
+    """The section that the case's rods have whatever the net; None where the net's curvature decides."""
+    if isinstance(entry, StockRodEntry):
+        return None if entry.section is None else named(read_catalogue(entry.catalogue), entry.section)
+    material = rod_material(entry)
+    if entry.width is not None and entry.height is not None:
+        return Rectangle(entry.width, entry.height, material)
+    if entry.radius is None:
+        return None
+    return Round(entry.radius, material) if entry.wall is None else Tube(entry.radius, entry.wall, material)
+
+
+def rod_of(entry: OwnRodEntry | StockRodEntry, net: Net) -> Rod:
+    """The case's rods; without given sizes the largest that the net allows. Raises InputError where it allows
+    any.
+    """
+    section = given_section(entry)
+    if section is not None:
+        return Rod(section)
+    if isinstance(entry, StockRodEntry):
+        return Rod(largest(read_catalogue(entry.catalogue), net))
+    material = rod_material(entry)
+    radius = net.max_radius(young=material.young, strength=material.strength)
+    if not math.isfinite(radius):
+        raise InputError(
+            "is needed: the net is straight, so that it bears rods of any size", where="rod.radius"
+        )
+    return Rod(Round(radius, material))
+
+
+def rod_limits(entry: OwnRodEntry | StockRodEntry, net: Net) -> dict[str, float]:
+    """For the summary: the farthest that the outermost fibre may lie from a rod's axis, m, the curvature that
+    the rods bear, 1/m, and the net's largest over it."""
+    material, section = rod_material(entry), given_section(entry)
+    most = net.max_radius(young=material.young, strength=material.strength)
+    limit = material.strength / (material.young * (most if section is None else max(section.fibres)))
+    return {
+        "rod_radius_max": most,
+        "curvature_limit": limit,
+        "curvature_utilisation": net.quality.curvature_max / limit if limit > 0.0 else 0.0,
+    }
+
+
+def rod_bounds(case: Case, shell: Gridshell) -> tuple[float, float]:
+    """Bounds (4) of the rods' radius, m: the catalogue's, or from half the start's to the largest that the
+    net allows.
+    """
+    rod, lowest = shell.rod, case.optimise.radius_min
+    catalogue = rounding_catalogue(case)
+    if catalogue is not None:
+        low, high = radius_bounds(shell.net, rod, catalogue)
+    else:
+        low, high = 0.5 * rod.radius, max(rod.radius, max_radius(shell.net, rod))
+    return lowest or low, high
+
+
+def rounding_catalogue(case: Case) -> Catalogue | None:
+    """The catalogue to which a free radius is rounded, if there is one."""
+    if case.optimise.catalogue is not None:
+        return read_catalogue(case.optimise.catalogue)
+    return read_catalogue(case.rod.catalogue) if isinstance(case.rod, StockRodEntry) else None
+
+
+def load_cases(case: Case, shell: Gridshell, surface: Surface) -> dict[str, Reals]:
+    """The case's loads (n, 6), N: "none", "design", "additional", then the others as they are listed."""
+    entry = case.load
+    if isinstance(entry, LoadEntry):
+        design = shell.point_load(entry.force, every=entry.every, openings=entry.openings)
+        return {"none": np.zeros_like(design), "design": design, "additional": entry.additional * design}
+    used = {part for each in entry for part in [*each.factors, *each.stages]}
+    parts = {name: _named(name, part, shell, surface) for name, part in case.part.items() if name in used}
+    found: dict[str, Reals] = {}
+    for each in entry:
+        where = f"load {each.name!r}"
+        if each.stages:
+            found |= loads.staged(parts, each.stages, name=each.name, factors=each.factors, where=where)
+        else:
+            found[each.name] = loads.combined(parts, each.factors, where=where)
+    if len(found) < sum(max(1, len(each.stages)) for each in entry):
+        raise InputError("a stage has the name of another case", where="load.stages", value=list(found))
+    if not found["design"][:, 2].any():
+        raise InputError(
+            "weighs nothing", where="load 'design'", remedy="Give its parts factors other than 0."
+        )
+    first = {
+        "none": np.zeros_like(found["design"]),
+        "design": found["design"],
+        "additional": found["additional"],
+    }
+    return first | found
+
+
+def _named(name: str, entry: Any, shell: Gridshell, surface: Surface) -> Reals:
+    try:
+        return _part(entry, shell, surface)
+    except InputError as error:
+        raise InputError(
+            error.what, where=f"part.{name}: {error.where}", value=error.value, remedy=error.remedy
+        ) from error
+
+
+def _part(entry: Any, shell: Gridshell, surface: Surface) -> Reals:
+    net = shell.net
+    if isinstance(entry, PointsEntry):
+        return loads.points(net, entry.force, every=entry.every, openings=entry.openings, inside=entry.inside)
+    if isinstance(entry, ConcreteEntry):
+        return loads.concrete(
+            net, surface, thickness=entry.thickness, density=entry.density, region=_region(entry)
+        )
+    if isinstance(entry, SheetEntry):
+        return loads.sheet(net, surface, entry.mass, _region(entry))
+    if isinstance(entry, JointsWeightEntry):
+        return loads.joints(net, entry.mass)
+    return loads.rods(net, shell.rod.section)
+
+
+def _region(entry: ConcreteEntry | SheetEntry) -> Region:
+    turned = None if entry.half is None else math.radians(entry.half)
+    strip = None if entry.strip is None else (math.radians(entry.strip[0]), *entry.strip[1:])
+    return Region(entry.openings, entry.inside, turned, strip, entry.ring)
+
+
+def catalogue_bytes(case: Case) -> bytes:
+    """The content of the case's own catalogues, if it has any, for the keys of its stages."""
+    sources = [case.optimise.catalogue, case.rod.catalogue if isinstance(case.rod, StockRodEntry) else None]
+    return b"".join(Path(each).read_bytes() for each in sources if each is not None and Path(each).is_file())

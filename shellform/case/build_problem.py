@@ -1,0 +1,223 @@
+"""From a case to its design problem, the engineer's limits included, and what each design shows of them.
+
+Every limit holds under every load case, and those that matter before concrete comes also without load. The
+critical load factor F is kept by a load case "critical NAME", F times the load case, that every accepted
+design bears on its stable branch, its softest mode keeping a share of the initial design's stiffness under
+the design load (checks.py: Softness). Load steps can pass a bifurcation that is followed by stable states
+again: in the end the paths are followed closely (`critical_factors`), and a design whose path ends before F
+isn't feasible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.case.build_gridshell import rod_bounds
+from shellform.case.case import Case
+from shellform.case.entries import RobustEntry
+from shellform.errors import InputError, NotConverged
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.scatter import Scatter
+from shellform.problem.engineering import (
+    ConnectorTurn,
+    LargestCableForce,
+    RodUtilisation,
+    Slackness,
+    Softness,
+    Uplift,
+)
+from shellform.problem.problem import Problem, follow
+from shellform.problem.robust import RobustMisfit
+from shellform.problem.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
+from shellform.structure.answers import results
+from shellform.structure.answers.stability import critical_load, modes
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.loading import forces
+
+# of the initial design's softest mode under the design load, that is left at the critical factor asked for
+_SOFTEST = 0.25
+_EQUAL = 1e-3  # relative: critical factors that count as equal
+_SOUGHT = 3.0  # critical load factor up to which designs are followed
+
+
+def case_problem(
+    case: Case, shell: Gridshell, loads: Mapping[str, Reals], start: Design, *, frees_radius: bool = True
+) -> Problem:
+    """The problem (2) to (6) of the case on the shell, with its limits; `start` is the initial design. With
+    the radius fixed its share goes to the others in proportion."""
+    entry = case.optimise
+    shares: list[tuple[float, Term]] = [
+        (entry.misfit, Misfit("design")),
+        (entry.cable_force, CableForce("design")),
+    ]
+    if frees_radius:
+        shares.append((entry.rod_radius, RodRadius()))
+    robust = robust_misfit(case, loads)
+    if robust is not None:
+        shares.append((entry.robust, robust))
+    total = sum(share for share, _ in shares)
+    others = [name for name in loads if name not in ("none", "design")]
+    limits = [AtMost(case.cable.force_max, CableForces("design"))]
+    for name in others:
+        limits.append(AtMost(entry.misfit_rms_additional, RmsMisfit(name)))
+        limits.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
+    limits += _engineers(case, shell, loads)
+    if case.robust is not None and case.robust.limit is not None and robust is not None:
+        limits.append(AtMost(case.robust.limit**2 * len(shell.net.grid.flat), robust))
+    used = dict(loads)
+    factor, critical = case.limits.critical_factor, []
+    if factor is not None:
+        least = _SOFTEST * _stiffness(shell, start, loads["design"])
+        for each in _known(
+            "limits.critical_loads", case.limits.critical_loads, [name for name in loads if name != "none"]
+        ):
+            critical.append(f"critical {each}")
+            used[critical[-1]] = factor * loads[each]
+            limits.append(AtMost(1.0, Softness(critical[-1], least)))
+    # The design load leads; its own critical case comes last, where thinning looks at what cables do against
+    # buckling.
+    order = ["design", "none", *others, *sorted(critical, key="critical design".__eq__)]
+    return Problem(
+        shell,
+        {name: used[name] for name in order if name in used},
+        [Share(share / total, term) for share, term in shares if share > 0.0],
+        limits,
+        entry.rest_length_min,
+        entry.rest_length_max,
+        rod_bounds(case, shell),
+    )
+
+
+def scatter_of(entry: RobustEntry) -> Scatter:
+    """What scatters."""
+    return Scatter(**{each.name: getattr(entry, each.name) for each in fields(Scatter)})
+
+
+def robust_misfit(case: Case, loads: Mapping[str, Reals]) -> RobustMisfit | None:
+    """The robust misfit of the case under the design load, if it has one."""
+    if case.robust is None:
+        return None
+    return RobustMisfit("design", loads["design"], scatter_of(case.robust), case.robust.deviations)
+
+
+def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[AtMost]:
+    """The limits on rods, connectors, supports and slack cables."""
+    entry, found = case.limits, []
+    for name, load in loads.items():
+        if entry.utilisation is not None:
+            found.append(AtMost(entry.utilisation, RodUtilisation(name)))
+        if entry.connector_turn is not None:
+            found.append(AtMost(entry.connector_turn, ConnectorTurn(name)))
+        if entry.uplift is not None:
+            offset = max(entry.uplift, -float(loads["design"][:, 2].sum()) / len(shell.net.supports))
+            found.append(AtMost(offset + entry.uplift, Uplift(name, load, offset)))
+    if entry.slack_min is not None:
+        longest = case.cable.rest_ratio * case.optimise.rest_length_max
+        let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
+        for name in _known("limits.slack_loads", entry.slack_loads, list(loads)):
+            found.append(AtMost(1.0, Slackness(name, entry.slack_min, let_out)))
+    return found
+
+
+def _known(where: str, names: Sequence[str], known: Sequence[str]) -> Sequence[str]:
+    for name in names:
+        if name not in known:
+            raise InputError(
+                "there is no such load case", where=where, value=name, remedy=f"Known: {', '.join(known)}."
+            )
+    return names
+
+
+def _stiffness(shell: Gridshell, start: Design, load: Reals) -> float:
+    """Of the start's softest mode under the design load, N/m. Raises NotConverged where it doesn't bear
+    that.
+    """
+    reached = follow(shell, start, {"design": load}, stay=True)["design"]
+    found = float(modes(assemble(shell.network(start)), reached.equilibrium.state, 1).stiffness[0])
+    if not (reached.on_branch and found > 0.0):
+        raise NotConverged(
+            f"The initial design loses stability at {reached.share:.2f} of the design load, so that no critical factor can be kept",
+            state=reached.equilibrium.state,
+            remedy="Choose a denser grid, thicker rods or stiffer cables.",
+        )
+    return found
+
+
+def shown(shell: Gridshell, design: Design, state: State, load: Reals) -> dict[str, Any]:
+    """What a design shows of the limited quantities in a state under the load, for its part of the
+    summary.
+    """
+    beams, cables = shell.beams(design.radius), shell.cables(design)
+    pull = cables.tension(state)
+    section = shell.rod.resized(design.radius).section
+    used = results.utilisation(beams, beams.local_forces(state), {beams.kinds[0]: section})
+    turn = results.twist(beams.local_deformations(state))[beams.kind == 1]
+    held = shell.net.supports
+    inner = assemble(shell.network(design)).evaluate(state, tangent=False).force
+    return {
+        "stress_utilisation_max": float(np.nanmax(used)),
+        "connector_turn_max": float(np.abs(turn).max(initial=0.0)),
+        "uplift_max": max(0.0, -float((inner - load)[held, 2].min())),
+        "cable_force_max": float(pull.max(initial=0.0)),
+        "cable_force_min": float(pull.min()) if len(pull) else 0.0,
+        "cables_slack": int((pull <= 0.0).sum()),
+    }
+
+
+def below_factor(factors: Mapping[str, Mapping[str, Any]], wanted: float, names: Sequence[str]) -> list[str]:
+    """Those of the load cases `names` whose path ends below the `wanted` factor, as `critical_factors` found
+    it by following.
+    """
+    found = {name: factors[name]["critical_factor"] for name in names if name in factors}
+    return [name for name, factor in found.items() if factor is not None and factor < wanted * (1.0 - _EQUAL)]
+
+
+def critical_factors(
+    shell: Gridshell, design: Design, unloaded: State, loads: Mapping[str, Reals], *, wanted: float | None
+) -> dict[str, dict[str, Any]]:
+    """For each load case the factor at which the design's path from the `unloaded` state loses stability:
+    `critical_factor`, None where it doesn't up to `critical_sought`, and the `critical_kind` of point."""
+    goal = max(_SOUGHT, 1.5 * (wanted or 0.0))
+    assembly, found = assemble(shell.network(design)), dict[str, dict[str, Any]]()
+    sizes = {name: float(np.linalg.norm(load)) for name, load in loads.items()}
+    # The largest first: a load case that is a share of another one has the same path, and isn't followed
+    # again.
+    for name in sorted((name for name in loads if sizes[name]), key=lambda name: -sizes[name]):
+        larger = next((each for each in found if _is_share(loads[name], loads[each])), None)
+        if larger is None:
+            found[name] = _critical(assembly, unloaded, loads[name], goal)
+        else:
+            factor = found[larger]["critical_factor"]
+            factor = None if factor is None else factor * sizes[larger] / sizes[name]
+            found[name] = (
+                {**found[larger], "critical_factor": factor}
+                if factor is None or factor <= goal
+                else _told(goal)
+            )
+    return {name: found[name] for name in loads if name in found}
+
+
+def _is_share(load: Reals, larger: Reals) -> bool:
+    share = float(np.vdot(load, larger) / np.vdot(larger, larger))
+    return share > 0.0 and bool(
+        np.allclose(load, share * larger, rtol=0.0, atol=1e-12 * float(np.abs(larger).max()))
+    )
+
+
+def _told(goal: float) -> dict[str, Any]:
+    return {"critical_sought": goal, "critical_factor": None, "critical_kind": None}
+
+
+def _critical(assembly: Assembly, unloaded: State, load: Reals, goal: float) -> dict[str, Any]:
+    try:
+        end = critical_load(assembly, unloaded, forces(load), goal=goal)
+    except NotConverged as error:  # the rest of the summary stands without it
+        return _told(goal) | {"critical_kind": f"not found: {error.what}"}
+    return _told(goal) | ({} if end is None else {"critical_factor": end.factor, "critical_kind": end.kind})

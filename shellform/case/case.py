@@ -1,0 +1,276 @@
+"""The case file: TOML, checked entry by entry, every default filled in."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import NoneType, UnionType
+from typing import Annotated, Any, get_args, get_origin
+
+import tomli_w
+from pydantic import (
+    BaseModel,
+    Discriminator,
+    Field,
+    Tag,
+    ValidationError,
+    model_validator,
+)
+
+import shellform
+from shellform.case.entries import (
+    CableEntry,
+    ConcreteEntry,
+    FiguresEntry,
+    JointEntry,
+    JointsWeightEntry,
+    LimitsEntry,
+    LoadCaseEntry,
+    LoadEntry,
+    NetEntry,
+    OptimiseEntry,
+    OwnRodEntry,
+    PointsEntry,
+    RobustEntry,
+    RodsWeightEntry,
+    Section,
+    SheetEntry,
+    StockRodEntry,
+    SurfaceEntry,
+)
+from shellform.errors import InputError
+from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
+
+
+class Case(Section):
+    """One design job."""
+
+    title: str = ""
+    surface: SurfaceEntry
+    net: NetEntry
+    rod: Annotated[
+        Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
+        Discriminator(lambda entry: "stock" if _has(entry, "catalogue") else "own"),
+    ]
+    joint: JointEntry
+    cable: CableEntry
+    load: Annotated[
+        Annotated[LoadEntry, Tag("table")] | Annotated[list[LoadCaseEntry], Tag("cases")],
+        Discriminator(lambda entry: "cases" if isinstance(entry, list) else "table"),
+    ]
+    part: dict[
+        str,
+        Annotated[
+            PointsEntry | ConcreteEntry | SheetEntry | RodsWeightEntry | JointsWeightEntry,
+            Field(discriminator="kind"),
+        ],
+    ] = Field({}, description="parts of the load cases, by name")
+    optimise: OptimiseEntry
+    limits: LimitsEntry = Field(default_factory=lambda: LimitsEntry.model_validate({}))
+    robust: RobustEntry | None = None
+    figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=0.010))
+
+    @model_validator(mode="after")
+    def _fitting(self) -> Case:
+        if self.joint.gap >= 0.5 * self.net.spacing:
+            raise ValueError(
+                f"joint.gap ({self.joint.gap:g} m) must be well below net.spacing ({self.net.spacing:g} m)"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _robust(self) -> Case:
+        causes = RobustEntry.model_fields.keys() - {"deviations", "limit", "samples", "seed"}
+        if self.robust is not None and not any(getattr(self.robust, name) for name in causes):
+            raise ValueError(f"nothing scatters in [robust]: give one of {', '.join(sorted(causes))}")
+        if self.optimise.robust and self.robust is None:
+            raise ValueError("a share robust needs a table [robust] that says what scatters")
+        return self
+
+    @model_validator(mode="after")
+    def _known_parts(self) -> Case:
+        if isinstance(self.load, LoadEntry):
+            if self.part:
+                raise ValueError(
+                    "the parts of [part] need load cases, each a [[load]] with a name and factors"
+                )
+            return self
+        names = [each.name for each in self.load]
+        for needed in ("design", "additional"):
+            if names.count(needed) != 1:
+                raise ValueError(f"there must be one [[load]] with the name {needed!r}")
+        for each in self.load:
+            if names.count(each.name) > 1 or each.name == "none" or each.name.startswith("critical "):
+                raise ValueError(f"the load's name {each.name!r} is taken")
+            if each.stages and each.name in ("design", "additional"):
+                raise ValueError(f"the load {each.name!r} is one case and can't have stages")
+            for part in [*each.factors, *each.stages]:
+                if part not in self.part:
+                    known = ", ".join(self.part) or "none: add tables [part.NAME]"
+                    raise ValueError(
+                        f"the load {each.name!r} names a part {part!r} that isn't there; known are {known}"
+                    )
+        return self
+
+
+def load_case(path: str | Path, settings: Sequence[str] = ()) -> Case:
+    """The case in a TOML file, with `settings` like "net.spacing=0.06" in place of its entries.
+
+    The paths of its surface and catalogue are made absolute. Raises InputError naming every entry that is
+    wrong.
+    """
+    data = read_toml(Path(path))
+    for setting in settings:
+        _set(data, setting)
+    return make_case(data, Path(path))
+
+
+def read_toml(file: Path) -> dict[str, Any]:
+    """The tables of a TOML file. Raises InputError where it can't be read."""
+    try:
+        return tomllib.loads(file.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"can't be read: {error}", where=str(file)) from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"isn't valid TOML: {error}", where=str(file)) from error
+    except RecursionError as error:
+        raise InputError("isn't valid TOML: it is nested too deeply", where=str(file)) from error
+
+
+def make_case(data: Mapping[str, Any], file: Path) -> Case:
+    """As `load_case`, from the tables of a file that are read already."""
+    try:
+        case = Case.model_validate(data)
+    except ValidationError as error:
+        raise InputError("; ".join(told(each, Case) for each in error.errors()), where=str(file)) from error
+    place = (file.parent / case.surface.file).resolve()
+    found: dict[str, Any] = {"surface": case.surface.model_copy(update={"file": str(place)})}
+    if case.optimise.catalogue is not None:
+        source = _found_catalogue(case.optimise.catalogue, file)
+        read_catalogue(source)
+        found["optimise"] = case.optimise.model_copy(update={"catalogue": source})
+    if isinstance(case.rod, StockRodEntry):
+        source = _found_catalogue(case.rod.catalogue, file)
+        stock = read_catalogue(source)
+        if case.rod.section is not None:
+            named(stock, case.rod.section)
+        found["rod"] = case.rod.model_copy(update={"catalogue": source})
+    return case.model_copy(update=found)
+
+
+def _found_catalogue(source: str, file: Path) -> str:
+    """A shipped catalogue's name, or the absolute path of one relative to the case file."""
+    return source if source in shipped_catalogues() else str((file.parent / source).resolve())
+
+
+def dump_case(case: Case) -> str:
+    """The case as TOML, every default filled in."""
+    return tomli_w.dumps(case.model_dump(mode="json", exclude_none=True))
+
+
+def shipped_surfaces() -> Path:
+    """The folder of the builder scripts that come with shellform."""
+    package = Path(shellform.__file__).resolve().parent
+    inside = package / "_surfaces"
+    return inside if inside.is_dir() else package.parent / "surfaces"
+
+
+def check_script(path: Path, *, allow_scripts: bool) -> None:
+    """Raises InputError for a builder script from elsewhere, which would run its code, unless that is
+    allowed.
+    """
+    if path.suffix == ".py" and not allow_scripts and shipped_surfaces() not in path.resolve().parents:
+        raise InputError(
+            "is a Python script from outside the shipped surfaces and isn't run unasked",
+            where=str(path),
+            remedy="Read it, and if you trust it, add --allow-scripts.",
+        )
+
+
+def _set(data: dict[str, Any], setting: str) -> None:
+    key, equals, text = setting.partition("=")
+    if not equals or not key.strip():
+        raise InputError(
+            "must be KEY=VALUE", where="--set", value=setting, remedy="For example net.spacing=0.06."
+        )
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text  # a bare word stands for itself
+    set_entry(data, key.strip(), value, where="--set")
+
+
+def set_entry(data: dict[str, Any], key: str, value: Any, *, where: str) -> None:
+    """Puts a value in place of the entry named like "net.spacing". Raises InputError where that lies inside
+    another value.
+    """
+    *sections, last = key.split(".")
+    for section in sections:
+        data = data.setdefault(section, {})
+        if not isinstance(data, dict):
+            raise InputError("names an entry inside a value", where=where, value=key)
+    data[last] = value
+
+
+def told(error: Any, root: type[BaseModel]) -> str:
+    """One validation error in words: the entry of the file of `root`'s kind, what is wrong, the value, and
+    the nearest known name.
+    """
+    kind = error["type"]
+    entry, model = _entry(error["loc"], root)
+    if kind == "extra_forbidden":
+        near = difflib.get_close_matches(str(error["loc"][-1]), model.model_fields, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(model.model_fields)}"
+        return f"{entry} is no known entry; {hint}"
+    if kind == "union_tag_invalid":
+        return f"{entry}.kind: must be one of {error['ctx']['expected_tags']} (found {error['ctx']['tag']!r})"
+    if kind == "union_tag_not_found":
+        return f"{entry}.kind is missing"
+    if kind == "missing":
+        return f"{entry} is missing"
+    message = str(error["msg"]).removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    value = "" if kind == "value_error" else f" (found {error['input']!r})"
+    return f"{entry}: {message}{value}"
+
+
+def _entry(place: Sequence[int | str], root: type[BaseModel]) -> tuple[str, Any]:
+    """The name of an entry as the file has it, and the section in which it stands; where an entry may be of
+    several kinds, the place that pydantic gives names the kind too."""
+    names: list[str] = []
+    kind: Any = root
+    section: Any = root
+    for part in place:
+        plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+        if (
+            get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain)
+        ):  # a table that may be left out
+            plain = next(each for each in get_args(plain) if each is not NoneType)
+        told = {tag: each for each in get_args(plain) for tag in _tags(each)}
+        if part in told:
+            kind = told[part]
+            continue
+        names.append(str(part))
+        if get_origin(plain) in (list, dict):
+            kind = get_args(plain)[-1]
+        elif isinstance(plain, type) and issubclass(plain, BaseModel):
+            section = plain
+            field = plain.model_fields.get(str(part))
+            kind = Any if field is None else field.annotation
+        else:
+            kind = Any
+    return ".".join(names) or root.__name__.lower(), section
+
+
+def _tags(choice: Any) -> list[str]:
+    """The names by which pydantic tells a choice of a union apart."""
+    own = [each.tag for each in get_args(choice)[1:] if isinstance(each, Tag)]
+    if isinstance(choice, type) and issubclass(choice, BaseModel) and "kind" in choice.model_fields:
+        own += get_args(choice.model_fields["kind"].annotation)
+    return own
+
+
+def _has(entry: Any, name: str) -> bool:
+    return name in entry if isinstance(entry, dict) else hasattr(entry, name)

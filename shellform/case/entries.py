@@ -1,0 +1,348 @@
+"""The tables of the case file, each with its entries, their units, defaults and bounds (case.py puts them
+together and reads the file).
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    NonNegativeFloat,
+    NonNegativeInt,
+    PositiveFloat,
+    PositiveInt,
+    model_validator,
+)
+
+_Polygon = list[tuple[float, float]]
+
+
+class Section(BaseModel):
+    """A table of the case file: no unknown entries, finite numbers."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class SurfaceEntry(Section):
+    """What is to be built."""
+
+    file: str = Field(description="surface file, or a builder script, relative to the case file")
+    unit: Literal["m", "cm", "mm", "in", "ft"] | None = Field(
+        None, description="unit of files that carry none"
+    )
+    up: Literal["y", "z"] | None = Field(
+        None, description="vertical axis of the file; left out: the format's"
+    )
+    size: PositiveFloat | None = Field(None, description="mesh size, m")
+    layer: str = Field("", description="layer of the surface in the file")
+    object: str = Field("", description="name of the surface in the file")
+    face: Literal["upper", "lower"] | None = Field(None, description="face of a solid")
+    piece: PositiveInt | None = Field(None, description="number of a separate piece, 1 the largest")
+    fill: Literal["holes", "edges", "all"] | None = Field(None, description="openings to close")
+    ground: float | None = Field(
+        None, description="height to which open edges are closed, m; left out: the edge's lowest"
+    )
+    dimensions: dict[str, PositiveFloat] = Field({}, description="named dimensions of a builder script, m")
+
+
+class NetEntry(Section):
+    """The Chebyshev net."""
+
+    spacing: PositiveFloat = Field(description="between rods, m")
+    spacing_v: PositiveFloat | None = Field(None, description="along the v rods; left out: as along u, m")
+    angle: float | Literal["auto"] = Field(
+        0.0, description="of u rods against the x axis, degrees; auto: with least bending"
+    )
+    offset: tuple[float, float] = Field(
+        (0.0, 0.0), description="of the net's origin from the middle, in spacings"
+    )
+    elements: PositiveInt = Field(4, description="beam elements a segment")
+    guides: list[list[tuple[float, float]]] | None = Field(
+        None, description="two plan curves in place of angle and offset, m"
+    )
+    method: Literal["pull", "compass"] = Field(
+        "pull", description="compass: the compass net as it is, unrelaxed"
+    )
+    start: Literal["compass", "flat"] = Field("compass", description="from where the grid is pulled")
+    spring_density: list[PositiveFloat] | None = Field(None, description="fictitious springs, rising, EI/s³")
+    shear_stiffness: PositiveFloat = Field(
+        0.1, description="fictitious, of a joint in the grid's plane, EI/s a radian"
+    )
+    merge: float = Field(
+        0.2, gt=0.0, lt=0.5, description="joints nearer to the edge, in spacings, are left out"
+    )
+    ground: float | None = Field(None, description="height at which rods end, m")
+    outline: list[tuple[float, float]] | None = Field(
+        None, description="closed plan curve at which rods end, m"
+    )
+
+    @model_validator(mode="after")
+    def _guided(self) -> NetEntry:
+        if self.guides is not None and (len(self.guides) != 2 or min(len(each) for each in self.guides) < 2):
+            raise ValueError("guides must be two curves of at least two points each")
+        if self.guides is not None and self.angle == "auto":
+            raise ValueError("guides leave no angle to search for")
+        return self
+
+
+class _BoughtEntry(Section):
+    stock_length: PositiveFloat | None = Field(
+        None, description="in which rods are bought, m; left out: the catalogue's, or 6 m"
+    )
+    kerf: float = Field(0.003, ge=0.0, description="width of a saw cut, m")
+
+
+class OwnRodEntry(_BoughtEntry):
+    """Rods of given sizes: round, tubes or laths."""
+
+    young: PositiveFloat = Field(description="Young's modulus, Pa")
+    poisson: float = Field(0.3, ge=0.0, lt=0.5, description="Poisson's ratio, for the shear modulus")
+    shear: PositiveFloat | None = Field(None, description="shear modulus, Pa, in place of poisson")
+    strength: PositiveFloat = Field(description="flexural strength, Pa")
+    density: float = Field(0.0, ge=0.0, description="kg/m³, for the rods' own weight")
+    radius: PositiveFloat | None = Field(
+        None, description="of round rods and tubes, m; left out: the largest that the net allows"
+    )
+    wall: PositiveFloat | None = Field(None, description="of tubes, m")
+    width: PositiveFloat | None = Field(None, description="of laths in the surface, m")
+    height: PositiveFloat | None = Field(None, description="of laths across the surface, m")
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> OwnRodEntry:
+        if self.wall is not None and (self.radius is None or self.wall >= self.radius):
+            raise ValueError("a tube's wall needs a radius larger than it")
+        if (self.width is None) != (self.height is None):
+            raise ValueError("a lath needs both width and height")
+        if self.width is not None and self.radius is not None:
+            raise ValueError("a rod has either a radius or a width and a height")
+        return self
+
+
+class StockRodEntry(_BoughtEntry):
+    """Rods from a catalogue."""
+
+    catalogue: str = Field(description="a shipped catalogue's name, or a TOML file relative to the case file")
+    section: str | None = Field(
+        None, description='like "10 mm", "42 x 3.5 mm"; left out: the stiffest that the net allows'
+    )
+
+
+class JointEntry(Section):
+    """The connection of two crossing rods, a short beam."""
+
+    axial: PositiveFloat = Field(description="EA, N")
+    torsion: PositiveFloat = Field(description="GJ, N·m²")
+    bending: PositiveFloat = Field(description="EI, N·m²")
+    gap: PositiveFloat = Field(description="between the rods' axes, m")
+
+
+class CableEntry(Section):
+    """Bracing cables."""
+
+    stiffness: PositiveFloat = Field(description="EA, N")
+    rest_ratio: float = Field(
+        0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target"
+    )
+    force_max: PositiveFloat = Field(description="largest allowed tension, N (constraint 5)")
+    without: bool = Field(
+        True, description="also load the grid without cables, to compare with (paper, section 4.1)"
+    )
+    adjustment: NonNegativeFloat | None = Field(
+        None, description="range of the turnbuckles, m; given: cables are cut to the fewest lengths"
+    )
+
+
+class LoadEntry(Section):
+    """Wet concrete as point loads."""
+
+    force: PositiveFloat = Field(description="on each loaded crossing, N")
+    every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
+    additional: float = Field(1.2, ge=1.0, description="factor of the additional load case")
+    openings: list[_Polygon] = Field([], description="plan polygons without load, m")
+
+
+class LoadCaseEntry(Section):
+    """A named load case: factors times parts. The cases "design" and "additional" must be there."""
+
+    name: str = Field(pattern=r"^\w[\w .-]*$", description="of the case, and of its files")
+    factors: dict[str, float] = Field({}, description="part = factor")
+    stages: list[str] = Field(
+        [], description='parts added one after the other in the cases "NAME 1", "NAME 2", …'
+    )
+
+
+class PointsEntry(Section):
+    """Point loads on crossings."""
+
+    kind: Literal["points"]
+    force: PositiveFloat = Field(description="on each loaded crossing, N")
+    every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
+    openings: list[_Polygon] = Field([], description="plan polygons without load, m")
+    inside: list[_Polygon] = Field([], description="plan polygons with load, m; left out: everywhere")
+
+
+class _SpreadEntry(Section):
+    openings: list[_Polygon] = Field([], description="plan polygons where there is none, m")
+    inside: list[_Polygon] = Field(
+        [], description="plan polygons where there is some, m; left out: everywhere"
+    )
+    half: float | None = Field(
+        None, description="only the half towards this direction in plan, degrees from x"
+    )
+    strip: tuple[float, float, float] | None = Field(
+        None, description="only between two places along a direction: degrees, m, m"
+    )
+    ring: tuple[float, float] | None = Field(None, description="only between two levels, m")
+
+
+class ConcreteEntry(_SpreadEntry):
+    """Wet concrete on its true area."""
+
+    kind: Literal["concrete"]
+    thickness: PositiveFloat = Field(description="across the surface, m")
+    density: PositiveFloat = Field(2500.0, description="kg/m³")
+
+
+class SheetEntry(_SpreadEntry):
+    """A membrane or reinforcement on its true area."""
+
+    kind: Literal["membrane", "reinforcement"]
+    mass: PositiveFloat = Field(description="kg/m²")
+
+
+class RodsWeightEntry(Section):
+    """The rods' own weight."""
+
+    kind: Literal["rods"]
+
+
+class JointsWeightEntry(Section):
+    """The joints' own weight."""
+
+    kind: Literal["joints"]
+    mass: PositiveFloat = Field(description="of each, kg")
+
+
+class OptimiseEntry(Section):
+    """Objective (2), bounds (3, 4) and constraint (6)."""
+
+    misfit: float = Field(
+        0.7, ge=0.0, le=1.0, description="share of the misfit in the start value of the objective"
+    )
+    cable_force: float = Field(0.3, ge=0.0, le=1.0, description="share of the sum of cable forces")
+    rod_radius: float = Field(
+        0.0, ge=0.0, le=1.0, description="share of the rod radius; above 0 it is a variable"
+    )
+    robust: float = Field(
+        0.0, ge=0.0, le=1.0, description="share of the misfit's mean and deviation as [robust] says"
+    )
+    rest_length_min: PositiveFloat = Field(0.01, description="bound (3), m")
+    rest_length_max: float = Field(1.1, gt=1.0, description="bound (3), times the initial rest length")
+    radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
+    misfit_rms_additional: PositiveFloat = Field(
+        description="constraint (6) as root mean square distance a node, m"
+    )
+    evaluations: PositiveInt = Field(100, description="design evaluations at the most")
+    stiffness_min: float = Field(
+        0.08,
+        ge=0.0,
+        lt=1.0,
+        description="of the softest mode under additional loads, over the start's under the design load",
+    )
+    catalogue: str | None = Field(
+        None, description="to which a free radius is rounded up; left out: the rods' own, if they have one"
+    )
+    rounded: int = Field(
+        30, ge=0, description="design evaluations for each section that is tried in rounding; 0: no rounding"
+    )
+    neighbours: int = Field(
+        1, ge=0, description="sections below and above the rounded one that are tried too"
+    )
+    cables_max: PositiveInt | None = Field(
+        None, description="cables are taken away down to this number, if limits allow"
+    )
+    symmetric: bool = Field(
+        False, description="cables that a symmetry of the net joins are polished to one length"
+    )
+    polish: int = Field(
+        20, ge=0, description="design evaluations for the design polished, without the cables' share; 0: none"
+    )
+
+    unloaded: bool = Field(
+        True,
+        description="also make the design without regard to the loads, to compare with (paper, section 4.1)",
+    )
+
+    @model_validator(mode="after")
+    def _whole(self) -> OptimiseEntry:
+        total = self.misfit + self.cable_force + self.rod_radius + self.robust
+        if abs(total - 1.0) > 1e-9:
+            raise ValueError(
+                f"the shares misfit, cable_force, rod_radius and robust must add up to 1, not {total:g}"
+            )
+        if self.symmetric and not self.polish:
+            raise ValueError("symmetric lengths are found in polishing: give polish some evaluations")
+        if self.catalogue is not None and not self.rod_radius:
+            raise ValueError("catalogue is for a free radius: give rod_radius a share")
+        return self
+
+
+class FiguresEntry(Section):
+    """Pictures."""
+
+    limit: PositiveFloat = Field(0.010, description="end of the colour scale, m")
+
+
+class LimitsEntry(Section):
+    """What an engineer limits besides constraints (5) and (6), each under every load case and without load;
+    left out: not limited.
+    """
+
+    utilisation: PositiveFloat | None = Field(
+        None, description="largest fibre stress of the rods over their strength, erection stress included"
+    )
+    connector_turn: PositiveFloat | None = Field(
+        None, description="of two crossing rods against each other from the flat grid, rad"
+    )
+    uplift: NonNegativeFloat | None = Field(
+        None, description="force with which a support may have to hold a rod's end down, N"
+    )
+    slack_min: PositiveFloat | None = Field(None, description="least tension of every cable, N")
+    slack_loads: list[str] = Field(
+        ["none"], description="load cases in which slack_min holds; none: before any load"
+    )
+    critical_factor: float | None = Field(
+        None, gt=1.0, description="of each of critical_loads, up to which its path stays stable"
+    )
+    critical_loads: list[str] = Field(
+        ["design"], min_length=1, description="load cases that critical_factor holds for"
+    )
+
+
+class RobustEntry(Section):
+    """Standard deviations of what isn't known exactly, each relative where no unit is named; 0 leaves a cause
+    out.
+    """
+
+    cable_stiffness: NonNegativeFloat = Field(0.0, description="of each cable")
+    cable_stiffness_all: NonNegativeFloat = Field(0.0, description="of all cables together")
+    rest_length: NonNegativeFloat = Field(0.0, description="of each cable: the error of its prestress, m")
+    supports: NonNegativeFloat = Field(0.0, description="of each coordinate of each support, m")
+    joints: NonNegativeFloat = Field(0.0, description="of each connector's torsion and bending stiffness")
+    joints_all: NonNegativeFloat = Field(0.0, description="of all connectors together")
+    loads: NonNegativeFloat = Field(0.0, description="of the load on each node")
+    loads_all: NonNegativeFloat = Field(0.0, description="of the whole load")
+    deviations: NonNegativeFloat = Field(
+        1.0,
+        description="standard deviations that are added to the mean misfit where it is limited or minimised",
+    )
+    limit: PositiveFloat | None = Field(
+        None, description="of that misfit under the design load, as root mean square distance a node, m"
+    )
+    samples: NonNegativeInt = Field(
+        0, description="drawn structures solved anew to check mean and deviation; 0: none"
+    )
+    seed: NonNegativeInt = Field(0, description="of the drawing")

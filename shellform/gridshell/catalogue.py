@@ -1,0 +1,265 @@
+"""Catalogues of rods: TOML files of sections that can be bought, and rounding to them (operation 4 of the
+framework).
+
+The optimised radius stands for a section similar to the rod's. It is rounded to the next stiffer section of
+the catalogue: for round rods of one material that is the next higher radius, as in the paper; for tubes and
+laths the least stiff section that bends in neither direction more easily. Only sections count that bear the
+curvature of the net: σ = E κ c at the outermost fibre (equation 1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Design, Gridshell, Rod, erection_stress
+from shellform.net.net import Net
+from shellform.structure.elements.sections import (
+    Material,
+    Rectangle,
+    Round,
+    Section,
+    Tube,
+    isotropic,
+    mass_per_length,
+    stiffness,
+)
+
+_SHIPPED = Path(__file__).resolve().parent.parent / "catalogues"
+_EQUAL = 1e-9  # relative: stiffnesses that count as equal
+
+
+class _Material(msgspec.Struct, forbid_unknown_fields=True):
+    young: float
+    strength: float
+    density: float
+    shear: float | None = None
+    poisson: float | None = None
+    lasting: float = 1.0
+
+
+class _Sizes(msgspec.Struct, forbid_unknown_fields=True):
+    round: list[float] = []
+    tube: list[tuple[float, float]] = []
+    rectangle: list[tuple[float, float]] = []
+
+
+class _Document(msgspec.Struct, forbid_unknown_fields=True):
+    material: _Material
+    sizes: _Sizes
+    title: str = ""
+    stock_length: float | None = None
+
+
+@dataclass(frozen=True)
+class Catalogue:
+    """`sections` of one `material` under a `title`, by rising stiffness; `stock_length`, m, in which they are
+    sold, where it is known.
+    """
+
+    title: str
+    material: Material
+    sections: tuple[Section, ...]
+    stock_length: float | None = None
+
+
+def shipped_catalogues() -> list[str]:
+    """Names of the catalogues that come with shellform."""
+    return sorted(path.stem for path in _SHIPPED.glob("*.toml"))
+
+
+def read_catalogue(source: str | Path) -> Catalogue:
+    """The catalogue in a TOML file, or a shipped one by its name.
+
+    `[material]` has young, shear or poisson, density, strength (flexural) and lasting, the share of it that
+    rods bear for as long as they stay bent; `stock_length` may say in which lengths, m, they are sold;
+    `[sizes]` has lists round (diameters), tube (outer diameter, wall) and rectangle (width in the surface,
+    height across it). SI units. Raises InputError naming the entry that is wrong.
+    """
+    path = _SHIPPED / f"{source}.toml" if str(source) in shipped_catalogues() else Path(source)
+    try:
+        document = msgspec.toml.decode(path.read_bytes(), type=_Document)
+    except OSError as error:
+        remedy = f"Shipped are {', '.join(shipped_catalogues())}."
+        raise InputError(f"can't be read: {error}", where=f"catalogue {path}", remedy=remedy) from error
+    except msgspec.ValidationError as error:
+        what, _, place = str(error).partition(" - at ")
+        raise InputError(
+            what[:1].lower() + what[1:], where=f"catalogue {path}: {place.strip('`$.') or 'top'}"
+        ) from error
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"isn't valid TOML: {error}", where=f"catalogue {path}") from error
+    material = _checked(f"catalogue {path}", lambda: _material(document.material))
+    kinds: list[tuple[str, Sequence[Any], Callable[[Any], Section]]] = [
+        ("round", document.sizes.round, lambda size: Round(0.5 * size, material)),
+        ("tube", document.sizes.tube, lambda size: Tube(0.5 * size[0], size[1], material)),
+        ("rectangle", document.sizes.rectangle, lambda size: Rectangle(size[0], size[1], material)),
+    ]
+    sections = [
+        _checked(f"catalogue {path}: sizes.{kind}[{k}]", partial(make, size))
+        for kind, sizes, make in kinds
+        for k, size in enumerate(sizes)
+    ]
+    if not sections:
+        raise InputError(
+            "has no sizes", where=f"catalogue {path}: sizes", remedy="List round, tube or rectangle."
+        )
+    stock = document.stock_length
+    if stock is not None and not 0.0 < stock < np.inf:
+        raise InputError("must be positive", where=f"catalogue {path}: stock_length", value=stock)
+    return Catalogue(document.title or path.stem, material, tuple(sorted(sections, key=_order)), stock)
+
+
+def _material(given: _Material) -> Material:
+    if (given.shear is None) == (given.poisson is None):
+        raise InputError("needs either shear or poisson", where="material")
+    if not 0.0 < given.lasting <= 1.0:
+        raise InputError("must lie between 0 and 1", where="material.lasting", value=given.lasting)
+    strength = given.strength * given.lasting
+    if given.shear is None:
+        return isotropic(
+            young=given.young, poisson=given.poisson or 0.0, density=given.density, strength=strength
+        )
+    return Material(given.young, given.shear, given.density, strength)
+
+
+def _checked(where: str, make: Callable[[], Any]) -> Any:
+    try:
+        return make()
+    except InputError as error:
+        raise InputError(
+            error.what, where=f"{where}: {error.where}", value=error.value, remedy=error.remedy
+        ) from error
+
+
+def label(section: Section) -> str:
+    """What a section is called: "⌀ 10 mm", "⌀ 42 × 3.5 mm", "50 × 35 mm"."""
+    if isinstance(section, Round):
+        return f"⌀ {2e3 * section.radius:g} mm"
+    if isinstance(section, Tube):
+        return f"⌀ {2e3 * section.radius:g} × {1e3 * section.thickness:g} mm"
+    return " × ".join(f"{1e3 * size:g}" for size in section.sizes) + " mm"
+
+
+def named(catalogue: Catalogue, name: str) -> Section:
+    """The catalogue's section of that label. Raises InputError naming all of them."""
+    found = {_plain(label(section)): section for section in catalogue.sections}
+    if _plain(name) not in found:
+        known = ", ".join(label(section) for section in catalogue.sections)
+        raise InputError(
+            f"is not in the catalogue {catalogue.title!r}",
+            where="rod.section",
+            value=name,
+            remedy=f"Known: {known}.",
+        )
+    return found[_plain(name)]
+
+
+def _plain(text: str) -> str:
+    return text.lower().replace("×", "x").replace("⌀", "").replace("mm", "").replace(" ", "")
+
+
+def allowed(catalogue: Catalogue, net: Net) -> tuple[Section, ...]:
+    """The sections that bear the net's curvature (equation 1), by rising stiffness. Raises InputError where
+    there are none.
+    """
+    found = tuple(
+        s for s in catalogue.sections if erection_stress(net, s) <= s.material.strength * (1.0 + _EQUAL)
+    )
+    if not found:
+        least = min(catalogue.sections, key=lambda section: erection_stress(net, section))
+        raise InputError(
+            f"none of the sections of the catalogue {catalogue.title!r} bears the net's curvature of {net.quality.curvature_max:.3g} 1/m: "
+            f"{label(least)} would be stressed to {erection_stress(net, least) / 1e6:.3g} of {least.material.strength / 1e6:.3g} MPa",
+            where="rod.catalogue",
+            remedy="Choose thinner or stronger rods, another angle of the net, or a flatter surface.",
+        )
+    return found
+
+
+def largest(catalogue: Catalogue, net: Net) -> Section:
+    """The stiffest section that the net allows: that of the initial design (operation 2)."""
+    return allowed(catalogue, net)[-1]
+
+
+def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, float]:
+    """Bounds (4), m, of the radius of sections similar to the rod's: from as stiff as the softest section
+    that the net allows to as stiff as the stiffest, so that each can be rounded up. Between two of different
+    shape the stiffness about the weaker axis counts.
+
+    Raises InputError where the rod is stiffer than the stiffest.
+    """
+    sections = allowed(catalogue, net)
+    own = np.array(rod.stiffness[2:])
+    low, high = (
+        rod.radius * float((np.array(stiffness(sections[k])[2:]) / own).min()) ** 0.25 for k in (0, -1)
+    )
+    if rod.radius > high * (1.0 + _EQUAL):
+        raise _too_stiff(rod.radius, catalogue, sections)
+    return low, max(high, rod.radius)
+
+
+def rounded_up(shell: Gridshell, design: Design, catalogue: Catalogue) -> tuple[Gridshell, Design]:
+    """The gridshell and design with the next stiffer section of the catalogue, the cables as they are
+    (operation 4).
+
+    Raises InputError where no section that the net allows is stiff enough.
+    """
+    sections = allowed(catalogue, shell.net)
+    at = _stiff_enough(sections, shell.rod.resized(design.radius).section)
+    if at < len(sections):
+        return with_section(shell, design, sections[at])
+    raise _too_stiff(design.radius, catalogue, sections)
+
+
+def _too_stiff(radius: float, catalogue: Catalogue, sections: Sequence[Section]) -> InputError:
+    return InputError(
+        f"no section of the catalogue {catalogue.title!r} that bears the net's curvature is as stiff as the design's",
+        where="rod.catalogue",
+        value=radius,
+        remedy=f"The stiffest is {label(sections[-1])}: bound the radius by it.",
+    )
+
+
+def neighbours(
+    shell: Gridshell, design: Design, catalogue: Catalogue, *, count: int = 1
+) -> list[tuple[Gridshell, Design]]:
+    """The gridshell and design with each of `count` sections below the rounded-up one, that one, and `count`
+    above it, by rising stiffness, as far as the catalogue goes and the net allows. Raises InputError for a
+    count below 0."""
+    if count < 0:
+        raise InputError("must not be negative", where="neighbours.count", value=count)
+    sections = allowed(catalogue, shell.net)
+    at = _stiff_enough(sections, shell.rod.resized(design.radius).section)
+    return [with_section(shell, design, section) for section in sections[max(at - count, 0) : at + count + 1]]
+
+
+def with_section(shell: Gridshell, design: Design, section: Section) -> tuple[Gridshell, Design]:
+    """The gridshell and design with rods of another section."""
+    rod = Rod(section)
+    return replace(shell, rod=rod), replace(design, radius=rod.radius)
+
+
+def _stiff_enough(sections: Sequence[Section], least: Section) -> int:
+    """The place of the first of the sections that bends about neither axis more easily than `least`; past the
+    end if none does.
+    """
+    wanted = stiffness(least)[2:]
+    for k, section in enumerate(sections):
+        if all(
+            has >= needed * (1.0 - _EQUAL) for has, needed in zip(stiffness(section)[2:], wanted, strict=True)
+        ):
+            return k
+    return len(sections)
+
+
+def _order(section: Section) -> tuple[float, float, float]:
+    _, _, bending_y, bending_z = stiffness(section)
+    return bending_y, bending_z, mass_per_length(section)

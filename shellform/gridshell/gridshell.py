@@ -1,0 +1,273 @@
+"""The braced gridshell (operation 2 of the framework): rods, joints and candidate cables on a net."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shellform.arrays import Flags, Indices, Reals, reals
+from shellform.errors import InputError
+from shellform.gridshell.loads import points
+from shellform.net.grid import cells, grid_beams
+from shellform.net.net import Net
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.cable import Cables, make_cables
+from shellform.structure.elements.sections import Round, Section, isotropic, stiffness, stiffness_by_size
+from shellform.structure.elements.state import State
+from shellform.structure.network import Network
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.target import Surface
+
+_SAMPLES = (0.25, 0.5, 0.75)  # where along a cable its height over the surface is taken
+
+
+@dataclass(frozen=True)
+class Rod:
+    """Rods of one `section` and its material.
+
+    Where their thickness is a variable they vary among the sections similar to it, all sizes in proportion;
+    `radius` tells these apart.
+    """
+
+    section: Section
+
+    @classmethod
+    def round(
+        cls,
+        *,
+        young: float,
+        radius: float,
+        poisson: float = 0.3,
+        strength: float = math.inf,
+        density: float = 0.0,
+    ) -> Rod:
+        """A solid round rod of an isotropic material: `radius`, m; moduli and flexural strength, Pa (inf: not
+        known); kg/m³.
+        """
+        return cls(Round(radius, isotropic(young=young, poisson=poisson, density=density, strength=strength)))
+
+    @property
+    def radius(self) -> float:
+        """Distance of the outermost fibre, m: the outer radius of round rods and tubes, half a lath's longer
+        side.
+        """
+        return max(self.section.fibres)
+
+    @property
+    def young(self) -> float:
+        """Young's modulus, Pa."""
+        return self.section.material.young
+
+    @property
+    def shear(self) -> float:
+        """Shear modulus, Pa."""
+        return self.section.material.shear
+
+    @property
+    def strength(self) -> float:
+        """Flexural strength, Pa."""
+        return self.section.material.strength
+
+    @property
+    def stiffness(self) -> tuple[float, float, float, float]:
+        """EA, N; GJ, EI_y, EI_z, N·m²."""
+        return stiffness(self.section)
+
+    @property
+    def stiffness_by_radius(self) -> tuple[float, float, float, float]:
+        """Derivatives of EA, GJ, EI_y, EI_z by the radius, all sizes in proportion to it."""
+        axial, torsion, about_y, about_z = (np.array(self.section.sizes) / self.radius) @ stiffness_by_size(
+            self.section
+        )
+        return float(axial), float(torsion), float(about_y), float(about_z)
+
+    def resized(self, radius: float) -> Rod:
+        """The rod with a similar section of that radius, m."""
+        kind: Any = type(self.section)
+        return Rod(kind(*(size / self.radius * radius for size in self.section.sizes), self.section.material))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """The connection of two crossing rods, a short beam between their axes: EA, N; GJ and EI, N·m²; length
+    `gap`, m.
+    """
+
+    axial: float
+    torsion: float
+    bending: float
+    gap: float
+
+    def __post_init__(self) -> None:
+        for name in ("axial", "torsion", "bending", "gap"):
+            value = getattr(self, name)
+            if not (value > 0.0 and math.isfinite(value)):
+                raise InputError("must be positive and finite", where=f"joint.{name}", value=value)
+
+    @property
+    def stiffness(self) -> tuple[float, float, float, float]:
+        """EA, GJ, EI_y, EI_z."""
+        return self.axial, self.torsion, self.bending, self.bending
+
+
+@dataclass(frozen=True)
+class Cable:
+    """Axial stiffness EA, N, of every cable."""
+
+    stiffness: float
+
+    def __post_init__(self) -> None:
+        if not (self.stiffness > 0.0 and math.isfinite(self.stiffness)):
+            raise InputError("must be positive and finite", where="cable.stiffness", value=self.stiffness)
+
+
+@dataclass(frozen=True)
+class Design:
+    """What is designed: `rest_length` (c,), m, of every candidate cable, which of them exist, and the rods'
+    `radius`, m.
+    """
+
+    rest_length: Reals
+    present: Flags
+    radius: float
+
+    def __post_init__(self) -> None:
+        count = len(self.present)
+        object.__setattr__(
+            self, "rest_length", reals("rest_length", self.rest_length, (count,), positive=True)
+        )
+
+
+@dataclass(frozen=True)
+class Gridshell:
+    """A net with its rod, joint and candidate cables: `cable_ends` (c, 2) nodes, `cable_lengths` (c,), m, in
+    the target.
+    """
+
+    net: Net
+    rod: Rod
+    joint: Joint
+    cable: Cable
+    cable_ends: Indices
+    cable_lengths: Reals = field(init=False)
+
+    def __post_init__(self) -> None:
+        place = self.net.target.positions[self.cable_ends]
+        lengths = np.linalg.norm(place[:, 1] - place[:, 0], axis=1)
+        object.__setattr__(
+            self, "cable_lengths", reals("cable_lengths", lengths, (len(self.cable_ends),), positive=True)
+        )
+
+    @property
+    def target(self) -> State:
+        """The bent state on the target surface, (n,) nodes."""
+        return self.net.target
+
+    def design(self, *, rest_ratio: float = 0.99) -> Design:
+        """The initial design: every candidate cable at `rest_ratio` of its length in the target."""
+        if not 0.0 < rest_ratio < 1.0:
+            raise InputError("must lie between 0 and 1", where="cable.rest_ratio", value=rest_ratio)
+        every = np.ones(len(self.cable_ends), dtype=bool)
+        return Design(rest_ratio * self.cable_lengths, every, self.rod.radius)
+
+    def unbraced(self) -> Design:
+        """The design without cables."""
+        return replace(self.design(), present=np.zeros(len(self.cable_ends), dtype=bool))
+
+    def point_load(self, force: float, *, every: int = 1, openings: Sequence[ArrayLike] = ()) -> Reals:
+        """Dead load (n, 6): `force` N downwards on every `every`-th crossing outside the plan polygons
+        `openings`.
+
+        With 2 it is every second crossing of the checkerboard, as in section 4.1. It acts on the upper rod.
+        """
+        return points(self.net, force, every=every, openings=openings)
+
+    def beams(self, radius: float) -> Beams:
+        """Rods of the radius, m, and connectors."""
+        return grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
+
+    def beams_by_radius(self, radius: float) -> Beams:
+        """Beams whose end forces are the derivative of `beams`' end forces by the radius: they are linear in
+        the stiffness.
+        """
+        beams = self.beams(radius)
+        rate = self.rod.resized(radius).stiffness_by_radius
+        rods = beams.kind == 0
+        axial, torsion, bending_y, bending_z = (np.where(rods, value, 0.0) for value in rate)
+        return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
+
+    def cables(self, design: Design) -> Cables:
+        """The cables that exist in the design."""
+        here = design.present
+        return make_cables(
+            self.cable_ends[here], rest_length=design.rest_length[here], stiffness=self.cable.stiffness
+        )
+
+    def network(self, design: Design) -> Network:
+        """The structural model: flat and stress-free, pinned supports moved to where the rods end on the
+        target.
+        """
+        flat = self.net.grid.flat
+        fixed = np.zeros((len(flat), 6), dtype=bool)
+        fixed[self.net.supports, :3] = True
+        imposed = np.zeros((len(flat), 6))
+        imposed[self.net.supports, :3] = (self.target.positions - flat)[self.net.supports]
+        return Network(flat, self.beams(design.radius), self.cables(design), fixed, imposed)
+
+
+def erection_stress(net: Net, section: Section) -> float:
+    """The largest bending stress, Pa, of rods bent into the net: σ = E κ c at the outermost fibre (equation
+    1).
+
+    A section's local z axis stands across the surface: curvature out of the surface bends it about y,
+    curvature in it about z.
+    """
+    bent = net.quality.curvature
+    _, _, bending_y, bending_z = stiffness(section)
+    return float(section.bending(bending_y * bent[..., 0], bending_z * bent[..., 1]).max())
+
+
+def max_radius(net: Net, rod: Rod) -> float:
+    """Equation (1), m, for any section: the radius of the largest one similar to the rod's that bears the
+    net's curvature.
+    """
+    stress = erection_stress(net, rod.section)
+    return rod.radius * rod.strength / stress if stress > 0.0 else math.inf
+
+
+def brace(net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface) -> Gridshell:
+    """The gridshell with a candidate cable on both diagonals of every cell whose corners are all joints.
+
+    None ends at a support, since supports are no joints, and none rises above the surface `below` which they
+    have to stay. They join the lower rods. Raises InputError where the joint doesn't fit the net or the rod
+    doesn't bear its curvature.
+    """
+    if not math.isclose(joint.gap, net.grid.gap, rel_tol=1e-9):
+        raise InputError(
+            f"differs from the net's gap of {net.grid.gap:g} m",
+            where="joint.gap",
+            value=joint.gap,
+            remedy="Pull the net with the joint's gap.",
+        )
+    bearable = max_radius(net, rod)
+    if rod.radius > bearable * (1.0 + 1e-9):
+        raise InputError(
+            f"the net bends rods to {net.quality.curvature_max:.3g} 1/m; with the outermost fibre more than {bearable:.4g} m from the "
+            "axis they break (equation 1)",
+            where="rod.radius",
+            value=rod.radius,
+            remedy="Choose a thinner rod, a stronger material, another angle of the net, or a flatter surface.",
+        )
+    corners = cells(net.grid)
+    ends = net.grid.crossing_nodes[:, 0][np.vstack([corners[:, [0, 2]], corners[:, [1, 3]]])]
+    place = net.target.positions[ends]
+    finder = Locator(below)
+    above = np.zeros(len(ends), dtype=bool)
+    for share in _SAMPLES:
+        above |= finder.foot((1.0 - share) * place[:, 0] + share * place[:, 1]).distance > 0.0
+    return Gridshell(net, rod, joint, cable, ends[~above])

@@ -1,0 +1,76 @@
+"""Cables alike: those that a symmetry of the net maps onto each other, and the fewest lengths to cut them to.
+
+A symmetry is a mirror or a half turn of the plan about the middle of the joints under which every candidate
+cable lies on another one. Cables that symmetries join are a group, of which every member gets the same rest
+length (`mma.polish` with `groups`).
+
+Turnbuckles take up what lengths differ within a group. With a range of adjustment w, cables can be cut to the
+length L where all their rest lengths lie in [L, L + w]; walking up the sorted rest lengths and starting anew
+wherever the range is used up gives the fewest different lengths that there can be.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Gridshell
+
+_SYMMETRIES = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))  # signs of x and y in two mirrors and the half turn
+_TOLERANCE = 0.02  # of the spacing, within which a cable's middle has to lie on its image's
+
+
+def symmetric_groups(shell: Gridshell) -> Indices:
+    """A group number (c,) for every candidate cable. Raises InputError where the net has no symmetry that
+    joins any.
+    """
+    middle = shell.target.positions[shell.cable_ends].mean(axis=1)
+    plan = np.ptp(shell.net.crossings[:, :2], axis=0) / 2.0 + shell.net.crossings[:, :2].min(axis=0)
+    tree, reach = cKDTree(middle), _TOLERANCE * shell.net.spacing
+    count, joined = len(middle), []
+    for sign in _SYMMETRIES:
+        image = middle.copy()
+        image[:, :2] = plan + np.array(sign) * (middle[:, :2] - plan)
+        away, which = tree.query(image)
+        if (away <= reach).all():
+            joined.append(np.column_stack([np.arange(count), which]))
+    if not joined:
+        raise InputError(
+            f"has no mirror or half turn that maps all cables onto each other within {1e3 * reach:.2g} mm",
+            where="optimise.symmetric",
+            value=True,
+            remedy="Turn the net (net.angle) or shift it (net.offset) along the surface's symmetry, or leave symmetric out.",
+        )
+    pairs = np.vstack(joined)
+    graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+
+def averaged(values: Reals, groups: Indices, present: Flags) -> Reals:
+    """`values` (c,) with those of the present cables replaced by the means of their `groups` (c,)."""
+    numbers = groups[present]
+    sums = np.bincount(numbers, values[present], minlength=groups.max() + 1)
+    counts = np.bincount(numbers, minlength=groups.max() + 1)
+    result = values.copy()
+    result[present] = (sums / np.maximum(counts, 1))[numbers]
+    return result
+
+
+def cut_lengths(rest_lengths: Reals, adjustment: float) -> Reals:
+    """For each of the rest lengths (k,), m, the length (k,), m, to cut its cable to with the turnbuckle
+    closed; as few different ones as an `adjustment`, m, of the turnbuckles allows, each at most that much
+    shorter than the rest length."""
+    if not adjustment >= 0.0:
+        raise InputError("must be 0 or positive", where="cable.adjustment", value=adjustment)
+    order = np.argsort(rest_lengths, kind="stable")
+    result = np.empty_like(rest_lengths)
+    shortest = -np.inf
+    for k in order:
+        if rest_lengths[k] > shortest + adjustment:
+            shortest = float(rest_lengths[k])
+        result[k] = shortest
+    return result

@@ -1,0 +1,266 @@
+"""Dead loads on the net's nodes, (n, 6), N and N·m: weights act along -z, and a load case is a sum of factors
+times parts.
+
+Concrete, membrane and reinforcement weigh on their true area of the target surface (areas.py); a joint's
+share acts on its upper rod, a support's goes into the ground there and counts in the reaction only. Rods
+weigh half an element on each of its nodes, joints half on each rod. Table 1 of the paper is contained: with
+lengths times s and the density of what is poured divided by s the load on an area stays, and that on a node
+grows with s².
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shellform.arrays import Indices, Reals, reals
+from shellform.errors import InputError
+from shellform.gridshell.areas import areas, between, facets, tributary, within
+from shellform.net.net import Net
+from shellform.structure.elements.sections import Section, mass_per_length
+from shellform.surface.shape.target import Surface
+
+GRAVITY = 9.81  # m/s²: the paper's 700 g are 6.9 N
+
+
+@dataclass(frozen=True)
+class Region:
+    """Where something lies on the surface: everything, but for what its limits take away.
+
+    `openings` and `inside`: plan polygons, m, outside all of which and inside one of which it lies; `half`:
+    the half towards this direction in plan, rad from x, from the middle of the surface's extent along it;
+    `strip`: a direction in plan, rad, and the lowest and highest place along it, m from the origin; `ring`:
+    lowest and highest level, m.
+    """
+
+    openings: Sequence[ArrayLike] = ()
+    inside: Sequence[ArrayLike] = ()
+    half: float | None = None
+    strip: tuple[float, float, float] | None = None
+    ring: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        for name, limits in [("strip", self.strip and self.strip[1:]), ("ring", self.ring)]:
+            if limits and not limits[0] < limits[1]:
+                raise InputError(
+                    "the first limit must lie below the second", where=f"load.{name}", value=list(limits)
+                )
+
+
+EVERYWHERE = Region()
+
+
+def lying(surface: Surface, region: Region) -> Reals:
+    """The part of the surface in the region, as triangles (t, 3, 3), m. Raises InputError where nothing is
+    left.
+    """
+    triangles = facets(surface)
+    if region.half is not None:
+        direction = _plan(region.half)
+        along = surface.vertices @ direction
+        triangles = between(triangles, direction, 0.5 * float(along.min() + along.max()), np.inf)
+    if region.strip is not None:
+        triangles = between(triangles, _plan(region.strip[0]), *region.strip[1:])
+    if region.ring is not None:
+        triangles = between(triangles, np.array([0.0, 0.0, 1.0]), *region.ring)
+    for polygon in region.openings:
+        triangles = _parted(triangles, polygon, "load.openings")[1]
+    if region.inside:
+        found = []
+        for polygon in region.inside:  # what lies in two polygons counts once
+            part, triangles = _parted(triangles, polygon, "load.inside")
+            found.append(part)
+        triangles = np.concatenate(found)
+    if not areas(triangles).sum() > 0.0:
+        raise InputError(
+            "no part of the surface is loaded",
+            where="load",
+            remedy=f"The surface reaches from {_told(surface.vertices.min(axis=0))} to {_told(surface.vertices.max(axis=0))} m.",
+        )
+    return triangles
+
+
+def _plan(angle: float) -> Reals:
+    return np.array([math.cos(angle), math.sin(angle), 0.0])
+
+
+def _parted(triangles: Reals, polygon: ArrayLike, where: str) -> tuple[Reals, Reals]:
+    try:
+        return within(triangles, reals(where, polygon, (None, 2)))
+    except InputError as error:
+        raise InputError(error.what, where=where, value=error.value, remedy=error.remedy) from error
+
+
+def _told(point: Reals) -> str:
+    return "(" + ", ".join(f"{x:.3g}" for x in point) + ")"
+
+
+def pressure(thickness: float, density: float) -> float:
+    """Weight, N/m², of a layer of `thickness`, m, across the surface, and `density`, kg/m³."""
+    return GRAVITY * _positive("load.thickness", thickness) * _positive("load.density", density)
+
+
+def area_load(net: Net, surface: Surface, weight: float, region: Region = EVERYWHERE) -> Reals:
+    """Load (n, 6) of a `weight`, N/m² of the surface, in the region. It adds up to the weight times the
+    region's area.
+    """
+    return _down(_positive("load.weight", weight) * tributary(net, lying(surface, region)))
+
+
+def concrete(
+    net: Net, surface: Surface, *, thickness: float, density: float = 2500.0, region: Region = EVERYWHERE
+) -> Reals:
+    """Load (n, 6) of wet concrete of a thickness, m, across the surface, and a density, kg/m³, where it is
+    poured.
+    """
+    return area_load(net, surface, pressure(thickness, density), region)
+
+
+def sheet(net: Net, surface: Surface, mass: float, region: Region = EVERYWHERE) -> Reals:
+    """Load (n, 6) of a membrane or of reinforcement of `mass`, kg/m²."""
+    return area_load(net, surface, GRAVITY * _positive("load.mass", mass), region)
+
+
+def rods(net: Net, section: Section) -> Reals:
+    """Load (n, 6) of the rods themselves along their true lengths. Raises InputError where their density
+    isn't known.
+
+    It is the weight of this section: where the radius is a variable the load stays that of the section given.
+    """
+    if not section.material.density > 0.0:
+        raise InputError("the rods' density isn't known", where="rod.density", remedy="Give it in kg/m³.")
+    half = 0.5 * GRAVITY * mass_per_length(section) * net.grid.rod_rest_lengths
+    weight = np.zeros(len(net.grid.flat))
+    np.add.at(weight, net.grid.rod_ends, half[:, None])
+    return _down(weight)
+
+
+def joints(net: Net, mass: float) -> Reals:
+    """Load (n, 6) of joints of `mass`, kg, each, half on either rod."""
+    weight = np.zeros(len(net.grid.flat))
+    weight[net.grid.crossing_nodes] = 0.5 * GRAVITY * _positive("load.mass", mass)
+    return _down(weight)
+
+
+def points(
+    net: Net,
+    force: float,
+    *,
+    every: int = 1,
+    openings: Sequence[ArrayLike] = (),
+    inside: Sequence[ArrayLike] = (),
+) -> Reals:
+    """Load (n, 6) of `force`, N (below 0: upwards), on every `every`-th crossing (2: of the checkerboard, as
+    in section 4.1), on its upper rod, outside the plan polygons `openings` and, if any are given, inside one
+    of `inside`."""
+    loaded = crossings_to_load(net, every, openings, inside)
+    weight = np.zeros(len(net.grid.flat))
+    if not math.isfinite(force):
+        raise InputError("must be finite", where="load.force", value=force)
+    weight[net.grid.crossing_nodes[loaded, 1]] = force
+    return _down(weight)
+
+
+def combined(
+    parts: Mapping[str, Reals], factors: Mapping[str, float], *, where: str = "load.factors"
+) -> Reals:
+    """The load case (n, 6) that is the sum of factors times named parts. Raises InputError for a part that
+    isn't there.
+    """
+    if not factors:
+        raise InputError("names no part", where=where, remedy=f"Known: {', '.join(parts)}.")
+    for name, factor in factors.items():
+        if name not in parts:
+            raise InputError(
+                "there is no such part of the load",
+                where=where,
+                value=name,
+                remedy=f"Known: {', '.join(parts)}.",
+            )
+        if not math.isfinite(factor):
+            raise InputError("must be finite", where=f"{where}.{name}", value=factor)
+    return np.asarray(sum(factor * parts[name] for name, factor in factors.items()))
+
+
+def staged(
+    parts: Mapping[str, Reals],
+    steps: Sequence[str],
+    *,
+    name: str,
+    factors: Mapping[str, float],
+    where: str = "load.stages",
+) -> dict[str, Reals]:
+    """Load cases "NAME 1", "NAME 2", …: the parts `steps` are added one after the other, as layers or
+    sections are poured.
+
+    `factors` are what is there from the beginning; a part named there too has its factor, another 1.
+    """
+    before = {part: factor for part, factor in factors.items() if part not in steps}
+    result = {}
+    for k in range(len(steps)):
+        now = before | {part: factors.get(part, 1.0) for part in steps[: k + 1]}
+        result[f"{name} {k + 1}"] = combined(parts, now, where=where)
+    return result
+
+
+def crossings_to_load(
+    net: Net, every: int, openings: Sequence[ArrayLike] = (), within_one: Sequence[ArrayLike] = ()
+) -> Indices:
+    """Numbers of the crossings whose lattice place i + j is a multiple of `every`, outside the plan polygons
+    `openings` and, if any are given, inside one of `within_one`.
+
+    Raises InputError where none is left.
+    """
+    if every < 1:
+        raise InputError("must be at least 1", where="load.every", value=every)
+    loaded = net.grid.lattice.sum(axis=1) % every == 0
+    plan = net.crossings[:, :2]
+    for polygon in _polygons("load.openings", openings):
+        loaded &= ~inside(plan, polygon)
+    if len(within_one):
+        loaded &= np.any([inside(plan, polygon) for polygon in _polygons("load.inside", within_one)], axis=0)
+    if not loaded.any():
+        raise InputError(
+            "no crossing is loaded",
+            where="load",
+            remedy="Make the openings smaller (they are in metres, in plan) or load more crossings.",
+        )
+    return np.flatnonzero(loaded)
+
+
+def _polygons(where: str, given: Sequence[ArrayLike]) -> list[Reals]:
+    result = []
+    for number, polygon in enumerate(given):
+        corners = reals(f"{where}[{number}]", polygon, (None, 2))
+        if len(corners) < 3:
+            raise InputError("needs at least three corners", where=f"{where}[{number}]", value=len(corners))
+        result.append(corners)
+    return result
+
+
+def inside(points: Reals, polygon: Reals) -> np.ndarray:
+    """Which plan points (k, 2) lie inside the polygon (p, 2), by the parity of crossings of a ray along x."""
+    x, y = points[:, :1], points[:, 1:]
+    x1, y1 = polygon.T
+    x2, y2 = np.roll(polygon, -1, axis=0).T
+    straddles = (y1 > y) != (y2 > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        hit = x < x1 + (y - y1) * (x2 - x1) / (y2 - y1)
+    return np.asarray((straddles & hit).sum(axis=1) % 2 == 1)
+
+
+def _down(weight: Reals) -> Reals:
+    """Weights (n,), N, as a load (n, 6)."""
+    load = np.zeros((len(weight), 6))
+    load[:, 2] = -weight
+    return load
+
+
+def _positive(where: str, value: float) -> float:
+    if not (value > 0.0 and math.isfinite(value)):
+        raise InputError("must be positive and finite", where=where, value=value)
+    return value

@@ -1,0 +1,172 @@
+"""Which way the net should lie: the angle and the offset with the least bending and shear.
+
+The cost of a net is the mean over its rods of (curvature × spacing)² / 2 and over its crossings of 0.1 × (90°
+- angle)² / 2, the elastic energy of a segment in EI/s as the pull has it. First the compass nets of angles
+all round are compared, which cost little; the best of them, apart from each other, are then pulled, and the
+best of those with other offsets, in processes of their own if asked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Any, Literal
+
+import numpy as np
+
+from shellform.compiled import set_num_threads
+from shellform.errors import InputError, ShellformError
+from shellform.net.chebyshev import Method, pull_net
+from shellform.net.net import Net
+from shellform.net.pull import SHEAR_STIFFNESS
+from shellform.surface.shape.target import Surface
+
+_ANGLES = 12  # compass nets, over a quarter turn: u and v are alike
+_BEST = 6  # angles that are pulled
+_OFFSETS = ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5))
+
+
+Job = tuple[float, tuple[float, float], Method]
+"""Angle, rad, offset in spacings, and how the net is made."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One net of the search: `angle`, rad, `offset` in spacings, its `cost`, infinite where there is none,
+    and why.
+    """
+
+    angle: float
+    offset: tuple[float, float]
+    cost: float
+    reason: str = ""
+
+
+def cost(net: Net) -> float:
+    """The mean elastic energy of a segment and its joint in EI/s."""
+    bent = 0.5 * float((net.curvature**2).mean()) * net.grid.scale**2
+    sheared = 0.5 * SHEAR_STIFFNESS * float(((0.5 * math.pi - net.quality.shear_angle) ** 2).mean())
+    return bent + sheared
+
+
+def oriented_net(
+    surface: Surface,
+    settings: dict[str, Any],
+    *,
+    angle: float | Literal["auto"],
+    offset: tuple[float, float] = (0.0, 0.0),
+    workers: int = 2,
+    progress: Callable[[str], None] = lambda text: None,
+) -> tuple[Net, float, tuple[float, float]]:
+    """The net with the other `settings` of pull_net at the `angle`, rad, and `offset`, or at those that
+    `best_orientation` finds; and which these are."""
+    if angle == "auto":
+        best, _ = best_orientation(surface, settings, workers=workers, progress=progress)
+        angle, offset = best.angle, best.offset
+
+    def watch(what: str, residual: float) -> None:
+        progress(f"{what}, residual {residual:.1e}")
+
+    return pull_net(surface, **settings, angle=angle, offset=offset, progress=watch), angle, offset
+
+
+def best_orientation(
+    surface: Surface,
+    settings: dict[str, Any],
+    *,
+    workers: int = 1,
+    progress: Callable[[str], None] = lambda text: None,
+) -> tuple[Trial, list[Trial]]:
+    """The best trial and all of them; `settings` are those of pull_net but for angle and offset.
+
+    Raises InputError where no orientation gives a net.
+    """
+    quarter = 0.5 * math.pi
+    if settings.get("spacing_v") not in (None, settings["spacing"]):
+        quarter = math.pi  # u and v differ
+    angles = [quarter * k / _ANGLES for k in range(_ANGLES)]
+    tried: list[Trial] = []
+    with _runner(surface, settings, workers) as run:
+
+        def stage(name: str, jobs: list[Job]) -> list[Trial]:
+            found = []
+            for k, trial in enumerate(run(jobs), start=1):
+                found.append(trial)
+                said = f"cost {trial.cost:.4g}" if math.isfinite(trial.cost) else "no net"
+                progress(
+                    f"{name} {k}/{len(jobs)}: angle {math.degrees(trial.angle):.1f}°, offset {trial.offset}: {said}"
+                )
+            return found
+
+        compass = stage("compass net", [(angle, (0.0, 0.0), "compass") for angle in angles])
+        usable = sorted(
+            (trial for trial in compass if math.isfinite(trial.cost)), key=lambda trial: trial.cost
+        )
+        if not usable:
+            raise InputError(
+                f"no angle gives a net: {compass[0].reason}",
+                where="net.angle",
+                value="auto",
+                remedy="Choose a smaller spacing.",
+            )
+        pulled = stage("pulled net", [(trial.angle, (0.0, 0.0), "pull") for trial in usable[:_BEST]])
+        best = min(pulled, key=lambda trial: trial.cost)
+        tried += pulled
+        # Between the best angle and its neighbours, and with other offsets
+        half = 0.5 * quarter / _ANGLES
+        turned = stage("pulled net", [(best.angle + side * half, (0.0, 0.0), "pull") for side in (-1.0, 1.0)])
+        best = min([best, *turned], key=lambda trial: trial.cost)
+        shifted = stage("pulled net", [(best.angle, offset, "pull") for offset in _OFFSETS[1:]])
+        tried += turned + shifted
+        best = min([best, *shifted], key=lambda trial: trial.cost)
+    if not math.isfinite(best.cost):
+        raise InputError(
+            f"no angle gives a net: {best.reason}",
+            where="net.angle",
+            value="auto",
+            remedy="Choose a smaller spacing.",
+        )
+    return best, tried
+
+
+@contextmanager
+def _runner(
+    surface: Surface, settings: dict[str, Any], workers: int
+) -> Iterator[Callable[[list[Job]], Iterator[Trial]]]:
+    """Runs trials one by one, or in processes that each know the surface; gives them back in their order."""
+    if workers == 1:
+        yield lambda jobs: (_try(surface, settings, job) for job in jobs)
+        return
+    # Not forked: numba's threads don't survive that.
+    pool = ProcessPoolExecutor(
+        workers, mp_context=get_context("spawn"), initializer=_begin, initargs=(surface, settings)
+    )
+    try:
+        yield lambda jobs: pool.map(_run, jobs)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+_work: dict[str, Any] = {}
+
+
+def _begin(surface: Surface, settings: dict[str, Any]) -> None:
+    set_num_threads(1)
+    _work.update(surface=surface, settings=settings)
+
+
+def _run(job: Job) -> Trial:
+    return _try(_work["surface"], _work["settings"], job)
+
+
+def _try(surface: Surface, settings: dict[str, Any], job: Job) -> Trial:
+    angle, offset, method = job
+    try:
+        net = pull_net(surface, **{**settings, "angle": angle, "offset": offset, "method": method})
+    except ShellformError as error:
+        return Trial(angle, offset, math.inf, str(error))
+    return Trial(angle, offset, float(np.round(cost(net), 12)))

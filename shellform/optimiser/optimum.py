@@ -1,0 +1,69 @@
+"""What an optimisation tells: its steps, where it stands on the way, and the design at its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shellform.gridshell.gridshell import Design
+from shellform.problem.problem import Problem
+from shellform.structure.elements.state import State
+from shellform.structure.solve.loading import Loaded
+
+
+@dataclass(frozen=True)
+class Step:
+    """One trial in the history: `objective` and its weighted `terms`, `constraints` by name (largest value of
+    each), the `cables` in tension, the `stage` of the additional loads, whether it was `accepted`, and
+    `seconds` since the start."""
+
+    evaluation: int
+    objective: float
+    terms: Mapping[str, float]
+    constraints: Mapping[str, float]
+    cables: int
+    stage: float
+    accepted: bool
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """Where an optimisation stood before a trial: `numbers` and words by name, `arrays` by name, and the
+    `history` so far.
+    """
+
+    numbers: Mapping[str, Any]
+    arrays: Mapping[str, np.ndarray]
+    history: tuple[Step, ...]
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """What the optimisation found: the `design` without its slack cables, how it carries each load on the
+    documented path (`loaded`, with "none" first), the `history`, a `status` sentence, the work it took, of
+    which factorisations in rejected trials were `wasted`, and the `stiffness`, N/m, that the softest mode had
+    to keep under the additional loads."""
+
+    problem: Problem
+    design: Design
+    loaded: Mapping[str, Loaded]
+    objective_start: float
+    objective: float
+    constraints: Mapping[str, float]
+    history: Sequence[Step]
+    status: str
+    evaluations: int
+    rejected: int
+    equilibria: int
+    factorisations: int
+    wasted: int
+    stiffness: float
+
+    @property
+    def states(self) -> dict[str, State]:
+        """The equilibrium state by load case."""
+        return {name: loaded.equilibrium.state for name, loaded in self.loaded.items()}

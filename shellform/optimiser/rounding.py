@@ -1,0 +1,230 @@
+"""From a free radius to sections that can be bought (operation 4): rounded up, the cables optimised again,
+and the sections beside it tried too.
+
+The cables' lengths are optimised anew with the section fixed, the same objective but for the radius' share
+and the same constraints, from the cables that the design with the free radius keeps; where these don't bear
+the load with the section, from all candidates. All sections are compared by the objective of the free
+problem, its weights those of the initial design.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import NotConverged
+from shellform.gridshell.catalogue import Catalogue, label, neighbours, rounded_up
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.optimiser import solver
+from shellform.optimiser.optimum import Optimum
+from shellform.problem.problem import Problem, deviations, follow
+from shellform.structure.answers import results
+from shellform.structure.answers.stability import modes
+from shellform.structure.elements.sections import mass_per_length
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A section of the catalogue: the `shell` with it and its `optimum` (None where none was found); the
+    `objective` of the free problem, distances `deviation_max` and `deviation_mean`, m, from the target and
+    stress `utilisation` under the design load, `cables`, the rods' `mass`, kg; `why` it isn't feasible, empty
+    where it is; and whether it is the one `rounded_up` to."""
+
+    section: str
+    shell: Gridshell
+    optimum: Optimum | None
+    objective: float
+    deviation_max: float
+    deviation_mean: float
+    cables: int
+    utilisation: float
+    mass: float
+    why: str
+    rounded_up: bool
+
+    def row(self) -> dict[str, object]:
+        """As a line of sections.csv and of the summary; what isn't known is None."""
+        known = self.optimum is not None
+        values = {
+            "objective": self.objective,
+            "deviation_max": self.deviation_max,
+            "deviation_mean": self.deviation_mean,
+            "cables": self.cables,
+            "stress_utilisation_max": self.utilisation,
+        }
+        return {
+            "section": self.section,
+            "rod_radius": self.shell.rod.radius,
+            "rod_mass": self.mass,
+            "rounded_up": self.rounded_up,
+            **{name: value if known else None for name, value in values.items()},
+            "feasible": not self.why,
+            "why_not": self.why,
+        }
+
+
+def tried(
+    best: Optimum,
+    start: Design,
+    catalogue: Catalogue,
+    problem_of: Callable[[Gridshell], Problem],
+    *,
+    evaluations: int,
+    beside: int,
+    most_cables: int | None = None,
+    progress: Callable[[str], None] = lambda text: None,
+) -> list[Trial]:
+    """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness,
+    each with its cables optimised.
+
+    `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
+    section. Raises InputError where no section that the net allows is stiff enough.
+    """
+    shell = best.problem.shell
+    base = next(iter(best.problem.loads))
+    first = follow(shell, start, {base: best.problem.loads[base]})[base].equilibrium.state
+    weights = [
+        share.share / max(float(share.term.measure(shell, start, first).value[0]), 1e-300)
+        for share in best.problem.minimize
+    ]
+    up = rounded_up(shell, best.design, catalogue)[0].rod.section
+    found = []
+    for other, design in neighbours(shell, best.design, catalogue, count=beside):
+        name = label(other.rod.section)
+        progress(f"cables for rods {name}")
+        optimum, why = _optimised(
+            problem_of(other), [design, _whole(start, design)], best.stiffness, evaluations, most_cables
+        )
+        found.append(_trial(name, other, optimum, why, weights, best.problem, other.rod.section == up))
+    return found
+
+
+def chosen(trials: Sequence[Trial]) -> Trial | None:
+    """The rounded-up section if it is feasible, else the feasible one with the least objective, else the
+    rounded-up one; None without any optimum.
+    """
+    up = next(each for each in trials if each.rounded_up)
+    feasible = [each for each in trials if not each.why]
+    if not up.why or not feasible:
+        return up if up.optimum is not None else None
+    return min(feasible, key=lambda each: each.objective)
+
+
+def table(trials: Sequence[Trial]) -> str:
+    """The content of sections.csv."""
+    text = io.StringIO()
+    rows = [each.row() for each in trials]
+    writer = csv.DictWriter(text, list(rows[0]))
+    writer.writeheader()
+    writer.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows)
+    return text.getvalue()
+
+
+def rods_mass(shell: Gridshell) -> float:
+    """Of all rods, kg."""
+    beams = shell.beams(shell.rod.radius)
+    return float(beams.rest_length[beams.kind == 0].sum() * mass_per_length(shell.rod.section))
+
+
+def _whole(start: Design, design: Design) -> Design:
+    return Design(start.rest_length, start.present, design.radius)
+
+
+def _optimised(
+    problem: Problem, starts: Sequence[Design], least: float, evaluations: int, most_cables: int | None
+) -> tuple[Optimum | None, str]:
+    """The best design from the first of the starts that leads to a feasible one, or the last found; and why
+    it isn't feasible.
+    """
+    optimum, why = None, ""
+    for start in starts:
+        try:
+            found = solver.optimize(
+                problem,
+                start,
+                evaluations=evaluations,
+                stiffness=_share(problem, start, least),
+                most_cables=most_cables,
+            )
+        except NotConverged as error:
+            why = why or error.what
+            continue
+        optimum, why = found, broken(found)
+        if not why:
+            break
+    return optimum, why
+
+
+def broken(optimum: Optimum) -> str:
+    """The limits that the optimum doesn't keep, in words; empty where it keeps all."""
+    lost = [name for name in optimum.problem.loads if not optimum.loaded[name].on_branch]
+    over = [f"{name} {value:+.1%}" for name, value in optimum.constraints.items() if value > solver.FEASIBLE]
+    said = [f"not stable under {', '.join(lost)}"] if lost else []
+    return "; ".join(said + ([f"over its limit: {', '.join(over)}"] if over else []))
+
+
+def _share(problem: Problem, start: Design, least: float) -> float:
+    """`least`, N/m, as a share of the start's softest mode under the base load."""
+    name, load = next(iter(problem.loads.items()))
+    reached = follow(problem.shell, start, {name: load}, stay=True)[name]
+    softest = (
+        modes(assemble(problem.shell.network(start)), reached.equilibrium.state, 1).stiffness[0]
+        if reached.on_branch
+        else 0.0
+    )
+    return float(least / softest) if softest > 0.0 else 0.0
+
+
+def _trial(
+    name: str,
+    shell: Gridshell,
+    optimum: Optimum | None,
+    why: str,
+    weights: Sequence[float],
+    problem: Problem,
+    up: bool,
+) -> Trial:
+    nothing = float("nan")
+    if optimum is None:
+        return Trial(name, shell, None, nothing, nothing, nothing, 0, nothing, rods_mass(shell), why, up)
+    base = next(iter(problem.loads))
+    state = optimum.states[base]
+    away = deviations(shell, state)
+    objective = sum(
+        weight * float(part.term.measure(shell, optimum.design, state).value[0])
+        for weight, part in zip(weights, problem.minimize, strict=True)
+    )
+    used = _used(shell, optimum.design, state)
+    if used > 1.0:
+        why = "; ".join(
+            [
+                *([why] if why else []),
+                f"the rods are used to {used:.0%} of their strength under the {base} load",
+            ]
+        )
+    return Trial(
+        name,
+        shell,
+        optimum,
+        float(objective),
+        float(away.max()),
+        float(away.mean()),
+        int(optimum.design.present.sum()),
+        used,
+        rods_mass(shell),
+        why,
+        up,
+    )
+
+
+def _used(shell: Gridshell, design: Design, state: State) -> float:
+    beams = shell.beams(design.radius)
+    values: Reals = results.utilisation(beams, beams.local_forces(state), {beams.kinds[0]: shell.rod.section})
+    return float(np.nanmax(values))

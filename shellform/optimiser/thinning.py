@@ -1,0 +1,65 @@
+"""Which cables a braced shell can spare.
+
+The L1 term empties the cables with the least tension; but tension says little about what a cable does against
+buckling. Without the cables of a set R the tangent K at a loaded state loses their stiffness, K - B k B', and
+stays positive definite as long as
+
+    S = I - k^½ B' K⁻¹ B k^½,   rows and columns of R,
+
+does, B being the cables' directions and k = EA/l0. One block solve gives S for all cables; its diagonal is
+what the structure keeps of its stiffness along each cable when that one goes, small numbers belonging to
+cables that hold the softest mode. Sets are chosen greedily by a Cholesky factor of S that grows row by row
+and may not lose more than a set share.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from shellform.arrays import Indices, Reals
+from shellform.structure.answers.sensitivity import element_columns
+from shellform.structure.elements.cable import Cables
+from shellform.structure.elements.state import State
+from shellform.structure.solve.assembly import Assembly
+
+_BLOCK = 256  # columns solved for at once
+
+
+def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
+    """The matrix S (c, c) of the cables at the stable `state`; slack cables have rows of the identity.
+
+    Raises NotPositiveDefinite.
+    """
+    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    stiffness = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
+    unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
+    pull = element_columns(assembly, cables.freedoms(), np.hstack([-unit, unit]))
+    factor, kept = assembly.factor(state), np.eye(len(unit))
+    for first in range(0, len(unit), _BLOCK):
+        own = slice(first, min(first + _BLOCK, len(unit)))
+        kept[:, own] -= pull.T @ factor.solve(np.asfortranarray(pull[:, own].toarray()))
+    return kept
+
+
+def spared(kept: Reals, order: Indices, most: int, least: float) -> Indices:
+    """The first cables of `order`, at most `most`, without all of which every direction keeps a share of at
+    least `least` of its stiffness.
+
+    A cable that would bring it below is passed over. `kept` (c, c) is the matrix S above.
+    """
+    chosen: list[int] = []
+    factor = np.zeros((most, most))
+    for cable in order:
+        count = len(chosen)
+        if count == most:
+            break
+        row = kept[cable, chosen]
+        solved = solve_triangular(factor[:count, :count], row, lower=True) if count else row
+        pivot = kept[cable, cable] - least - float(solved @ solved)
+        if pivot <= 0.0:
+            continue
+        factor[count, :count], factor[count, count] = solved, np.sqrt(pivot)
+        chosen.append(int(cable))
+    return np.array(chosen, dtype=np.int64)

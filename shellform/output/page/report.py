@@ -1,0 +1,337 @@
+"""One HTML page with everything that was found, for one run or several side by side: no network, no other
+file.
+
+The template, the style and the scripts stand in `assets/`; the template writes what can be read without a
+script, and the three-dimensional view and its tables take their numbers from JSON inside the page, with
+positions as base64 of little-endian float32. Titles, file names and settings are text from elsewhere: the
+template escapes them, the JSON has no "<", and the page's own policy refuses every script but its own and
+every request.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import InputError
+from shellform.gridshell.catalogue import label
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.output.page import charts, verdict
+from shellform.output.page.embed import Picture
+from shellform.output.page.template import filled, part
+from shellform.output.pictures.colours import VIRIDIS
+from shellform.problem.problem import deviations
+from shellform.structure.elements.state import State
+from shellform.surface.shape.target import Surface
+
+GENERATOR = "shellform report"  # in the page's head, so that it is known again
+_SCRIPTS = ("solid.js", "view.js", "tables.js", "page.js")
+_MOST_TRIANGLES = 30_000  # of the surface in the view; more are merged
+# of the case's colour scale: where the deviation is larger than this, the view begins with a scale of its own
+_BEYOND = 2.0
+_MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One run on the page.
+
+    `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which `best` is to
+    be built; `loads` (n, 6), N; the `summary` of the run folder; rows of the `history`; `settings`, the case
+    file's text; `limit`, m, ends the colour scale; `notes` say what is missing or to be known; `files` are
+    those of the run folder.
+    """
+
+    title: str
+    place: str
+    shells: Mapping[str, Gridshell]
+    surface: Surface
+    loads: Mapping[str, Reals]
+    designs: Mapping[str, Design]
+    states: Mapping[str, Mapping[str, State]]
+    best: str
+    summary: Mapping[str, Any]
+    history: Sequence[Mapping[str, str]]
+    settings: str
+    pictures: Sequence[Picture]
+    limit: float
+    bounds: verdict.Bounds
+    notes: Sequence[str]
+    files: Sequence[str]
+
+    @property
+    def shell(self) -> Gridshell:
+        """The shell of the design to build."""
+        return self.shells[self.best]
+
+
+def html(entries: Sequence[Entry], versions: Mapping[str, str]) -> str:
+    """The page. Raises InputError where there is no run to show."""
+    if not entries:
+        raise InputError("there is no run to report", where="report", remedy="Name one or more run folders.")
+    runs = [_told(entry, number) for number, entry in enumerate(entries)]
+    return filled(
+        "page.html",
+        {
+            "runs": runs,
+            "differences": _differences(entries),
+            "versions": versions,
+            "gradient": ", ".join(f"rgb{colour}" for colour in VIRIDIS),
+        },
+        generator=GENERATOR,
+        style=part("style.css"),
+        script="(() => {\n" + "\n".join(part(name) for name in _SCRIPTS) + "\n})();",
+        data={"viridis": VIRIDIS, "runs": [_drawn(entry) for entry in entries]},
+        number=verdict.number,
+    )
+
+
+def _told(entry: Entry, number: int) -> dict[str, Any]:
+    """What the template writes of a run."""
+    found = verdict.checks(entry.shells, entry.designs, entry.summary, entry.bounds)
+    failed = verdict.failed(found, entry.best)
+    rows = {name: entry.summary.get("designs", {}).get(name, {}) for name in entry.designs}
+    best = rows[entry.best]
+    optimisation = entry.summary.get("optimisation")
+    return {
+        "id": f"run{number}",
+        "title": entry.title,
+        "place": entry.place,
+        "best": entry.best,
+        "best_title": verdict.design_title(entry.best),
+        "finished": optimisation is not None,
+        "failed": failed,
+        "asked": verdict.asked(found, entry.best),
+        "answers": verdict.answers(
+            entry.shell, entry.best, entry.designs[entry.best], entry.states[entry.best], entry.summary
+        ),
+        "designs": [(name, verdict.design_title(name), row) for name, row in rows.items()],
+        "shown_first": sorted(
+            [(name, verdict.design_title(name), row) for name, row in rows.items()],
+            key=lambda each: each[0] != entry.best,
+        ),
+        "loads": [(name, verdict.load_title(name, _factor(rows, name))) for name in entry.loads],
+        "checks": found,
+        "charts": _charts(entry.history),
+        "pictures": [(picture, _caption(picture.name)) for picture in entry.pictures],
+        "notes": [
+            *entry.notes,
+            *entry.summary.get("net", {}).get("notes", []),
+            *entry.summary.get("surface", {}).get("mended", []),
+        ],
+        "settings": entry.settings,
+        "files": _folders(entry.files),
+        "summary": entry.summary,
+        "optimisation": optimisation,
+        "seconds": dict(
+            sorted(entry.summary.get("seconds", {}).items(), key=lambda each: each[0] == "total")
+        ),
+        "rod": label(entry.shell.rod.resized(entry.designs[entry.best].radius).section),
+        "row": best,
+        "limit": 1e3 * entry.limit,
+        "beyond": best.get("loads", {}).get("design", {}).get("deviation_max", 0.0) > _BEYOND * entry.limit,
+    }
+
+
+def _factor(rows: Mapping[str, Any], load: str) -> float | None:
+    return next(
+        (row["loads"][load].get("factor") for row in rows.values() if load in row.get("loads", {})), None
+    )
+
+
+def _caption(name: str) -> str:
+    """A file's name in words: "utilisation-optimised-design" is "Utilisation: optimised, the design load"."""
+    parts = [
+        verdict.TITLES.get(part, verdict.LOADS.get(part, part.replace("_", " "))) for part in name.split("-")
+    ]
+    words = [part if k == 0 else part[:1].lower() + part[1:] for k, part in enumerate(parts)]
+    text = words[0] + (": " + ", ".join(words[1:]) if len(words) > 1 else "")
+    return text[:1].upper() + text[1:]
+
+
+def _folders(files: Sequence[str]) -> dict[str, list[str]]:
+    """File names by folder; "" for those in the run folder itself."""
+    found: dict[str, list[str]] = {}
+    for file in files:
+        folder, _, name = file.rpartition("/")
+        found.setdefault(folder, []).append(name)
+    return found
+
+
+def _charts(history: Sequence[Mapping[str, str]]) -> list[charts.Chart]:
+    """Objective and terms, constraints, and the number of cables at each accepted design."""
+    rows = [row for row in history if row.get("accepted", "1") == "1"]
+    if not rows:
+        return []
+
+    def column(name: str) -> list[float]:
+        try:
+            return [float(row[name]) for row in rows]
+        except (KeyError, TypeError, ValueError):
+            return [float("nan")] * len(rows)
+
+    at = column("evaluation")
+    if not np.isfinite(at).all():
+        return []
+    terms = {"objective": column("objective")}
+    terms |= {name[5:].replace("_", " "): column(name) for name in rows[0] if name.startswith("term.")}
+    limits = {
+        verdict.constraint_title(name[11:])[11:]: column(name)
+        for name in rows[0]
+        if name.startswith("constraint.")
+    }
+    found = [charts.line_chart("Objective and its terms", at, terms)]
+    if limits:
+        title = "Constraints: value over limit, less 1 (cut at −1.5 and 1)"
+        found.append(charts.line_chart(title, at, limits, least=-1.5, most=1.0, limit=0.0, main=False))
+    found.append(charts.line_chart("Cables in tension", at, {"cables": column("cables")}))
+    return found
+
+
+def _differences(entries: Sequence[Entry]) -> list[tuple[str, list[str]]]:
+    """Settings by name that are not the same in all runs, with each run's value ("–": not set)."""
+    if len(entries) < 2:
+        return []
+    flat = [_flat(tomllib.loads(entry.settings)) for entry in entries]
+    names = list(dict.fromkeys(name for each in flat for name in each))
+    rows = [(name, [each.get(name, "–") for each in flat]) for name in names]
+    return [(name, values) for name, values in rows if len(set(values)) > 1]
+
+
+def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
+    found: dict[str, str] = {}
+    for name, value in table.items():
+        if isinstance(value, dict):
+            found |= _flat(value, f"{prefix}{name}.")
+        else:
+            text = json.dumps(value, ensure_ascii=False)
+            found[f"{prefix}{name}"] = text if len(text) <= 80 else f"{text[:77]}…"
+    return found
+
+
+def _drawn(entry: Entry) -> dict[str, Any]:
+    """What the view and the tables are made from: lengths in mm but for positions, which are in m from the
+    `middle`; forces in N."""
+    shell, grid = entry.shell, entry.shell.net.grid
+    place = shell.target.positions
+    middle = 0.5 * (place.min(axis=0) + place.max(axis=0))
+    joint_of = {int(node): k for k, pair in enumerate(grid.crossing_nodes) for node in pair}
+    vertices, triangles = _light(entry.surface)
+    rows = entry.summary.get("designs", {})
+    return {
+        "title": entry.title,
+        "limit": 1e3 * entry.limit,
+        "radius": shell.rod.radius,
+        "spacing": shell.net.spacing,
+        "strength": bool(np.isfinite(shell.rod.strength)),
+        "force_max": entry.bounds.force,
+        "target": _floats(place - middle),
+        "supports": shell.net.supports.tolist(),
+        "rods": [
+            {
+                "name": f"{rod.direction.upper()}{number}",
+                "nodes": rod.nodes.tolist(),
+                "length": round(1e3 * rod.length, 3),
+                "crossings": len(rod.crossings),
+            }
+            for number, rod in enumerate(grid.rods)
+        ],
+        "cables": {
+            "ends": shell.cable_ends.tolist(),
+            "joints": [[joint_of[int(n)] for n in pair] for pair in shell.cable_ends],
+        },
+        "surface": {"vertices": _floats(vertices - middle), "triangles": _bytes(triangles.astype("<u4"))},
+        "loads": [
+            {"name": name, "title": verdict.load_title(name, _factor(rows, name)), "points": _marked(load)}
+            for name, load in entry.loads.items()
+        ],
+        "designs": [_design(entry, name) for name in entry.designs],
+        "best": list(entry.designs).index(entry.best),
+    }
+
+
+def _design(entry: Entry, name: str) -> dict[str, Any]:
+    shell, design = entry.shells[name], entry.designs[name]
+    cables = shell.cables(design)
+    states = {}
+    for load, state in entry.states[name].items():
+        use = _utilisation(shell, design, state)
+        away = deviations(shell, state)
+        states[load] = {
+            "positions": _floats(state.positions - _middle(shell)),
+            "utilisation": _floats(use),
+            "length": np.round(1e3 * cables.lengths(state), 4).tolist(),
+            "force": [_short(value) for value in cables.tension(state)],
+            "rods": [
+                [round(1e3 * float(away[rod.nodes].max()), 4), _short(use[rod.nodes].max())]
+                for rod in shell.net.grid.rods
+            ],
+        }
+    return {
+        "name": name,
+        "title": verdict.design_title(name),
+        "radius": design.radius,
+        "cables": np.flatnonzero(design.present).tolist(),
+        "rest": np.round(1e3 * cables.rest_length, 4).tolist(),
+        "states": states,
+    }
+
+
+def _middle(shell: Gridshell) -> Reals:
+    place = shell.target.positions
+    return np.asarray(0.5 * (place.min(axis=0) + place.max(axis=0)))
+
+
+def _utilisation(shell: Gridshell, design: Design, state: State) -> Reals:
+    """Bending stress over strength (n,) at each node, the larger of its elements' ends; 0 where the strength
+    isn't known.
+    """
+    section, ends = shell.rod.resized(design.radius).section, shell.net.grid.rod_ends
+    forces = shell.beams(design.radius).local_forces(state)[: len(ends)]
+    use = np.zeros(len(state.positions))
+    np.maximum.at(
+        use, ends, section.bending(forces[:, [2, 5]], forces[:, [3, 6]]) / section.material.strength
+    )
+    return use
+
+
+def _marked(load: Reals) -> list[int]:
+    weight = np.linalg.norm(load[:, :3], axis=1)
+    return [int(node) for node in np.flatnonzero(weight > _MARKED * weight.max())]
+
+
+def _light(surface: Surface) -> tuple[Reals, Any]:
+    """Vertices (v, 3), m, and triangles (t, 3) of the surface; of a fine one vertices in one cell of a cubic
+    grid are merged to their mean."""
+    vertices, triangles = np.asarray(surface.vertices), np.asarray(surface.triangles)
+    if len(triangles) <= _MOST_TRIANGLES:
+        return vertices, triangles
+    size = np.sqrt(2.0 * surface.area / _MOST_TRIANGLES)
+    _, cell = np.unique(
+        np.floor((vertices - vertices.min(axis=0)) / size).astype(np.int64), axis=0, return_inverse=True
+    )
+    cell = cell.ravel()
+    count = np.bincount(cell).astype(float)
+    merged = np.column_stack([np.bincount(cell, vertices[:, k]) / count for k in range(3)])
+    corners = cell[triangles]
+    whole = (corners != np.roll(corners, 1, axis=1)).all(axis=1)
+    return merged, corners[whole]
+
+
+def _floats(values: Reals) -> str:
+    return _bytes(np.asarray(values).astype("<f4"))
+
+
+def _bytes(values: Any) -> str:
+    return base64.b64encode(np.ascontiguousarray(values).tobytes()).decode()
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.6g}")

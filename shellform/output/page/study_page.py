@@ -1,0 +1,197 @@
+"""The page of a study in one HTML file: front, scatter, parallel coordinates, rank correlations, best
+designs, table. No network.
+
+The template, style and script stand in `assets/study.*`; the script draws from JSON inside the page. Names
+and reasons are text from elsewhere: the template escapes them, the JSON has no "<", and the page's own policy
+refuses every script but its own and every request.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.gridshell.gridshell import Gridshell
+from shellform.output.page.template import filled, part
+from shellform.problem.problem import deviations
+from shellform.structure.elements.state import State
+
+MOST_ROWS = 4000  # that are drawn; the front is always among them
+_COLOURS = (
+    "#440154",
+    "#472d7b",
+    "#3b528b",
+    "#2c728e",
+    "#21918c",
+    "#28ae80",
+    "#5ec962",
+    "#addc30",
+    "#fde725",
+)  # viridis
+_SEGMENTS = 1500  # of a thumbnail
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What the page tells: rows with number, key, status, reason and `columns`, of which `varied` were given
+    and `goals` are to be small (1) or large (-1); the keys on the `front`, of which `best` have a card; by
+    key, `links` to pages and `pictures` (SVG); counts of `designs` done and failed; rank `correlation`; and
+    `notes`."""
+
+    title: str
+    rows: Sequence[Mapping[str, Any]]
+    varied: Sequence[str]
+    found: Sequence[str]
+    goals: Mapping[str, float]
+    front: Sequence[str]
+    best: Sequence[str]
+    links: Mapping[str, str]
+    pictures: Mapping[str, str]
+    designs: Mapping[str, int]
+    correlation: Mapping[str, Mapping[str, float]]
+    notes: Sequence[str]
+
+
+def study_page(sheet: Sheet) -> str:
+    """The page's text."""
+    names = [*sheet.varied, *sheet.found]
+    front = set(sheet.front)
+    drawn = [
+        [row["number"], int(row["key"] in front), *(_number(row.get(name)) for name in names)]
+        for row in sheet.rows
+        if row["status"] == "done"
+    ]
+    data = {
+        "names": names,
+        "varied": len(sheet.varied),
+        "goals": [name for name in sheet.goals if name in names],
+        "rows": drawn,
+        "links": {
+            str(row["number"]): sheet.links[row["key"]] for row in sheet.rows if row["key"] in sheet.links
+        },
+    }
+    shown = {row["key"]: row for row in reversed(sheet.rows)}
+    failed: dict[str, int] = {}
+    for row in sheet.rows:
+        if row["status"] != "done":
+            words = f"{row['status']}: {row['reason']}"
+            failed[words] = failed.get(words, 0) + 1
+    return filled(
+        "study.html",
+        {
+            "sheet": sheet,
+            "cards": [shown[key] for key in sheet.best if key in shown],
+            "names": names,
+            "failed": sorted(failed.items(), key=lambda each: -each[1])[:20],
+            "shade": _shade,
+        },
+        generator="shellform study",
+        style=part("study.css"),
+        script=part("study.js"),
+        data=data,
+        number=told,
+    )
+
+
+def spread(keys: Sequence[str], most: int = 24) -> list[str]:
+    """At most so many of a front's keys, evenly spread along it."""
+    return (
+        [
+            keys[k]
+            for k in sorted(
+                set(np.linspace(0, len(keys) - 1, min(most, len(keys))).round().astype(int).tolist())
+            )
+        ]
+        if keys
+        else []
+    )
+
+
+def chosen(count: int, front: Sequence[int]) -> list[int]:
+    """Which of `count` rows are drawn: all, or the front's and evenly spread others."""
+    if count <= MOST_ROWS:
+        return list(range(count))
+    return sorted({*front[:MOST_ROWS], *np.linspace(0, count - 1, MOST_ROWS).astype(int).tolist()})
+
+
+def rank_correlations(
+    given: Mapping[str, Sequence[Any]], found: Mapping[str, Sequence[Any]]
+) -> dict[str, dict[str, float]]:
+    """Spearman's rank correlation of each given column with each found one; those that don't vary or aren't
+    numbers are left out.
+    """
+    from scipy.stats import rankdata
+
+    result: dict[str, dict[str, float]] = {}
+    for name, values in given.items():
+        for other, results in found.items():
+            pairs = [
+                (float(a), float(b))
+                for a, b in zip(values, results, strict=True)
+                if _number(a) is not None and _number(b) is not None
+            ]
+            if len(pairs) < 3:
+                continue
+            a, b = (rankdata(each) for each in np.array(pairs).T)
+            if a.std() > 0.0 and b.std() > 0.0:
+                result.setdefault(name, {})[other] = float(np.corrcoef(a, b)[0, 1])
+    return result
+
+
+def thumbnail(shell: Gridshell, state: State, limit: float, *, width: int = 240) -> str:
+    """The loaded rods from above at a slant as SVG, coloured by their distance from the target, up to
+    `limit`, m.
+    """
+    away = deviations(shell, state)
+    ends = shell.net.grid.rod_ends
+    step = max(1, math.ceil(len(ends) / _SEGMENTS))
+    ends = ends[::step] if step > 1 else ends
+    place = _slanted(state.positions)
+    low, size = place.min(axis=0), np.ptp(place, axis=0)
+    scale = (width - 8) / max(float(size[0]), 1e-9)
+    height = 8 + scale * float(size[1])
+    points = 4 + scale * (place - low)
+    points[:, 1] = height - points[:, 1]
+    shade = np.minimum(
+        (len(_COLOURS) * away[ends].mean(axis=1) / max(limit, 1e-12)).astype(int), len(_COLOURS) - 1
+    )
+    paths = []
+    for k, colour in enumerate(_COLOURS):
+        lines = points[ends[shade == k]]
+        if len(lines):
+            told_lines = "".join(f"M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}" for a, b in lines)
+            paths.append(f'<path stroke="{colour}" d="{told_lines}"/>')
+    head = f'<svg viewBox="0 0 {width} {height:.0f}" role="img" fill="none" stroke-width="1.6" stroke-linecap="round">'
+    return f"{head}<title>{1e3 * float(away.max()):.1f} mm off at most</title>{''.join(paths)}</svg>"
+
+
+def _slanted(positions: Reals) -> Reals:
+    """Seen along a direction 40° above the ground and 30° from y."""
+    turn, tilt = math.radians(30.0), math.radians(40.0)
+    x, y, z = positions.T
+    across = math.cos(turn) * x + math.sin(turn) * y
+    along = -math.sin(turn) * x + math.cos(turn) * y
+    return np.column_stack([across, math.sin(tilt) * along + math.cos(tilt) * z])
+
+
+def told(value: Any) -> str:
+    """A number at four digits; a dash where there is none."""
+    if value is None or (isinstance(value, float) and not math.isfinite(value)):
+        return "–"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _number(value: Any) -> float | int | None:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return float(f"{value:.6g}") if isinstance(value, float) else value
+
+
+def _shade(value: float) -> str:
+    """How strongly a correlation is coloured."""
+    return f"{abs(value):.2f}"

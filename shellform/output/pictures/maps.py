@@ -1,0 +1,158 @@
+"""What the rods of a gridshell can be coloured by: from a design and a state to a panel.
+
+Deviation from the target (7); utilisation, the bending stress over the flexural strength; the rods' curvature
+κ = M / EI; the shear angle between the two rods of a crossing, from the right angle; and the softest mode
+(stability.py), in which the shell would buckle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.net import Net
+from shellform.net.quality import shear_angles
+from shellform.output.pictures.panel import Panel
+from shellform.problem.problem import deviations
+from shellform.structure.answers.stability import modes
+from shellform.structure.elements.sections import stiffness
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+
+DEGREE = float(np.pi / 180.0)
+# of the largest load on a node: smaller ones, such as of the rods' own weight, would hide the shell behind
+# arrows
+_MARKED = 0.2
+_AMPLITUDE = 0.05  # of the shell's size, at which a mode is drawn
+
+
+@dataclass(frozen=True)
+class Map:
+    """Values (n,) at the nodes of what `quantity` says, in a `unit` of a name and so much in SI, drawn at
+    `positions` (n, 3), m.
+    """
+
+    values: Reals
+    quantity: str
+    unit: tuple[str, float]
+    positions: Reals
+    note: str = ""
+
+
+def panel_of(
+    shell: Gridshell,
+    design: Design | None,
+    state: State,
+    *,
+    load: Reals | None = None,
+    quantity: str = "deviation",
+    title: str = "",
+) -> Panel:
+    """The shell in a state, its rods coloured by one of QUANTITIES; with the `design` its cables, with the
+    `load` (n, 6), N, its arrows.
+
+    Raises InputError for another quantity and where the shell and the state don't belong together,
+    NotConverged where no mode is found.
+    """
+    if quantity not in QUANTITIES:
+        raise InputError(
+            "is nothing to draw", where="quantity", value=quantity, remedy=f"Known: {', '.join(QUANTITIES)}."
+        )
+    if len(state.positions) != len(shell.net.grid.flat):
+        raise InputError("belongs to another shell", where="state", value=len(state.positions))
+    chosen = shell.unbraced() if design is None else design
+    seen = QUANTITIES[quantity](shell, chosen, state)
+    cables = shell.cables(chosen)
+    weight = np.zeros(len(state.positions)) if load is None else np.linalg.norm(load[:, :3], axis=1)
+    return Panel(
+        f"{title}{seen.note}",
+        seen.positions,
+        shell.net.grid.rod_ends,
+        seen.values,
+        cables.ends,
+        cables.tension(state),
+        shell.net.supports,
+        np.flatnonzero(weight > _MARKED * weight.max(initial=0.0)),
+        chosen.radius,
+        seen.quantity,
+        seen.unit,
+    )
+
+
+def _deviation(shell: Gridshell, design: Design, state: State) -> Map:
+    return Map(deviations(shell, state), "deviation from the target", ("mm", 1e-3), state.positions)
+
+
+def _utilisation(shell: Gridshell, design: Design, state: State) -> Map:
+    section = shell.rod.resized(design.radius).section
+    moments = _moments(shell, design, state)
+    stress = np.stack([section.bending(moments[:, end, 0], moments[:, end, 1]) for end in range(2)], axis=1)
+    values = worst_at_nodes(shell.net, stress / section.material.strength)
+    return Map(values, "utilisation of the rods in bending", ("", 1.0), state.positions)
+
+
+def _curvature(shell: Gridshell, design: Design, state: State) -> Map:
+    _, _, about_y, about_z = stiffness(shell.rod.resized(design.radius).section)
+    bent = np.linalg.norm(_moments(shell, design, state) / [about_y, about_z], axis=2)
+    return Map(worst_at_nodes(shell.net, bent), "curvature of the rods", ("1/m", 1.0), state.positions)
+
+
+def _shear(shell: Gridshell, design: Design, state: State) -> Map:
+    skew = np.abs(0.5 * np.pi - shear_angles(shell.net.grid, state))
+    return Map(
+        along_rods(shell.net, skew), "shear of the grid, from the right angle", ("°", DEGREE), state.positions
+    )
+
+
+def _mode(shell: Gridshell, design: Design, state: State) -> Map:
+    found = modes(assemble(shell.network(design)), state, 1)
+    size = float(np.ptp(state.positions, axis=0).max())
+    shift = found.shapes[0, :, :3] / np.linalg.norm(found.shapes[0, :, :3], axis=1).max()
+    upright = (
+        1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0
+    )  # a mode has no sign: drawn as it sinks
+    note = f": softest mode, {found.stiffness[0]:.3g} N/m"
+    place = state.positions + _AMPLITUDE * size * upright * shift
+    return Map(np.linalg.norm(shift, axis=1), "amplitude over the largest", ("", 1.0), place, note)
+
+
+QUANTITIES: dict[str, Callable[[Gridshell, Design, State], Map]] = {
+    "deviation": _deviation,
+    "utilisation": _utilisation,
+    "curvature": _curvature,
+    "shear": _shear,
+    "mode": _mode,
+}
+
+
+def _moments(shell: Gridshell, design: Design, state: State) -> Reals:
+    """Bending moments (m, 2, 2), N·m, of the rod elements at their two ends about their local y and z
+    axes.
+    """
+    forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
+    return np.asarray(forces[:, [[2, 3], [5, 6]]])
+
+
+def along_rods(net: Net, at_crossings: Reals) -> Reals:
+    """Values (n,) at all nodes from those at crossings (c,), linear along each rod."""
+    result = np.zeros(len(net.grid.flat))
+    known = np.full(len(net.grid.flat), np.nan)
+    for side in range(2):
+        known[net.grid.crossing_nodes[:, side]] = at_crossings
+    for rod in net.grid.rods:
+        nodes = np.asarray(rod.nodes)
+        place = np.flatnonzero(~np.isnan(known[nodes]))
+        result[nodes] = np.interp(np.arange(len(nodes)), place, known[nodes][place])
+    return result
+
+
+def worst_at_nodes(net: Net, at_ends: Reals) -> Reals:
+    """The largest of the rod elements' values at their two ends (m, 2) at each node (n,)."""
+    result = np.zeros(len(net.grid.flat))
+    np.maximum.at(result, net.grid.rod_ends, at_ends)
+    return result

@@ -1,0 +1,76 @@
+"""Maps of a net's quality: distance from the surface, curvature of the rods, skewness of the cells, forces of
+the springs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.net.net import Net
+from shellform.output.pictures import render
+from shellform.output.pictures.maps import DEGREE, along_rods, worst_at_nodes
+from shellform.output.pictures.panel import Look, Panel
+from shellform.written import folder as made
+
+
+def draw_net(net: Net, folder: str | Path, *, look: Look | None = None, ending: str = ".png") -> list[Path]:
+    """Writes net-distance, net-curvature, net-skew and net-springs with the `ending` (.png, .svg or .pdf);
+    returns the files.
+    """
+    target = made(folder)
+    return [draw_map(net, name, target / f"net-{name}{ending}", look=look) for name in _MAPS]
+
+
+def draw_map(net: Net, name: str, path: Path, *, look: Look | None = None) -> Path:
+    """Writes one of the maps "distance", "curvature", "skew" and "springs"; its colours end at the largest
+    value.
+    """
+    panel = panel_of(net, name)
+    render.picture(path, panel, replace(look or Look(), limit=limit_of(panel)))
+    return path
+
+
+def panel_of(net: Net, name: str) -> Panel:
+    """The net on its target, its rods coloured by one of the maps."""
+    quantity, unit = _MAPS[name]
+    return Panel(
+        f"net of {len(net.grid.rods)} rods, {len(net.grid.lattice)} crossings, spacing {net.spacing:g} m",
+        net.target.positions,
+        net.grid.rod_ends,
+        _values(net, name),
+        np.zeros((0, 2), dtype=np.int64),
+        np.zeros(0),
+        net.supports,
+        np.zeros(0, dtype=np.int64),
+        0.02 * net.spacing,
+        quantity,
+        unit,
+    )
+
+
+def limit_of(panel: Panel) -> float:
+    """The largest value, as the end of a colour scale."""
+    return max(float(panel.deviation.max()), 1e-9 * panel.unit[1])
+
+
+_MAPS = {
+    "distance": ("distance from the surface", ("mm", 1e-3)),
+    "curvature": ("curvature of the rods", ("1/m", 1.0)),
+    "skew": ("skewness of the cells", ("°", DEGREE)),
+    "springs": ("force left in the springs", ("EI/s²", 1.0)),
+}
+
+
+def _values(net: Net, name: str) -> Reals:
+    quality = net.quality
+    if name == "distance":
+        return along_rods(net, np.abs(quality.distance))
+    if name == "curvature":
+        return worst_at_nodes(net, np.linalg.norm(quality.curvature, axis=2))
+    if name == "skew":
+        return along_rods(net, np.abs(0.5 * np.pi - quality.shear_angle))
+    return np.abs(quality.pull)

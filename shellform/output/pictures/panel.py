@@ -1,0 +1,170 @@
+"""What a picture shows, as plain arrays: a gridshell in one state with one quantity on its rods, and how it
+is looked at.
+
+Nothing here knows a drawing library: `scene.py` draws panels as pixels, `vectors.py` as lines.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shellform.arrays import Indices, Reals, indices, reals
+from shellform.errors import InputError
+
+LIMIT = 0.010  # m, end of the colour scale in figures 12 to 14
+VIEWS = ("best", "top", "front", "side")
+SMALLEST = (160, 120)  # pixels; below it the title leaves no room for the shell
+LARGEST = 8000  # pixels a side: drawn at twice that, near which drivers end
+_THIN = 0.0024  # half the width at which a rod is drawn at least, over the width of the picture
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One picture: a gridshell in one state.
+
+    `positions` (n, 3), m; rod elements `beams` (m, 2); `deviation` (n,), m, of each node from its target;
+    `cables` (c, 2) with their `cable_forces` (c,), N, slack at or below zero; nodes of `supports` (s,) and of
+    loads, `load_points` (k,); `rod_radius`, m. `quantity` says what `deviation` measures where it is
+    something else, in a `unit` of a name and so much in SI. Raises InputError for wrong shapes and indices.
+    """
+
+    title: str
+    positions: Reals
+    beams: Indices
+    deviation: Reals
+    cables: Indices
+    cable_forces: Reals
+    supports: Indices
+    load_points: Indices
+    rod_radius: float
+    quantity: str = "deviation from the target"
+    unit: tuple[str, float] = ("mm", 1e-3)
+
+    def __post_init__(self) -> None:
+        put = functools.partial(object.__setattr__, self)
+        put("positions", reals("positions", self.positions, (None, 3)))
+        count = len(self.positions)
+        if count == 0:
+            raise InputError("positions has no nodes", where=f"panel {self.title!r}")
+        put("deviation", reals("deviation", self.deviation, (count,)))
+        if self.deviation.min() < 0.0:
+            raise InputError(
+                "deviation is a distance and can't be negative", value=float(self.deviation.min())
+            )
+        for name, width in [("beams", 2), ("cables", 2), ("supports", 0), ("load_points", 0)]:
+            shape = (None, width) if width else (None,)
+            put(name, indices(name, getattr(self, name), shape, below=count))
+        put("cable_forces", reals("cable_forces", self.cable_forces, (len(self.cables),)))
+        put("rod_radius", float(reals("rod_radius", self.rod_radius, (), positive=True)))
+
+
+@dataclass(frozen=True)
+class Skin:
+    """A surface that is shown translucent: `vertices` (v, 3), m, and `triangles` (t, 3)."""
+
+    vertices: Reals
+    triangles: Indices
+
+    def __post_init__(self) -> None:
+        points = reals("surface vertices", self.vertices, (None, 3))
+        object.__setattr__(self, "vertices", points)
+        object.__setattr__(
+            self, "triangles", indices("surface triangles", self.triangles, (None, 3), below=len(points))
+        )
+
+
+@dataclass(frozen=True)
+class Look:
+    """How panels are looked at.
+
+    `limit` ends the colour scale (m, or what the panels' quantity is measured in); `force`, N, that of the
+    cables (0: the largest drawn). `size` (width, height) of one picture in pixels; `view` one of VIEWS;
+    `thickness` of the rods, times their own (0: their own, but at least as thick as can be seen). `surface`
+    is drawn translucent. `frame` (p, 3), m, are further points that must be in view: give the nodes of all
+    states where single pictures are to be compared. `transparent`: no background. Raises InputError for what
+    can't be drawn.
+    """
+
+    limit: float = LIMIT
+    size: tuple[int, int] = (1600, 1000)
+    view: str = "best"
+    thickness: float = 0.0
+    force: float = 0.0
+    surface: Skin | None = None
+    frame: ArrayLike | None = None
+    transparent: bool = False
+
+    def __post_init__(self) -> None:
+        if self.view not in VIEWS:
+            raise InputError(
+                "is no view", where="view", value=self.view, remedy=f"Known: {', '.join(VIEWS)}."
+            )
+        if not 0.0 < self.limit < np.inf:
+            raise InputError("must be positive", where="figures.limit", value=self.limit)
+        for name in ("thickness", "force"):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise InputError("must be 0 or more", where=name, value=getattr(self, name))
+        if self.size[0] < SMALLEST[0] or self.size[1] < SMALLEST[1]:
+            raise InputError(
+                "is too small", where="size", value=self.size, remedy=f"Give {SMALLEST} pixels or more."
+            )
+        if max(self.size) > LARGEST:
+            raise InputError(
+                "is too large", where="size", value=self.size, remedy=f"Give at most {LARGEST} pixels a side."
+            )
+        if self.frame is not None:
+            object.__setattr__(self, "frame", reals("frame", self.frame, (None, 3)))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What all panels of a picture share: metres, newtons and letters."""
+
+    limit: float  # in SI units
+    beyond: bool  # whether a value is larger
+    force: float  # N; 0 where no cable is taut
+    slack: bool  # whether any cable is
+    reach: float  # m, the largest extent, which loads are drawn by
+    letters: int  # pixels
+    quantity: str  # what the colours measure
+    unit: tuple[str, float]
+
+
+def scale_of(panels: Sequence[Panel], look: Look, size: tuple[int, int]) -> Scale:
+    """The scale of panels that are drawn `size` pixels large each."""
+    reach = max(max(float(np.ptp(panel.positions, axis=0).max()) for panel in panels), 1e-9)
+    force = look.force or max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
+    slack = any((panel.cable_forces <= 0.0).any() for panel in panels)
+    letters = max(11, round(0.034 * min(size[1], 0.7 * size[0])))
+    beyond = any(panel.deviation.max() > look.limit * (1.0 + 1e-9) for panel in panels)
+    return Scale(
+        look.limit, beyond, max(force, 0.0), slack, reach, letters, panels[0].quantity, panels[0].unit
+    )
+
+
+def drawn_radius(panel: Panel, look: Look, width: float) -> float:
+    """Half the thickness, m, at which a panel's rods are drawn in a picture `width` m wide."""
+    return look.thickness * panel.rod_radius if look.thickness else max(panel.rod_radius, _THIN * width)
+
+
+def cable_thickness(share: Reals) -> Reals:
+    """A cable's thickness over a rod's, from its force over the scale's."""
+    return np.asarray(0.2 + 0.5 * np.sqrt(share))
+
+
+def arrow_length(scale: Scale) -> float:
+    """m, of the arrows that mark loads."""
+    return 0.04 * scale.reach
+
+
+def long_enough(positions: Reals, pairs: Indices) -> Indices:
+    """Those of the pairs (p, 2) that have a length, as numbers: VTK refuses a whole line for one element
+    without.
+    """
+    length = np.linalg.norm(positions[pairs[:, 1]] - positions[pairs[:, 0]], axis=1)
+    return np.flatnonzero(length > 1e-9 * max(float(np.ptp(positions, axis=0).max()), 1e-9))

@@ -1,0 +1,378 @@
+"""Convergence plots (figures 10, 11, 15 and 16 of the paper), and pages of lines and words; the door to
+matplotlib.
+
+Figures are made as objects with their own canvas, so that nothing global is touched and any thread may draw.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import cycle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from numpy.typing import ArrayLike, NDArray
+
+from shellform.arrays import Reals
+from shellform.errors import InputError
+from shellform.output.pictures.legend import Ramp, Word
+from shellform.written import door, whole
+
+_COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
+_DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
+_FAR = -1.5  # values further below their limit than this run out of the picture: what is near is what counts
+FORMATS = (".png", ".svg", ".pdf")
+_DOTS = 160.0  # pixels an inch
+_POINT = 72.0 / _DOTS  # points a pixel
+_INCH, _POINTS = 25.4, 72.0  # mm and points in an inch
+_CAPITAL = 0.73  # height of a capital over the font's size
+_WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
+
+
+@dataclass(frozen=True)
+class History:
+    """What the plots take: one entry an accepted design."""
+
+    evaluation: list[float]
+    terms: dict[str, list[float]]
+    constraints: dict[str, list[float]]
+    cables: list[float] | None
+
+
+def read_history(table: Mapping[str, Sequence[object]] | Iterable[Mapping[str, object]]) -> History:
+    """The columns of an optimiser's history, from rows (as of csv.DictReader on history.csv) or from named
+    columns.
+
+    Wanted: `evaluation` (or `iteration`), `term.NAME` and `constraint.NAME` for each; `cables` and `accepted`
+    if there. Rows with `accepted` 0 are left out. Raises InputError for missing columns, ragged ones and what
+    is no number.
+    """
+    columns = dict(table) if isinstance(table, Mapping) else _turned(list(table))
+    step = next((name for name in ("evaluation", "iteration") if name in columns), None)
+    if step is None or not len(columns[step]):
+        raise InputError(
+            "has no rows with a column evaluation or iteration", where="history", value=sorted(columns)
+        )
+    wanted = [
+        step,
+        *(
+            name
+            for name in columns
+            if name.startswith(("term.", "constraint.")) or name in ("cables", "accepted")
+        ),
+    ]
+    numbers: dict[str, list[float]] = {}
+    for name in wanted:
+        try:
+            numbers[name] = [float(value) for value in columns[name]]  # type: ignore[arg-type]
+        except (TypeError, ValueError) as error:
+            raise InputError(f"column {name} must be numbers: {error}", where="history") from error
+        if len(numbers[name]) != len(columns[step]):
+            raise InputError(
+                f"column {name} and {step} differ in length", where="history", value=len(numbers[name])
+            )
+    keep = [bool(flag) for flag in numbers.pop("accepted", [1.0] * len(columns[step]))]
+    kept = {
+        name: [v for v, good in zip(values, keep, strict=True) if good] for name, values in numbers.items()
+    }
+
+    def group(prefix: str) -> dict[str, list[float]]:
+        return {name.removeprefix(prefix): values for name, values in kept.items() if name.startswith(prefix)}
+
+    return History(kept[step], group("term."), group("constraint."), kept.get("cables"))
+
+
+def objective_history(
+    path: str | Path,
+    evaluation: Sequence[float],
+    terms: Mapping[str, Sequence[float]],
+    *,
+    cables: Sequence[float] | None = None,
+) -> None:
+    """Figure 10: the objective and its weighted terms at each accepted design, and `cables` in tension if
+    given.
+
+    The ending of `path` chooses the format: png, svg or pdf. Raises InputError for other endings and uneven
+    columns.
+    """
+    at, lines = _columns(evaluation, terms)
+    figure, axes = _figure()
+    axes.plot(at, np.sum(list(lines.values()), axis=0), color="black", linewidth=2.0, label="objective")
+    _curves(axes, at, lines)
+    axes.set(xlabel="design evaluations", ylabel="objective and its terms")
+    if np.nanmin(list(lines.values()), initial=0.0) >= 0.0:
+        axes.set_ylim(bottom=0.0)
+    if cables is not None:
+        beside = axes.twinx()
+        (count,) = _columns(evaluation, {"cables": cables})[1].values()
+        beside.step(
+            at, count, where="post", color="#9a9a9a", linewidth=1.2, linestyle="--", label="cables (right)"
+        )
+        beside.set_ylabel("cables", color="#6a6a6a")
+        beside.set_ylim(bottom=0.0, top=1.1 * float(np.nanmax(count, initial=1.0)))
+        beside.yaxis.set_major_locator(MaxNLocator(integer=True))
+        beside.tick_params(axis="y", colors="#6a6a6a")
+        beside.spines[["top", "left"]].set_visible(False)
+        beside.spines["right"].set_color("#b0b0b0")
+    _save(figure, path)
+
+
+def constraint_history(
+    path: str | Path, evaluation: Sequence[float], constraints: Mapping[str, Sequence[float]]
+) -> None:
+    """Figure 11: value over limit, minus 1, of each constraint at each accepted design; feasible at and below
+    zero.
+
+    Linear, or, where a value exceeds 3, linear between -1 and 1 and logarithmic beyond; what is below -1.5 is
+    out of the picture. `path` as in `objective_history`.
+    """
+    at, lines = _columns(evaluation, constraints)
+    figure, axes = _figure()
+    _curves(axes, at, lines)
+    values = np.concatenate(list(lines.values()))
+    highest, lowest = float(np.nanmax(values, initial=0.0)), float(np.nanmin(values, initial=0.0))
+    if highest > _WIDE:
+        axes.set_yscale("symlog", linthresh=1.0, linscale=1.0)
+        decades = [k * 10.0**n for n in range(int(np.log10(highest)) + 1) for k in (1, 2, 5)]
+        axes.yaxis.set_major_locator(FixedLocator([-5.0, -2.0, -1.0, -0.5, 0.0, 0.5, *decades]))
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        top = 1.5 * highest
+    else:
+        top = max(1.15 * highest, 0.15)
+    bottom = max(min(1.1 * lowest, -0.15), _FAR)
+    axes.set_ylim(bottom, top)
+    axes.axhspan(0.0, top, color="#f8ddd3", linewidth=0.0, zorder=0)
+    axes.axhspan(bottom, 0.0, color="#e4eff6", linewidth=0.0, zorder=0)
+    axes.axhline(0.0, color="black", linewidth=0.9, zorder=1.5)
+    for word, offset, foot in [("infeasible", 4, "bottom"), ("feasible", -4, "top")]:
+        axes.annotate(
+            word, (1.0, 0.0), (-6, offset), xycoords=("axes fraction", "data"), textcoords="offset points",
+            ha="right", va=foot, color="#5a5a5a", style="italic",
+        )  # fmt: skip
+    axes.set(xlabel="design evaluations", ylabel="value / limit − 1")
+    _save(figure, path)
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line through `points` (x, y), mm from the page's lower left corner, `width` mm wide."""
+
+    points: Sequence[tuple[float, float]]
+    colour: str = "#000000"
+    width: float = 0.18
+    dashed: bool = False
+
+
+@dataclass(frozen=True)
+class Label:
+    """A line of `text` with capitals `height` mm high, turned by `angle` degrees; `side` and `foot` of it are
+    at `place`, mm.
+    """
+
+    place: tuple[float, float]
+    height: float
+    text: str
+    colour: str = "#000000"
+    angle: float = 0.0
+    side: str = "left"
+    foot: str = "bottom"
+    bold: bool = False
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page of `width` and `height`, mm, with its lines and labels."""
+
+    width: float
+    height: float
+    lines: tuple[Line, ...]
+    labels: tuple[Label, ...]
+
+
+def write_pages(path: str | Path, pages: Sequence[Page], title: str = "") -> None:
+    """Writes the pages, to scale and with their words as text, to a PDF; a single page may also go to a PNG
+    or SVG.
+
+    The same pages give the same bytes. The caller sees to it that `path` can be written.
+    """
+    target = Path(path)
+    with rc_context(
+        {
+            "pdf.fonttype": 42,
+            "svg.fonttype": "none",
+            "svg.hashsalt": "shellform",
+            "font.family": "DejaVu Sans",
+        }
+    ):
+        if target.suffix.lower() != ".pdf":
+            _page(pages[0]).savefig(target, dpi=160)
+            return
+        with PdfPages(target, metadata={"Title": title, "CreationDate": None}) as book:
+            for page in pages:
+                book.savefig(_page(page))
+
+
+def _page(page: Page) -> Figure:
+    figure = Figure(figsize=(page.width / _INCH, page.height / _INCH))
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0.0, page.width), ylim=(0.0, page.height))
+    axes.axis("off")
+    kinds: dict[tuple[str, float, bool], list[Sequence[tuple[float, float]]]] = {}
+    for line in page.lines:
+        kinds.setdefault((line.colour, line.width, line.dashed), []).append(line.points)
+    for (colour, width, dashed), several in kinds.items():
+        style: Any = (0, (8.0, 6.0)) if dashed else "solid"
+        axes.add_collection(
+            LineCollection(
+                several,
+                colors=colour,
+                linewidths=width / _INCH * _POINTS,
+                linestyles=[style],
+                capstyle="round",
+            )
+        )
+    vertical = {"bottom": "baseline", "middle": "center_baseline", "top": "top"}
+    for label in page.labels:
+        axes.text(
+            *label.place, label.text, fontsize=label.height / _CAPITAL / _INCH * _POINTS, color=label.colour, rotation=label.angle,
+            ha="center" if label.side == "middle" else label.side, va=vertical[label.foot], rotation_mode="anchor",
+            fontweight="bold" if label.bold else "normal",
+        )  # fmt: skip
+    return figure
+
+
+def _turned(rows: Sequence[Mapping[str, object]]) -> dict[str, Sequence[object]]:
+    names = list(rows[0]) if rows else []
+    for number, row in enumerate(rows):
+        if list(row) != names:
+            raise InputError(
+                f"row {number} has other columns than the first", where="history", value=sorted(row)
+            )
+    return {name: [row[name] for row in rows] for name in names}
+
+
+def _columns(
+    evaluation: Sequence[float], named: Mapping[str, Sequence[float]]
+) -> tuple[Reals, dict[str, Reals]]:
+    """Arrays of one length; what is not finite (a design without an equilibrium) leaves a gap."""
+    at = np.asarray(evaluation, dtype=np.float64)
+    if at.ndim != 1 or not len(at) or not named:
+        raise InputError(
+            "has nothing to draw", where="history", remedy="Give at least one row and one column."
+        )
+    lines = {}
+    for name, values in named.items():
+        line = np.asarray(values, dtype=np.float64)
+        if line.shape != at.shape:
+            raise InputError(
+                f"column {name} and evaluation differ in length", where="history", value=line.shape
+            )
+        lines[name] = np.where(np.isfinite(line), line, np.nan)
+    return at, lines
+
+
+def _figure() -> tuple[Figure, Axes]:
+    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.grid(color="#e0e0e0", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.margins(x=0.02)
+    return figure, axes
+
+
+def _curves(axes: Axes, at: Reals, lines: Mapping[str, Reals]) -> None:
+    styles = cycle([(colour, dash) for dash in _DASHES for colour in _COLOURS])
+    for (name, values), (colour, dash) in zip(lines.items(), styles, strict=False):
+        label = name.replace(".", ", ").replace("_", " ")
+        axes.plot(
+            at, values, color=colour, linestyle=dash, linewidth=1.4, marker=".", markersize=5, label=label
+        )
+
+
+def _save(figure: Figure, path: str | Path) -> None:
+    """Writes all of the file or nothing; the same history gives the same bytes."""
+    target = door(path, *FORMATS)
+    figure.legend(loc="outside right upper", frameon=False)
+    _write(figure, target, 160)
+
+
+def _write(figure: Figure, target: Path, resolution: float) -> None:
+    undated: dict[str, None] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(
+        target.suffix.lower(), {}
+    )
+    with whole(target) as partial, rc_context({"svg.hashsalt": "shellform", "path.simplify": False}):
+        figure.savefig(partial, dpi=resolution, metadata=undated)
+
+
+def blank(size: tuple[int, int], *, transparent: bool = False) -> Axes:
+    """An empty page measured in pixels from its lower left corner."""
+    figure = Figure(
+        figsize=(size[0] / _DOTS, size[1] / _DOTS), dpi=_DOTS, facecolor="none" if transparent else "white"
+    )
+    FigureCanvasAgg(figure)
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0, size[0]), ylim=(0, size[1]))
+    axes.set_axis_off()
+    return axes
+
+
+def strokes(axes: Axes, ends: Reals, widths: Reals, colours: ArrayLike) -> None:
+    """Straight lines (s, 2, 2) of `widths` (s,), all in pixels, and `colours` (s, 3) from 0 to 1, later ones
+    above earlier ones.
+    """
+    lines = LineCollection(
+        list(np.round(ends, 1)), linewidths=widths * _POINT, colors=colours, capstyle="round", clip_on=False
+    )
+    axes.add_collection(lines, autolim=False)
+
+
+def areas(axes: Axes, corners: Reals, colour: str) -> None:
+    """Filled polygons (p, k, 2), pixels, of one colour."""
+    axes.add_collection(
+        PolyCollection(list(np.round(corners, 1)), facecolors=colour, linewidths=0.0, clip_on=False),
+        autolim=False,
+    )
+
+
+def letter(axes: Axes, word: Word, corner: tuple[float, float]) -> None:
+    """A word of a drawing whose lower left corner stands at `corner`."""
+    axes.text(
+        corner[0] + word.at[0], corner[1] + word.at[1], word.text, fontsize=word.pixels * _POINT, color=word.colour,
+        weight="bold" if word.bold else "normal", ha=word.justify, va="baseline",
+    )  # fmt: skip
+
+
+def strip(axes: Axes, ramp: Ramp, corner: tuple[float, float]) -> None:
+    """A strip of colours of a drawing whose lower left corner stands at `corner`."""
+    x, y = corner
+    place = (x + ramp.left, x + ramp.right, y + ramp.low, y + ramp.high)
+    axes.imshow(ramp.colours[None], extent=place, aspect="auto", interpolation="nearest")
+    axes.set(xlim=(0, axes.figure.bbox.width), ylim=(0, axes.figure.bbox.height))
+
+
+def save(axes: Axes, path: str | Path) -> None:
+    """Writes a page as .svg, .pdf or .png: the same page gives the same bytes."""
+    figure = axes.figure
+    assert isinstance(figure, Figure)
+    _write(figure, door(path, *FORMATS), _DOTS)
+
+
+def pixels(axes: Axes) -> NDArray[np.uint8]:
+    """A page as an array (height, width, 4)."""
+    canvas = axes.figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    canvas.draw()
+    return np.array(canvas.buffer_rgba())

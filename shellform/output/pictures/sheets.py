@@ -1,0 +1,91 @@
+"""The layout of a page: panels in rows, all with one scale and one camera, a heading above and the keys below
+them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from shellform.errors import InputError
+from shellform.output.pictures import legend
+from shellform.output.pictures.legend import Ramp, Word
+from shellform.output.pictures.panel import Look, Panel, Scale, scale_of
+from shellform.output.pictures.view import Camera, fitted
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A rectangle of a page: `size` in pixels, `corner` its upper left one's place from the page's; what it
+    shows.
+    """
+
+    size: tuple[int, int]
+    corner: tuple[int, int]
+    words: tuple[Word, ...] = ()
+    ramps: tuple[Ramp, ...] = ()
+    panel: Panel | None = None
+
+
+@dataclass(frozen=True)
+class Page:
+    """`drawings` on a page of a `size` in pixels, all with one `scale`, `camera` and `look`."""
+
+    size: tuple[int, int]
+    drawings: Sequence[Drawing]
+    scale: Scale
+    camera: Camera
+    look: Look
+
+
+def single(panels: Sequence[Panel], look: Look) -> list[Page]:
+    """A page of the look's size for each panel, all with one scale and camera: one picture, or the frames of
+    a film.
+    """
+    if not panels:
+        raise InputError("has no panels", where="picture", remedy="Give at least one.")
+    width, height = look.size
+    strip = legend.key_height(look.size)
+    room = (width, height - strip)
+    scale = scale_of(panels, look, room)
+    camera = fitted(panels, look, scale, room)
+    words, ramps = legend.key(scale, width)
+    foot = Drawing((width, strip), (0, height - strip), words, ramps)
+    return [
+        Page(
+            look.size,
+            [Drawing(room, (0, 0), legend.title(panel, scale, room), (), panel), foot],
+            scale,
+            camera,
+            look,
+        )
+        for panel in panels
+    ]
+
+
+def table(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> Page:
+    """All panels on one page, each of the look's size; rows may differ in length."""
+    panels = [panel for row in rows for panel in row]
+    if not panels:
+        raise InputError("has no panels", where="sheet", remedy="Give at least one row with one panel.")
+    width, height = look.size
+    scale = scale_of(panels, look, look.size)
+    camera = fitted(panels, look, scale, look.size)
+    columns, strip = max(len(row) for row in rows), legend.key_height(look.size)
+    top = round(2.6 * scale.letters) if heading else 0
+    drawings = [
+        Drawing(look.size, (j * width, top + i * height), legend.title(panel, scale, look.size), (), panel)
+        for i, row in enumerate(rows)
+        for j, panel in enumerate(row)
+    ]
+    across = width * columns
+    if heading:
+        drawings.append(
+            Drawing(
+                (across, top), (0, 0), legend.heading(heading, (across, top), round(1.25 * scale.letters))
+            )
+        )
+    words, ramps = legend.key(scale, min(across, 2 * width))
+    wide = min(across, 2 * width)
+    drawings.append(Drawing((wide, strip), ((across - wide) // 2, top + height * len(rows)), words, ramps))
+    return Page((across, top + height * len(rows) + strip), drawings, scale, camera, look)

@@ -1,0 +1,380 @@
+"""What is cut, tensioned and set out: the tables that go to the workshop and to the site, in SI units.
+
+Names are those of the drawings: rod U5 or V16 has the number 5 or 16 in net.json, crossing 37 and support S3
+too; cable C12 is number 12 in the model file of the design. All places are those of the rods' axes; a
+crossing lies in the middle between its two rods.
+
+**Rods.** Marks are distances of the crossings from the rod's first end along the straight rod.
+
+**Cables.** A cable is made with its rest length, between the pins' axes with nothing pulling on it. Where it
+is measured on site it is taut: the clear length between its pins at a load is that of the loaded state, and
+its force N = EA (l - l⁰) / l⁰. Load "none" is the erected grid before the pour. The turnbuckle has to reach
+from the length at which the cable is hung in without force, that between its pins in the grid before bracing,
+to the rest length, and `RESERVE` beyond both for what a survey asks for.
+
+Where the turnbuckles' range of adjustment is given, cables are cut to the fewest lengths that it allows
+(grouping.py): with the turnbuckle closed a cable has its cut length, and it is let out to its rest length.
+
+**Order of tensioning.** Round after round from the supports to the crown: a cable's round is the number of
+segments from its ends to the nearest rod end along the rods, the smaller of both. The grid is held at its
+feet and the curvature is set there first, so that each round pulls against a part that is braced already, and
+the crown, the softest part, stays free to settle until the end. Within a round the cables stand in the order
+in which they go round the plan, and are best tightened on opposite sides at a time. On the optimised vault no
+round loses stability (erection.py), and no cable pulls more than 5.0 N on the way to 4.6 N; the reverse order
+does as well there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.gridshell.catalogue import label
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.grouping import cut_lengths
+from shellform.net.grid import Grid, crossing_points
+from shellform.output.workshop.nesting import Cutting
+from shellform.structure.elements.sections import mass_per_length
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.tables import Table, Value, write_tables
+
+RESERVE = 0.02  # of the rest length, at both ends of a turnbuckle's range
+
+
+@dataclass(frozen=True)
+class Built:
+    """A design to build: the `shell`, its `design`, its `states` by load case, "none" among them, and the
+    state `hung` in which the cables are hung in, the erected grid before bracing (left out: the target).
+    `name` of the design and `title` of the job are for the heads; `adjustment`, m, is the range of the
+    turnbuckles by which cables are let out from the lengths that they are cut to (None: each is cut for
+    itself)."""
+
+    shell: Gridshell
+    design: Design
+    states: Mapping[str, State]
+    hung: State | None = None
+    name: str = ""
+    title: str = ""
+    adjustment: float | None = None
+
+    def __post_init__(self) -> None:
+        if "none" not in self.states:
+            raise InputError("needs the state without load", where="states", value=list(self.states))
+
+    @property
+    def grid(self) -> Grid:
+        """The net's grid."""
+        return self.shell.net.grid
+
+
+def rod_names(grid: Grid) -> list[str]:
+    """U or V and the rod's number."""
+    return [f"{rod.direction.upper()}{k}" for k, rod in enumerate(grid.rods)]
+
+
+def rods(built: Built, cutting: Cutting) -> Table:
+    """The rods: lengths, marks, section, mass, and from which bars they are cut."""
+    section = built.shell.rod.resized(built.design.radius).section
+    weight = mass_per_length(section)
+    places: dict[int, list[tuple[int, str]]] = {}
+    for number, bar in enumerate(cutting.bars, 1):
+        for piece in bar.pieces:
+            said = f"B{number}" if piece.parts == 1 else f"part {piece.part}: B{number}"
+            places.setdefault(piece.rod, []).append((piece.part, said))
+    rows = tuple(
+        (
+            name, rod.direction, rod.length, label(section), weight * rod.length if weight else None, len(rod.marks),
+            " ".join(f"{mark:.4f}" for mark in rod.marks), " ".join(map(str, rod.crossings.tolist())),
+            ", ".join(said for _, said in sorted(places[k])), "spliced" if k in cutting.spliced else "",
+        )
+        for k, (name, rod) in enumerate(zip(rod_names(built.grid), built.grid.rods, strict=True))
+    )  # fmt: skip
+    heads = (
+        "rod", "direction", "length [m]", "section", "mass [kg]", "crossings",
+        "marks from the first end [m]", "crossing numbers", "bars", "note",
+    )  # fmt: skip
+    notes = cutting_notes(cutting, rod_names(built.grid))
+    if not weight:
+        notes += ("No masses: the rods' density isn't known (rod.density).",)
+    return Table("rods", heads, rows, notes)
+
+
+def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
+    """What the buyer and the carpenter must know, a sentence each."""
+    count = len(cutting.bars)
+    told = "fewer" if count == cutting.least else f"fewer than {cutting.least}"
+    said = [
+        f"{count} bars of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, {100 * cutting.waste:.0f} % waste; {told} can't do."
+    ]
+    if cutting.spliced:
+        which = ", ".join(names[rod] for rod in cutting.spliced)
+        said.append(
+            f"{len(cutting.spliced)} rods are longer than the stock and must be SPLICED; the analysis takes a splice for as stiff and as "
+            f"strong as the rod: {which}."
+        )
+    return tuple(said)
+
+
+def splices(built: Built, cutting: Cutting) -> Table:
+    """Where rods longer than the stock are spliced, and what the splices bear at each load: tension N and
+    bending moment, interpolated between the nodes."""
+    grid, beams = built.grid, built.shell.beams(built.design.radius)
+    first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in grid.rods])])  # element of each rod
+    forces = {name: beams.local_forces(built.states[name]) for name in _in_order(built)}
+    names = rod_names(grid)
+    places = sorted(
+        (piece.rod, piece.start) for bar in cutting.bars for piece in bar.pieces if piece.part > 1
+    )
+    rows = []
+    for number, at in places:
+        rod = grid.rods[number]
+        inside = int(np.clip(np.searchsorted(rod.arc, at) - 1, 0, len(rod.arc) - 2))
+        share = (at - rod.arc[inside]) / (rod.arc[inside + 1] - rod.arc[inside])
+        before = int(np.searchsorted(rod.marks, at)) - 1
+        row: list[Value] = [
+            names[number],
+            float(at),
+            int(rod.crossings[before]),
+            int(rod.crossings[before + 1]),
+        ]
+        for told in forces.values():
+            axial, _, y_a, z_a, _, y_b, z_b = told[first[number] + inside]
+            # Both ends' moments are counted as they turn the ends, so that a constant bending moment has
+            # opposite signs there.
+            bent = (1.0 - share) * np.array([y_a, z_a]) - share * np.array([y_b, z_b])
+            row += [float(axial), float(np.linalg.norm(bent))]
+        rows.append(tuple(row))
+    heads = ["rod", "from the first end [m]", "after crossing", "before crossing"]
+    for name in forces:
+        heads += [f"{_stage(name)}: tension [N]", f"{_stage(name)}: bending moment [N m]"]
+    return Table(
+        "splices", tuple(heads), tuple(rows), cutting_notes(cutting, names)[1:] or ("No rod is spliced.",)
+    )
+
+
+def marks(built: Built) -> Table:
+    """One row a mark: rod, crossing, its distance from the first end, and the rod that crosses there."""
+    grid, names = built.grid, rod_names(built.grid)
+    across: dict[tuple[str, int], str] = {
+        (rod.direction, crossing): name
+        for name, rod in zip(names, grid.rods, strict=True)
+        for crossing in rod.crossings.tolist()
+    }
+    rows = tuple(
+        (name, number, crossing, mark, across["v" if rod.direction == "u" else "u", crossing])
+        for name, rod in zip(names, grid.rods, strict=True)
+        for number, (crossing, mark) in enumerate(
+            zip(rod.crossings.tolist(), rod.marks.tolist(), strict=True), 1
+        )
+    )
+    return Table("marks", ("rod", "mark", "crossing", "from the first end [m]", "crosses rod"), rows)
+
+
+def bars(built: Built, cutting: Cutting) -> Table:
+    """One row a piece: which bar it is cut from, in which order, and the bar's offcut after the last one."""
+    names = rod_names(built.grid)
+    rows = []
+    for number, bar in enumerate(cutting.bars, 1):
+        at = 0.0
+        for place, piece in enumerate(bar.pieces, 1):
+            part = "" if piece.parts == 1 else f"{piece.part} of {piece.parts}"
+            last = bar.offcut if place == len(bar.pieces) else None
+            rows.append((f"B{number}", place, names[piece.rod], part, piece.length, at, piece.start, last))
+            at += piece.length + cutting.kerf
+    heads = (
+        "bar", "piece", "rod", "part", "length [m]", "begins on the bar at [m]", "begins on the rod at [m]", "offcut [m]",
+    )  # fmt: skip
+    return Table("bars", heads, tuple(rows), cutting_notes(cutting, names))
+
+
+def rounds(shell: Gridshell, design: Design) -> Indices:
+    """The round (c,), from 1, in which each cable of the design is tightened (see the module's head)."""
+    grid = shell.net.grid
+    steps = np.full(len(grid.lattice), len(grid.lattice))
+    for rod in grid.rods:
+        count = len(rod.crossings)
+        near = np.minimum(np.arange(count), np.arange(count)[::-1])
+        steps[rod.crossings] = np.minimum(steps[rod.crossings], near)
+    own = steps[cable_crossings(shell, design)].min(axis=1)
+    used = np.unique(own)
+    return np.asarray(np.searchsorted(used, own) + 1, dtype=np.int64)
+
+
+def tension_order(shell: Gridshell, design: Design) -> Indices:
+    """The design's cables in the order of tensioning (c,): round after round, and each round about the middle
+    of the plan.
+    """
+    ends = shell.cable_ends[design.present]
+    middle = shell.target.positions[ends].mean(axis=1)[:, :2]
+    away = middle - shell.net.crossings[:, :2].mean(axis=0)
+    turned = np.arctan2(away[:, 1], away[:, 0])
+    return np.lexsort((turned, rounds(shell, design)))
+
+
+def cable_crossings(shell: Gridshell, design: Design) -> Indices:
+    """The crossings (c, 2) that the design's cables join."""
+    number = np.full(len(shell.net.grid.flat), -1)
+    for side in range(2):
+        nodes = shell.net.grid.crossing_nodes[:, side]
+        number[nodes] = np.arange(len(nodes))
+    return np.asarray(number[shell.cable_ends[design.present]], dtype=np.int64)
+
+
+def cables(built: Built) -> Table:
+    """The cables: crossings, rest length, turnbuckle, order of tensioning, and clear length and force at each
+    load.
+    """
+    shell, design = built.shell, built.design
+    ties = shell.cables(design)
+    pairs = cable_crossings(shell, design)
+    hung = ties.lengths(built.hung or shell.target)
+    shortest = (1.0 - RESERVE) * np.minimum(ties.rest_length, hung)
+    longest = (1.0 + RESERVE) * np.maximum(ties.rest_length, hung)
+    order = np.empty(len(pairs), dtype=np.int64)
+    order[tension_order(shell, design)] = np.arange(1, len(pairs) + 1)
+    columns: dict[str, Reals | Indices] = {
+        "from crossing": pairs[:, 0],
+        "to crossing": pairs[:, 1],
+        "tensioning round": rounds(shell, design),
+        "tensioning order": order,
+        "rest length [m]": ties.rest_length,
+        **(
+            {}
+            if built.adjustment is None
+            else {"cut length [m]": cut_lengths(ties.rest_length, built.adjustment)}
+        ),
+        "hung in at [m]": hung,
+        "turnbuckle shortest [m]": shortest,
+        "turnbuckle longest [m]": longest,
+    }
+    for name in _in_order(built):
+        state = built.states[name]
+        columns[f"{_stage(name)}: clear length [m]"] = ties.lengths(state)
+        columns[f"{_stage(name)}: force [N]"] = ties.tension(state)
+    rows = tuple((f"C{k}", *(values[k].item() for values in columns.values())) for k in range(len(pairs)))
+    notes = (
+        f"Lengths between the pins' axes. {len(pairs)} cables, EA = {shell.cable.stiffness:g} N. A force of 0: slack at that stage.",
+        *cutting_of_cables(built),
+    )
+    return Table("cables", ("cable", *columns), rows, notes)
+
+
+def cut_counts(built: Built) -> dict[str, int]:
+    """For the summary: how many different `rest_lengths` the cables have, and to how many `cut_lengths` they
+    are cut, if turnbuckles' range is known.
+    """
+    lengths = built.shell.cables(built.design).rest_length
+    found = {"rest_lengths": len(np.unique(lengths))}
+    if built.adjustment is not None:
+        found["cut_lengths"] = len(np.unique(cut_lengths(lengths, built.adjustment)))
+    return found
+
+
+def cutting_of_cables(built: Built) -> tuple[str, ...]:
+    """To how many lengths cables are cut, in words; nothing where each is cut for itself."""
+    counts = cut_counts(built)
+    if built.adjustment is None or "cut_lengths" not in counts:
+        return ()
+    return (
+        f"Cut to {counts['cut_lengths']} different lengths, the fewest for {counts['rest_lengths']} different rest lengths and turnbuckles that "
+        f"let a cable out by {1e3 * built.adjustment:g} mm from its cut length.",
+    )
+
+
+def supports(built: Built) -> Table:
+    """The supports: which end of which rod, where its axis stands, how it leaves the ground: bearing from x
+    and rise, rad; and with which force the rod acts on it at each load."""
+    grid, place = built.grid, built.shell.target.positions
+    ends = {
+        int(rod.nodes[side]): (name, word, place[rod.nodes[inner]] - place[rod.nodes[side]])
+        for name, rod in zip(rod_names(grid), grid.rods, strict=True)
+        for side, inner, word in ((0, 1, "first"), (-1, -2, "second"))
+    }
+    assembly = assemble(built.shell.network(built.design))
+    pushes = {
+        name: -assembly.evaluate(built.states[name], tangent=False).force[:, :3] for name in _in_order(built)
+    }
+    rows = []
+    for number, node in enumerate(built.shell.net.supports.tolist()):
+        rod, side, along = ends[node]
+        x, y, z = place[node].tolist()
+        bearing = float(np.arctan2(along[1], along[0]))
+        rise = float(np.arctan2(along[2], np.hypot(along[0], along[1])))
+        forces = [value for push in pushes.values() for value in push[node].tolist()]
+        rows.append((f"S{number}", rod, side, x, y, z, bearing, rise, *forces))
+    heads = [
+        "support",
+        "rod",
+        "end",
+        "x [m]",
+        "y [m]",
+        "z [m]",
+        "bearing of the rod [rad]",
+        "rise of the rod [rad]",
+    ]
+    heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
+    notes = (
+        "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them.",
+    )
+    return Table("supports", tuple(heads), tuple(rows), notes)
+
+
+def survey(built: Built) -> Table:
+    """Every crossing: where it is wanted, and where it is expected at each load, "none" before the pour."""
+    grid, shell = built.grid, built.shell
+    places = {"target": shell.net.crossings}
+    places |= {_stage(name): crossing_points(grid, built.states[name]) for name in _in_order(built)}
+    across = {
+        (rod.direction, c): name
+        for name, rod in zip(rod_names(grid), grid.rods, strict=True)
+        for c in rod.crossings.tolist()
+    }
+    heads = ["crossing", "rod u", "rod v"]
+    for name in places:
+        heads += [f"{name}: {axis} [m]" for axis in "xyz"]
+    heads += [f"{name}: off the target [m]" for name in places if name != "target"]
+    rows = []
+    for k in range(len(grid.lattice)):
+        here = [value for place in places.values() for value in place[k].tolist()]
+        off = [
+            float(np.linalg.norm(p[k] - places["target"][k]))
+            for name, p in places.items()
+            if name != "target"
+        ]
+        rows.append((k, across["u", k], across["v", k], *here, *off))
+    return Table("survey", tuple(heads), tuple(rows), ("Middle between the axes of the two rods.",))
+
+
+def all_tables(built: Built, cutting: Cutting) -> list[Table]:
+    """Every schedule, that of the splices also where there are none, so that none is left from another
+    stock.
+    """
+    return [
+        rods(built, cutting), bars(built, cutting), splices(built, cutting), marks(built), cables(built), supports(built), survey(built),
+    ]  # fmt: skip
+
+
+def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
+    """Writes every schedule as NAME.csv and all of them as schedules.xlsx; returns the files. Raises
+    InputError where they can't be written.
+    """
+    return write_tables(folder, all_tables(built, cutting))
+
+
+def _in_order(built: Built) -> list[str]:
+    """The load cases as they come on site: before the pour, the stages of pouring, all of it, and what is
+    only checked.
+    """
+    last = [name for name in ("design", "additional") if name in built.states]
+    return ["none", *(name for name in built.states if name not in ("none", *last)), *last]
+
+
+def _stage(load: str) -> str:
+    """What a load case is called on site."""
+    return "erected" if load == "none" else load

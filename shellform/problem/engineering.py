@@ -1,0 +1,274 @@
+"""What an engineer limits besides the paper's constraints: stress, the turning of connectors, cable forces,
+slack cables, uplift.
+
+Each is the largest of many values, v_k at rod ends, connectors, cables or supports, which has no derivative
+where two change places. The Kreisselmeier-Steinhauser function
+
+    KS(v) = max v + ln(sum exp(q (v_k - max v))) / q
+
+is smooth, never below the largest and at most ln(number)/q above it, so that a limit on it keeps the limit on
+each; q is `SHARPNESS` over the quantity's unit. One value, so one adjoint solve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.problem.terms import Measure
+from shellform.structure.answers.mode_stiffness import (
+    quadratic,
+    stiffness_by_freedom,
+    stiffness_by_rest_length,
+)
+from shellform.structure.answers.results import end_stress, end_stress_by_force, twist
+from shellform.structure.answers.sensitivity import reaction_rows
+from shellform.structure.answers.stability import modes
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.sections import stress_by_size
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve import residual
+
+# per unit: 3000 rod ends that are all used to the full are told 4 % too high, and a single one not at all
+SHARPNESS = 200.0
+# the same for slack cables: tensions change by many times their least in a step, so that a sharp maximum
+# would hop from cable to cable
+_EASED = 10.0
+_MODES = 4
+_TURN = 0.1  # rad, the unit of turns
+
+
+@dataclass(frozen=True)
+class RodUtilisation:
+    """The largest fibre stress of the rods, for round ones |N|/A + |M| r/I, at any end, over their strength;
+    erection stress is in it.
+    """
+
+    load: str
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value. Raises InputError where the rods' strength isn't known."""
+        rod = shell.rod
+        if not np.isfinite(rod.strength):
+            raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
+        section = rod.resized(design.radius).section
+        beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
+        chosen = {beams.kinds[0]: section}
+        forces = beams.local_forces(state)
+        own = beams.kind == 0
+        values = end_stress(beams, forces, chosen)[own].ravel() / rod.strength
+        by_force = end_stress_by_force(beams, forces, chosen)[own] / rod.strength
+        rows = (by_force @ beams.local_forces_by_freedom(state)[own]).reshape(len(values), 12)
+        by_radius = (by_force @ rate.local_forces(state)[own][:, :, None])[:, :, 0]
+        for end in range(2):
+            at = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
+            by_radius[:, end] += (
+                np.array(section.sizes) / design.radius @ stress_by_size(section, *at) / rod.strength
+            )
+        return _largest(
+            shell, 1.0, values, np.repeat(beams.freedoms()[own], 2, axis=0), rows, by_radius.ravel()
+        )
+
+
+@dataclass(frozen=True)
+class ConnectorTurn:
+    """The largest turning, rad, of two crossing rods against each other about their connector's axis, from
+    the stress-free grid.
+    """
+
+    load: str
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value, rad."""
+        beams = shell.beams(design.radius)
+        own = beams.kind == 1
+        turn = twist(beams.local_deformations(state))[own]
+        # Mx_a = GJ (theta_a - theta_b) / l0, so that its derivative is that of the twist but for a factor.
+        scale = (-beams.rest_length / beams.torsion)[own]
+        rows = scale[:, None] * beams.local_forces_by_freedom(state)[own, 1]
+        sign = np.where(turn < 0.0, -1.0, 1.0)
+        return _largest(
+            shell, _TURN, np.abs(turn), beams.freedoms()[own], sign[:, None] * rows, np.zeros(len(turn))
+        )
+
+
+@dataclass(frozen=True)
+class LargestCableForce:
+    """The largest cable tension, N: constraint (5) for load cases beside the design load, in one value;
+    `scale`, N, is the size of tensions that matter, such as their limit. A cable at less than nine tenths of
+    the largest has no weight."""
+
+    load: str
+    scale: float
+
+    def __post_init__(self) -> None:
+        if not self.scale > 0.0:
+            raise InputError("must be positive", where="largest_cable_force.scale", value=self.scale)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value, N; slack cables count with the push that they would give."""
+        return _of_tensions(shell, design, state, np.flatnonzero(design.present), self.scale, 0.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Slackness:
+    """2 less the least cable tension over `least`, N: at most 1 where every present cable pulls with `least`
+    or more.
+
+    It is kept with up to ln(number) / 10 of `least` to spare. Cables longer than `let_out` times their length
+    in the target don't count: those which the optimiser has done without (tensions.py).
+    """
+
+    load: str
+    least: float
+    let_out: float = np.inf
+
+    def __post_init__(self) -> None:
+        if not self.least > 0.0:
+            raise InputError("must be positive", where="slackness.least", value=self.least)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value. A slack cable counts with the tension that it would have if it could push, which tells
+        how slack it is.
+        """
+        chosen = np.flatnonzero(design.present & (design.rest_length <= self.let_out * shell.cable_lengths))
+        return _of_tensions(shell, design, state, chosen, SHARPNESS / _EASED, 2.0, -1.0 / self.least)
+
+
+@dataclass(frozen=True)
+class Softness:
+    """2 less the square of the softest mode's stiffness under the load over `least`, N/m: at most 1 where no
+    mode is softer than `least`.
+
+    The square, because that stiffness goes with the root of the distance to a limit point: its square is
+    nearly linear in the design. Stability ends where that stiffness comes to 0, long before deviations tell
+    of it; a load case at F times the design load that keeps this limit has a critical load factor above F.
+    The softest four modes count, so that they may change places.
+    """
+
+    load: str
+    least: float
+
+    def __post_init__(self) -> None:
+        if not self.least > 0.0:
+            raise InputError("must be positive", where="softness.least", value=self.least)
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value."""
+        assembly = assemble(shell.network(design))
+        found = modes(assembly, state, _MODES)
+        mass = residual.Measure(assembly).mass_shape
+        rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
+        rows, by_radius, by_rest = [], [], []
+        for shape in found.shapes:
+            unit = shape / np.sqrt(float(mass @ shape.ravel()[assembly.free] ** 2))
+            rows.append(stiffness_by_freedom(assembly, state, unit))
+            by_radius.append(quadratic(rate, state, unit))
+            by_rest.append(stiffness_by_rest_length(cables, state, unit))
+        ratio = found.stiffness / self.least
+        weight, value = _smooth(2.0 - ratio * np.abs(ratio), SHARPNESS)
+        weight = 2.0 * np.abs(ratio) * weight
+        slope = -(weight @ np.array(rows)) / self.least
+        spread = np.zeros(len(shell.cable_ends))
+        spread[np.flatnonzero(design.present)] = -(weight @ np.array(by_rest)) / self.least
+        return Measure(
+            np.array([value]),
+            sp.csr_array(slope[None]),
+            sp.csr_array(spread[None]),
+            np.array([-float(weight @ np.array(by_radius)) / self.least]),
+        )
+
+
+@dataclass(frozen=True)
+class Uplift:
+    """The largest force, N, with which a support has to hold a rod's end down, plus `offset`, N, which keeps
+    it above 0.
+    """
+
+    load: str
+    force: Reals
+    offset: float = 1.0
+
+    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+        """One value, N; `force` (n, 6) is the load case, of which supports may bear a part at once."""
+        assembly = assemble(shell.network(design))
+        held = 6 * np.asarray(shell.net.supports) + 2
+        reaction = assembly.evaluate(state, tangent=False).force.ravel()[held] - self.force.ravel()[held]
+        rows = -reaction_rows(assembly, state, held).toarray()
+        freedoms = np.broadcast_to(assembly.free, rows.shape)
+        rate = shell.beams_by_radius(design.radius)
+        change = np.zeros(6 * assembly.count)
+        np.add.at(change, rate.freedoms(), rate.evaluate(state, tangent=False).force)
+        cables = shell.cables(design)
+        if np.isin(cables.ends, shell.net.supports).any():
+            raise InputError("cables that end at supports are not provided for", where="uplift")
+        return _largest(shell, self.offset, self.offset - reaction, freedoms, rows, -change[held])
+
+
+def _of_tensions(
+    shell: Gridshell, design: Design, state: State, chosen: Indices, unit: float, offset: float, factor: float
+) -> Measure:
+    """KS of offset + factor EA (l / l0 - 1) of the `chosen` candidate cables; 0 where there are none."""
+    if not len(chosen):
+        zero = sp.csr_array((1, len(shell.cable_ends)))
+        return Measure(np.zeros(1), sp.csr_array((1, 6 * len(shell.net.grid.flat))), zero, np.zeros(1))
+    cables = make_cables(
+        shell.cable_ends[chosen], rest_length=design.rest_length[chosen], stiffness=shell.cable.stiffness
+    )
+    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    slope = factor * cables.stiffness / cables.rest_length
+    toward = (slope / length)[:, None] * chord
+    values = offset + slope * (length - cables.rest_length)
+    by_rest = -slope * length / cables.rest_length
+    return _largest(
+        shell,
+        unit,
+        values,
+        cables.freedoms(),
+        np.hstack([-toward, toward]),
+        np.zeros(len(values)),
+        chosen,
+        by_rest,
+    )
+
+
+def _largest(
+    shell: Gridshell,
+    unit: float,
+    values: Reals,
+    freedoms: np.ndarray,
+    rows: Reals,
+    by_radius: Reals,
+    cables: np.ndarray | None = None,
+    by_rest_length: Reals | None = None,
+) -> Measure:
+    """KS of `values` (k,) from their derivatives `rows` (k, q) at `freedoms` (k, q), `by_radius` (k,), and
+    each by its own cable's rest length.
+    """
+    weight, value = _smooth(values, SHARPNESS / unit)
+    slope = np.zeros(6 * len(shell.net.grid.flat))
+    np.add.at(slope, freedoms, weight[:, None] * rows)
+    by_rest = np.zeros(len(shell.cable_ends))
+    if cables is not None and by_rest_length is not None:
+        by_rest[cables] = weight * by_rest_length
+    return Measure(
+        np.array([value]),
+        sp.csr_array(slope[None]),
+        sp.csr_array(by_rest[None]),
+        np.array([float(weight @ by_radius)]),
+    )
+
+
+def _smooth(values: Reals, sharpness: float) -> tuple[Reals, float]:
+    """Weights (k,), the derivatives of KS by the values, and KS."""
+    top = float(values.max())
+    weight = np.exp(sharpness * (values - top))
+    total = float(weight.sum())
+    return weight / total, top + float(np.log(total)) / sharpness

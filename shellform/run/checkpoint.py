@@ -1,0 +1,54 @@
+"""The optimiser's checkpoint in a run folder: one file, replaced whole before every trial and deleted when
+the stage is done.
+
+It carries the key of its stage (run.py), so that it is taken up only where nothing has changed since.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import read_arrays
+from shellform.errors import InputError
+from shellform.optimiser.optimum import Checkpoint, Step
+from shellform.written import whole
+
+FILE = "optimise.npz"
+
+
+def save_checkpoint(folder: Path, key: str, checkpoint: Checkpoint) -> None:
+    """Writes the checkpoint of the stage with the `key`. Raises InputError where it can't be written."""
+    told = {
+        "key": key,
+        "numbers": dict(checkpoint.numbers),
+        "history": [asdict(step) for step in checkpoint.history],
+    }
+    arrays: dict[str, Any] = {**checkpoint.arrays, "told": np.array(json.dumps(told))}
+    with whole(folder / FILE, ".npz") as partial:
+        np.savez(partial, **arrays)
+
+
+def load_checkpoint(folder: Path, key: str) -> Checkpoint | None:
+    """The checkpoint of the stage with the `key`; None where there is none, or one of another case, or a
+    damaged one.
+    """
+    if not (folder / FILE).is_file():
+        return None
+    try:
+        arrays = dict(read_arrays(folder / FILE))
+        told = json.loads(str(arrays.pop("told")))
+        if told["key"] != key:
+            return None
+        return Checkpoint(told["numbers"], arrays, tuple(Step(**step) for step in told["history"]))
+    except (InputError, KeyError, TypeError, ValueError):  # what can't be read is computed anew
+        return None
+
+
+def drop_checkpoint(folder: Path) -> None:
+    """Deletes the checkpoint of a stage that is done."""
+    (folder / FILE).unlink(missing_ok=True)

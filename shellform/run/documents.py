@@ -1,0 +1,68 @@
+"""What goes to the workshop, to the site and to other programs: drawings, schedules and models of a run's
+best design.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from shellform.case.case import Case, StockRodEntry
+from shellform.gridshell.catalogue import read_catalogue
+from shellform.output.exchange import exports
+from shellform.output.workshop import drawings, nesting, schedules
+from shellform.output.workshop.schedules import Built
+from shellform.run.folder import Report, Run
+
+
+def built_design(run: Run) -> Built:
+    """The run's best design, a rounded one with the catalogue's rods; its cables are hung into the erected
+    grid before bracing.
+    """
+    hung = run.states["unbraced"]["none"] if "unbraced" in run.states else None
+    return Built(
+        run.shell_of(run.best),
+        run.designs[run.best],
+        run.states[run.best],
+        hung,
+        run.best,
+        run.case.title,
+        run.case.cable.adjustment,
+    )
+
+
+def stock_length(case: Case) -> float:
+    """In which length, m, rods are bought: the case's, the catalogue's, or 6 m."""
+    rod = case.rod
+    sold = read_catalogue(rod.catalogue).stock_length if isinstance(rod, StockRodEntry) else None
+    return rod.stock_length or sold or nesting.STOCK
+
+
+def write_documents(run: Run, *, report: Report = lambda stage, text: None) -> dict[str, Any]:
+    """Writes drawings/, schedules/ and models/ of a run and returns their part of the summary.
+
+    Raises InputError where they can't be written. Without gmsh's system libraries there is no STEP file, and
+    a line that says why.
+    """
+    built = built_design(run)
+    cutting = nesting.cut(run.net.grid, stock=stock_length(run.case), kerf=run.case.rod.kerf)
+    report("documents", f"schedules of the {built.name} design")
+    schedules.write_schedules(run.folder / "schedules", built, cutting)
+    report("documents", "drawings")
+    drawings.write_drawings(run.folder / "drawings", built, cutting)
+    report("documents", "models")
+    exports.write_exports(run.folder / "models", built, run.surface, run.loads)
+    if exports.no_step():
+        report("documents", f"note: no STEP file: {exports.no_step()}")
+    notes = schedules.cutting_notes(cutting, schedules.rod_names(run.net.grid))
+    for note in notes[1:]:
+        report("documents", f"note: {note}")
+    return {
+        "design": built.name,
+        "stock_length": cutting.stock,
+        "bars": len(cutting.bars),
+        "bars_least": cutting.least,
+        "waste": cutting.waste,
+        "spliced": list(cutting.spliced),
+        "notes": list(notes),
+        **schedules.cut_counts(built),
+    }

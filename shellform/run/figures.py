@@ -1,0 +1,286 @@
+"""The pictures of a run: maps of its designs under its loads, maps of its net, histories, and states as .vtp
+files.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from shellform.errors import InputError, NotConverged
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.run.folder import Report, Run, read_run
+from shellform.structure.elements.state import State
+from shellform.written import folder as made
+
+_LOADS = {"none": "no load", "design": "design load", "additional": "additional load"}
+
+
+QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode", "history")
+FILMS = ("pour", "erection")
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What of a run is to be drawn, and how: `design` and `load` (all of them), `quantity`, its `limit` in SI
+    units (the case's for the deviation, 1 for the utilisation, what the rods bear for their curvature, else
+    the largest), and the rest as in panel.py."""
+
+    design: str | None = None
+    load: str | None = None
+    quantity: str = "deviation"
+    limit: float | None = None
+    view: str = "best"
+    size: tuple[int, int] | None = None
+    thickness: float = 0.0
+    transparent: bool = False
+    endings: tuple[str, ...] = (".png",)
+
+
+def wish(
+    *,
+    design: str | None,
+    load: str | None,
+    quantity: str | None,
+    limit: float | None,
+    view: str,
+    size: str | None,
+    thickness: float,
+    transparent: bool,
+    kind: str | None,
+    film: str | None,
+) -> Wish:
+    """A wish as the command line says it: `size` as WIDTHxHEIGHT, the file's `kind` without a dot. Raises
+    InputError for bad options.
+    """
+    if film is not None and film not in FILMS:
+        raise InputError("is no film", where="--film", value=film, remedy=f"Known: {', '.join(FILMS)}.")
+    if film is not None and (transparent or quantity in ("spring", "mode", "history")):
+        raise InputError(
+            "can't be filmed", where="--film", value="--transparent" if transparent else quantity
+        )
+    if quantity is not None and quantity not in QUANTITIES:
+        raise InputError(
+            "is nothing to draw",
+            where="--quantity",
+            value=quantity,
+            remedy=f"Known: {', '.join(QUANTITIES)}.",
+        )
+    kinds = ("gif", "mp4") if film else ("png", "svg", "pdf")
+    if kind is not None and kind not in kinds:
+        raise InputError(
+            "is no format of it", where="--format", value=kind, remedy=f"Known: {', '.join(kinds)}."
+        )
+    chosen_kinds = (kind,) if kind else kinds if film else kinds[:1]
+    usual = "utilisation" if film == "erection" else "deviation"
+    endings = tuple(f".{each}" for each in chosen_kinds)
+    return Wish(
+        design,
+        load,
+        quantity or usual,
+        limit,
+        view,
+        None if size is None else _pixels(size),
+        thickness,
+        transparent,
+        endings,
+    )
+
+
+def _pixels(text: str) -> tuple[int, int]:
+    try:
+        width, height = (int(each) for each in text.lower().split("x"))
+    except ValueError as error:
+        raise InputError(
+            "must read WIDTHxHEIGHT in pixels", where="--size", value=text, remedy="For example 1600x1000."
+        ) from error
+    return width, height
+
+
+def draw_everything(run: Run, *, report: Report = lambda stage, text: None) -> bool:
+    """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False."""
+    from shellform.output.pictures.net_maps import draw_net  # loads no OpenGL
+
+    drawn = pictures_possible(report)
+    if drawn:
+        draw_designs(run, report=report)
+        for quantity in ("utilisation", "curvature", "shear", "mode"):
+            try:
+                draw_designs(run, Wish(run.best, "design", quantity), report=report)
+            except (
+                NotConverged
+            ) as error:  # of a shell at its limit no mode may be found; the other maps stand
+                report("figures", f"no pictures of the {quantity}: {error}")
+        for view in ("top", "front", "side"):
+            draw_designs(run, Wish(run.best, "design", view=view), report=report)
+        draw_net(run.net, run.folder / "figures")
+    if (run.folder / "history.csv").is_file():
+        draw_histories(run)
+    return drawn
+
+
+def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:
+    """The objective with its terms and cables, and the constraints, at each accepted design; .png, .svg or
+    .pdf.
+    """
+    from shellform.output.pictures import plots
+
+    source = run.folder / "history.csv"
+    if not source.is_file():
+        raise InputError(
+            "isn't there: nothing was optimised yet",
+            where=str(source),
+            remedy="Run shellform design on it again.",
+        )
+    with source.open(encoding="utf-8", newline="") as file:
+        history = plots.read_history(csv.DictReader(file))
+    files = [made(run.folder / "figures") / f"{name}{ending}" for name in ("objective", "constraints")]
+    plots.objective_history(files[0], history.evaluation, history.terms, cables=history.cables)
+    plots.constraint_history(files[1], history.evaluation, history.constraints)
+    return files
+
+
+def pictures_possible(report: Report) -> bool:
+    """Whether VTK can draw; if not, one line says why: everything but the pictures is still made."""
+    try:
+        from shellform.output.pictures import scene
+
+        scene.require()
+    except InputError as error:
+        report("figures", f"no pictures: {error}")
+        return False
+    return True
+
+
+def draw_run(folder: str | Path, wish: Wish | None = None) -> list[Path]:
+    """Draws maps of a run's designs and loads (all, or those named) and returns their files."""
+    return draw_designs(read_run(folder), wish)
+
+
+def draw_designs(
+    run: Run, wish: Wish | None = None, *, report: Report = lambda stage, text: None
+) -> list[Path]:
+    """As `draw_run`, of a run that is read already."""
+    from shellform.output.pictures import net_maps, render
+    from shellform.output.pictures.panel import Look
+
+    asked = wish or Wish()
+    figures = made(run.folder / "figures")
+    if asked.quantity == "history":
+        return draw_histories(run, ending=asked.endings[0])
+    if asked.quantity == "spring":  # what the springs still pull is the net's, whatever the design
+        look = Look(
+            size=asked.size or (1600, 1000),
+            view=asked.view,
+            thickness=asked.thickness,
+            transparent=asked.transparent,
+        )
+        return [net_maps.draw_map(run.net, "springs", figures / f"net-springs{asked.endings[0]}", look=look)]
+    names, loads = chosen(run, asked.design, asked.load)
+    report("figures", f"{asked.quantity} of {', '.join(names)}")
+    rows = [[panel_of(run, name, each, asked.quantity) for each in loads] for name in names]
+    look = look_of(run, asked, [panel for row in rows for panel in row])
+    files = [figures / f"{_stem(asked, name, each)}{asked.endings[0]}" for name in names for each in loads]
+    render.pictures(files, [titled(run, panel) for row in rows for panel in row], look)
+    if len(files) > 1:
+        shown = [row for name, row in zip(names, rows, strict=True) if name in _four(run) or asked.design]
+        page = (
+            figures
+            / f"{_stem(asked, 'deviations' if asked.quantity == 'deviation' else 'all')}{asked.endings[0]}"
+        )
+        render.sheet(page, shown, replace(look, size=_half(asked.size)), heading=run.case.title)
+        files.append(page)
+    return files
+
+
+def chosen(run: Run, design: str | None, load: str | None) -> tuple[list[str], list[str]]:
+    """The designs and loads that are meant. Raises InputError for unknown ones."""
+    for what, name, known in [("--design", design, list(run.designs)), ("--load", load, list(run.loads))]:
+        if name is not None and name not in known:
+            raise InputError("isn't there", where=what, value=name, remedy=f"Known: {', '.join(known)}.")
+    return [design] if design else list(run.designs), [load] if load else list(run.loads)
+
+
+def panel_of(run: Run, design: str, load: str, quantity: str = "deviation") -> Any:
+    """A design under a load."""
+    from shellform.output.pictures import maps
+
+    told = _LOADS.get(load, f"load: {load}")
+    title = f"{design} design, {told}"
+    state = run.states[design][load]
+    try:
+        return maps.panel_of(
+            run.shell_of(design),
+            run.designs[design],
+            state,
+            load=run.loads[load],
+            quantity=quantity,
+            title=title,
+        )
+    except NotConverged as error:
+        raise NotConverged(f"{title}: {error.what}", remedy="Choose another design or load.") from error
+
+
+def titled(run: Run, panel: Any) -> Any:
+    """The panel with the case's title before its own, for a picture that stands alone."""
+    return replace(panel, title=f"{run.case.title}: {panel.title}") if run.case.title else panel
+
+
+def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:
+    """How the run's panels are drawn: one scale of colours and of forces for all."""
+    from shellform.output.pictures.panel import Look, Skin
+
+    largest = max(max(float(panel.deviation.max()) for panel in panels), 1e-9 * panels[0].unit[1])
+    rod = run.shell.rod
+    borne = rod.strength / (rod.young * max(design.radius for design in run.designs.values()))
+    usual = {"deviation": run.case.figures.limit, "utilisation": 1.0, "mode": 1.0}
+    if math.isfinite(borne):
+        usual["curvature"] = borne
+    force = max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
+    return Look(
+        limit=wish.limit or usual.get(wish.quantity, largest),
+        size=wish.size or (1600, 1000),
+        view=wish.view,
+        thickness=wish.thickness,
+        force=force,
+        surface=Skin(run.surface.vertices, run.surface.triangles),
+        transparent=wish.transparent,
+    )
+
+
+def write_states(
+    folder: Path,
+    shell: Gridshell,
+    name: str,
+    design: Design,
+    states: Mapping[str, State],
+) -> None:
+    """states/NAME-LOAD.vtp: the loaded geometry with deviations, m, and the rods' end forces."""
+    from shellform.output.exchange import vtp
+    from shellform.output.pictures import maps
+
+    labels = ("N", "Mx_a", "My_a", "Mz_a", "Mx_b", "My_b", "Mz_b")
+    for each, state in states.items():
+        forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
+        columns = {label: forces[:, k] for k, label in enumerate(labels)}
+        vtp.write_vtp(folder / f"states/{name}-{each}.vtp", maps.panel_of(shell, design, state), columns)
+
+
+def _four(run: Run) -> list[str]:
+    """The rows of the sheet: the three designs to compare with, and the one to build."""
+    return ["unbraced", "initial", "unloaded", run.best]
+
+
+def _half(size: tuple[int, int] | None) -> tuple[int, int]:
+    return (800, 560) if size is None else (max(size[0] // 2, 160), max(size[1] // 2, 120))
+
+
+def _stem(wish: Wish, *parts: str) -> str:
+    """A file's name: what is usual isn't in it."""
+    front = [] if wish.quantity == "deviation" else [wish.quantity]
+    back = [] if wish.view == "best" else [wish.view]
+    return "-".join([*front, *parts, *back])

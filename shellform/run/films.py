@@ -1,0 +1,152 @@
+"""Films of a run: the load coming on (`pour`), stage after stage where it is poured in stages, and the grid
+rising from the ground (`erection`).
+
+The frames are equilibria. A pour goes from the state before along the documented path (loading.py) and its
+frames lie evenly over the load, states in between on straight lines; erection shows every step of
+erection.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shellform.errors import InputError
+from shellform.run.figures import Wish, look_of, titled
+from shellform.run.folder import Report, Run
+from shellform.site.erection import erect
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import Equilibrium
+from shellform.structure.solve.loading import apply_load
+from shellform.written import folder as made
+
+_FRAMES = 24  # of a stage
+_SIZE = (960, 600)
+
+
+def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = lambda stage, text: None) -> list[Path]:
+    """Writes figures/pour-DESIGN-LOAD or figures/erection-DESIGN in the wish's formats; the design is the
+    best one unless it is named.
+
+    Raises InputError for unknown names and where VTK can't draw, NotConverged where there is no path.
+    """
+    from shellform.output.pictures import render, scene
+
+    scene.require()  # before minutes are spent on states
+    name = wish.design or run.best
+    for what, each, known in [
+        ("--design", name, list(run.designs)),
+        ("--load", wish.load or "design", list(run.loads)),
+    ]:
+        if each not in known:
+            raise InputError("isn't there", where=what, value=each, remedy=f"Known: {', '.join(known)}.")
+    if kind == "pour":
+        stages = _stages(run, wish.load)
+        panels = _pour(run, name, stages, wish.quantity, report)
+        stem = f"pour-{name}-{stages[-1]}"
+    else:
+        panels = _erection(run, name, wish, report)
+        stem = f"erection-{name}"
+    look = look_of(run, replace(wish, size=wish.size or _SIZE), panels)
+    files = [made(run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings]
+    report("film", f"drawing {len(panels)} frames")
+    render.film(files, [titled(run, panel) for panel in panels], look)
+    return files
+
+
+def _stages(run: Run, load: str | None) -> list[str]:
+    """The load cases that follow one another: all stages of a poured case up to the one that is meant, or
+    that case alone.
+    """
+    wanted = load or "design"
+    entries = run.case.load if isinstance(run.case.load, list) else []
+    for entry in entries:
+        names = [f"{entry.name} {k}" for k in range(1, len(entry.stages) + 1)]
+        if load is None and names:
+            return names
+        if wanted in names:
+            return names[: names.index(wanted) + 1]
+    return [wanted]
+
+
+def _pour(run: Run, name: str, stages: Sequence[str], quantity: str, report: Report) -> list[Any]:
+    from shellform.output.pictures import maps
+
+    design, shell = run.designs[name], run.shell_of(name)
+    assembly = assemble(shell.network(design))
+    state, before = run.states[name]["none"], run.loads["none"]
+    panels: list[Any] = []
+    for stage in stages:
+        after, found = run.loads[stage], [(0.0, state)]
+
+        def note(share: float, reached: Equilibrium, found: list[tuple[float, State]] = found) -> None:
+            found.append((share, reached.state))
+            report("film", f"at {100.0 * share:.0f} %")
+
+        reached = apply_load(assembly, state, before, after, step=1.0 / _FRAMES, report=note)
+        first = 1 if panels else 0
+        for share in np.linspace(0.0, 1.0, _FRAMES + 1)[first:]:
+            load = before + share * (after - before)
+            shown = f"{name} design, {stage} load, {100.0 * share:.0f} %" + (
+                "" if reached.on_branch or share < reached.share else ": snapped"
+            )
+            panels.append(
+                maps.panel_of(
+                    shell, design, _between(found, float(share)), load=load, quantity=quantity, title=shown
+                )
+            )
+        state, before = reached.equilibrium.state, after
+    return panels
+
+
+def _between(found: Sequence[tuple[float, State]], share: float) -> State:
+    """The state at a share of the load, on the straight line between the two that are known."""
+    at = [each[0] for each in found]
+    after = min(int(np.searchsorted(at, share)), len(at) - 1)
+    if after == 0 or at[after] == share:
+        return found[after][1]
+    (low, a), (high, b) = found[after - 1], found[after]
+    t = (share - low) / (high - low)
+    turned = (1.0 - t) * a.quaternions + t * b.quaternions * np.sign(
+        np.sum(a.quaternions * b.quaternions, axis=1, keepdims=True)
+    )
+    return State(
+        (1.0 - t) * a.positions + t * b.positions, turned / np.linalg.norm(turned, axis=1, keepdims=True)
+    )
+
+
+def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
+    from shellform.output.pictures import maps
+
+    report("film", "following the grid from the ground")
+    design, shell = run.designs[name], run.shell_of(name)
+    load = run.loads[wish.load] if wish.load else None
+    steps = erect(shell, design, load=load, step=1.0 / _FRAMES).steps
+    rising = [step for step in steps if step.stage not in ("tightening", "loading")]
+    pairs = rising[-1].state.positions[shell.cable_ends]
+    slack = np.maximum(
+        np.linalg.norm(pairs[:, 1] - pairs[:, 0], axis=1), design.rest_length
+    )  # as erection.py begins to tighten them
+    none = replace(design, present=np.zeros(len(design.present), dtype=bool))
+    panels: list[Any] = []
+    for step in steps:
+        tightened = 1.0 if step.stage == "loading" else step.share
+        shown = replace(design, rest_length=slack + tightened * (design.rest_length - slack))
+        acting = step.share * load if load is not None and step.stage == "loading" else None
+        title = f"{name} design, {step.stage}, {100.0 * step.share:.0f} %"
+        panels.append(
+            maps.panel_of(
+                shell,
+                none if len(panels) < len(rising) else shown,
+                step.state,
+                load=acting,
+                quantity=wish.quantity,
+                title=title,
+            )
+        )
+    return panels

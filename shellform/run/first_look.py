@@ -1,0 +1,177 @@
+"""`shellform check` and `shellform net`: a first look at a surface, and its net alone."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from pydantic import ValidationError
+
+import shellform
+from shellform.case.build_gridshell import rod_material
+from shellform.case.build_net import net_summary, surface_of, surface_summary, told_size
+from shellform.case.case import SurfaceEntry, load_case
+from shellform.errors import InputError
+from shellform.net.files import net_document, save_net
+from shellform.net.orientation import oriented_net
+from shellform.run.figures import pictures_possible
+from shellform.run.folder import FORMAT, VERSION, Report, refuse_overwriting
+from shellform.surface.readers.reading import FORMATS, kind_of
+from shellform.surface.shape.target import largest_curvature
+from shellform.written import folder as made
+from shellform.written import write_text
+
+_GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
+YOUNG, STRENGTH = 40e9, 255e6  # Pa, of the paper's GFRP rods
+
+
+def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> dict[str, Any]:
+    """What a surface file or a case's surface is, in SI units; `options` are the entries of [surface] in a
+    case.
+
+    For a case they take the place of its own, and what to expect of its net is told too.
+    """
+    case = load_case(file) if file.suffix.lower() == ".toml" else None
+    entry = (
+        surface_entry(file, options)
+        if case is None
+        else surface_entry(None, {**case.surface.model_dump(), **options})
+    )
+    path = Path(entry.file)
+    surface = surface_of(entry, allow_scripts=allow_scripts)
+    bent = largest_curvature(surface)
+    material = rod_material(case.rod) if case else None
+    young, strength = (material.young, material.strength) if material else (YOUNG, STRENGTH)
+    found = surface_summary(surface, str(path)) | {
+        "format": "builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
+        "unit": _unit(path, entry.unit),
+        "curvature_max": bent,
+        "rod_radius_max": largest_radius(young, strength, bent),
+    }
+    if case:
+        cells = surface.area / case.net.spacing**2
+        found["expected"] = {
+            "spacing": case.net.spacing,
+            "crossings": round(cells),
+            "freedoms": round(48 * cells),
+        }
+    return found
+
+
+def largest_radius(young: float, strength: float, curvature: float) -> float | None:
+    """Of rods on a surface, m, by equation (1) at its largest `curvature`, 1/m; None where it is flat. Moduli
+    in Pa.
+    """
+    return strength / (young * curvature) if curvature > 0.0 else None
+
+
+def told(found: Mapping[str, Any]) -> dict[str, str]:
+    """What `check_file` found, as labelled lines."""
+    bent, largest = found["curvature_max"], found["rod_radius_max"]
+    lines = {
+        "surface": found["source"],
+        "format": found["format"],
+        "unit": found["unit"],
+        "size": told_size(found["size"]),
+        "area": f"{found['area']:.4g} m²",
+        "triangles": str(found["triangles"]),
+        "holes": str(found["holes"]),
+        "mended": "nothing" if not found["mended"] else found["mended"][0],
+        **{f"mended {k}": text for k, text in enumerate(found["mended"][1:], 2)},
+        "largest curvature": f"{bent:.3g} 1/m, radius {1.0 / bent:.3g} m" if bent > 0.0 else "none",
+    }
+    expected = found.get("expected")
+    if expected:
+        lines["crossings to expect"] = f"about {expected['crossings']} at {expected['spacing']:g} m"
+        lines["freedoms to expect"] = f"about {expected['freedoms']}"
+    source = (
+        "equation 1, at the surface's largest curvature"
+        if expected
+        else "in GFRP, strength/E = 255 MPa/40 GPa"
+    )
+    lines["largest rod radius"] = f"at least {largest:.3g} m ({source})" if largest else "any"
+    return lines
+
+
+def surface_entry(file: Path | None, options: Mapping[str, Any]) -> SurfaceEntry:
+    """The [surface] entry of a file with options as a case has them. Raises InputError naming the option that
+    is wrong.
+    """
+    given = {**({} if file is None else {"file": str(file)}), **options}
+    try:
+        entry = SurfaceEntry.model_validate(given)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(["surface", *(str(part) for part in first["loc"])])
+        raise InputError(str(first["msg"]).lower(), where=where, value=first["input"]) from error
+    if not Path(entry.file).is_file():
+        raise InputError("there is no such file", where=entry.file)
+    return entry
+
+
+def _unit(path: Path, stated: str | None) -> str:
+    if path.suffix == ".py":
+        return "m"
+    if kind_of(path) in ("step", "iges", "3dm"):
+        return "the file's own"
+    return stated or "m, as none is stated (--unit)"
+
+
+def net_alone(
+    file: Path,
+    folder: Path,
+    options: Mapping[str, Any],
+    *,
+    spacing: float,
+    angle: str,
+    gap: float | None,
+    allow_scripts: bool,
+    report: Report,
+) -> dict[str, Any]:
+    """Writes net.json, net.npz and summary.json of the net on a surface file; returns what summary.json says.
+
+    `options` are the entries of [surface] in a case; `angle` degrees or "auto".
+    """
+    refuse_overwriting(folder)
+    if (folder / "stages.json").is_file():
+        raise InputError(
+            "holds a run of shellform design",
+            where=str(folder),
+            remedy="Choose another --output for the net alone.",
+        )
+    surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
+    report("surface", f"size {told_size(surface.size)}")
+    settings = {"spacing": spacing, "gap": gap or _GAP * spacing}
+    net, found, offset = oriented_net(
+        surface, settings, angle=_angle(angle), progress=lambda text: report("net", text)
+    )
+    summary = net_summary(net) | {"angle": found, "offset": list(offset)}
+    made(folder)
+    save_net(folder / "net.npz", net)
+    write_text(folder / "net.json", json.dumps(net_document(net)))
+    document = {
+        "format": FORMAT,
+        "version": VERSION,
+        "shellform": shellform.__version__,
+        "surface": surface_summary(surface, str(file)),
+        "net": summary,
+    }
+    write_text(folder / "summary.json", json.dumps(document, indent=1))
+    if pictures_possible(report):
+        from shellform.output.pictures.net_maps import draw_net
+
+        draw_net(net, folder / "figures")
+    return document
+
+
+def _angle(text: str) -> float | Literal["auto"]:
+    """An angle, rad, from degrees or the word auto."""
+    if text == "auto":
+        return "auto"
+    try:
+        return float(np.deg2rad(float(text)))
+    except ValueError as error:
+        raise InputError("must be degrees or auto", where="--angle", value=text) from error

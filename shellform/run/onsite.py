@@ -1,0 +1,382 @@
+"""What a run tells the site: calibration of connectors from scans, re-tensioning from surveys, and erection
+(`shellform calibrate`, `survey`, `erect`).
+
+Each reads CSV files (tables.py), calls its module of the design room, and leaves its tables in the run's
+folder `schedules`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import tomli_w
+
+from shellform.arrays import Indices, Reals, read_arrays
+from shellform.case.build_gridshell import gridshell
+from shellform.case.build_net import net_of, surface_of
+from shellform.case.case import load_case
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.run.folder import Run, read_run
+from shellform.site import calibration, erection, measurements, retensioning
+from shellform.site.scans import Scan, match, read_points
+from shellform.structure.elements.state import State
+from shellform.surface.units import METRES
+from shellform.written import folder as made
+from shellform.written import write_arrays, write_text
+
+
+@dataclass(frozen=True)
+class Told:
+    """Lines to print and the files that were written."""
+
+    lines: Sequence[str]
+    files: Sequence[Path]
+
+
+def calibrate(
+    source: Path,
+    scans: Sequence[str],
+    *,
+    design: str | None = None,
+    markers: Path | None = None,
+    unit: str = "m",
+    noise: float = calibration.NOISE,
+    free: Sequence[str] = (),
+    placed: bool = False,
+    offsets: bool = False,
+    output: Path | None = None,
+    allow_scripts: bool = False,
+) -> Told:
+    """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design` or, unbraced, as
+    a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
+    Raises InputError, NotConverged."""
+    if not (noise > 0.0 and np.isfinite(noise)):
+        raise InputError("must be positive", where="--noise", value=noise)
+    shell, built, loads, folder = _built(source, design, output, allow_scripts=allow_scripts)
+    pairs = [_scan(each, shell, loads, unit, None if placed else 0) for each in scans]
+    nodes = (
+        shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
+    )
+    found = calibration.calibrate(
+        shell, built, pairs, nodes, free=free or calibration.PARAMETERS, noise=noise, offsets=offsets
+    )
+    joint = {name: getattr(found.joint, name) for name in (*calibration.PARAMETERS, "gap")}
+    files = [folder / "calibration.csv", folder / "calibration.toml"]
+    write_text(files[0], found.table())
+    write_text(files[1], tomli_w.dumps({"joint": joint}))
+    seen = 1e3 * found.after[np.isfinite(found.after)]
+    line = f"distances to the model: {seen.mean():.3f} mm on average, {seen.max():.3f} mm at most"
+    return Told([*found.sentences(), line], files)
+
+
+def _built(
+    source: Path, design: str | None, output: Path | None, *, allow_scripts: bool
+) -> tuple[Gridshell, Design, Mapping[str, Reals], Path]:
+    """The shell, its design, its loads and where results go, from a run folder or a case file."""
+    if source.suffix.lower() != ".toml":
+        run = read_run(source)
+        name = _design(run, design, "unbraced")
+        return run.shell_of(name), run.designs[name], run.loads, made(output or run.folder / "schedules")
+    if design not in (None, "unbraced"):
+        raise InputError(
+            "a case has no designs yet: the grid is taken unbraced",
+            where="--design",
+            value=design,
+            remedy="Give a run folder.",
+        )
+    case = load_case(source)
+    surface = surface_of(case.surface, allow_scripts=allow_scripts)
+    net, _, _ = net_of(case, surface)
+    shell, loads = gridshell(case, net, surface)
+    return shell, shell.unbraced(), loads, made(output or Path.cwd())
+
+
+def _scan(text: str, shell: Gridshell, loads: Mapping[str, Reals], unit: str, frame: int | None) -> Scan:
+    """A scan from "POINTS.csv=LOAD"; without a load the grid stood alone."""
+    points, _, load = text.partition("=")
+    return Scan(read_points(points, unit=unit), _load(load or "none", shell, loads), frame)
+
+
+def _load(name: str, shell: Gridshell, loads: Mapping[str, Reals]) -> Reals:
+    """A load case by its name, or from a CSV file."""
+    if name in loads:
+        return loads[name]
+    if Path(name).is_file():
+        return measurements.read_loads(name, shell)
+    raise InputError(
+        "is neither a load case nor a file",
+        where="load",
+        value=name,
+        remedy=f"Load cases: {', '.join(loads)}.",
+    )
+
+
+@dataclass(frozen=True)
+class Survey:
+    """How a survey is read and what the crew can do: see `shellform survey --help`."""
+
+    design: str | None = None
+    load: str = "none"
+    unit: str = "m"
+    noise: float = calibration.NOISE
+    length_error: float = 1e-3
+    step: float = 0.25e-3
+    largest: float = 1.5e-3
+    cables: int = 60
+    after: Path | None = None
+
+    @property
+    def crew(self) -> retensioning.Crew:
+        """What the crew can do in a round."""
+        return retensioning.Crew(self.step, self.largest, self.cables)
+
+
+def survey(folder: Path, measured: Path, options: Survey, output: Path | None = None) -> Told:
+    """The next turns of the turnbuckles from a survey of a run's grid as built. Writes turns.csv,
+    predicted.csv and belief.npz, which `options.after` of the next round names. Raises InputError,
+    NotConverged."""
+    run = read_run(folder)
+    name, shell, belief = _believed(run, options)
+    goal = run.states[name][options.load].positions
+    nodes, places, doubts = _surveyed(measured, shell, belief.state, options)
+    learnt = retensioning.learn(shell, belief, nodes, places, noise=options.noise)
+    step = retensioning.adjust(shell, learnt, goal, options.crew, noise=options.noise)
+    where = made(output or run.folder / "schedules")
+    files = [where / each for each in ("turns.csv", "predicted.csv", "belief.npz")]
+    write_text(files[0], step.schedule(shell))
+    write_text(files[1], _predicted(shell, learnt.state, step, goal))
+    now = step.belief
+    write_arrays(
+        files[2],
+        rest_length=now.design.rest_length,
+        present=now.design.present,
+        radius=np.array(now.design.radius),
+        covariance=now.covariance,
+        positions=now.state.positions,
+        quaternions=now.state.quaternions,
+        origin=np.array(f"{name}/{options.load}"),
+    )
+    count = int(np.count_nonzero(step.turns))
+    size = len(goal)
+    lines = [
+        *doubts,
+        f"{len(places)} nodes were seen; the grid lies {_mm(step.misfit_before, size)} mm from where it should be (root mean square)",
+        f"{count} cables to turn, {int(np.abs(step.turns).sum())} turns of {1e3 * options.step:g} mm; afterwards {_mm(step.misfit_after, size)} mm are predicted"
+        if count
+        else "no turn is worth taking: what is left is below what the survey can see or the crew can do",
+    ]
+    if step.halved:
+        lines.append(f"the turns were halved {step.halved} times, to stay on the stable branch")
+    return Told(lines, files)
+
+
+def replay(
+    folder: Path,
+    options: Survey,
+    *,
+    rounds: int,
+    seed: int,
+    slip: float,
+    markers: Path | None = None,
+    output: Path | None = None,
+) -> Told:
+    """The loop of survey and turning played with random length errors, `options.noise` and the crew's `slip`.
+    Writes replay.csv. Raises InputError, NotConverged.
+    """
+    if rounds < 1:
+        raise InputError("must be at least 1", where="--replay", value=rounds)
+    if not (slip >= 0.0 and np.isfinite(slip)):
+        raise InputError("must not be negative", where="--slip", value=slip)
+    run = read_run(folder)
+    name, shell, belief = _believed(run, options)
+    nodes = (
+        shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
+    )
+    errors = options.length_error * np.random.default_rng(seed).normal(size=len(shell.cable_ends))
+    goal = run.states[name][options.load].positions
+    played = retensioning.replay(
+        shell,
+        belief,
+        errors,
+        goal,
+        nodes,
+        options.crew,
+        noise=options.noise,
+        rounds=rounds,
+        seed=seed + 1,
+        slip=slip,
+    )
+    lines = ["round,rms distance from the design [mm],cables turned,turns"]
+    turned = [
+        (0, 0),
+        *((int(np.count_nonzero(each.turns)), int(np.abs(each.turns).sum())) for each in played.adjustments),
+    ]
+    for number, (misfit, (cables, turns)) in enumerate(zip(played.misfits, turned, strict=True)):
+        lines.append(f"{number},{_mm(misfit, len(goal))},{cables},{turns}")
+    file = made(output or run.folder / "schedules") / "replay.csv"
+    write_text(file, "\n".join(lines) + "\n")
+    return Told(
+        [
+            *lines,
+            f"{100.0 * played.removed:.0f} % of the misfit are gone after {len(played.adjustments)} rounds",
+        ],
+        [file],
+    )
+
+
+def erect(
+    folder: Path,
+    *,
+    design: str | None = None,
+    load: str | None = None,
+    weight: str | None = None,
+    lift: str | None = None,
+    groups: Path | None = None,
+    way: Path | None = None,
+    step: float = erection.STEP,
+    output: Path | None = None,
+) -> Told:
+    """From the flat grid to the erected, tightened and loaded shell. Writes erection.csv, a line a step, and
+    erection.npz with the shapes. Raises InputError, NotConverged.
+    """
+    run = read_run(folder)
+    name = _design(run, design, run.best)
+    shell = run.shell_of(name)
+    carried = [None if each is None else _load(each, shell, run.loads) for each in (load, weight, lift)]
+    done = erection.erect(
+        shell,
+        run.designs[name],
+        way=[] if way is None else measurements.read_way(way, shell),
+        groups=None if groups is None else measurements.read_groups(groups, shell),
+        load=carried[0],
+        weight=carried[1],
+        lift=carried[2],
+        step=step,
+    )
+    where = made(output or run.folder / "schedules")
+    files = [where / "erection.csv", where / "erection.npz"]
+    write_text(files[0], done.table())
+    write_arrays(
+        files[1],
+        positions=np.stack([each.state.positions for each in done.steps]),
+        stage=np.array([each.stage for each in done.steps]),
+    )
+    worst, last = done.worst, done.steps[-1]
+    return Told(
+        [
+            f"{len(done.steps)} steps: {', '.join(dict.fromkeys(each.stage for each in done.steps))}",
+            f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the strength, at {worst.share:.2f} of {worst.stage}; "
+            f"{1e-6 * last.stress:.0f} MPa in the end",
+            f"largest cable tension {max(each.tension for each in done.steps):.3g} N, largest force on a support {max(each.reaction for each in done.steps):.3g} N",
+        ],
+        files,
+    )
+
+
+def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.Belief]:
+    """The design's name, its shell, and what is believed of it: as drawn, or after the round before."""
+    for label, value in (("--noise", options.noise), ("--length-error", options.length_error)):
+        if not (value > 0.0 and np.isfinite(value)):
+            raise InputError("must be positive", where=label, value=value)
+    name = _design(run, options.design, run.best)
+    if options.load not in run.loads:
+        raise InputError(
+            "there is no such load case",
+            where="--load",
+            value=options.load,
+            remedy=f"Known: {', '.join(run.loads)}.",
+        )
+    shell, load = run.shell_of(name), run.loads[options.load]
+    design, state = run.designs[name], run.states[name][options.load]
+    if options.after is None:
+        return name, shell, retensioning.drawn(shell, design, state, load, length_error=options.length_error)
+    data = read_arrays(options.after)
+    lacking = {
+        "rest_length",
+        "present",
+        "radius",
+        "covariance",
+        "positions",
+        "quaternions",
+        "origin",
+    } - data.keys()
+    if lacking:
+        raise InputError(
+            "was not left by shellform survey", where=str(options.after), value=", ".join(sorted(lacking))
+        )
+    if str(data["origin"]) != f"{name}/{options.load}" or not np.array_equal(data["present"], design.present):
+        raise InputError(
+            "belongs to another design or load case", where=str(options.after), value=str(data["origin"])
+        )
+    known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
+    there = State(data["positions"], data["quaternions"])
+    return name, shell, retensioning.Belief(known, data["covariance"], there, load)
+
+
+def _surveyed(
+    path: Path, shell: Gridshell, expected: State, options: Survey
+) -> tuple[Indices, Reals, list[str]]:
+    """Nodes, their places in the model's axes, and what is doubtful. Points without names are laid onto the
+    crossings by a rigid motion.
+    """
+    if measurements.has_column(path, "node") or measurements.has_column(path, "crossing"):
+        if options.unit not in METRES:
+            raise InputError(
+                "isn't a known unit",
+                where="--unit",
+                value=options.unit,
+                remedy=f"Known: {', '.join(METRES)}.",
+            )
+        nodes, places = measurements.read_places(path, shell)
+        places = METRES[options.unit] * places
+        seen = np.isfinite(places).all(axis=1)
+        if not seen.any():
+            raise InputError("no node was seen", where=str(path))
+        nodes, places = nodes[seen], places[seen]
+        away = np.linalg.norm(places - expected.positions[nodes], axis=1)
+        worst = int(np.argmax(away))
+        if away[worst] > 0.5 * shell.net.spacing:
+            raise InputError(
+                f"node {nodes[worst]} lies {1e3 * away[worst]:.1f} mm from where it is expected, more than half a spacing",
+                where=str(path),
+                remedy="Check the unit, the axes and the numbering; leave the columns node and crossing out to have points laid onto the model.",
+            )
+        return nodes, places, []
+    points = read_points(path, unit=options.unit)
+    crossings = shell.net.grid.crossing_nodes[:, 1]
+    found = match(points, expected.positions[crossings], reach=0.5 * shell.net.spacing)
+    places = found.places(points)
+    seen = np.isfinite(places).all(axis=1)
+    return crossings[seen], places[seen], list(found.doubts)
+
+
+def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, goal: Reals) -> str:
+    """predicted.csv: each crossing's predicted place, m, and how far it is from its goal before and after the
+    turns, mm.
+    """
+    lines = ["crossing,node,x,y,z,distance before [mm],distance after [mm]"]
+    after = step.belief.state.positions
+    for number, node in enumerate(shell.net.grid.crossing_nodes[:, 1]):
+        place = ",".join(f"{each:.6f}" for each in after[node])
+        was, then = (
+            1e3 * float(np.linalg.norm(each[node] - goal[node])) for each in (before.positions, after)
+        )
+        lines.append(f"{number},{node},{place},{was:.3f},{then:.3f}")
+    return "\n".join(lines) + "\n"
+
+
+def _design(run: Run, name: str | None, usual: str) -> str:
+    chosen = name or usual
+    if chosen not in run.designs:
+        raise InputError(
+            "isn't there", where="--design", value=chosen, remedy=f"Known: {', '.join(run.designs)}."
+        )
+    return chosen
+
+
+def _mm(misfit: float, nodes: int) -> str:
+    return f"{1e3 * np.sqrt(misfit / nodes):.3f}"

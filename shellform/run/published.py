@@ -1,0 +1,297 @@
+"""A run of one of the paper's two studies (section 4.1), set beside what the paper says of it.
+
+What is published stands in published.toml, each number with its place in the paper. A run gives the same
+quantities under the same keys; the table joins them, and says of each line whether it must agree ("equal":
+inputs, and relations that hold on any shape), can be compared in its order of magnitude only ("order": the
+paper's surface is not public), or not at all ("none").
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shellform.case.case import LoadEntry
+from shellform.errors import InputError
+from shellform.gridshell.loads import pressure
+from shellform.run.folder import Run
+from shellform.written import write_text
+
+STUDIES = ("fixed", "radius")
+_DATA = Path(__file__).with_name("published.toml")
+_ACTIVE = 0.02  # of a constraint's limit: the paper's 0.0 and -0.01 are active, its -0.05 is not
+_TITLES = {
+    "fixed": "Rods of 2 mm (section 4.1, figures 10 to 14)",
+    "radius": "Rod radius free (section 4.1, figures 15 and 16)",
+}
+_SAYS = {"equal": "=", "order": "~", "none": "–"}
+
+Value = float | str | None
+
+
+@dataclass(frozen=True)
+class Line:
+    """One `quantity`: its value `here` and in the `paper` (None: not known), both in `unit`; `source`, its
+    place in the paper; `compare`: "equal", "order" or "none"; `note`."""
+
+    key: str
+    quantity: str
+    here: Value
+    paper: Value
+    unit: str
+    source: str
+    compare: str
+    note: str
+
+
+def paper() -> dict[str, Any]:
+    """What published.toml holds."""
+    return tomllib.loads(_DATA.read_text(encoding="utf-8"))
+
+
+def study_of(run: Run) -> str:
+    """Which of the two studies the run is: "fixed" or "radius"."""
+    return "radius" if run.case.optimise.rod_radius > 0.0 else "fixed"
+
+
+def beside(run: Run, *, fixed: Run | None = None) -> list[Line]:
+    """The lines of the run's study in the paper's order. The study with a free radius is compared with the
+    `fixed` one too, where given.
+
+    Raises InputError where the run isn't finished or `fixed` is no run of the fixed radius.
+    """
+    study = study_of(run)
+    if fixed is not None and study_of(fixed) != "fixed":
+        raise InputError("is no run with a fixed radius", where=str(fixed.folder))
+    values = quantities(run)
+    if fixed is not None and study == "radius":
+        values |= _ratios(values, quantities(fixed))
+    lines = [
+        Line(
+            each["key"],
+            each["quantity"],
+            values.get(each["key"]),
+            each.get("value"),
+            each.get("unit", ""),
+            each["source"],
+            each["compare"],
+            each.get("note", ""),
+        )
+        for each in paper()["values"]
+        if each["study"] in (study, "both")
+    ]
+    return lines + _beyond(run, values)
+
+
+def quantities(run: Run) -> dict[str, Value]:
+    """What the run says, by the keys and in the units of published.toml."""
+    summary, steps = run.summary, history(run)
+    if "optimised" not in run.designs or not steps:
+        raise InputError(
+            "the run isn't finished",
+            where=str(run.folder),
+            remedy="Run shellform design on it without --until.",
+        )
+    designs, start = summary["designs"], steps[0]
+    first, best = designs["initial"], designs["optimised"]
+    nodes = summary["model"]["nodes"]
+    misfits = [nodes * each["loads"]["design"]["deviation_rms"] ** 2 for each in (first, best)]
+    limits = summary["optimisation"]["constraints"]
+    # The second term of the objective at the start is its share, and so on.
+    shares = [start["term.misfit"], start["term.cable_force"], start.get("term.rod_radius", 0.0)]
+    found: dict[str, Value] = {
+        **_inputs(run),
+        "length": summary["surface"]["size"][0],
+        "width": summary["surface"]["size"][1],
+        "height": summary["surface"]["size"][2],
+        "radius_max": 1e3 * summary["net"]["rod_radius_max"],
+        "nodes": nodes,
+        "cables_start": first["cables"],
+        "iterations": summary["optimisation"]["iterations"],
+        "misfit_weight": shares[0] / misfits[0],
+        "force_weight": shares[1] / first["cable_force_sum"],
+        "radius_weight": shares[2] / first["rod_radius"],
+        "misfit_start": misfits[0],
+        "misfit_end": misfits[1],
+        "force_start": first["cable_force_sum"],
+        "force_end": best["cable_force_sum"],
+        "radius_start": 1e3 * first["rod_radius"],
+        "radius_end": 1e3 * best["rod_radius"],
+        "objective_start": start["objective"],
+        "objective_end": summary["optimisation"]["objective_end"],
+        "cables_end": best["cables"],
+        "force_largest": run.case.cable.force_max
+        * (1.0 + max(step["constraint.cable_force"] for step in steps)),
+        "c1_start": start["constraint.misfit.additional"],
+        "c1_end": limits["misfit.additional"],
+        "c2_start": start["constraint.cable_force"],
+        "c2_end": limits["cable_force"],
+    }
+    for name, design in designs.items():
+        for load, each in design["loads"].items():
+            for word in ("max", "mean"):
+                found[f"deviation.{name}.{load}.{word}"] = 1e3 * each[f"deviation_{word}"]
+    return {**found, **_relations(designs, found)}
+
+
+def history(run: Run) -> list[dict[str, float]]:
+    """The accepted designs of history.csv, a dict of its columns each."""
+    with (run.folder / "history.csv").open(encoding="utf-8", newline="") as file:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    return [row for row in rows if row["accepted"]]
+
+
+def table(lines: Sequence[Line]) -> str:
+    """The lines as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text)
+    writer.writerow(["key", "quantity", "unit", "here", "paper", "compare", "source", "note"])
+    for line in lines:
+        here, published = ("" if value is None else value for value in (line.here, line.paper))
+        writer.writerow(
+            [line.key, line.quantity, line.unit, here, published, line.compare, line.source, line.note]
+        )
+    return text.getvalue()
+
+
+def page(run: Run, lines: Sequence[Line]) -> str:
+    """The lines and the run's history as Markdown."""
+    rows = [
+        f"| {line.quantity} | {_told(line.here)} | {_told(line.paper, digits=4)} | {line.unit} | {_SAYS[line.compare]} "
+        f"| {line.source} | {line.note} |"
+        for line in lines
+    ]
+    columns = [name for name in history(run)[0] if name not in ("accepted", "seconds", "stage")]
+    steps = [
+        "| "
+        + " | ".join(
+            _told(int(step[name]) if name in ("evaluation", "cables") else step[name]) for name in columns
+        )
+        + " |"
+        for step in history(run)
+    ]
+    return "\n".join(
+        [
+            f"# {_TITLES[study_of(run)]}",
+            "",
+            "= must agree; ~ depends on the shape: orders of magnitude only, the paper's surface not being public; – can't be",
+            "compared.",
+            "",
+            "| quantity | here | paper | unit | | where in the paper | note |",
+            "| --- | --- | --- | --- | --- | --- | --- |",
+            *rows,
+            "",
+            "Accepted designs. The paper draws these curves (figures 10 and 11, 15 and 16); its text gives their ends above. Here they",
+            "are drawn in figures/objective.png and figures/constraints.png, the deviations in figures/deviations.png.",
+            "",
+            "| " + " | ".join(columns) + " |",
+            "| " + " | ".join("---" for _ in columns) + " |",
+            *steps,
+            "",
+        ]
+    )
+
+
+def write_beside(run: Run, *, fixed: Run | None = None) -> list[Path]:
+    """Writes published.md and published.csv into the run's folder; returns them."""
+    lines = beside(run, fixed=fixed)
+    files = [run.folder / "published.md", run.folder / "published.csv"]
+    for file, text in zip(files, (page(run, lines), table(lines)), strict=True):
+        write_text(file, text)
+    return files
+
+
+def _inputs(run: Run) -> dict[str, Value]:
+    """What the case puts in."""
+    case = run.case
+    point = isinstance(case.load, LoadEntry)
+    return {
+        "spacing": 1e3 * case.net.spacing,
+        "young": 1e-9 * run.shell.rod.young,
+        "elements": case.net.elements,
+        "cable_stiffness": case.cable.stiffness,
+        "rest_ratio": case.cable.rest_ratio,
+        "joint_axial": case.joint.axial,
+        "joint_torsion": case.joint.torsion,
+        "joint_bending": case.joint.bending,
+        "load": case.load.force if isinstance(case.load, LoadEntry) else None,
+        "additional": case.load.additional if isinstance(case.load, LoadEntry) else None,
+        "force_max": case.cable.force_max,
+        "rms_max": 1e3 * case.optimise.misfit_rms_additional,
+        "pressure": pressure(0.05, 2500.0) if point else None,
+        "node_force": pressure(0.0025, 50_000.0) * case.net.spacing**2 if point else None,
+        "node_force_large": pressure(0.05, 2500.0) * (20.0 * case.net.spacing) ** 2 if point else None,
+        "share_misfit": case.optimise.misfit,
+        "share_force": case.optimise.cable_force,
+        "share_radius": case.optimise.rod_radius,
+    }
+
+
+def _relations(designs: Mapping[str, Any], values: Mapping[str, Value]) -> dict[str, Value]:
+    """What the paper says of its designs that should hold on any shape, "yes" or "no"; left out where a
+    design was not made.
+    """
+
+    def away(name: str, load: str) -> float:
+        return float(designs[name]["loads"][load]["deviation_rms"])
+
+    braced = [name for name in ("initial", "unloaded") if name in designs]
+    found = {"half_vanish": designs["optimised"]["cables"] < 0.5 * designs["initial"]["cables"]}
+    found["c1_active"] = abs(_number(values["c1_end"])) < _ACTIVE <= abs(_number(values["c2_end"]))
+    if "unbraced" in designs:
+        found["unbraced_snaps"] = not designs["unbraced"]["loads"]["design"]["on_branch"]
+    if "unloaded" in designs:
+        found["unloaded_fits_best"] = all(
+            away("unloaded", "none") < away(name, "none") for name in designs if name != "unloaded"
+        )
+        found["optimised_fits_best"] = all(
+            away("optimised", "none") > away(name, "none") for name in braced
+        ) and all(
+            away("optimised", load) < away(name, load) for name in braced for load in ("design", "additional")
+        )
+    return {name: "yes" if value else "no" for name, value in found.items()}
+
+
+def _beyond(run: Run, values: Mapping[str, Value]) -> list[Line]:
+    """The polished design, which the paper doesn't have."""
+    if "polished" not in run.summary["designs"]:
+        return []
+    lines = [
+        ("cables_polished", "cables of the polished design", run.summary["designs"]["polished"]["cables"], "")
+    ]
+    for load in ("none", "design", "additional"):
+        for word, said in (("max", "largest"), ("mean", "mean")):
+            key = f"deviation.polished.{load}.{word}"
+            lines.append((key, f"{said} deviation, load {load!r}: polished design", values[key], "mm"))
+    return [
+        Line(key, quantity, here, None, unit, "–", "none", "past the paper")
+        for key, quantity, here, unit in lines
+    ]
+
+
+def _ratios(free: Mapping[str, Value], fixed: Mapping[str, Value]) -> dict[str, Value]:
+    """The study with a free radius over the one with a fixed radius."""
+    names = ("misfit", "force", "cables", "radius")
+    ratio = {name: _number(free[f"{name}_end"]) / _number(fixed[f"{name}_end"]) for name in names}
+    lower = all(ratio[name] < 1.0 for name in names[:3])
+    changes: dict[str, Value] = {f"{name}_change": value for name, value in ratio.items()}
+    return {**changes, "all_lower": "yes" if lower else "no"}
+
+
+def _number(value: Value) -> float:
+    assert isinstance(value, (int, float))
+    return value
+
+
+def _told(value: Value, digits: int = 3) -> str:
+    """Numbers with so many digits, a dash for what is not known."""
+    if value is None:
+        return "–"
+    if isinstance(value, str):
+        return value
+    return f"{value:.0f}" if 1e3 <= abs(value) < 1e5 else f"{value:.{digits}g}"

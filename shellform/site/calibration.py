@@ -1,0 +1,462 @@
+"""Calibration of the connectors from scans of the built grid under known loads (section 4.1).
+
+Their stiffnesses EA, GJ and EI are unknown; the positions of marked nodes in several load states are
+measured. What is sought are the logarithms q of the stiffnesses over their start values that minimise the sum
+of squares of
+
+    r(q) = P (y - x(q)),
+
+with the measured y (3 a marker and scan), the model's positions x in the equilibria under the loads, and P
+the projection that takes away what isn't the grid's doing: the scanner's place (a small rigid motion for each
+frame) and, if asked, how far each marker sits from its node (an offset for each marker, the same in all
+scans). The Jacobian -P dx/dq is analytic (sensitivity.py; end forces are linear in the stiffness), the steps
+are Gauss-Newton's within a trust region (SciPy's `least_squares`). All equilibria stay on the stable branch:
+a trial that leaves it counts as worse, and load states that the start doesn't bear come in when the others
+have been fitted. After a fit the points are laid and named anew, until nothing changes.
+
+Parameters that the data don't tell (identifiability.py) are held at their start values, and it is said so;
+connectors of the scale model are so short and stiff along their axis that their EA is always among these.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from shellform.arrays import Indices, Reals, indices
+from shellform.errors import InputError, NotConverged
+from shellform.gridshell.gridshell import Design, Gridshell, Joint
+from shellform.problem.problem import follow
+from shellform.site.identifiability import Identifiability, told
+from shellform.site.scans import Match, Motion, Scan, match, rigid_fit
+from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.loading import Loaded
+
+PARAMETERS = ("axial", "torsion", "bending")
+NOISE = 0.15e-3  # m, the average error that section 4.2 reports for its motion capture
+_RANGE = np.log(1e3)  # a stiffness is sought between a thousandth and a thousand times its start
+_TRIAL = 15  # factorisations of a trial's equilibrium; next to a known one five are enough
+_ROUNDS = 6  # of fitting and naming points anew
+_WORSE = 1e3  # times the start's residuals: what a trial off the branch counts
+_SETTLED = 1e-5  # relative change of the residual norm or of the logarithms at which a fit ends
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The calibrated `joint`; which parameters were `fitted` and which `held` at the start; what the data
+    tell, `identifiability`, with the noise or the residuals, whichever are larger; the `matches` of the
+    scans; `before` and `after` (m, s), m, the distances of markers from the model with the start's and the
+    calibrated joint, NaN where missing; the `residual` standard deviation of a coordinate, m; `states`; how
+    many `evaluations` of all load states it took and how many trials were `rejected` off the branch."""
+
+    joint: Joint
+    fitted: tuple[str, ...]
+    held: tuple[str, ...]
+    identifiability: Identifiability
+    nodes: Indices
+    matches: tuple[Match, ...]
+    before: Reals
+    after: Reals
+    residual: float
+    states: tuple[State, ...]
+    evaluations: int
+    rejected: int
+
+    def sentences(self) -> list[str]:
+        """What was found, held and doubted."""
+        result = [f"{name} = {getattr(self.joint, name):.4g}" for name in self.fitted]
+        result += [
+            f"{name} was held at its start value, {getattr(self.joint, name):.4g}." for name in self.held
+        ]
+        result += self.identifiability.sentences()
+        for number, each in enumerate(self.matches, 1):
+            if len(each.missing):
+                result.append(
+                    f"Scan {number}: no point for nodes {', '.join(map(str, self.nodes[each.missing]))}."
+                )
+            if len(each.outliers):
+                result.append(
+                    f"Scan {number}: points {', '.join(map(str, each.outliers))} belong to no marker."
+                )
+            result += [f"Scan {number}: {doubt}" for doubt in each.doubts]
+        return result
+
+    def table(self) -> str:
+        """Distances, mm, between numerical and physical model at the markers, as in table 2, with means and
+        maxima, as CSV.
+        """
+        scans = self.after.shape[1]
+        lines = ["pos.,node," + ",".join(f"{k} start,{k}" for k in range(1, scans + 1))]
+        both = 1e3 * np.stack([self.before, self.after], axis=2).reshape(len(self.nodes), -1)
+        for number, (node, row) in enumerate(zip(self.nodes, both, strict=True), 1):
+            lines.append(
+                f"{number},{node}," + ",".join("" if np.isnan(each) else f"{each:.3f}" for each in row)
+            )
+        for name, measure in (("mean", np.mean), ("max", np.max)):
+            seen = [column[np.isfinite(column)] for column in both.T]
+            lines.append(f"{name},," + ",".join(f"{measure(each):.3f}" if len(each) else "" for each in seen))
+        return "\n".join(lines) + "\n"
+
+
+def foresee(
+    shell: Gridshell,
+    design: Design,
+    loads: Sequence[Reals],
+    nodes: Indices,
+    *,
+    noise: float = NOISE,
+    frame: int | None = 0,
+    offsets: bool = False,
+) -> Identifiability:
+    """What scans of the `nodes` (m,) under the `loads`, (n, 6) each, would tell about all three stiffnesses,
+    at their present values: choose load states with it before anything is measured. Raises NotConverged where
+    a load isn't borne on the stable branch."""
+    markers = _checked(shell, nodes)
+    model = _Model(shell, design, loads)
+    begun = model.begin(shell.joint)
+    if not all(each.on_branch for each in begun):
+        _refuse(begun)
+    states = [each.equilibrium.state for each in begun]
+    jacobian = model.jacobian(shell.joint, states, PARAMETERS)[:, markers, :3].reshape(-1, len(PARAMETERS))
+    basis = _nuisance(
+        states, markers, [frame] * len(loads), np.ones((len(loads), len(markers)), dtype=bool), offsets
+    )
+    return told(PARAMETERS, jacobian - basis @ (basis.T @ jacobian), jacobian, noise)
+
+
+def calibrate(
+    shell: Gridshell,
+    design: Design,
+    scans: Sequence[Scan],
+    nodes: Indices,
+    *,
+    free: Sequence[str] = PARAMETERS,
+    noise: float = NOISE,
+    offsets: bool = False,
+    reach: float | None = None,
+) -> Calibration:
+    """Connector stiffnesses, of those in `free`, from scans of the marked `nodes` (m,) of the `shell` as
+    built with `design`; its joint is the start. `offsets` lets each marker sit away from its node; `reach`, m
+    (half the net's spacing), bounds how far a point lies from its marker.
+
+    Raises InputError where points can't be named, NotConverged where a load isn't borne on the stable branch
+    or where nothing can be told.
+    """
+    markers = _checked(shell, nodes)
+    for name in free:
+        if name not in PARAMETERS:
+            raise InputError(
+                "isn't a connector's stiffness",
+                where="calibrate.free",
+                value=name,
+                remedy=f"Known: {', '.join(PARAMETERS)}.",
+            )
+    if not scans:
+        raise InputError("needs at least one scan", where="calibrate")
+    beside = 0.5 * shell.net.spacing if reach is None else reach
+    first = tuple(name for name in PARAMETERS if name in free)
+    model = _Model(shell, design, [scan.load for scan in scans])
+    joint, begun = shell.joint, model.begin(shell.joint)
+    before = np.full((len(markers), len(scans)), np.nan)
+    carried = [k for k, each in enumerate(begun) if each.on_branch]
+    own = [scans[k] for k in carried]
+    near = [begun[k].equilibrium.state for k in carried]
+    before[:, carried] = _distances(own, _laid(own, near, markers, beside), near, markers)
+    while len(carried) < len(scans):
+        # The start is too soft for some load states: what the others tell comes first.
+        if carried:
+            part = _Model(shell, design, [scans[k].load for k in carried])
+            joint = _rounds(
+                part, joint, near, [scans[k] for k in carried], markers, first, noise, offsets, beside
+            )[0]
+            model.evaluations += part.evaluations
+            model.rejected += part.rejected
+            begun = model.begin(joint)
+        more = [k for k, each in enumerate(begun) if each.on_branch]
+        if len(more) <= len(carried):
+            _refuse(begun)
+        carried, near = more, [begun[k].equilibrium.state for k in more]
+    joint, states, matches, fitted = _rounds(
+        model, joint, near, scans, markers, first, noise, offsets, beside
+    )
+    fit = _Fit(model, joint, states, scans, matches, markers, offsets)
+    deviation = fit.deviation(len(fitted))
+    return Calibration(
+        joint,
+        fitted,
+        tuple(name for name in first if name not in fitted),
+        fit.told(first, max(noise, deviation)),
+        markers,
+        tuple(matches),
+        before,
+        _distances(scans, matches, states, markers),
+        deviation,
+        tuple(states),
+        model.evaluations,
+        model.rejected,
+    )
+
+
+def _rounds(
+    model: _Model,
+    joint: Joint,
+    states: list[State],
+    scans: Sequence[Scan],
+    markers: Indices,
+    free: tuple[str, ...],
+    noise: float,
+    offsets: bool,
+    reach: float,
+) -> tuple[Joint, list[State], list[Match], tuple[str, ...]]:
+    """Fits, lays and names the points anew until nothing changes; the names of what was fitted come last."""
+    matches = _laid(scans, states, markers, reach)
+    for _ in range(_ROUNDS):
+        fit = _Fit(model, joint, states, scans, matches, markers, offsets)
+        known = fit.told(free, noise)
+        if not known.tellable:
+            raise NotConverged(
+                "The data tell none of the connectors' stiffnesses: " + " ".join(known.sentences()),
+                state=states,
+                remedy="Choose load states that move the markers more (see `foresee`).",
+            )
+        joint, states = fit.solve(known.tellable)
+        before, matches = matches, _laid(scans, states, markers, reach)
+        pairs = list(zip(before, matches, strict=True))
+        moved = max(_apart(a.motion, b.motion, model.shell.target.positions) for a, b in pairs)
+        if moved < 0.1 * noise and all(np.array_equal(a.point, b.point) for a, b in pairs):
+            break
+    return joint, states, matches, known.tellable
+
+
+def _refuse(begun: Sequence[Loaded]) -> None:
+    number = next(k for k, each in enumerate(begun) if not each.on_branch)
+    raise NotConverged(
+        f"With the start's joint the grid bears {begun[number].share:.2f} of load {number + 1} only",
+        state=begun[number].equilibrium.state,
+        remedy="Start from stiffer connectors, or leave this load state out.",
+    )
+
+
+class _Model:
+    """Equilibria of the shell under several loads with any joint; counts its work."""
+
+    def __init__(self, shell: Gridshell, design: Design, loads: Sequence[Reals]) -> None:
+        self.shell, self.design, self.loads = shell, design, list(loads)
+        nodes = len(shell.net.grid.flat)
+        for number, load in enumerate(self.loads):
+            if np.shape(load) != (nodes, 6):
+                raise InputError("must be a load (nodes, 6)", where=f"loads[{number}]", value=np.shape(load))
+        self.base = assemble(shell.network(design))
+        self.evaluations = self.rejected = 0
+
+    def assembly(self, joint: Joint) -> Assembly:
+        """The assembly with the joint's stiffness."""
+        other = replace(self.shell, joint=joint)
+        return self.base.with_parts((other.beams(self.design.radius), other.cables(self.design)))
+
+    def begin(self, joint: Joint) -> list[Loaded]:
+        """The documented path towards every load, as far as the stable branch goes."""
+        self.evaluations += 1
+        loads = {str(k): load for k, load in enumerate(self.loads)}
+        return list(follow(replace(self.shell, joint=joint), self.design, loads, stay=True).values())
+
+    def near(self, joint: Joint, states: Sequence[State]) -> list[State] | None:
+        """The equilibria next to those known for a similar joint; None where one has left the stable
+        branch.
+        """
+        self.evaluations += 1
+        assembly = self.assembly(joint)
+        result = []
+        for state, load in zip(states, self.loads, strict=True):
+            try:
+                found = find_equilibrium(assembly, state, load, limit=_TRIAL, on_branch=True)
+            except NotConverged:
+                found = None
+            if found is None or not found.stable:
+                self.rejected += 1
+                return None
+            result.append(found.state)
+        return result
+
+    def jacobian(self, joint: Joint, states: Sequence[State], names: Sequence[str]) -> Reals:
+        """Derivatives (s, n, 6, p) of all freedoms, m and rad, by the logarithms of the joint's
+        stiffnesses.
+        """
+        assembly = self.assembly(joint)
+        beams = assembly.beams[0]
+        stiffness = {"axial": (joint.axial, 0.0, 0.0, 0.0), "torsion": (0.0, joint.torsion, 0.0, 0.0)}
+        stiffness["bending"] = (0.0, 0.0, joint.bending, joint.bending)
+        rates = [stiffness_rate(beams, "connector", stiffness[name]) for name in names]
+        result = np.zeros((len(states), 6 * assembly.count, len(names)))
+        for each, state in zip(result, states, strict=True):
+            each[assembly.free] = state_by_design(
+                respond(assembly, state, by_stiffness(assembly, state, *rates))
+            )
+        return result.reshape(len(states), assembly.count, 6, len(names))
+
+
+class _Fit:
+    """One least-squares problem with the points' names and places fixed."""
+
+    def __init__(
+        self,
+        model: _Model,
+        joint: Joint,
+        states: list[State],
+        scans: Sequence[Scan],
+        matches: Sequence[Match],
+        markers: Indices,
+        offsets: bool,
+    ) -> None:
+        self.model, self.joint, self.states, self.markers = model, joint, states, markers
+        self.goal = np.stack([each.places(scan.points) for each, scan in zip(matches, scans, strict=True)])
+        self.seen = np.isfinite(self.goal[:, :, 0])
+        self.basis = _nuisance(states, markers, [scan.frame for scan in scans], self.seen, offsets)
+        self.freedom = 3 * int(self.seen.sum()) - self.basis.shape[1]
+
+    def residuals(self, states: Sequence[State]) -> Reals:
+        """Projected distances (r,), m."""
+        away = np.stack([state.positions[self.markers] for state in states])[self.seen] - self.goal[self.seen]
+        return self._projected(away.reshape(-1, 1))[:, 0]
+
+    def jacobian(self, joint: Joint, states: Sequence[State], names: Sequence[str]) -> tuple[Reals, Reals]:
+        """Derivatives (r, p), m, by the logarithms, projected and as they are."""
+        raw = self.model.jacobian(joint, states, names)[:, self.markers, :3][self.seen].reshape(
+            -1, len(names)
+        )
+        return self._projected(raw), raw
+
+    def told(self, names: Sequence[str], noise: float) -> Identifiability:
+        """What the data tell about the names."""
+        return told(names, *self.jacobian(self.joint, self.states, names), noise)
+
+    def solve(self, names: Sequence[str]) -> tuple[Joint, list[State]]:
+        """The best joint and its equilibria."""
+        known: dict[bytes, list[State] | None] = {np.zeros(len(names)).tobytes(): self.states}
+        accepted = self.states
+        far = _WORSE * self.residuals(self.states)
+
+        def states_at(q: Reals) -> list[State] | None:
+            key = q.tobytes()
+            if key not in known:
+                known[key] = self.model.near(self._joint(q, names), accepted)
+            return known[key]
+
+        def value(q: Reals) -> Reals:
+            states = states_at(q)
+            return far if states is None else self.residuals(states)
+
+        def slope(q: Reals) -> Reals:
+            nonlocal accepted
+            states = states_at(q)
+            assert states is not None  # asked for at accepted points only
+            accepted = states
+            return self.jacobian(self._joint(q, names), states, names)[0]
+
+        size = len(names)
+        found = least_squares(
+            value,
+            np.zeros(size),
+            slope,
+            bounds=(np.full(size, -_RANGE), np.full(size, _RANGE)),
+            xtol=_SETTLED,
+            ftol=_SETTLED**2,
+            gtol=None,
+        )
+        best = states_at(found.x)
+        assert best is not None
+        return self._joint(found.x, names), best
+
+    def deviation(self, fitted: int) -> float:
+        """Standard deviation, m, of a coordinate that the residuals show."""
+        left = self.freedom - fitted
+        return float(np.sqrt((self.residuals(self.states) ** 2).sum() / left)) if left > 0 else np.inf
+
+    def _joint(self, q: Reals, names: Sequence[str]) -> Joint:
+        values = {
+            name: getattr(self.joint, name) * float(np.exp(each)) for name, each in zip(names, q, strict=True)
+        }
+        return replace(self.joint, **values)
+
+    def _projected(self, columns: Reals) -> Reals:
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+
+def _nuisance(
+    states: Sequence[State], markers: Indices, frames: Sequence[int | None], seen: np.ndarray, offsets: bool
+) -> Reals:
+    """An orthonormal basis (r, k) of what rigid motions of the frames and offsets of the markers do to the
+    seen coordinates.
+    """
+    place = np.stack([state.positions[markers] for state in states])
+    middle = place.reshape(-1, 3).mean(axis=0)
+    size = float(np.abs(place - middle).max())
+    columns = []
+    for frame in sorted({each for each in frames if each is not None}):
+        own = np.array([each == frame for each in frames])[:, None, None]
+        for axis in np.eye(3):
+            columns.append(own * np.broadcast_to(axis, place.shape))
+            columns.append(own * np.cross(axis, (place - middle) / size))
+    if offsets:
+        for marker in range(len(markers)):
+            for k in range(3):
+                each = np.zeros(place.shape)
+                each[:, marker, k] = 1.0
+                columns.append(each)
+    rows = 3 * int(seen.sum())
+    if not columns:
+        return np.zeros((rows, 0))
+    matrix = np.stack([each[seen].ravel() for each in columns], axis=1)
+    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
+    return np.asarray(left[:, singular > 1e-10 * singular[0]])
+
+
+def _laid(scans: Sequence[Scan], states: Sequence[State], markers: Indices, reach: float) -> list[Match]:
+    """The scans' points named and laid onto the states; scans of one frame by one motion."""
+    found = [
+        match(scan.points, state.positions[markers], reach=reach, placed=scan.frame is None)
+        for scan, state in zip(scans, states, strict=True)
+    ]
+    for frame in sorted({scan.frame for scan in scans if scan.frame is not None}):
+        own = [k for k, scan in enumerate(scans) if scan.frame == frame]
+        points = np.vstack([scans[k].points[found[k].point[found[k].point >= 0]] for k in own])
+        places = np.vstack([states[k].positions[markers][found[k].point >= 0] for k in own])
+        motion = rigid_fit(points, places)
+        for k in own:
+            distance = np.linalg.norm(
+                replace(found[k], motion=motion).places(scans[k].points) - states[k].positions[markers],
+                axis=1,
+            )
+            found[k] = replace(found[k], motion=motion, distance=distance)
+    return found
+
+
+def _distances(
+    scans: Sequence[Scan], matches: Sequence[Match], states: Sequence[State], markers: Indices
+) -> Reals:
+    """Distances (m, s), m, of each scan's points from the states."""
+    away = [
+        each.places(scan.points) - state.positions[markers]
+        for each, scan, state in zip(matches, scans, states, strict=True)
+    ]
+    return np.linalg.norm(np.stack(away, axis=1), axis=2)
+
+
+def _apart(one: Motion, other: Motion, place: Reals) -> float:
+    """How far two motions lay the same points apart, m, at most, over the size of `place`."""
+    back = (place - one.shift) @ one.turn
+    return float(np.linalg.norm(other(back) - place, axis=1).max())
+
+
+def _checked(shell: Gridshell, nodes: Indices) -> Indices:
+    markers = indices("nodes", nodes, (None,), below=len(shell.net.grid.flat))
+    if len(np.unique(markers)) < len(markers):
+        raise InputError("a node is marked twice", where="nodes")
+    return markers

@@ -1,0 +1,208 @@
+"""CSV files that come from a site: columns by their names in the first line, in any order; lines that start
+with # are passed over.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Gridshell
+
+
+@dataclass(frozen=True)
+class Row:
+    """A `line` of a file with its `values` by column, NaN where a cell is empty."""
+
+    line: int
+    values: dict[str, float]
+
+
+def read_table(
+    path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = (), *, empty: tuple[str, ...] = ()
+) -> list[Row]:
+    """The rows of a CSV file with the columns `needed` and perhaps some `optional` ones; only those in
+    `empty` may have empty cells.
+
+    Raises InputError naming file, line and column.
+    """
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"can't be read: {error}", where=str(file)) from error
+    kept = [
+        (k, line)
+        for k, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    columns = f"Columns: {', '.join(needed)}" + (f"; if wanted {', '.join(optional)}." if optional else ".")
+    if not kept:
+        raise InputError("is empty", where=str(file), remedy=columns)
+    delimiter = next((each for each in ";\t," if each in kept[0][1]), ",")
+    lines = list(csv.reader([line for _, line in kept], delimiter=delimiter, skipinitialspace=True))
+    names = [each.strip().lower() for each in lines[0]]
+    for name in needed:
+        if name not in names:
+            raise InputError(
+                f"has no column {name!r} in its first line",
+                where=str(file),
+                value=", ".join(lines[0]),
+                remedy=columns,
+            )
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(f"has two columns {name!r}", where=str(file))
+    rows = []
+    for (number, _), cells in zip(kept[1:], lines[1:], strict=True):
+        if len(cells) > len(names):
+            raise InputError(
+                f"has {len(cells)} cells for {len(names)} columns", where=f"{file}, line {number}"
+            )
+        values = {}
+        for name in [each for each in (*needed, *optional) if each in names]:
+            place = names.index(name)
+            cell = cells[place].strip() if place < len(cells) else ""
+            values[name] = _number(cell, f"{file}, line {number}: {name}", name in empty)
+        rows.append(Row(number, values))
+    if not rows:
+        raise InputError("has no rows below its first line", where=str(file), remedy=columns)
+    return rows
+
+
+def has_column(path: str | Path, name: str) -> bool:
+    """Whether the first line of a file that can be read names the column."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"can't be read: {error}", where=str(path)) from error
+    first = next(
+        (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
+    )
+    return name in [each.strip().lower() for each in first.replace(";", ",").replace("\t", ",").split(",")]
+
+
+def nodes_of(path: str | Path, rows: list[Row], shell: Gridshell) -> Indices:
+    """The nodes (k,) that rows name by a `node` of the model or by a `crossing` of the net (its upper rod's
+    node); none twice.
+    """
+    crossings = shell.net.grid.crossing_nodes[:, 1]
+    found: list[int] = []
+    for row in rows:
+        for name, count in (("node", len(shell.net.grid.flat)), ("crossing", len(crossings))):
+            if name in row.values:
+                where = f"{path}, line {row.line}: {name}"
+                at = _index(row.values[name], where, count)
+                node = at if name == "node" else int(crossings[at])
+                if node in found:
+                    raise InputError("is there twice", where=where, value=at)
+                found.append(node)
+                break
+    return np.array(found, dtype=np.int64)
+
+
+def read_nodes(path: str | Path, shell: Gridshell) -> Indices:
+    """Marked nodes from a CSV file with a column `node` or `crossing`."""
+    return nodes_of(path, read_table(path, (named_by(path),)), shell)
+
+
+def named_by(path: str | Path) -> str:
+    """How a file names nodes: by "node" or "crossing". Raises InputError where by neither."""
+    for name in ("node", "crossing"):
+        if has_column(path, name):
+            return name
+    raise InputError(
+        "has no column 'node' or 'crossing' in its first line",
+        where=str(path),
+        remedy="Numbers are those of net.json and the model files.",
+    )
+
+
+def read_loads(path: str | Path, shell: Gridshell) -> Reals:
+    """A dead load (n, 6), N, from a CSV file: `node` or `crossing`, and fx, fy, fz of which those left out
+    are 0.
+    """
+    axes = ("fx", "fy", "fz")
+    rows = read_table(path, (named_by(path),), axes)
+    if not any(name in rows[0].values for name in axes):
+        raise InputError(
+            "has no column fx, fy or fz in its first line",
+            where=str(path),
+            remedy="Forces are in N, fz upwards.",
+        )
+    load = np.zeros((len(shell.net.grid.flat), 6))
+    for node, row in zip(nodes_of(path, rows, shell), rows, strict=True):
+        load[node, :3] = [row.values.get(name, 0.0) for name in axes]
+    return load
+
+
+def read_places(path: str | Path, shell: Gridshell) -> tuple[Indices, Reals]:
+    """Nodes (k,) and their places (k, 3), m, in the model's axes from a CSV file: `node` or `crossing`, x, y,
+    z; empty where one wasn't seen.
+    """
+    rows = read_table(path, (named_by(path), "x", "y", "z"), empty=("x", "y", "z"))
+    return nodes_of(path, rows, shell), np.array([[row.values[axis] for axis in "xyz"] for row in rows])
+
+
+def read_groups(path: str | Path, shell: Gridshell) -> list[Indices]:
+    """Groups of candidate cables by rising number from a CSV file: `cable`, `group`."""
+    teams: dict[float, list[int]] = {}
+    for row in read_table(path, ("cable", "group")):
+        where = f"{path}, line {row.line}: cable"
+        teams.setdefault(row.values["group"], []).append(
+            _index(row.values["cable"], where, len(shell.cable_ends))
+        )
+    return [np.array(teams[group], dtype=np.int64) for group in sorted(teams)]
+
+
+def read_way(path: str | Path, shell: Gridshell) -> list[Reals]:
+    """Places (s, 3), m, of all supports at stops by rising number, from a CSV file: `stop`, `node` (a
+    support's), x, y, z.
+    """
+    supports = [int(each) for each in shell.net.supports]
+    stops: dict[float, dict[int, list[float]]] = {}
+    for row in read_table(path, ("stop", "node", "x", "y", "z")):
+        where = f"{path}, line {row.line}: node"
+        node = _index(row.values["node"], where, len(shell.net.grid.flat))
+        if node not in supports:
+            raise InputError(
+                "is no support",
+                where=where,
+                value=node,
+                remedy=f"Supports: {', '.join(map(str, supports[:8]))}, …",
+            )
+        places = stops.setdefault(row.values["stop"], {})
+        if node in places:
+            raise InputError("is there twice in one stop", where=where, value=node)
+        places[node] = [row.values[axis] for axis in "xyz"]
+    for stop, places in stops.items():
+        lacking = [node for node in supports if node not in places]
+        if lacking:
+            raise InputError(
+                f"stop {stop:g} lacks {len(lacking)} supports", where=str(path), value=lacking[0]
+            )
+    return [np.array([stops[stop][node] for node in supports]) for stop in sorted(stops)]
+
+
+def _number(cell: str, where: str, may_be_empty: bool) -> float:
+    if not cell and may_be_empty:
+        return math.nan
+    try:
+        value = float(cell)
+    except ValueError as error:
+        raise InputError("must be a number", where=where, value=cell) from error
+    if not math.isfinite(value):
+        raise InputError("must be finite", where=where, value=cell)
+    return value
+
+
+def _index(value: float, where: str, count: int) -> int:
+    if value != int(value) or not 0 <= value < count:
+        raise InputError(f"must be a whole number from 0 to {count - 1}", where=where, value=value)
+    return int(value)

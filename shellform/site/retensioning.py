@@ -1,0 +1,393 @@
+"""Re-tensioning on site: from a survey of the erected grid to the next turn of the turnbuckles (the paper's
+outlook, after Liew et al.).
+
+Cables are never as long as drawn. What is known of their rest lengths l is a mean m and a covariance C, at
+first the drawing and the usual error of a cable. A survey y of the nodes x(l), with noise s, teaches more
+(the extended Kalman filter, iterated): with J = dx/dl at the estimate
+
+    l <- m + K (y - x(l) - J (m - l)),   K = C J' (J C J' + s² 1)⁻¹,   C <- C - K J C,
+
+x(l) being a re-solved equilibrium every time. Then the turns k, whole numbers of the turnbuckle's step h, are
+sought that minimise
+
+    |x + J h k - goal|² + λ |h k|²,
+
+x and J now those of the whole grid at the estimate, with no more cables touched and none changed further than
+the crew can. λ = (noise / largest change)²: a cable isn't turned for less than the survey can see. Cables are
+chosen one by one, each the one that lowers the sum most with all chosen ones solved for again (orthogonal
+matching pursuit); rounding to whole turns goes from the surest to the least sure one with the rest solved for
+again, and single turns more or less are tried in the end. The first-order shape is checked by the true
+equilibrium on the stable branch; turns that leave the branch are halved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals, indices, reals
+from shellform.errors import InputError, NotConverged
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.structure.answers.sensitivity import by_rest_length, predicted, respond, state_by_design
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.factorisation import NotPositiveDefinite
+
+_LEARNING = 4  # linearisations of one survey; the error is of second order after each
+_SETTLED = 0.02  # of a cable's usual error: smaller changes of the estimate end the learning
+_HALVINGS = 5  # of a change that leaves the stable branch
+_TRIAL = 25  # factorisations of an equilibrium next to a known one
+_BATCHES = 50  # in which cables are chosen and rounded: one by one as long as there are fewer of them
+_SWEEPS = 20  # over all chosen cables, trying single turns
+
+
+@dataclass(frozen=True)
+class Crew:
+    """What a crew can do in one round: turn a turnbuckle in steps of `step`, m of rest length, by at most
+    `largest`, m, on at most `cables` cables.
+    """
+
+    step: float
+    largest: float
+    cables: int
+
+    def __post_init__(self) -> None:
+        for name in ("step", "largest"):
+            if not (getattr(self, name) > 0.0 and np.isfinite(getattr(self, name))):
+                raise InputError("must be positive", where=f"crew.{name}", value=getattr(self, name))
+        if self.step > self.largest:
+            raise InputError("is more than the largest change", where="crew.step", value=self.step)
+        if self.cables < 1:
+            raise InputError("must be at least 1", where="crew.cables", value=self.cables)
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is thought of the grid as built: `design` with the estimated rest lengths, their `covariance` (p,
+    p), m², of the present cables, and the `state` in equilibrium under the dead `load` (n, 6)."""
+
+    design: Design
+    covariance: Reals
+    state: State
+    load: Reals
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """The next round: `turns` (c,) of every candidate cable in steps, `change` (c,), m, of rest length
+    (negative: shorter); the first-order shape `predicted` (n, 3), m, and the `belief` afterwards with the
+    true equilibrium; the sums of squares `misfit_before`, `misfit_predicted`, m², to first order, and
+    `misfit_after`, in the true equilibrium; `halved`: how often the change was, to stay on the stable
+    branch."""
+
+    turns: Indices
+    change: Reals
+    predicted: Reals
+    belief: Belief
+    misfit_before: float
+    misfit_predicted: float
+    misfit_after: float
+    halved: int
+
+    def schedule(self, shell: Gridshell) -> str:
+        """What the crew does, cable after cable, as CSV: number, both nodes, turns (negative: tighten),
+        change in mm, tension afterwards in N.
+        """
+        design = self.belief.design
+        tension = np.zeros(len(self.turns))
+        tension[design.present] = shell.cables(design).tension(self.belief.state)
+        lines = ["cable,node a,node b,turns,change [mm],tension after [N]"]
+        for cable in np.flatnonzero(self.turns):
+            a, b = shell.cable_ends[cable]
+            lines.append(
+                f"{cable},{a},{b},{self.turns[cable]:+d},{1e3 * self.change[cable]:+.2f},{tension[cable]:.2f}"
+            )
+        return "\n".join(lines) + "\n"
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A loop of survey and adjustment played on a grid whose true lengths are known: the true sum of squares
+    of distances to the goal `misfits` (r + 1,), m², before and after every round, the `adjustments` (r,), the
+    `cables` touched in each, and the true `state` in the end."""
+
+    misfits: Reals
+    adjustments: tuple[Adjustment, ...]
+    cables: Indices
+    state: State
+
+    @property
+    def removed(self) -> float:
+        """Share of the first misfit that is gone."""
+        return float(1.0 - self.misfits[-1] / self.misfits[0])
+
+
+def drawn(shell: Gridshell, design: Design, state: State, load: Reals, *, length_error: float) -> Belief:
+    """What is believed before the first survey: lengths as drawn with the usual error `length_error`, m (one
+    standard deviation), of a cable; `state` is the design's equilibrium under the `load`."""
+    if not (length_error > 0.0 and np.isfinite(length_error)):
+        raise InputError("must be positive", where="length_error", value=length_error)
+    count = int(design.present.sum())
+    if count == 0:
+        raise InputError("has no cables to turn", where="design")
+    return Belief(design, length_error**2 * np.eye(count), state, np.asarray(load))
+
+
+def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, noise: float) -> Belief:
+    """The belief after a `survey` (m, 3), m, of the `nodes` (m,) in the model's axes, NaN where a node wasn't
+    seen, with `noise`, m, a coordinate.
+
+    Raises InputError where nothing was seen, NotConverged where no equilibrium explains it even to a
+    thirtieth.
+    """
+    marked = indices("nodes", nodes, (None,), below=len(shell.net.grid.flat))
+    measured = np.asarray(survey, dtype=float)
+    if measured.shape != (len(marked), 3):
+        raise InputError("must be a point for each node", where="survey", value=measured.shape)
+    seen = np.isfinite(measured).all(axis=1)
+    if not seen.any():
+        raise InputError("no node was seen", where="survey")
+    if not (noise > 0.0 and np.isfinite(noise)):
+        raise InputError("must be positive", where="noise", value=noise)
+    goal, marked = measured[seen].ravel(), marked[seen]
+    assembly = assemble(shell.network(belief.design))
+    present = belief.design.present
+    mean, state, now = belief.design.rest_length[present], belief.state, belief.design
+    usual = np.sqrt(np.diag(belief.covariance).max())
+    for _ in range(_LEARNING):
+        rates = _rates(shell, assembly, now, state)[marked].reshape(len(goal), -1)
+        spread = belief.covariance @ rates.T
+        gain = np.linalg.solve(rates @ spread + noise**2 * np.eye(len(goal)), spread.T).T
+        here = now.rest_length[present]
+        wanted = mean + gain @ (goal - state.positions[marked].ravel() - rates @ (mean - here))
+        now, state, _ = _followed(shell, assembly, now, state, belief.load, wanted - here)
+        if np.abs(now.rest_length[present] - here).max() < _SETTLED * usual:
+            break
+    covariance = belief.covariance - gain @ spread.T
+    return Belief(now, 0.5 * (covariance + covariance.T), state, belief.load)
+
+
+def adjust(shell: Gridshell, belief: Belief, goal: Reals, crew: Crew, *, noise: float) -> Adjustment:
+    """The next turns towards the `goal` (n, 3), m, as far as the crew can; see the head. Raises
+    NotConverged.
+    """
+    wanted = reals("goal", goal, (len(shell.net.grid.flat), 3))
+    assembly = assemble(shell.network(belief.design))
+    rates = _rates(shell, assembly, belief.design, belief.state)
+    jacobian = rates.reshape(-1, rates.shape[2])
+    away = (belief.state.positions - wanted).ravel()
+    # Slack cables don't answer to a turn; nothing is known of them before they are taut.
+    answers = np.abs(jacobian).max(axis=0) > 0.0
+    steps = np.zeros(jacobian.shape[1], dtype=np.int64)
+    steps[answers] = whole_turns(jacobian[:, answers], away, crew, weight=(noise / crew.largest) ** 2)
+    design, state, halved = _followed(
+        shell,
+        assembly,
+        belief.design,
+        belief.state,
+        belief.load,
+        crew.step * steps.astype(float),
+        step=crew.step,
+    )
+    present = belief.design.present
+    change = np.zeros(len(present))
+    change[present] = design.rest_length[present] - belief.design.rest_length[present]
+    turns = np.rint(change / crew.step).astype(np.int64)
+    linear = belief.state.positions + (jacobian @ change[present]).reshape(-1, 3)
+    return Adjustment(
+        turns,
+        change,
+        linear,
+        replace(belief, design=design, state=state),
+        float((away**2).sum()),
+        float(((linear - wanted) ** 2).sum()),
+        float(((state.positions - wanted) ** 2).sum()),
+        halved,
+    )
+
+
+def whole_turns(jacobian: Reals, away: Reals, crew: Crew, *, weight: float) -> Indices:
+    """Whole numbers k (p,) of steps h that nearly minimise |away + J h k|² + weight |h k|² for J (r, p) and
+    `away` (r,), within what the crew can do.
+    """
+    most = int(crew.largest / crew.step * (1.0 + 1e-9))
+    gram = crew.step**2 * (jacobian.T @ jacobian + weight * np.eye(jacobian.shape[1]))
+    slope = crew.step * (jacobian.T @ away)
+    most_cables = min(crew.cables, len(slope))
+    batch = 1 + most_cables // _BATCHES
+    chosen: list[int] = [] if most_cables < len(slope) else list(range(len(slope)))
+    steps = np.zeros(len(slope))
+    while len(chosen) < most_cables:
+        # What each cable alone would bring more, within its bounds.
+        rest = slope + gram @ steps
+        best = np.clip(-rest / np.diag(gram), -most, most)
+        gain = -(rest * best + 0.5 * np.diag(gram) * best**2)
+        gain[chosen] = 0.0
+        order = np.argsort(-gain, kind="stable")[: min(batch, most_cables - len(chosen))]
+        taken = order[gain[order] > 0.0].tolist()
+        if not taken:
+            break
+        chosen += taken
+        steps[chosen] = _bounded(gram, slope, chosen, np.zeros(len(slope)), most)
+    whole = np.zeros(len(slope))
+    loose = list(chosen)
+    while loose:
+        steps[loose] = _bounded(gram, slope, loose, whole, most)
+        loose.sort(key=lambda each: abs(steps[each] - np.rint(steps[each])))
+        surest, loose = loose[:batch], loose[batch:]
+        whole[surest] = np.rint(steps[surest])
+    return _polished(gram, slope, whole, chosen, most)
+
+
+def replay(
+    shell: Gridshell,
+    belief: Belief,
+    errors: Reals,
+    goal: Reals,
+    nodes: Indices,
+    crew: Crew,
+    *,
+    noise: float,
+    rounds: int,
+    seed: int,
+    slip: float = 0.0,
+) -> Replay:
+    """The loop of survey, learning and adjustment on a grid whose candidate cables are longer than believed
+    by `errors` (c,), m.
+
+    Surveys of the `nodes` have `noise`, m, a coordinate; each turned cable misses its change by `slip` of it
+    (one standard deviation). It ends after `rounds`, or where no turn is worth taking. Raises NotConverged.
+    """
+    rng = np.random.default_rng(seed)
+    wanted = reals("goal", goal, (len(shell.net.grid.flat), 3))
+    wrong = reals("errors", errors, (len(belief.design.present),))
+    assembly = assemble(shell.network(belief.design))
+    present = belief.design.present
+    true, state, halved = _followed(shell, assembly, belief.design, belief.state, belief.load, wrong[present])
+    if halved:
+        raise NotConverged(
+            "With these errors the grid isn't on the stable branch",
+            state=state,
+            remedy="Plant smaller errors.",
+        )
+    misfits = [float(((state.positions - wanted) ** 2).sum())]
+    done: list[Adjustment] = []
+    for _ in range(rounds):
+        survey = state.positions[nodes] + noise * rng.normal(size=(len(nodes), 3))
+        belief = learn(shell, belief, nodes, survey, noise=noise)
+        step = adjust(shell, belief, wanted, crew, noise=noise)
+        if not step.turns.any():
+            break
+        moved = step.change * (1.0 + slip * rng.normal(size=len(present)))
+        true, state, halved = _followed(shell, assembly, true, state, belief.load, moved[present])
+        if halved:
+            raise NotConverged(
+                "An adjustment led the true grid off the stable branch",
+                state=state,
+                remedy="Allow smaller changes.",
+            )
+        # The crew's own inaccuracy adds to what isn't known.
+        slack = np.diag((slip * step.change[present]) ** 2)
+        belief = replace(step.belief, covariance=step.belief.covariance + slack)
+        misfits.append(float(((state.positions - wanted) ** 2).sum()))
+        done.append(step)
+    return Replay(
+        np.array(misfits),
+        tuple(done),
+        np.array([np.count_nonzero(each.turns) for each in done], dtype=np.int64),
+        state,
+    )
+
+
+def _rates(shell: Gridshell, assembly: Assembly, design: Design, state: State) -> Reals:
+    """dx/dl (n, 3, p) of all nodes by the rest lengths of the present cables."""
+    cables = shell.cables(design)
+    here = assembly.with_parts((shell.beams(design.radius), cables))
+    try:
+        response = respond(here, state, by_rest_length(here, state, cables))
+    except NotPositiveDefinite as error:
+        raise NotConverged(
+            "The believed state isn't stable",
+            state=state,
+            remedy="Start from the equilibrium of the design under this load.",
+        ) from error
+    result = np.zeros((6 * assembly.count, len(cables.ends)))
+    result[assembly.free] = state_by_design(response)
+    return result.reshape(assembly.count, 6, -1)[:, :3]
+
+
+def _followed(
+    shell: Gridshell,
+    assembly: Assembly,
+    design: Design,
+    state: State,
+    load: Reals,
+    change: Reals,
+    *,
+    step: float = 0.0,
+) -> tuple[Design, State, int]:
+    """The design with its present rest lengths changed by (p,), m, its equilibrium, and how often the change
+    was halved (to whole steps, if there is one) to stay on the stable branch. Raises NotConverged."""
+    for halving in range(_HALVINGS + 1):
+        part = change * 0.5**halving
+        if step > 0.0:
+            part = step * np.trunc(np.rint(change / step) * 0.5**halving)
+        lengths = design.rest_length.copy()
+        lengths[design.present] += part
+        if (lengths <= 0.0).any():
+            continue
+        then = replace(design, rest_length=lengths)
+        cables = shell.cables(design)
+        here = assembly.with_parts((shell.beams(design.radius), cables))
+        there = assembly.with_parts((shell.beams(design.radius), shell.cables(then)))
+        for start in (None, state):
+            try:
+                if start is None:
+                    start = predicted(here, respond(here, state, by_rest_length(here, state, cables)), part)
+                found = find_equilibrium(there, start, load, limit=_TRIAL, on_branch=True)
+            except (NotConverged, NotPositiveDefinite):
+                continue
+            if found.stable:
+                return then, found.state, halving
+    raise NotConverged(
+        "No stable equilibrium follows the change of rest lengths, however small",
+        state=state,
+        remedy="Start from a stable equilibrium of the design under this load, or prop the grid first.",
+    )
+
+
+def _bounded(gram: Reals, slope: Reals, free: Sequence[int], fixed: Reals, most: int) -> Reals:
+    """Nearly the minimum over the `free` entries, each within ±most, of slope·k + k'Gk/2 with the other
+    entries `fixed`: what would leave its bounds is set there and the rest solved for again."""
+    steps = fixed.copy()
+    steps[list(free)] = 0.0
+    loose = np.asarray(free)
+    while len(loose):
+        steps[loose] = 0.0
+        found = np.linalg.solve(gram[np.ix_(loose, loose)], -(slope + gram @ steps)[loose])
+        steps[loose] = np.clip(found, -most, most)
+        inside = np.abs(found) <= most
+        if inside.all():
+            break
+        loose = loose[inside]
+    return steps[list(free)]
+
+
+def _polished(gram: Reals, slope: Reals, whole: Reals, chosen: Sequence[int], most: int) -> Indices:
+    """Single turns more or less on the chosen cables as long as they help."""
+    steps = whole.copy()
+    rest = slope + gram @ steps
+    for _ in range(_SWEEPS):
+        before = steps.copy()
+        for cable in chosen:
+            there = float(np.clip(np.rint(steps[cable] - rest[cable] / gram[cable, cable]), -most, most))
+            if there != steps[cable]:
+                rest = rest + gram[:, cable] * (there - steps[cable])
+                steps[cable] = there
+        if np.array_equal(before, steps):
+            break
+    return steps.astype(np.int64)

@@ -1,0 +1,245 @@
+"""Scans of a built grid: points read from a file, laid onto the model and named after its nodes.
+
+A scanner gives points in its own axes and in no order; some markers are hidden, some points are reflections.
+The points are laid onto the predicted nodes by a rigid motion (no scaling), found by iterating closest points
+(Besl and McKay 1992): each marker takes its nearest point, one point to one marker and none beyond a reach,
+the best motion for the pairs follows in closed form (Kabsch 1976), and so on until the pairs stay the same.
+The iteration finds the motion nearest to its start only, so that it starts from many: the principal axes of
+both sets laid over each other, turned about their common normal and flipped. The best wins; a second pairing
+that fits nearly as well makes the match doubtful, which is said and not guessed.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from shellform.arrays import Indices, Reals, indices, reals
+from shellform.errors import InputError
+from shellform.surface.units import METRES
+
+_TURNS = 24  # starts about the common normal, each also flipped
+_ROUNDS = 60  # of closest points from one start
+_STRAY = (
+    3.0  # times the median distance from the middle: such points don't take part in the axes of the start
+)
+_RIVAL = 1.5  # a second pairing whose cost is below this much times the best one's makes the match doubtful
+_PAIRS = 4  # three points and one to check them
+_THIN = 0.02  # second principal size over the first, below which points lie on a line
+
+
+@dataclass(frozen=True)
+class Scan:
+    """What was measured in one load state: `points` (k, 3), m, in any order; the dead `load` (n, 6), N, at
+    the time; and the `frame` in which the scanner measured: scans of one number share their axes, None means
+    the model's own."""
+
+    points: Reals
+    load: Reals
+    frame: int | None = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", reals("scan.points", self.points, (None, 3)))
+        object.__setattr__(self, "load", reals("scan.load", self.load, (None, 6)))
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A rigid motion x -> `turn` (3, 3) x + `shift` (3,), m."""
+
+    turn: Reals
+    shift: Reals
+
+    def __call__(self, points: Reals) -> Reals:
+        """The points (k, 3) moved."""
+        return np.asarray(points @ self.turn.T + self.shift)
+
+
+@dataclass(frozen=True)
+class Match:
+    """Which point is which marker: `point` (m,) the number of each marker's point, -1 where it is missing;
+    `outliers` the points that belong to no marker; the `motion` that lays the points onto the model;
+    `distance` (m,), m, that remains, NaN where missing; and in `doubts` what may be wrong, a sentence
+    each."""
+
+    point: Indices
+    outliers: Indices
+    motion: Motion
+    distance: Reals
+    doubts: tuple[str, ...]
+
+    @property
+    def missing(self) -> Indices:
+        """Markers without a point."""
+        return np.flatnonzero(self.point < 0)
+
+    def places(self, points: Reals) -> Reals:
+        """The points in the order of the markers and in the model's axes (m, 3), m; NaN where missing."""
+        result = np.full((len(self.point), 3), np.nan)
+        found = self.point >= 0
+        result[found] = self.motion(points[self.point[found]])
+        return result
+
+
+def read_points(path: str | Path, *, unit: str = "m") -> Reals:
+    """Points (k, 3), m, from a CSV file: columns x, y, z by their names in the first line or, without names,
+    the first three; lines that start with # and lines whose coordinates are all empty (markers out of sight)
+    are passed over. Raises InputError."""
+    if unit not in METRES:
+        raise InputError(
+            "isn't a known unit", where="scan.unit", value=unit, remedy=f"Known: {', '.join(METRES)}."
+        )
+    file = Path(path)
+    try:
+        text = file.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"can't be read: {error}", where=str(file)) from error
+    numbered = [
+        (k, line)
+        for k, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    delimiter = next((each for each in ";\t," if numbered and each in numbered[0][1]), ",")
+    rows = list(csv.reader([line for _, line in numbered], delimiter=delimiter, skipinitialspace=True))
+    columns = [0, 1, 2]
+    names = [each.strip().lower() for each in rows[0]] if rows else []
+    if {"x", "y", "z"} <= set(names):
+        columns = [names.index(each) for each in "xyz"]
+        rows, numbered = rows[1:], numbered[1:]
+    found = []
+    for (line, _), row in zip(numbered, rows, strict=True):
+        cells = [row[k].strip() if k < len(row) else "" for k in columns]
+        if any(cells):
+            try:
+                found.append([float(each) for each in cells])
+            except ValueError as error:
+                raise InputError(
+                    "must be three numbers",
+                    where=f"{file}, line {line}",
+                    value=cells,
+                    remedy="Name the columns x, y, z in the first line.",
+                ) from error
+    if not found:
+        raise InputError("has no points", where=str(file))
+    return METRES[unit] * reals(str(file), found, (None, 3))
+
+
+def rigid_fit(points: Reals, places: Reals) -> Motion:
+    """The rigid motion that brings the points (k, 3) nearest to the places (k, 3) in the sense of least
+    squares (Kabsch).
+    """
+    middle, goal = points.mean(axis=0), places.mean(axis=0)
+    left, _, right = np.linalg.svd((points - middle).T @ (places - goal))
+    proper = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    turn = right.T @ (proper[:, None] * left.T)
+    return Motion(turn, goal - turn @ middle)
+
+
+def match(points: Reals, markers: Reals, *, reach: float, placed: bool = False) -> Match:
+    """Names the points (k, 3) after the predicted `markers` (m, 3), none farther than `reach`, m, from its
+    own. `placed`: the points are in the model's axes already. Raises InputError where fewer than half of the
+    markers are found, or they lie on a line."""
+    cloud = reals("scan.points", points, (None, 3))
+    if len(markers) < _PAIRS or len(cloud) < _PAIRS:
+        raise InputError(
+            f"needs at least {_PAIRS} points and as many markers",
+            where="scan",
+            value=(len(cloud), len(markers)),
+        )
+    spread = np.linalg.svd(markers - markers.mean(axis=0), compute_uv=False)
+    if spread[1] < _THIN * spread[0]:
+        raise InputError("the markers lie on a line", where="scan", remedy="Spread them over the grid.")
+    tree = cKDTree(markers)
+    if placed:
+        pairs = _pairs(tree, cloud, reach)
+        return _named(cloud, markers, pairs, Motion(np.eye(3), np.zeros(3)), ())
+    found = [_closest(tree, cloud, markers, start, reach) for start in _starts(cloud, markers)]
+    found.sort(key=lambda each: each[0])
+    cost, pairs, motion = found[0]
+    rivals = [other[0] for other in found[1:] if not np.array_equal(other[1], pairs)]
+    doubts: tuple[str, ...] = ()
+    if rivals and rivals[0] < _RIVAL * cost:
+        other = next(each for each in found[1:] if not np.array_equal(each[1], pairs))
+        swing = np.degrees(
+            np.arccos(np.clip(0.5 * (np.trace(other[2].turn @ motion.turn.T) - 1.0), -1.0, 1.0))
+        )
+        doubts = (
+            f"Turned by {swing:.0f}° the points fit nearly as well ({rivals[0] / cost:.2f} times the cost): mark the grid less symmetrically, "
+            "or give the points in the model's axes.",
+        )
+    return _named(cloud, markers, pairs, motion, doubts)
+
+
+def _named(cloud: Reals, markers: Reals, pairs: Indices, motion: Motion, doubts: tuple[str, ...]) -> Match:
+    """The match of pairs (k,), the marker of each point or -1."""
+    taken = np.flatnonzero(pairs >= 0)
+    if len(taken) < max(_PAIRS, (len(markers) + 1) // 2):
+        raise InputError(
+            f"only {len(taken)} of {len(markers)} markers are found among {len(cloud)} points",
+            where="scan",
+            remedy="Check the unit and the handedness of the axes, and that the load case and the markers are the right ones.",
+        )
+    point = np.full(len(markers), -1)
+    point[pairs[taken]] = taken
+    distance = np.full(len(markers), np.nan)
+    distance[pairs[taken]] = np.linalg.norm(motion(cloud[taken]) - markers[pairs[taken]], axis=1)
+    every = indices("match.point", point + 1, (len(markers),), below=len(cloud) + 1) - 1
+    return Match(every, np.flatnonzero(pairs < 0), motion, distance, doubts)
+
+
+def _pairs(tree: cKDTree, cloud: Reals, reach: float) -> Indices:
+    """The nearest marker (k,) of each point where the point is also the marker's nearest; -1 elsewhere and
+    beyond the reach.
+    """
+    distance, marker = tree.query(cloud, distance_upper_bound=reach)
+    order = np.argsort(distance, kind="stable")
+    near = order[np.isfinite(distance[order])]
+    _, first = np.unique(marker[near], return_index=True)
+    result = np.full(len(cloud), -1)
+    result[near[first]] = marker[near[first]]
+    return result
+
+
+def _closest(
+    tree: cKDTree, cloud: Reals, markers: Reals, start: Motion, reach: float
+) -> tuple[float, Indices, Motion]:
+    """Iterates closest points from a start; the cost is the sum of squares with every lost marker or point at
+    the reach.
+    """
+    motion, before = start, np.full(len(cloud), -2)
+    for _ in range(_ROUNDS):
+        pairs = _pairs(tree, motion(cloud), reach)
+        if np.array_equal(pairs, before) or (pairs >= 0).sum() < _PAIRS:
+            break
+        motion, before = rigid_fit(cloud[pairs >= 0], markers[pairs[pairs >= 0]]), pairs
+    kept = pairs >= 0
+    away = motion(cloud[kept]) - markers[pairs[kept]]
+    lost = len(markers) - int(kept.sum())
+    return float((away**2).sum()) + lost * reach**2, pairs, motion
+
+
+def _starts(cloud: Reals, markers: Reals) -> list[Motion]:
+    """The principal axes of the points on those of the markers, turned about the normal and flipped."""
+    middle, axes = _axes(cloud)
+    goal, onto = _axes(markers)
+    result = []
+    for angle in np.arange(_TURNS) * (2.0 * np.pi / _TURNS):
+        c, s = np.cos(angle), np.sin(angle)
+        about = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+        for flip in (np.eye(3), np.diag([1.0, -1.0, -1.0])):
+            turn = onto @ about @ flip @ axes.T
+            result.append(Motion(turn, goal - turn @ middle))
+    return result
+
+
+def _axes(points: Reals) -> tuple[Reals, Reals]:
+    """Middle (3,) and right-handed principal axes (3, 3), the normal last, of the points without strays."""
+    away = np.linalg.norm(points - np.median(points, axis=0), axis=1)
+    near = points[away <= _STRAY * np.median(away)]
+    middle = near.mean(axis=0)
+    axes = np.linalg.svd(near - middle)[2].T
+    return middle, axes * np.array([1.0, 1.0, np.sign(np.linalg.det(axes))])

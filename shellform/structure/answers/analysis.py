@@ -1,0 +1,422 @@
+"""The analysis of a model: how it comes to its load, and what there is to tell of it then
+(contracts/model-file.md).
+
+Three ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the
+stable branch and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole
+increments without help. A path goes through limit points, loads falling and rising, to where the factor first
+comes to its goal or a led displacement to its own (path.py).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import InputError, NotConverged
+from shellform.structure.answers.results import elongation, end_stress, energy_by_kind, twist, utilisation
+from shellform.structure.answers.stability import Critical, Modes, critical_load, modes
+from shellform.structure.elements import rotation
+from shellform.structure.elements.sections import Section
+from shellform.structure.elements.state import State, at_rest, moved
+from shellform.structure.model import Model
+from shellform.structure.network import Network, assemble, doubts
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
+from shellform.structure.solve.loading import Drive, advance
+from shellform.structure.solve.path import follow
+
+LIMIT = 1000  # factorisations of one relaxation
+
+METHODS = ("relaxation", "newton", "path")
+Progress = Callable[[float, int], None]
+"""Called with the load factor and the factorisations so far."""
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The last state reached and why it ended there.
+
+    `load` (n, 6) at that state; `reactions` (n, 6), what held freedoms bear there, N and N·m; `converged`;
+    `increments` as the contract has them, each with the `steps` it took; `modes` and `critical` where they
+    were asked for; `warnings`, a sentence each.
+    """
+
+    model: Model
+    load: Reals
+    reactions: Reals
+    equilibrium: Equilibrium
+    converged: bool
+    increments: tuple[dict[str, Any], ...]
+    seconds: Mapping[str, float]
+    message: str = ""
+    warnings: tuple[str, ...] = ()
+    modes: Modes | None = None
+    critical: Critical | None = None
+    critical_sought: float = 0.0
+
+
+def analyse(
+    model: Model,
+    *,
+    load: str | None = None,
+    factor: float = 1.0,
+    increments: int = 1,
+    tolerance: float = TOLERANCE,
+    method: str = "relaxation",
+    lead: tuple[int, int, float] | None = None,
+    limit: int = LIMIT,
+    mode_count: int = 0,
+    critical_to: float | None = None,
+    progress: Progress | None = None,
+) -> Analysis:
+    """The equilibrium of the model under `factor` times the case `load`, reached in equal `increments` by one
+    of METHODS.
+
+    Loads and imposed displacements grow together; from a given start, imposed displacements hold in full and
+    only the loads grow. `lead` (node, axis 0 to 2, displacement in m) leads a path by a free displacement
+    instead of by its length. `limit` bounds the factorisations of a relaxation. `mode_count` softest modes
+    are found at the end; with `critical_to` the critical load factor up to that multiple of the load. Where
+    no equilibrium is found the last one is kept and `converged` is false. Raises InputError for bad requests.
+    """
+    began = time.perf_counter()
+    chosen = _chosen(model, load)
+    _check(factor, increments, tolerance, method, lead, limit, len(model.network.nodes))
+    assembly = assemble(model.network)
+    walk = _Walk(model, assembly, chosen, factor, tolerance, limit, progress)
+    message, converged = "", True
+    critical, softest = None, None
+    try:
+        walk.begin()
+        origin = walk.state
+        if method == "path":
+            walk.path(lead, increments)
+        else:
+            walk.increments(increments, method)
+        if critical_to is not None:
+            critical = critical_load(assembly, origin, walk.drive, goal=critical_to, tolerance=tolerance)
+        if mode_count:
+            softest = modes(assembly, walk.state, mode_count)
+    except NotConverged as error:
+        converged, message = False, str(error)
+        walk.keep(error)
+    found = walk.found
+    if found is None:  # not even the start: what there is of it
+        found = walk.measured(walk.state, np.inf)
+    loaded = walk.drive.at(walk.reached)
+    return Analysis(
+        model,
+        loaded,
+        assembly.evaluate(found.state, tangent=False).force - loaded,
+        replace(found, factorisations=walk.spent),
+        converged,
+        tuple(walk.told),
+        _seconds(assembly, time.perf_counter() - began),
+        message,
+        tuple(doubts(model.network)),
+        softest,
+        critical,
+        critical_to or 0.0,
+    )
+
+
+@dataclass
+class _Walk:
+    """An analysis under way."""
+
+    model: Model
+    assembly: Assembly
+    load: Reals
+    factor: float
+    tolerance: float
+    limit: int
+    progress: Progress | None
+    spent: int = 0
+    reached: float = 0.0
+    told: list[dict[str, Any]] = field(default_factory=list)
+    found: Equilibrium | None = None
+
+    def __post_init__(self) -> None:
+        network = self.model.network
+        none = np.zeros_like(self.load)
+        # Rotations that are imposed turn the node as a whole.
+        _check_turns(network)
+        imposed = none if self.model.start is not None else np.where(network.fixed, network.imposed, 0.0)
+        self.drive = Drive(self.load, imposed, none)
+        self.loaded = np.flatnonzero(self.load.any(axis=1))
+        self.state = (
+            at_rest(network.nodes) if self.model.start is None else _imposed(network, self.model.start)
+        )
+
+    def begin(self) -> None:
+        """The unloaded equilibrium from which the loading begins."""
+        if self.model.start is None:
+            return
+        found = find_equilibrium(
+            self.assembly,
+            self.state,
+            self.drive.at(0.0),
+            tolerance=self.tolerance,
+            limit=self.limit,
+            progress=self._watch(0.0),
+        )
+        self.accept(found, 0.0, found.factorisations)
+
+    def increments(self, count: int, method: str) -> None:
+        """Equal increments up to the factor."""
+        for k in range(1, count + 1):
+            before, after = (k - 1) / count * self.factor, k / count * self.factor
+            steps: list[dict[str, Any]] = []
+            if method == "newton":
+                start = moved(self.state, (after - before) * self.drive.imposed)
+                found = newton(
+                    self.assembly,
+                    start,
+                    self.drive.at(after),
+                    tolerance=self.tolerance,
+                    progress=self._watch(after),
+                )
+                spent = found.factorisations
+            else:
+                arrived = advance(
+                    self.assembly,
+                    self.state,
+                    self.drive,
+                    begin=before,
+                    end=after,
+                    tolerance=self.tolerance,
+                    limit=self.limit,
+                    report=self._reporter(steps, before, after),
+                )
+                found, spent = arrived.equilibrium, arrived.factorisations
+            self.accept(found, after, spent)
+            self.told.append(self._increment(after, spent) | {"steps": steps})
+
+    def path(self, lead: tuple[int, int, float] | None, parts: int) -> None:
+        """Along the path to the factor or to the led displacement, the first step a `parts`-th of it, or a
+        tenth.
+        """
+        first = 1.0 / parts if parts > 1 else 0.1
+        before = 0
+        points = follow(
+            self.assembly,
+            self.state,
+            self.drive,
+            goal=self.factor,
+            lead=lead,
+            first=first,
+            tolerance=self.tolerance,
+        )
+        for point in points:
+            spent = point.equilibrium.factorisations
+            if point.factor == 0.0 and not self.told:
+                continue
+            self.accept(point.equilibrium, point.factor, spent - before)
+            self.told.append(
+                self._increment(point.factor, spent - before) | {"rate": point.rate, "event": point.event}
+            )
+            before = spent
+
+    def accept(self, found: Equilibrium, factor: float, spent: int) -> None:
+        """Takes an equilibrium over as the last one."""
+        self.found, self.state, self.reached = found, found.state, factor
+        self.spent += spent
+        if self.progress is not None:
+            self.progress(factor, self.spent)
+
+    def keep(self, error: NotConverged) -> None:
+        """Takes the last state of a failure over."""
+        self.spent += error.iterations
+        if isinstance(error.state, State):
+            self.state = error.state
+            self.found = self.measured(error.state, error.residual)
+
+    def measured(self, state: State, residual: float) -> Equilibrium:
+        """A state that isn't an equilibrium, with its energy and stability."""
+        balance = self.assembly.evaluate(state)
+        stable, negative = stability(self.assembly, balance)
+        return Equilibrium(state, balance.energy, residual, self.spent, stable, negative)
+
+    def _increment(self, factor: float, spent: int) -> dict[str, Any]:
+        assert self.found is not None
+        moves = (self.state.positions - self.model.network.nodes)[self.loaded]
+        return {
+            "factor": factor,
+            "iterations": spent,
+            "displacements": {str(n): d for n, d in zip(self.loaded.tolist(), moves.tolist(), strict=True)},
+            "stable": self.found.stable,
+            "negative_pivots": self.found.negative,
+        }
+
+    def _reporter(
+        self, steps: list[dict[str, Any]], before: float, after: float
+    ) -> Callable[[float, Equilibrium], None]:
+        def report(share: float, found: Equilibrium) -> None:
+            factor = before + share * (after - before)
+            steps.append({"factor": factor, "iterations": found.factorisations, "stable": found.stable})
+            if self.progress is not None:
+                self.progress(factor, self.spent + found.factorisations)
+
+        return report
+
+    def _watch(self, factor: float) -> Callable[[int, float], None] | None:
+        if self.progress is None:
+            return None
+        tell = self.progress
+        return lambda factorisations, residual: tell(factor, self.spent + factorisations)
+
+
+def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None) -> dict[str, Any]:
+    """The result document of the contract, and besides it `warnings`, `beam_twists`, `cable_elongations`,
+    `energy_by_kind`, with `sections` by kind of beam `stresses` (Pa, at both ends) and `utilisation`, and
+    where asked for `modes` and `critical`."""
+    network, found = analysis.model.network, analysis.equilibrium
+    reaction = analysis.reactions
+    names = ("N", "Mx_a", "My_a", "Mz_a", "Mx_b", "My_b", "Mz_b")
+    forces = network.beams.local_forces(found.state)
+    document = {
+        "converged": analysis.converged,
+        "stable": found.stable,
+        "negative_pivots": found.negative,
+        "iterations": found.factorisations,
+        "residual": found.residual if np.isfinite(found.residual) else None,
+        "displacements": (found.state.positions - network.nodes).tolist(),
+        "rotations": found.state.rotations.tolist(),
+        "beam_forces": [dict(zip(names, row, strict=True)) for row in forces.tolist()],
+        "cable_forces": network.cables.tension(found.state).tolist(),
+        "reactions": [
+            {
+                "node": node,
+                "force": np.where(network.fixed[node, :3], reaction[node, :3], 0.0).tolist(),
+                "moment": np.where(network.fixed[node, 3:], reaction[node, 3:], 0.0).tolist(),
+            }
+            for node in analysis.model.supported
+        ],
+        "energy": found.energy,
+        "increments": list(analysis.increments),
+        "seconds": dict(analysis.seconds),
+        "warnings": list(analysis.warnings),
+        "beam_twists": twist(network.beams.local_deformations(found.state)).tolist(),
+        "cable_elongations": elongation(network.cables, found.state).tolist(),
+        "energy_by_kind": energy_by_kind(network, found.state),
+    }
+    if sections is not None:
+        unknown = sorted(set(sections) - set(network.beams.kinds))
+        if unknown:
+            raise InputError(
+                f"the model has no beams of kind {unknown[0]!r}",
+                where="--sections",
+                remedy=f"It has: {', '.join(network.beams.kinds)}.",
+            )
+        document["stresses"] = _numbers(end_stress(network.beams, forces, sections))
+        document["utilisation"] = _numbers(utilisation(network.beams, forces, sections))
+    if analysis.modes is not None:
+        document["modes"] = [
+            {
+                "stiffness": stiffness,
+                "displacements": shape[:, :3].tolist(),
+                "rotations": shape[:, 3:].tolist(),
+            }
+            for stiffness, shape in zip(analysis.modes.stiffness.tolist(), analysis.modes.shapes, strict=True)
+        ]
+    if analysis.critical_sought:
+        document["critical"] = _told(analysis.critical, analysis.critical_sought)
+    if analysis.message:
+        document["message"] = analysis.message
+    return document
+
+
+def _told(critical: Critical | None, sought: float) -> dict[str, Any]:
+    if critical is None:
+        return {"factor": None, "sought_to": sought}
+    estimate = critical.linearised if np.isfinite(critical.linearised) else None
+    return {
+        "factor": critical.factor,
+        "kind": critical.kind,
+        "linearised": estimate,
+        "sought_to": sought,
+        "mode": critical.mode[:, :3].tolist(),
+    }
+
+
+def _numbers(values: Reals) -> list[Any]:
+    """Nested lists with null for what is undefined."""
+    listed: Sequence[Any] = values.tolist()
+    return [[_or_none(x) for x in row] if isinstance(row, list) else _or_none(row) for row in listed]
+
+
+def _or_none(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _check(
+    factor: float,
+    increments: int,
+    tolerance: float,
+    method: str,
+    lead: tuple[int, int, float] | None,
+    limit: int,
+    count: int,
+) -> None:
+    if increments < 1:
+        raise InputError("must be at least 1", where="--increments", value=increments)
+    if not (np.isfinite(factor) and 0.0 < tolerance < 1.0):
+        raise InputError("--factor must be finite and --tolerance between 0 and 1", value=(factor, tolerance))
+    if method not in METHODS:
+        raise InputError(
+            "unknown method", where="--method", value=method, remedy=f"Known: {', '.join(METHODS)}."
+        )
+    if limit < 1:
+        raise InputError("must be at least 1", where="--limit", value=limit)
+    if lead is not None and not (
+        0 <= lead[0] < count and lead[1] in (0, 1, 2) and np.isfinite(lead[2]) and lead[2] != 0.0
+    ):
+        raise InputError(
+            "must be a node, an axis 0 to 2 and a displacement other than 0", where="--lead", value=lead
+        )
+
+
+def _imposed(network: Network, state: State) -> State:
+    """The state with held freedoms where the supports want them at load factor 1."""
+    positions, quaternions = state.positions.copy(), state.quaternions.copy()
+    held = network.fixed[:, :3]
+    positions[held] = (network.nodes + network.imposed[:, :3])[held]
+    turned = network.fixed[:, 3:].all(axis=1)
+    quaternions[turned] = rotation.from_vectors(network.imposed[turned, 3:])
+    return State(positions, quaternions)
+
+
+def _check_turns(network: Network) -> None:
+    partly = (
+        network.fixed[:, 3:].any(axis=1)
+        & ~network.fixed[:, 3:].all(axis=1)
+        & network.imposed[:, 3:].any(axis=1)
+    )
+    if partly.any():
+        raise InputError(
+            "a rotation can be imposed only where all three rotations are fixed",
+            where=f"supports at node {int(np.argmax(partly))}",
+        )
+
+
+def _chosen(model: Model, name: str | None) -> Reals:
+    if name is None:
+        if len(model.loads) > 1:
+            raise InputError(
+                "the model has several load cases",
+                remedy=f"Choose one with --load: {', '.join(model.loads)}.",
+            )
+        return next(iter(model.loads.values()), np.zeros((len(model.network.nodes), 6)))
+    if name not in model.loads:
+        known = ", ".join(model.loads) or "none"
+        raise InputError("there is no such load case", where="--load", value=name, remedy=f"Known: {known}.")
+    return model.loads[name]
+
+
+def _seconds(assembly: Assembly, total: float) -> dict[str, float]:
+    clock = assembly.clock
+    return {**{name: clock.get(name, 0.0) for name in ("assembly", "factorisation", "solve")}, "total": total}

@@ -1,0 +1,232 @@
+"""Sensitivities of an equilibrium (appendix A): how states and what is measured on them change with the
+design.
+
+In equilibrium r = p - f(x, s) = 0 whatever the design s, so that (A.12 to A.16)
+
+    K dx/ds = -df/ds.
+
+For a measure g(x, s) there are two ways to its derivative: direct, solving for dx/ds once for every design
+variable, or adjoint,
+
+    dg/ds = ∂g/∂s - y' df/ds,   K y = (∂g/∂x)',
+
+solving once for every measure. Both are exact, K being symmetric in an equilibrium without applied moments;
+`gradients` counts the solves and takes the cheaper way. The right-hand sides go to the solver as one block,
+with one factor for all. Where the measures are as local as the variables (tensions by rest lengths), `direct`
+condenses K to the few freedoms that they touch.
+
+A design variable is a column of df/ds: `by_rest_length` for cables, `by_stiffness` for whatever the beams'
+stiffness depends on (a rod's radius or another size, a connector's EA, GJ or EI), `by_load` for the load
+factor. A measure is a row of ∂g/∂x: `tension_rows`, `end_force_rows`, `stress_rows`, or rows of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Indices, Reals
+from shellform.structure.answers.results import end_stress_by_force
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.cable import Cables
+from shellform.structure.elements.sections import Section
+from shellform.structure.elements.state import State, moved
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.factorisation import Factor, Symmetric
+
+_MOST = 4000  # freedoms to which K is condensed: a dense matrix of 128 MB
+# freedoms that a design variable and the measures touch, for each variable: two nodes' translations shared by
+# several cables
+_FEW = 3
+
+
+@dataclass(frozen=True)
+class Response:
+    """An equilibrium ready for sensitivities: `factor` of the tangent at `state`, and `force_by_design` (f,
+    s), the derivative of the unbalanced internal forces on the free freedoms by the design variables;
+    `family` and `tangent` (nnz,) are what was factorised."""
+
+    state: State
+    factor: Factor
+    force_by_design: sp.csc_array
+    family: Symmetric
+    tangent: Reals
+
+
+def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Response:
+    """The response at the equilibrium `state` to the design variables of all `columns` (f, k), in order.
+
+    Raises NotPositiveDefinite where the state isn't stable.
+    """
+    tangent = assembly.evaluate(state).tangent
+    assert tangent is not None
+    together = sp.csc_array(sp.hstack(columns, format="csc"))
+    return Response(state, assembly.matrix.factor(tangent), together, assembly.matrix, tangent)
+
+
+def by_rest_length(assembly: Assembly, state: State, cables: Cables) -> sp.csc_array:
+    """Derivative (f, c), N/m, of the internal forces by the cables' rest lengths (A.23)."""
+    return element_columns(assembly, cables.freedoms(), cables.force_by_rest_length(state))
+
+
+def element_columns(assembly: Assembly, freedoms: Indices, values: Reals) -> sp.csc_array:
+    """A column (f, m) on the free freedoms for each element, from its `values` (m, k) at its `freedoms` (m,
+    k).
+    """
+    rows = assembly.number[freedoms]
+    taken = rows >= 0
+    columns = np.broadcast_to(np.arange(len(rows))[:, None], rows.shape)
+    return sp.csc_array((values[taken], (rows[taken], columns[taken])), shape=(len(assembly.free), len(rows)))
+
+
+def by_stiffness(assembly: Assembly, state: State, *rates: Beams) -> sp.csc_array:
+    """Derivatives (f, k) of the internal forces by k variables, on each of which the beams' stiffness depends
+    at one of the `rates`: end forces are linear in the stiffness, so that beams with the rate for a stiffness
+    have the derivative for end forces (A.27 to A.29)."""
+    change = np.zeros((6 * assembly.count, len(rates)))
+    for column, rate in zip(change.T, rates, strict=True):
+        np.add.at(column, rate.freedoms(), rate.evaluate(state, tangent=False).force)
+    return sp.csc_array(change[assembly.free])
+
+
+def stiffness_rate(beams: Beams, kind: str, rate: tuple[float, float, float, float]) -> Beams:
+    """The beams with the derivatives of EA, GJ, EI_y, EI_z by one variable for the stiffness of one kind, and
+    none for the rest.
+    """
+    chosen = (
+        beams.kind == beams.kinds.index(kind)
+        if kind in beams.kinds
+        else np.zeros(len(beams.ends), dtype=bool)
+    )
+    axial, torsion, bending_y, bending_z = (np.where(chosen, value, 0.0) for value in rate)
+    return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
+
+
+def by_load(assembly: Assembly, load: Reals) -> sp.csc_array:
+    """The column (f, 1) of the factor of a dead load (n, 6)."""
+    return sp.csc_array(-load.ravel()[assembly.free][:, None])
+
+
+def tension_rows(assembly: Assembly, state: State, cables: Cables) -> sp.csr_array:
+    """Derivative (c, f), N/m, of the tensions by the free freedoms at fixed rest lengths; they add -EA l/l0²
+    by their own.
+    """
+    return _rows(assembly, cables.freedoms()[:, None, :], cables.tension_by_position(state)[:, None, :])
+
+
+def end_force_rows(assembly: Assembly, state: State, beams: Beams) -> sp.csr_array:
+    """Derivative (7 m, f) of N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam by the free freedoms at fixed
+    stiffness.
+    """
+    rates = beams.local_forces_by_freedom(state)
+    return _rows(assembly, beams.freedoms()[:, None, :], rates)
+
+
+def stress_rows(
+    assembly: Assembly, state: State, beams: Beams, sections: Mapping[str, Section]
+) -> sp.csr_array:
+    """Derivative (2 m, f), Pa/m and Pa/rad, of the largest fibre stresses at both ends of each beam by the
+    free freedoms.
+    """
+    by_force = end_stress_by_force(beams, beams.local_forces(state), sections)
+    return _rows(assembly, beams.freedoms()[:, None, :], by_force @ beams.local_forces_by_freedom(state))
+
+
+def reaction_rows(assembly: Assembly, state: State, freedoms: Indices) -> sp.csr_array:
+    """Derivative (k, f), N/m and N/rad, of the internal forces at held `freedoms` (k,) by the free ones: of
+    the reactions, the load given.
+    """
+    wanted = np.full(6 * assembly.count, -1)
+    wanted[freedoms] = np.arange(len(freedoms))
+    number = assembly.number
+    result = sp.csr_array((len(freedoms), len(assembly.free)))
+    for part in assembly.parts:
+        own = part.freedoms()
+        size = own.shape[1] if own.ndim == 2 else 0
+        touched = np.flatnonzero((wanted[own] >= 0).any(axis=1)) if size else np.zeros(0, dtype=np.int64)
+        if not len(touched):
+            continue
+        packed = part.evaluate(state, tangent=True).tangent
+        assert packed is not None
+        lower = np.tril_indices(size)
+        full = np.zeros((len(touched), size, size))
+        full[:, lower[0], lower[1]] = full[:, lower[1], lower[0]] = packed[touched]
+        rows = np.broadcast_to(wanted[own[touched]][:, :, None], full.shape)
+        columns = np.broadcast_to(number[own[touched]][:, None, :], full.shape)
+        kept = (rows >= 0) & (columns >= 0)
+        result = result + sp.csr_array((full[kept], (rows[kept], columns[kept])), shape=result.shape)
+    return result
+
+
+def gradients(response: Response, by_state: Reals, by_design: Reals) -> Reals:
+    """Total derivatives (g, s) of g measures, from their partial ones by the free freedoms (g, f) and by the
+    design (g, s).
+    """
+    if by_state.shape[0] == 0:
+        return by_design
+    if by_state.shape[0] <= response.force_by_design.shape[1]:
+        return by_design + adjoint(response, by_state)
+    return by_design + direct(response, by_state)
+
+
+def adjoint(response: Response, by_state: Reals | sp.csr_array) -> Reals:
+    """-(K⁻¹ ∂g/∂x)' ∂f/∂s (g, s), one solve for each measure."""
+    multipliers = response.factor.solve(_dense(by_state.T))
+    return np.asarray(-(response.force_by_design.T @ multipliers).T)
+
+
+def direct(response: Response, by_state: Reals | sp.csr_array) -> Reals:
+    """∂g/∂x dx/ds (g, s), one solve for each design variable, or through the few freedoms that both touch."""
+    if sp.issparse(by_state):
+        kept = _touched(response, sp.csr_array(by_state))
+        if len(kept) <= min(_FEW * response.force_by_design.shape[1], _MOST):
+            moves = response.family.solve_kept(
+                response.tangent, kept, response.force_by_design[kept].toarray()
+            )
+            if moves is not None:
+                return np.asarray(-(by_state[:, kept] @ moves))
+    return np.asarray(by_state @ state_by_design(response))
+
+
+def _touched(response: Response, by_state: sp.csr_array) -> np.ndarray:
+    """The freedoms, ascending, that the design's forces act on or that the measures read.
+
+    dx/ds is wanted there only, and K condensed to them says as much of it as K: the solves are dense ones of
+    their number.
+    """
+    marked = np.zeros(by_state.shape[1], dtype=bool)
+    marked[response.force_by_design.indices] = True
+    marked[by_state.indices] = True
+    return np.flatnonzero(marked)
+
+
+def state_by_design(response: Response) -> Reals:
+    """dx/ds (f, s) of the free freedoms (A.16)."""
+    return -response.factor.solve(_dense(response.force_by_design))
+
+
+def predicted(assembly: Assembly, response: Response, change: Reals) -> State:
+    """Where the equilibrium goes with a `change` (s,) of the design variables, to first order: a start for
+    the next one.
+    """
+    step = np.zeros(6 * assembly.count)
+    step[assembly.free] = -response.factor.solve(response.force_by_design @ change)
+    return moved(response.state, assembly.chords.corrected(response.state, step.reshape(-1, 6)))
+
+
+def _rows(assembly: Assembly, freedoms: np.ndarray, values: Reals) -> sp.csr_array:
+    """Rows (m q, f) from values (m, q, k) at freedoms (m, 1, k)."""
+    columns = np.broadcast_to(assembly.number[freedoms], values.shape)
+    taken = columns >= 0
+    rows = np.broadcast_to(
+        np.arange(values.shape[0] * values.shape[1]).reshape(values.shape[:2])[:, :, None], values.shape
+    )
+    shape = (values.shape[0] * values.shape[1], len(assembly.free))
+    return sp.csr_array((values[taken], (rows[taken], columns[taken])), shape=shape)
+
+
+def _dense(matrix: Reals | sp.csc_array) -> Reals:
+    return np.asfortranarray(sp.csc_array(matrix).toarray() if sp.issparse(matrix) else matrix)

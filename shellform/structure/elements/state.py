@@ -1,0 +1,48 @@
+"""The state of a network: where its nodes are and how they are turned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shellform.arrays import Reals, reals
+from shellform.structure.elements import rotation
+
+
+@dataclass(frozen=True)
+class State:
+    """Positions (n, 3), m, and total rotations from the stress-free state, unit quaternions (n, 4)."""
+
+    positions: Reals
+    quaternions: Reals
+
+    def __post_init__(self) -> None:
+        positions = reals("positions", self.positions, (None, 3))
+        object.__setattr__(self, "positions", positions)
+        object.__setattr__(self, "quaternions", reals("quaternions", self.quaternions, (len(positions), 4)))
+
+    @property
+    def rotations(self) -> Reals:
+        """Total rotation vectors (n, 3), rad, of length at most pi."""
+        return rotation.to_vectors(self.quaternions)
+
+
+def at_rest(positions: ArrayLike) -> State:
+    """The state with unrotated nodes at `positions` (n, 3), m."""
+    place = np.asarray(positions, dtype=float)
+    return State(place, rotation.identity(len(place)))
+
+
+def from_vectors(positions: ArrayLike, rotations: ArrayLike) -> State:
+    """The state with nodes at `positions` (n, 3), m, turned by the rotation vectors `rotations` (n, 3),
+    rad.
+    """
+    place = np.asarray(positions, dtype=float)
+    return State(place, rotation.from_vectors(reals("rotations", rotations, (len(place), 3))))
+
+
+def moved(state: State, step: Reals) -> State:
+    """The state after `step` (n, 6): translations, m, and spins about global axes, rad (equation 9)."""
+    return State(state.positions + step[:, :3], rotation.turned(step[:, 3:], state.quaternions))

@@ -1,0 +1,78 @@
+"""Compiled loops over elements, shared among the cores, and dense algebra kept on one.
+
+Each element writes to places of its own, so that the result is the same to the last bit on any number of
+cores. Sums over many terms in BLAS come out otherwise on another number of threads, which an optimisation's
+decisions can magnify: 108 and 102 cables.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from functools import cache
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+_WORTH_SHARING = 500  # elements; below, starting the threads takes longer than the loop
+
+
+def cores() -> int:
+    """How many cores this process may use: OMP_NUM_THREADS where it is set, else those that the system
+    grants.
+    """
+    asked = os.environ.get("OMP_NUM_THREADS", "")
+    if asked.isdigit() and int(asked) > 0:
+        return int(asked)
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def dense_on_one() -> Iterator[None]:
+    """Dense algebra on one thread within, so that its sums don't depend on their number."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1, user_api="blas"):
+        yield
+
+
+def share(loop: Callable[..., Any], count: int, *arguments: Any) -> None:
+    """Runs `loop(start, stop, *arguments)` over 0 to `count`; the loop has to release the interpreter
+    (nogil).
+    """
+    number = min(cores(), count // _WORTH_SHARING)
+    if number < 2:
+        loop(0, count, *arguments)
+        return
+    bounds = [count * k // number for k in range(number + 1)]
+    pool = _pool(os.getpid(), number - 1)
+    running = [pool.submit(loop, bounds[k], bounds[k + 1], *arguments) for k in range(1, number)]
+    loop(0, bounds[1], *arguments)
+    for each in running:
+        each.result()
+
+
+def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
+    """`work` on every item, on as many threads as there are cores; results in order. The first error that is
+    raised ends the rest.
+    """
+    number = min(cores(), len(items))
+    if number < 2:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(number, thread_name_prefix="shellform-case") as pool:
+        running = [pool.submit(work, item) for item in items]
+        try:
+            return [each.result() for each in running]
+        except BaseException:
+            for each in running:
+                each.cancel()
+            raise
+
+
+@cache
+def _pool(process: int, threads: int) -> ThreadPoolExecutor:
+    """The threads of a process: a forked child has none of its parent's."""
+    return ThreadPoolExecutor(threads, thread_name_prefix=f"shellform-{process}")

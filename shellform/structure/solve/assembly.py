@@ -1,0 +1,268 @@
+"""From the elements of several parts to one force vector and one sparse tangent.
+
+The pattern of the tangent is built once: each packed entry of each element has a fixed slot among the values
+of the lower triangle, so that an assembly is one pass of additions. Held freedoms never enter; a node that no
+beam touches has no rotations.
+"""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.compiled import njit
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.parts import Part
+from shellform.structure.elements.state import State
+from shellform.structure.elements.threads import share
+from shellform.structure.solve.chords import ChordKeeper
+from shellform.structure.solve.factorisation import Factor, Symmetric
+
+
+@dataclass(frozen=True)
+class Balance:
+    """All elements at one state: strain `energy` J, nodal internal `force` (n, 6), lower `tangent` values (or
+    None).
+
+    `largest` is the largest component of any element's end force, moments over the node's arm, N: the scale
+    for residuals.
+    """
+
+    energy: float
+    force: Reals
+    tangent: Reals | None
+    largest: float
+
+
+class Assembly:
+    """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in
+    order, `number` (6 count,) the place of each freedom among them, -1 where it is held or has no stiffness;
+    `arms` (count,), m: the mean rest length of each node's beams; `clock` adds up the seconds spent on
+    assembly, factorisation and solve."""
+
+    def __init__(self, count: int, parts: Sequence[Part], fixed: Flags) -> None:
+        self.count = count
+        self.parts = tuple(parts)
+        freedoms = [part.freedoms() for part in self.parts]
+        active = np.zeros(6 * count, dtype=bool)
+        for each in freedoms:
+            active[each.ravel()] = True
+        active &= ~fixed.ravel()
+        self.free: Indices = np.flatnonzero(active)
+        self.number: Indices = np.full(6 * count, -1, dtype=np.int64)
+        self.number[self.free] = np.arange(len(self.free))
+        self.clock: dict[str, float] = {"assembly": 0.0, "factorisation": 0.0, "solve": 0.0}
+        self._freedoms = freedoms
+        self.arms = _arms(count, self.beams)
+        # What turns a force or a moment into a force: 1 for translations, 1 over the node's arm for
+        # rotations.
+        self.reach: Reals = np.repeat(1.0 / self.arms[:, None], 6, axis=1)
+        self.reach[:, :3] = 1.0
+        self.reach = self.reach.ravel()
+        self.matrix, self._sources = _pattern(self.number, freedoms)
+        ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
+        self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
+        self._entries = np.empty(int(ends[-1]))
+
+    def with_parts(self, parts: Sequence[Part]) -> Assembly:
+        """The same assembly, its pattern shared, with parts of the same elements and other properties."""
+        other = copy.copy(self)
+        other.parts = tuple(parts)
+        other._entries = np.empty_like(self._entries)
+        return other
+
+    @property
+    def beams(self) -> list[Beams]:
+        """The parts that are beams."""
+        return [part for part in self.parts if isinstance(part, Beams)]
+
+    @cached_property
+    def turns(self) -> Indices:
+        """Places of the free rotations' diagonal entries among the tangent's values."""
+        return self.matrix.diagonal[self.free % 6 >= 3]
+
+    @cached_property
+    def chords(self) -> ChordKeeper:
+        """The second-order correction of steps; `with_parts` keeps it, its weights needn't be up to date."""
+        return ChordKeeper(self.count, self.beams, self.free)
+
+    def evaluate(self, state: State, *, tangent: bool = True) -> Balance:
+        """Energy, internal forces and, if asked for, the tangent at the state."""
+        began = time.perf_counter()
+        energy, largest = 0.0, 0.0
+        force = np.zeros(6 * self.count)
+        for part, freedoms, (first, last) in zip(self.parts, self._freedoms, self._shares, strict=True):
+            if not len(freedoms):
+                continue
+            block = self._entries[first:last].reshape(len(freedoms), -1) if tangent else None
+            result = part.evaluate(state, tangent=tangent, into=block)
+            energy += float(result.energy.sum())
+            largest = max(largest, _add_forces(freedoms, self.reach, result.force, force))
+        values = None
+        if tangent:
+            values = np.empty(len(self.matrix.indices))
+            share(_gather, len(values), *self._sources, self._entries, values)
+        self.clock["assembly"] += time.perf_counter() - began
+        return Balance(energy, force.reshape(-1, 6), values, largest)
+
+    def force_along(self, state: State, motion: Reals) -> Reals:
+        """How the internal forces (n, 6) begin to change, N and N·m, as the nodes move by `motion` (n, 6),
+        held freedoms too.
+        """
+        change = np.zeros(6 * self.count)
+        for part, freedoms in zip(self.parts, self._freedoms, strict=True):
+            if len(freedoms):
+                tangent = part.evaluate(state, tangent=True).tangent
+                assert tangent is not None
+                _multiply(freedoms, tangent, motion.ravel(), change)
+        return change.reshape(-1, 6)
+
+    def factor(self, state: State) -> Factor:
+        """Cholesky factor of the tangent at the state, good until the next factorisation here.
+
+        Raises NotPositiveDefinite where the state is not stable.
+        """
+        values = self.evaluate(state).tangent
+        assert values is not None
+        return self.matrix.factor(values)
+
+
+def _arms(count: int, beams: Sequence[Beams]) -> Reals:
+    """A length (count,) for each node, m: the mean rest length of the beams that meet there (1 where there
+    are none).
+    """
+    total, number = np.zeros(count), np.zeros(count)
+    for part in beams:
+        for end in part.ends.T:
+            np.add.at(total, end, part.rest_length)
+            np.add.at(number, end, 1.0)
+    return np.where(number > 0.0, total / np.maximum(number, 1.0), 1.0)
+
+
+def _pattern(
+    number: Indices, freedoms: Sequence[Indices]
+) -> tuple[Symmetric, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """The common lower pattern, and which packed entries of all elements, one after the other, add up to each
+    of its values: `first` has one for each value, and `sources` what else adds to the values at `places`,
+    which ascend."""
+    size = int(number.max(initial=-1)) + 1
+    count = sum(len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms)
+    # Half the width is half the memory that an assembly has to read.
+    width = np.int32 if count < np.iinfo(np.int32).max else np.int64
+    row, column = np.empty(count, dtype=width), np.empty(count, dtype=width)
+    begin = 0
+    for each in freedoms:
+        begin = _entries(number, each, begin, row, column)
+    order = np.flatnonzero(column >= 0).astype(width)
+    order = _counted(column, _counted(row, order, size), size)
+    indptr, indices, *sources = _merged(row, column, order, size)
+    return Symmetric(indptr, indices), (sources[0], sources[1], sources[2])
+
+
+@njit(cache=True)
+def _entries(number, freedoms, begin, row, column):  # type: ignore[no-untyped-def]
+    """Fills rows and columns of the packed entries of all elements from place `begin` on; where a freedom is
+    held the column is -1.
+    """
+    at = begin
+    for e in range(freedoms.shape[0]):
+        for i in range(freedoms.shape[1]):
+            for j in range(i + 1):
+                a, b = number[freedoms[e, i]], number[freedoms[e, j]]
+                row[at], column[at] = max(a, b), min(a, b)
+                at += 1
+    return at
+
+
+@njit(cache=True)
+def _counted(keys, order, size):  # type: ignore[no-untyped-def]
+    """`order` sorted by keys[order], which run from 0 to size - 1; equal ones stay in order (counting
+    sort).
+    """
+    place = np.zeros(size + 1, dtype=np.int64)
+    for k in order:
+        place[keys[k] + 1] += 1
+    for k in range(1, size + 1):
+        place[k] += place[k - 1]
+    result = np.empty_like(order)
+    for k in order:
+        result[place[keys[k]]] = k
+        place[keys[k]] += 1
+    return result
+
+
+@njit(cache=True)
+def _merged(row, column, order, size):  # type: ignore[no-untyped-def]
+    """The pattern, column by column, of sorted entries with repetitions, and first, places and sources of
+    `_pattern`.
+    """
+    new = np.empty(len(order), dtype=np.bool_)
+    last_row, last_column, count = -1, -1, 0
+    for k in range(len(order)):
+        r, c = row[order[k]], column[order[k]]
+        new[k] = r != last_row or c != last_column
+        last_row, last_column = r, c
+        count += new[k]
+    indptr, indices = np.zeros(size + 1, dtype=np.int64), np.empty(count, dtype=np.int64)
+    first, places, sources = (
+        np.empty(count, order.dtype),
+        np.empty(len(order) - count, order.dtype),
+        np.empty(len(order) - count, order.dtype),
+    )
+    value, extra = -1, 0
+    for k in range(len(order)):
+        if new[k]:
+            value += 1
+            indices[value] = row[order[k]]
+            indptr[column[order[k]] + 1] += 1
+            first[value] = order[k]
+        else:
+            places[extra], sources[extra] = value, order[k]
+            extra += 1
+    for c in range(size):
+        indptr[c + 1] += indptr[c]
+    return indptr, indices, first, places, sources
+
+
+@njit(cache=True, nogil=True)
+def _gather(start, stop, first, places, sources, entries, values):  # type: ignore[no-untyped-def]
+    """The first entry of each value, then what adds to it: two loops without a branch that a processor could
+    guess wrong.
+    """
+    for v in range(start, stop):
+        values[v] = entries[first[v]]
+    for k in range(np.searchsorted(places, start), np.searchsorted(places, stop)):
+        values[places[k]] += entries[sources[k]]
+
+
+@njit(cache=True)
+def _add_forces(freedoms, reach, element, total):  # type: ignore[no-untyped-def]
+    """Adds the elements' end forces to the nodes' and returns the largest component, moments over the node's
+    arm.
+    """
+    largest = 0.0
+    for e in range(freedoms.shape[0]):
+        for k in range(freedoms.shape[1]):
+            freedom = freedoms[e, k]
+            total[freedom] += element[e, k]
+            largest = max(largest, abs(element[e, k]) * reach[freedom])
+    return largest
+
+
+@njit(cache=True)
+def _multiply(freedoms, tangent, motion, total):  # type: ignore[no-untyped-def]
+    """Adds each element's packed symmetric tangent times its motion."""
+    for e in range(freedoms.shape[0]):
+        at = 0
+        for i in range(freedoms.shape[1]):
+            for j in range(i + 1):
+                total[freedoms[e, i]] += tangent[e, at] * motion[freedoms[e, j]]
+                if j < i:
+                    total[freedoms[e, j]] += tangent[e, at] * motion[freedoms[e, i]]
+                at += 1

@@ -1,0 +1,326 @@
+"""Symmetric sparse factorisation with the symbolic analysis done once.
+
+MKL's PARDISO is the fastest Cholesky that pip installs; CHOLMOD's supernodal one, from the `cvxopt` wheel,
+takes its place where there is no MKL, and SciPy's SuperLU in symmetric mode without pivoting where there is
+neither. SHELLFORM_SOLVER=mkl, cholmod or superlu asks for one of them. A Cholesky factorisation that fails is
+information (the state is no stable equilibrium), so it is an exception of its own.
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from shellform.arrays import Indices, Reals
+from shellform.compiled import njit
+from shellform.errors import InputError
+from shellform.structure.solve import pardiso
+
+try:
+    from cvxopt import cholmod, matrix, spmatrix
+except ImportError:  # no wheel for this platform: SuperLU serves
+    cholmod = None
+
+_NAMES = {"mkl": "PARDISO (MKL)", "cholmod": "CHOLMOD (cvxopt)", "superlu": "SuperLU (SciPy)"}
+
+
+def installed() -> list[str]:
+    """The solvers there are, the fastest first."""
+    there = {"mkl": pardiso.library() is not None, "cholmod": cholmod is not None, "superlu": True}
+    return [name for name, here in there.items() if here]
+
+
+def backend() -> str:
+    """Which solver factorises: the one that SHELLFORM_SOLVER names, or the fastest there is. Raises
+    InputError.
+    """
+    known = installed()
+    asked = os.environ.get("SHELLFORM_SOLVER", known[0])
+    if asked not in known:
+        raise InputError(
+            "is no solver installed here",
+            where="SHELLFORM_SOLVER",
+            value=asked,
+            remedy=f"There are: {', '.join(known)}.",
+        )
+    return asked
+
+
+def backend_name() -> str:
+    """The solver's full name, for reports."""
+    return _NAMES[backend()]
+
+
+class NotPositiveDefinite(ArithmeticError):
+    """The matrix has an eigenvalue that is not positive."""
+
+
+class Factor(Protocol):
+    """A factorised matrix."""
+
+    def solve(self, right: Reals) -> Reals:
+        """The solution for right-hand sides (n,) or (n, k)."""
+
+
+class Indefinite(Factor, Protocol):
+    """A factorised matrix that needn't be positive definite."""
+
+    @property
+    def negative(self) -> int:
+        """How many of its eigenvalues are negative."""
+
+
+class Symmetric:
+    """A family of symmetric matrices with one pattern: lower triangle in CSC form, `indptr` (n + 1,),
+    `indices` (nnz,).
+    """
+
+    def __init__(self, indptr: Indices, indices: Indices) -> None:
+        self.size = len(indptr) - 1
+        self.indptr, self.indices = indptr, indices
+        self.columns = np.repeat(np.arange(self.size), np.diff(indptr))
+        self.diagonal = indptr[:-1]  # the first stored entry of each column of a lower triangle
+        self._backend = backend()
+        self._pardiso: pardiso.Factoriser | None = None
+        self._bunch_kaufman: pardiso.Factoriser | None = None
+        self._condensed: tuple[Indices, pardiso.Factoriser] | None = None
+        self._symbolic: Any = None
+        self._matrix: Any = None
+        self._generation = 0
+
+    def factor(self, values: Reals) -> Factor:
+        """Cholesky factor of the matrix with lower `values` (nnz,). It serves until the next call of
+        `factor`.
+
+        Raises NotPositiveDefinite.
+        """
+        if not np.isfinite(values.sum()):
+            raise NotPositiveDefinite("the matrix has entries that are not finite")
+        if self._backend == "mkl":
+            return self._factor_with_pardiso(values)
+        if self._backend == "superlu":
+            return _SuperLU(self.full(values))
+        if self._symbolic is None:
+            self._matrix = spmatrix(
+                matrix(values),
+                matrix(self.indices.astype(np.int64)),
+                matrix(self.columns),
+                (self.size, self.size),
+            )
+            cholmod.options["supernodal"] = 2
+            self._symbolic = cholmod.symbolic(self._matrix)
+        self._matrix.V = matrix(values)
+        self._generation += 1
+        try:
+            cholmod.numeric(self._matrix, self._symbolic)
+        except ArithmeticError as error:
+            raise NotPositiveDefinite("the matrix is not positive definite") from error
+        return _Cholmod(self, self._symbolic, self._generation)
+
+    def _factor_with_pardiso(self, values: Reals) -> Factor:
+        if self._pardiso is None:
+            self._pardiso = pardiso.Factoriser(self.indptr, self.indices)
+        self._generation += 1
+        try:
+            self._pardiso.factor(values)
+        except pardiso.NotDefinite as error:
+            raise NotPositiveDefinite("the matrix is not positive definite") from error
+        return _Pardiso(self, self._pardiso, self._generation)
+
+    def solve_kept(self, values: Reals, kept: Indices, right: Reals) -> Reals | None:
+        """The solution (k, s) on the freedoms `kept` (k,), ascending, for right-hand sides (k, s) on them
+        that are zero elsewhere.
+
+        All others are eliminated, which costs as much as a factorisation. Earlier factors go on serving. None
+        where the solver can't do it. Raises NotPositiveDefinite.
+        """
+        if self._backend != "mkl":
+            return None
+        if self._condensed is None or not np.array_equal(self._condensed[0], kept):
+            self._condensed = kept, pardiso.Factoriser(self.indptr, self.indices, kept=kept)
+        try:
+            return self._condensed[1].solve_kept(values, right)
+        except pardiso.NotDefinite as error:
+            raise NotPositiveDefinite("the matrix is not positive definite") from error
+
+    def factor_thin(self, values: Reals) -> Factor:
+        """L D L' of a matrix whose factor has a few entries a column, as the graph of a gridshell's beams:
+        the compiled solve takes a sixth of the time that CHOLMOD's blocks do. It serves for good. Raises
+        NotPositiveDefinite."""
+        if cholmod is None:
+            return _SuperLU(self.full(values))
+        symbolic, pivots = self._indefinite(values)
+        if not (pivots > 0.0).all():
+            raise NotPositiveDefinite("the matrix is not positive definite")
+        order = matrix(np.arange(float(self.size)))
+        cholmod.solve(symbolic, order, sys=7)
+        starts, rows, entries = (np.array(each)[:, 0] for each in cholmod.getfactor(symbolic).CCS)
+        return _Thin(np.array(order)[:, 0].astype(np.int64), starts, rows, entries)
+
+    def factor_indefinite(self, values: Reals) -> Indefinite:
+        """L D L' of a matrix that needn't be positive definite, with its number of negative eigenvalues
+        (Sylvester's law).
+
+        It serves until the next factorisation of either kind.
+        """
+        if self._backend == "mkl":
+            if self._bunch_kaufman is None:
+                self._bunch_kaufman = pardiso.Factoriser(self.indptr, self.indices, definite=False)
+            self._generation += 1
+            self._bunch_kaufman.factor(values)
+            return _Pardiso(self, self._bunch_kaufman, self._generation)
+        if self._backend == "superlu":
+            return _SuperLU(self.full(values), definite=False)
+        try:
+            symbolic, pivots = self._indefinite(values)
+        except ArithmeticError:  # a pivot is exactly zero; SuperLU exchanges rows
+            return _SuperLU(self.full(values), definite=False)
+        return _Indefinite(symbolic, int((pivots < 0.0).sum()))
+
+    def negative_eigenvalues(self, values: Reals) -> int:
+        """How many eigenvalues are negative."""
+        return self.factor_indefinite(values).negative
+
+    def newton(self, values: Reals, right: Reals) -> tuple[Reals, bool]:
+        """The solution for `right` (n,) with a matrix that needn't be definite, and whether `right` leaves
+        its negative part untouched: whether below 1e-9 of y'|D|y, L D L' = A and L D y = right, comes from
+        negative pivots."""
+        if cholmod is None:
+            plain = _SuperLU(self.full(values), definite=False)
+            return plain.solve(right), plain.negative == 0
+        try:
+            symbolic, pivots = self._indefinite(values)
+        except ArithmeticError:  # a pivot is exactly zero: no Newton step is to be had
+            return np.zeros_like(right), False
+        lower = matrix(right)
+        cholmod.solve(symbolic, lower, sys=7)
+        cholmod.solve(symbolic, lower, sys=4)
+        share = np.array(lower)[:, 0] ** 2 / np.abs(pivots)
+        untouched = float(share[pivots < 0.0].sum()) <= 1e-9 * float(share.sum())
+        solution = matrix(right)
+        cholmod.solve(symbolic, solution)
+        return np.array(solution)[:, 0], untouched
+
+    def _indefinite(self, values: Reals) -> tuple[Any, Reals]:
+        """CHOLMOD's simplicial LDLᵀ and the pivots D (n,)."""
+        cholmod.options["supernodal"] = 0
+        try:
+            lower = spmatrix(
+                matrix(values),
+                matrix(self.indices.astype(np.int64)),
+                matrix(self.columns),
+                (self.size, self.size),
+            )
+            symbolic = cholmod.symbolic(lower)
+            cholmod.numeric(lower, symbolic)
+            inverse = matrix(1.0, (self.size, 1))
+            cholmod.solve(symbolic, inverse, sys=6)
+        finally:
+            cholmod.options["supernodal"] = 2
+        return symbolic, 1.0 / np.array(inverse)[:, 0]
+
+    def _check(self, generation: int) -> None:
+        if generation != self._generation:
+            raise RuntimeError("this factor was replaced by a later factorisation of the same family")
+
+    def full(self, values: Reals) -> sp.csc_array:
+        """The whole matrix (n, n) with lower `values` (nnz,)."""
+        lower = sp.csc_array((values, self.indices, self.indptr), shape=(self.size, self.size))
+        return sp.csc_array(lower + sp.tril(lower, -1).T)
+
+
+class _Pardiso:
+    def __init__(self, family: Symmetric, factor: pardiso.Factoriser, generation: int) -> None:
+        self._family, self._factor, self._generation = family, factor, generation
+        self.negative = factor.negative
+
+    def solve(self, right: Reals) -> Reals:
+        self._family._check(self._generation)
+        return self._factor.solve(right)
+
+
+class _Cholmod:
+    def __init__(self, family: Symmetric, factor: Any, generation: int) -> None:
+        self._family, self._factor, self._generation = family, factor, generation
+
+    def solve(self, right: Reals) -> Reals:
+        self._family._check(self._generation)
+        vector = right.ndim == 1
+        solution = matrix(np.ascontiguousarray(right[:, None] if vector else right))
+        cholmod.solve(self._factor, solution)
+        result = np.array(solution)
+        return result[:, 0] if vector else result
+
+
+@dataclass(frozen=True)
+class _Indefinite:
+    factor: Any
+    negative: int
+
+    def solve(self, right: Reals) -> Reals:
+        solution = matrix(np.ascontiguousarray(right[:, None] if right.ndim == 1 else right))
+        cholmod.solve(self.factor, solution)
+        result = np.array(solution)
+        return result[:, 0] if right.ndim == 1 else result
+
+
+@dataclass(frozen=True)
+class _Thin:
+    """P A P' = L D L': `order` of the rows, L by columns with D on its diagonal, which comes first."""
+
+    order: Indices
+    starts: Indices
+    rows: Indices
+    entries: Reals
+
+    def solve(self, right: Reals) -> Reals:
+        columns = right[:, None] if right.ndim == 1 else right
+        solution = np.asarray(
+            _solve(self.order, self.starts, self.rows, self.entries, np.ascontiguousarray(columns))
+        )
+        return solution[:, 0] if right.ndim == 1 else solution
+
+
+@njit(cache=True)
+def _solve(order, starts, rows, entries, right):  # type: ignore[no-untyped-def]
+    size, sides = right.shape
+    x = np.empty((size, sides))
+    for i in range(size):
+        for c in range(sides):
+            x[i, c] = right[order[i], c]
+    for j in range(size):
+        for k in range(starts[j] + 1, starts[j + 1]):
+            for c in range(sides):
+                x[rows[k], c] -= entries[k] * x[j, c]
+    for j in range(size - 1, -1, -1):
+        for c in range(sides):
+            x[j, c] /= entries[starts[j]]
+        for k in range(starts[j] + 1, starts[j + 1]):
+            for c in range(sides):
+                x[j, c] -= entries[k] * x[rows[k], c]
+    result = np.empty((size, sides))
+    for i in range(size):
+        for c in range(sides):
+            result[order[i], c] = x[i, c]
+    return result
+
+
+class _SuperLU:
+    def __init__(self, full: sp.csc_array, *, definite: bool = True) -> None:
+        options = {"SymmetricMode": True}
+        try:
+            self._lu = splu(full, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options=options)
+        except RuntimeError as error:  # "Factor is exactly singular"
+            raise NotPositiveDefinite(str(error)) from error
+        pivots = self._lu.U.diagonal()
+        self.negative = int((pivots < 0.0).sum())
+        if definite and not (pivots > 0.0).all():
+            raise NotPositiveDefinite("the matrix is not positive definite")
+
+    def solve(self, right: Reals) -> Reals:
+        return np.asarray(self._lu.solve(right))

@@ -1,0 +1,186 @@
+"""Loading step by step along one documented path.
+
+Slender structures have many equilibria; which one is meant is a matter of how the load came on. The path
+here: from an equilibrium, loads and imposed displacements change together in increments (`STEP` of the whole
+unless said otherwise); each is solved from the one before by steps that may not lose definiteness on the way
+(`on_branch`). Where they do, or where many steps are needed, the increment is halved, down to `SMALLEST` of
+the whole; after two that succeed it is doubled again. Where even the smallest fails the stable branch has
+ended; the rest is then applied at once and implicit dynamic relaxation follows the snap-through to wherever
+it ends. So the same start and load always lead to the same state. Supports that move take the free nodes
+along by the tangent, K dx = -K_held d, before the steps begin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import NotConverged
+from shellform.structure.elements.state import State, moved
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium
+from shellform.structure.solve.factorisation import NotPositiveDefinite
+from shellform.structure.solve.residual import held
+
+STEP = 0.25
+SMALLEST = 1.0 / 64.0
+_PATIENCE = 25  # factorisations of one increment; on the branch five or six are enough
+_REGROWTH = 2  # good increments before one is doubled again
+
+Report = Callable[[float, Equilibrium], None]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What grows with the load factor: dead `load` (n, 6), N and N·m, and the motion `imposed` (n, 6) of held
+    freedoms, m and rad (turns about fixed axes); `base` (n, 6) is there all the time."""
+
+    load: Reals
+    imposed: Reals
+    base: Reals
+
+    def at(self, factor: float) -> Reals:
+        """The dead load (n, 6) at the factor."""
+        return self.base + factor * self.load
+
+    @property
+    def moves_supports(self) -> bool:
+        """Whether held freedoms move."""
+        return bool(self.imposed.any())
+
+
+def forces(load: Reals, *, base: Reals | None = None) -> Drive:
+    """A load (n, 6) that grows alone, on top of `base` (n, 6)."""
+    none = np.zeros_like(load)
+    return Drive(load, none, none if base is None else base)
+
+
+@dataclass(frozen=True)
+class Loaded:
+    """The equilibrium under the whole load; `share` of the load change up to which the stable branch was
+    followed (1: to the end); `factorisations` of all increments."""
+
+    equilibrium: Equilibrium
+    share: float
+    factorisations: int
+
+    @property
+    def on_branch(self) -> bool:
+        """Whether the state lies on the stable branch from the start."""
+        return self.share == 1.0
+
+
+def apply_load(
+    assembly: Assembly,
+    start: State,
+    before: Reals,
+    after: Reals,
+    *,
+    step: float = STEP,
+    smallest: float = SMALLEST,
+    tolerance: float = TOLERANCE,
+    stay: bool = False,
+    report: Report | None = None,
+) -> Loaded:
+    """The equilibrium under the load `after` (n, 6), reached from the equilibrium `start` under the load
+    `before`; see `advance`.
+    """
+    drive = forces(after - before, base=before)
+    return advance(
+        assembly, start, drive, step=step, smallest=smallest, tolerance=tolerance, stay=stay, report=report
+    )
+
+
+def advance(
+    assembly: Assembly,
+    start: State,
+    drive: Drive,
+    *,
+    begin: float = 0.0,
+    end: float = 1.0,
+    step: float = STEP,
+    smallest: float = SMALLEST,
+    tolerance: float = TOLERANCE,
+    stay: bool = False,
+    limit: int = 1000,
+    report: Report | None = None,
+) -> Loaded:
+    """The equilibrium at the drive's factor `end`, reached from the equilibrium `start` at the factor
+    `begin`.
+
+    Increments are at most `step` and at least `smallest`, shares of the whole. With `stay` the end of the
+    stable branch is returned instead of what lies beyond the snap-through: the last stable equilibrium and
+    the share of the change that it bears. `report(share, equilibrium)` is called at each accepted increment;
+    `limit` bounds the factorisations of what follows a snap-through. Raises NotConverged.
+    """
+    share, spent, good = 0.0, 0, 0
+    state, found = start, None
+    width = widest = 1.0 / max(1, round(1.0 / step))
+    while share < 1.0:
+        goal = 1.0 if share + width > 1.0 - 1e-12 else share + width
+        factor = begin + goal * (end - begin)
+        try:
+            then, cost = _carried(assembly, state, drive, (goal - share) * (end - begin))
+            spent += cost
+            found = find_equilibrium(
+                assembly, then, drive.at(factor), tolerance=tolerance, limit=_PATIENCE, on_branch=True
+            )
+            spent += found.factorisations
+            reached = found.stable  # converged onto an unstable equilibrium: no branch goes on from there
+        except NotConverged as error:
+            spent += error.iterations
+            reached = False
+        if not reached:
+            width, good = 0.5 * width, 0
+            if width < smallest:
+                break
+            continue
+        assert found is not None
+        share, state, good = goal, found.state, good + 1
+        if report is not None:
+            report(share, found)
+        if good == _REGROWTH:
+            width, good = min(2.0 * width, widest), 0
+    if share < 1.0 and not stay:
+        then = _with_supports(state, drive, (1.0 - share) * (end - begin))
+        found = find_equilibrium(assembly, then, drive.at(end), tolerance=tolerance, limit=limit)
+        spent += found.factorisations
+        if report is not None:
+            report(1.0, found)
+    elif share < 1.0 or found is None:
+        found = find_equilibrium(
+            assembly, state, drive.at(begin + share * (end - begin)), tolerance=tolerance
+        )
+        spent += found.factorisations
+    return Loaded(replace(found, factorisations=spent), share, spent)
+
+
+def limit_factor(assembly: Assembly, start: State, load: Reals, *, most: float = 2.0) -> float:
+    """The share of `load`, up to `most`, that is borne on the stable branch from the unloaded equilibrium
+    `start`.
+    """
+    none = np.zeros_like(load)
+    return most * apply_load(assembly, start, none, most * load, step=0.0625, stay=True).share
+
+
+def _with_supports(state: State, drive: Drive, change: float) -> State:
+    return moved(state, change * drive.imposed) if drive.moves_supports else state
+
+
+def _carried(assembly: Assembly, state: State, drive: Drive, change: float) -> tuple[State, int]:
+    """The state with the supports moved by the change of the factor and the free nodes along with them, and
+    factorisations spent.
+    """
+    if not drive.moves_supports:
+        return state, 0
+    motion = change * drive.imposed
+    pull = -assembly.force_along(state, motion).ravel()[assembly.free]
+    step = motion.ravel().copy()
+    try:
+        step[assembly.free] = assembly.matrix.factor(held(assembly, assembly.evaluate(state))).solve(pull)
+    except NotPositiveDefinite:
+        return _with_supports(state, drive, change), 1
+    return moved(state, assembly.chords.corrected(state, step.reshape(-1, 6))), 1

@@ -1,0 +1,308 @@
+"""Path following through limit points (Riks 1979; Crisfield 1981; Ramm 1981), with forces and with imposed
+displacements.
+
+All that grows does so with one load factor f: p(f) = base + f·load on the free freedoms, and the held ones
+move by f·imposed. Along the path the unknowns are the free freedoms x and f. A step of Newton's kind solves
+
+    K dx = r + q df,   r = p - internal forces,   q = load - K_held·imposed,
+    a·dx = g,
+
+by two solves with one factor of K, dx = u_r + df u_q, and df = (g - a·u_r) / (a·u_q). The last line is what
+holds the step to its size s:
+
+    arc length              a = 2 D,  g = s² - D·D     D the translations since the last point (spherical, translations only)
+    displacement control    a = e_c,  g = s - D_c      freedom c is led
+    load control            df = s - (f - f_last)      only to end at a given factor
+
+Near a limit point K is nearly singular, but dx is not. K needn't be positive definite: its factor is L D L',
+whose negative pivots count the negative eigenvalues at each point. Where the count changes between two
+points, a limit point lies between them if f turns round, else a bifurcation; it is located by bisecting the
+step on that count. Steps follow the curvature of the path: longer where Newton needs few iterations, cut
+where it doesn't get there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError, NotConverged
+from shellform.structure.elements.state import State, moved
+from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
+from shellform.structure.solve.factorisation import Indefinite
+from shellform.structure.solve.loading import Drive
+from shellform.structure.solve.residual import Measure, Turning, held
+
+FIRST = 0.1  # of the goal, the first step's change of the factor
+MOST = 500  # points
+_ITERATIONS = 12  # of Newton in one step
+_EASY = 4  # iterations that leave the step as it is
+_LONGEST, _SHORTEST = 2.0, 0.25  # change of the step from one to the next
+_SMALLEST = 1e-6  # of the first step
+_BISECTIONS = 30
+_LOCATED = 1e-7  # of the factor, as near as an event is located
+
+
+@dataclass(frozen=True)
+class Point:
+    """A converged point of the path: load `factor`; `equilibrium`; `rate`, the change of the factor with the
+    path's length (1/m, negative where the load falls); `event`: "", "limit point" or "bifurcation"."""
+
+    factor: float
+    equilibrium: Equilibrium
+    rate: float
+    event: str = ""
+
+
+def follow(
+    assembly: Assembly,
+    start: State,
+    drive: Drive,
+    *,
+    goal: float = 1.0,
+    lead: tuple[int, int, float] | None = None,
+    first: float = FIRST,
+    most: int = MOST,
+    tolerance: float = TOLERANCE,
+    events: bool = True,
+) -> Iterator[Point]:
+    """The points of the path from the equilibrium `start` at factor 0, one by one.
+
+    It ends when the factor comes to `goal` for the first time. With `lead` (node, axis 0 to 2, displacement
+    in m) that freedom is led instead, up to its displacement. `first`: the first step, as a share of the goal
+    or of the led displacement; `most` points. With `events` limit points and bifurcations are located and
+    given as points of their own. Raises NotConverged with the last state where no step succeeds or the points
+    run out, InputError for a held freedom as lead.
+    """
+    walk = _Path(assembly, start, drive, tolerance)
+    led = None if lead is None else walk.number(lead)
+    here = walk.point(start, 0.0, 0)
+    if lead is not None:
+        size = first * abs(lead[2]) * (1.0 if lead[2] > 0.0 else -1.0)
+        direction = 1.0
+    else:
+        direction = 1.0 if goal > 0.0 else -1.0
+        size = first * abs(goal) * float(np.linalg.norm(here.tangent[walk.moving]))
+    if size == 0.0 or not np.isfinite(size):
+        raise InputError(
+            "the goal of a path must not be zero", where="path", value=goal if lead is None else lead
+        )
+    yield here.told()
+    smallest = _SMALLEST * abs(size)
+    last: Reals | None = None
+    for _ in range(most):
+        try:
+            there = walk.step(here, size, led, last, direction)
+            crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
+            if lead is None and crossing:
+                there = walk.at_factor(here, there, goal)
+        except _Missed:
+            size *= _SHORTEST
+            if abs(size) < smallest:
+                raise walk.gave_up(here, "The path could not be followed further") from None
+            continue
+        turned = there.negative != here.negative
+        if events and turned:
+            event = walk.located(here, size, led, last, direction, there)
+            if event is not None:
+                yield event
+        yield there.told()
+        if lead is None:
+            if there.factor == goal:
+                return
+        elif abs(walk.displacement(there.state, lead)) >= abs(lead[2]) * (1.0 - 1e-9):
+            return
+        last = walk.between(here.state, there.state)
+        size *= float(np.clip(np.sqrt(_EASY / max(there.iterations, 1)), 0.5, _LONGEST))
+        if lead is not None:
+            left = lead[2] - walk.displacement(there.state, lead)
+            size = float(np.sign(left)) * min(abs(size), abs(left))
+        here = there
+    raise walk.gave_up(here, f"The path did not come to its end within {most} points")
+
+
+class _Missed(Exception):
+    """A step found no point."""
+
+
+@dataclass(frozen=True)
+class _Here:
+    """A point with what the next step needs: `tangent` (f,), the change of the free freedoms with the
+    factor.
+    """
+
+    state: State
+    factor: float
+    equilibrium: Equilibrium
+    tangent: Reals
+    rate: float
+    iterations: int
+
+    @property
+    def negative(self) -> int:
+        return self.equilibrium.negative
+
+    def told(self) -> Point:
+        return Point(self.factor, self.equilibrium, self.rate)
+
+
+class _Path:
+    def __init__(self, assembly: Assembly, start: State, drive: Drive, tolerance: float) -> None:
+        self.assembly, self.drive, self.tolerance, self.start = assembly, drive, tolerance, start
+        self.measure = Measure(assembly)
+        self.turning = Turning(assembly, drive.load + drive.base)
+        self.moving = assembly.free % 6 < 3
+        self.spent = 0
+
+    def number(self, lead: tuple[int, int, float]) -> int:
+        """Place among the free freedoms of the one that leads."""
+        found = np.flatnonzero(self.assembly.free == 6 * lead[0] + lead[1])
+        if not len(found):
+            raise InputError(
+                "is held or doesn't exist; only a free displacement can lead", where="path", value=lead[:2]
+            )
+        return int(found[0])
+
+    def displacement(self, state: State, lead: tuple[int, int, float]) -> float:
+        return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
+
+    def between(self, before: State, after: State) -> Reals:
+        """Translations (t,) of the free freedoms from one state to the other."""
+        return (after.positions - before.positions).ravel()[self._flat()]
+
+    def point(self, state: State, factor: float, iterations: int) -> _Here:
+        balance = self.assembly.evaluate(state)
+        matrix = self._factor(balance)
+        tangent = self.turning.solve(matrix, balance, self._drive(state))
+        residual = self.measure.residual(balance, self.drive.at(factor))
+        found = Equilibrium(
+            state, balance.energy, residual, self.spent, matrix.negative == 0, matrix.negative
+        )
+        speed = float(np.linalg.norm(tangent[self.moving]))
+        if speed == 0.0:
+            raise InputError(
+                "nothing moves under this load", where="path", remedy="Choose a load that acts on free nodes."
+            )
+        return _Here(state, factor, found, tangent, 1.0 / speed, iterations)
+
+    def step(self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float) -> _Here:
+        """The point at `size` from `here`. Raises _Missed."""
+        tangent = here.tangent
+        if led is None:
+            along = tangent[self.moving]
+            onward = direction if last is None else float(np.sign(along @ last)) or 1.0
+            change = onward * abs(size) / float(np.linalg.norm(along))
+        else:
+            if tangent[led] == 0.0:
+                raise _Missed
+            change = size / float(tangent[led])
+        state, factor = self._moved(here.state, change * tangent, change), here.factor + change
+        for iteration in range(1, _ITERATIONS + 1):
+            balance = self.assembly.evaluate(state)
+            unbalanced = (self.drive.at(factor) - balance.force).ravel()[self.assembly.free]
+            done = np.zeros(len(self.assembly.free))
+            done[self.moving] = self.between(here.state, state)
+            gap = size - done[led] if led is not None else size * size - float(done @ done)
+            size_kept = abs(gap) <= 1e-6 * (abs(size) if led is not None else size * size)
+            residual = self.measure.residual(balance, self.drive.at(factor))
+            if size_kept and residual <= max(
+                self.tolerance, self.measure.rounding(balance, state, self.drive.at(factor))
+            ):
+                return self._settled(here, state, factor, iteration)
+            if not residual < 1e12:
+                raise _Missed
+            matrix = self._factor(balance)
+            by_forces = self.turning.solve(matrix, balance, unbalanced)
+            by_factor = self.turning.solve(matrix, balance, self._drive(state))
+            if led is not None:
+                slope, rest = by_factor[led], gap - by_forces[led]
+            else:
+                slope, rest = 2.0 * float(done @ by_factor), gap - 2.0 * float(done @ by_forces)
+            if slope == 0.0:
+                raise _Missed
+            shift = float(rest / slope)
+            state, factor = self._moved(state, by_forces + shift * by_factor, shift), factor + shift
+        raise _Missed
+
+    def at_factor(self, here: _Here, there: _Here, goal: float) -> _Here:
+        """The point at the factor `goal` between two points: Newton's steps from the nearer one. Raises
+        _Missed where they turn too far.
+        """
+        near = here if abs(here.factor - goal) < abs(there.factor - goal) else there
+        state = self._moved(near.state, (goal - near.factor) * near.tangent, goal - near.factor)
+        for iteration in range(1, _ITERATIONS + 1):
+            balance = self.assembly.evaluate(state)
+            residual = self.measure.residual(balance, self.drive.at(goal))
+            if residual <= max(self.tolerance, self.measure.rounding(balance, state, self.drive.at(goal))):
+                return self._settled(here, state, goal, iteration)
+            if not residual < 1e12:
+                break
+            unbalanced = (self.drive.at(goal) - balance.force).ravel()[self.assembly.free]
+            state = self._moved(state, self.turning.solve(self._factor(balance), balance, unbalanced), 0.0)
+        return there  # the factor is close to a turning point: the path goes on and comes by again
+
+    def located(
+        self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float, there: _Here
+    ) -> Point | None:
+        """The point between two where the number of negative eigenvalues changes."""
+        low, high, near = 0.0, 1.0, there
+        total = size if led is not None else float(np.linalg.norm(self.between(here.state, there.state)))
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            try:
+                found = self.step(here, middle * total, led, last, direction)
+            except _Missed:
+                return None
+            if found.negative == here.negative:
+                low = middle
+            else:
+                high, near = middle, found
+            if (
+                abs(near.rate) * (high - low) * abs(total) < _LOCATED * max(abs(near.factor), 1e-300)
+                and high - low < 1e-3
+            ):
+                break
+        kind = "limit point" if here.rate * there.rate < 0.0 else "bifurcation"
+        return replace(near.told(), event=kind)
+
+    def gave_up(self, here: _Here, what: str) -> NotConverged:
+        return NotConverged(
+            f"{what} (load factor {here.factor:.6g})",
+            state=here.state,
+            residual=here.equilibrium.residual,
+            iterations=self.spent,
+            remedy="Take a smaller first step, lead another displacement, or allow more points.",
+        )
+
+    def _settled(self, here: _Here, state: State, factor: float, iterations: int) -> _Here:
+        """The converged point, its rate signed by which way along the path the factor grows."""
+        found = self.point(state, factor, iterations)
+        onward = float(np.sign(found.tangent[self.moving] @ self.between(here.state, state))) or 1.0
+        return replace(found, rate=onward * abs(found.rate))
+
+    def _factor(self, balance: Balance) -> Indefinite:
+        self.spent += 1
+        return self.assembly.matrix.factor_indefinite(held(self.assembly, balance))
+
+    def _drive(self, state: State) -> Reals:
+        drive = self.drive.load
+        if self.drive.moves_supports:
+            drive = drive - self.assembly.force_along(state, self.drive.imposed)
+        return drive.ravel()[self.assembly.free]
+
+    def _moved(self, state: State, change: Reals, factor: float) -> State:
+        whole = factor * self.drive.imposed.ravel()
+        whole[self.assembly.free] = change
+        step = whole.reshape(-1, 6)
+        spin = float(np.abs(step[:, 3:]).max(initial=0.0))
+        if not spin <= 2.0 * TURN:  # also where it isn't a number
+            raise _Missed
+        return moved(state, self.assembly.chords.corrected(state, step))
+
+    def _flat(self) -> Indices:
+        free = self.assembly.free[self.moving]
+        return 3 * (free // 6) + free % 6

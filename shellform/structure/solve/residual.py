@@ -1,0 +1,133 @@
+"""How far a state is from equilibrium, what holds a rod that is free to spin, and Newton's step under dead
+moments.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.linalg import LinearOperator, gmres
+
+from shellform.arrays import Reals
+from shellform.compiled import njit
+from shellform.structure.elements.state import State
+from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.factorisation import Factor
+
+_SPIN = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
+
+
+class Measure:
+    """Measures unbalanced forces, moments divided by a length, against the largest applied or internal force.
+
+    `arms` (n,), m: that length for each node; `mass_shape` (f,): 1 for free translations
+    and the arm's square for free rotations, so that both weigh alike.
+    """
+
+    def __init__(self, assembly: Assembly) -> None:
+        self.free = assembly.free
+        self.arms = assembly.arms
+        self._reach = assembly.reach
+        turns = self.free % 6 >= 3
+        self.mass_shape = np.ones(len(self.free))
+        self.mass_shape[turns] = self.arms[self.free[turns] // 6] ** 2
+
+    def residual(self, balance: Balance, load: Reals) -> float:
+        """Largest unbalanced force over the scale under the dead `load` (n, 6); infinite where a force isn't
+        finite.
+        """
+        largest = float(_largest_difference(load.ravel(), balance.force.ravel(), self.free, self._reach))
+        if not np.isfinite(largest):
+            return float("inf")
+        scale = self.scale(balance, load)
+        return largest / scale if scale > 0.0 else 0.0
+
+    def scale(self, balance: Balance, load: Reals) -> float:
+        """The largest applied or internal force, N."""
+        return max(float(_largest(load.ravel(), self._reach)), balance.largest)
+
+    def rounding(self, balance: Balance, state: State, load: Reals) -> float:
+        """The residual that rounding of the coordinates alone leaves: stiff short elements answer to the last
+        bit.
+        """
+        assert balance.tangent is not None
+        stiffest = float(balance.tangent.max(initial=0.0))  # on the diagonal
+        last_bit = 4.0 * np.finfo(float).eps * float(np.abs(state.positions).max(initial=0.0))
+        scale = self.scale(balance, load)
+        return stiffest * last_bit / scale if scale > 0.0 else 0.0
+
+
+def held(assembly: Assembly, balance: Balance) -> Reals:
+    """The tangent's lower values with rotations held by 1e-10 of their own stiffness.
+
+    A pinned straight rod can spin about its axis without any force; that much stiffness makes the matrix
+    regular and is far below what rounding leaves of the softest mode that matters.
+    """
+    assert balance.tangent is not None
+    return np.asarray(_stiffened(balance.tangent, assembly.turns, _SPIN))
+
+
+@njit(cache=True)
+def _stiffened(values, places, share):  # type: ignore[no-untyped-def]
+    """A copy of the values, those at `places` larger by a share of their size."""
+    result = values.copy()
+    for place in places:
+        result[place] += share * abs(result[place])
+    return result
+
+
+@njit(cache=True)
+def _largest_difference(load, force, free, reach):  # type: ignore[no-untyped-def]
+    """The largest |load - force| on the free freedoms, each times its reach; infinite where one isn't
+    finite.
+    """
+    largest = 0.0
+    for freedom in free:
+        size = abs(load[freedom] - force[freedom]) * reach[freedom]
+        if not np.isfinite(size):
+            return np.inf
+        largest = max(largest, size)
+    return largest
+
+
+@njit(cache=True)
+def _largest(load, reach):  # type: ignore[no-untyped-def]
+    """The largest |load|, each times its reach."""
+    largest = 0.0
+    for freedom in range(len(load)):
+        largest = max(largest, abs(load[freedom]) * reach[freedom])
+    return largest
+
+
+class Turning:
+    """Newton's step where dead moments turn about fixed axes in space.
+
+    Rotations don't commute, so the exact tangent of a node in equilibrium with an applied moment m has
+    -S(m)/2 besides its symmetric part. With K + E C E' for the tangent, C holding those blocks, the step (I +
+    K⁻¹ E C E') x = K⁻¹ r is found by GMRES, exactly after as many solves as there are such blocks' ranks.
+    """
+
+    def __init__(self, assembly: Assembly, load: Reals) -> None:
+        rotations = assembly.number.reshape(-1, 6)[:, 3:]
+        # With one free rotation there is nothing that it could fail to commute with.
+        self.nodes = np.flatnonzero(load[:, 3:].any(axis=1) & ((rotations >= 0).sum(axis=1) > 1))
+        self.rows = rotations[self.nodes]
+
+    def solve(self, factor: Factor, balance: Balance, right: Reals) -> Reals:
+        """The step (f,) for the unbalanced forces `right` (f,)."""
+        plain = factor.solve(right)
+        if not len(self.nodes):
+            return plain
+        moments = balance.force[self.nodes, 3:]
+
+        def turned(step: Reals) -> Reals:
+            spins = np.where(self.rows >= 0, step[self.rows], 0.0)
+            change = np.zeros_like(step)
+            kept = self.rows >= 0
+            change[self.rows[kept]] = (-0.5 * np.cross(moments, spins))[kept]
+            return step + factor.solve(change)
+
+        size = len(right)
+        found, failed = gmres(
+            LinearOperator((size, size), matvec=turned, dtype=float), plain, rtol=1e-10, restart=50, maxiter=4
+        )
+        return plain if failed else np.asarray(found)

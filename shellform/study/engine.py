@@ -1,0 +1,236 @@
+"""Many jobs on many processes: the door to Dask.
+
+Workers are processes with one thread each; linear algebra and loops within them keep to that thread, so that
+they don't fight for cores. Jobs are handed out within a window of twice the threads, and their outcomes are
+passed on as they come, so that memory doesn't grow with the study. A job on which others build is one task on
+which theirs depend: Dask runs it once, before them. When a worker dies, Dask starts another and gives its
+jobs out again; a job that has taken three workers with it is tried once more when all others are done, then
+given up.
+"""
+
+from __future__ import annotations
+
+import itertools
+import logging
+import math
+import os
+import time
+import uuid
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from typing import Any
+
+from shellform.errors import InputError
+from shellform.study.jobs import Job, Outcome
+from shellform.study.store import CRASHED
+
+Work = Callable[[Job, Outcome | None], Outcome]
+_DEATHS = 2  # that a job survives
+_AHEAD = 2  # jobs handed out for each thread
+_RECOUNT = 1.0  # seconds after which the cluster's threads are counted anew
+_ONE_THREAD = {
+    name: "1"
+    for name in (
+        "OMP_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "VECLIB_MAXIMUM_THREADS",
+        "VTK_SMP_MAX_THREADS",
+    )
+} | {"MKL_CBWR": "AUTO"}  # MKL adds up in the same order in each process
+
+# Run by each worker process as it starts: Ctrl-C reaches all processes of a terminal, and the study alone
+# answers it and ends its workers.
+_QUIET = """import logging, signal
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+for name in ("distributed", "distributed.worker", "distributed.nanny"):
+    logging.getLogger(name).setLevel(logging.CRITICAL)
+"""
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A running cluster: Dask's client and the address of its dashboard."""
+
+    client: Any
+    dashboard: str
+
+
+@contextmanager
+def engine(
+    *, workers: int | None = None, scheduler: str | None = None, processes: bool = True
+) -> Iterator[Engine]:
+    """`workers` processes on this machine (default: one a core), or the cluster whose `scheduler` has that
+    address.
+
+    Scheduler, workers and dashboard of this machine listen on its loopback address alone; the first two speak
+    to nobody without the certificate that is made for each cluster. With `processes` False the workers are
+    threads, to try out the engine. Raises InputError where a cluster doesn't answer.
+    """
+    import dask
+    from distributed import (  # before the settings: it adds its own, which would be forgotten with them
+        Client,
+        LocalCluster,
+    )
+
+    for name in ("distributed", "distributed.client", "bokeh", "tornado", "tornado.application"):
+        logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters of what they tell is in the rows
+    settings = {
+        "distributed.scheduler.allowed-failures": _DEATHS,
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.worker.preload": [_QUIET] if processes else [],
+        "distributed.worker.daemon": False,  # surface readers are processes of their own
+        # What the processes do for themselves takes 1.8 % of a core in all with these three, 7.1 % as Dask
+        # has them.
+        "distributed.admin.tick.interval": "500ms",
+        "distributed.admin.system-monitor.interval": "2s",
+        "distributed.worker.memory.monitor-interval": "500ms",
+        # it keeps some 0.6 MB for each second of work, for an hour
+        "distributed.worker.profile.enabled": False,
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
+        "distributed.comm.timeouts.connect": "30s",
+    }
+    with dask.config.set(settings):
+        if scheduler is not None:
+            try:
+                client = Client(scheduler, timeout="10s", set_as_default=False)
+            except (OSError, ValueError, ImportError) as error:
+                raise InputError(f"doesn't answer: {error}", where="--scheduler", value=scheduler) from error
+            try:
+                yield Engine(client, client.dashboard_link or "")
+            finally:
+                _close(client)
+            return
+        cluster = LocalCluster(
+            n_workers=workers or _cores(),
+            threads_per_worker=1,
+            memory_limit="auto"
+            if processes
+            else None,  # in one process each would take the whole one for its own
+            processes=processes,
+            host="127.0.0.1" if processes else None,
+            security=processes
+            or None,  # certificates of its own, in memory: nobody else on the machine can send it work
+            dashboard_address="127.0.0.1:0",
+            worker_dashboard_address=None,
+        )
+        try:
+            client = Client(cluster, set_as_default=False)
+            try:
+                yield Engine(client, cluster.dashboard_link)
+            finally:
+                _close(client)
+        finally:
+            _close(cluster)
+
+
+def _close(part: Any) -> None:
+    """Ends a client or a cluster; one that takes longer than it should is left behind, and ends with this
+    process.
+    """
+    with suppress(TimeoutError):
+        part.close(timeout=10)
+
+
+def sweep(engine: Engine, jobs: Iterable[Job], work: Work) -> Iterator[list[Outcome]]:
+    """Runs `work` on each job and gives the outcomes in the batches in which they come, in no order."""
+    again: list[Job] = []
+    yield from _pass(engine, jobs, work, lambda job, reason: again.append(job))
+    lost: list[Outcome] = []
+    for job in again:  # alone, so that no other job is blamed
+        yield from _pass(engine, [job], work, lambda job, reason: lost.append(_crashed(job, reason)))
+    if lost:
+        yield lost
+
+
+def _pass(
+    engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, str], None]
+) -> Iterator[list[Outcome]]:
+    from distributed import as_completed
+
+    client, waiting = engine.client, iter(jobs)
+    running: dict[str, tuple[Job, Any]] = {}
+    shared: dict[str, list[Any]] = {}  # a job before others: its future, and how many running ones need it
+    finished = as_completed([], loop=client.loop)
+    threads, asked = 1, -math.inf
+    while True:
+        if time.monotonic() > asked + _RECOUNT:
+            threads, asked = max(1, sum(client.nthreads().values())), time.monotonic()
+        room = _AHEAD * threads - len(running)
+        fresh = list(itertools.islice(waiting, max(0, room)))
+        futures = _submit(client, fresh, work, shared)
+        running |= {future.key: (job, future) for job, future in zip(fresh, futures, strict=True)}
+        finished.update(futures)
+        if not running:
+            return
+        batch = finished.next_batch(block=True)
+        for future in batch:
+            for each in running[future.key][0].before:
+                shared[each.key][1] -= 1
+                if not shared[each.key][1]:
+                    del shared[each.key]
+        yield _gathered(client, [(running.pop(future.key)[0], future) for future in batch], died)
+
+
+def _gathered(client: Any, ended: list[tuple[Job, Any]], died: Callable[[Job, str], None]) -> list[Outcome]:
+    """The outcomes of jobs that ended, asked for at once; one by one where a worker was lost between the end
+    and the asking.
+    """
+    try:
+        found: list[Outcome] = client.gather([future for _, future in ended])
+        return found
+    except Exception:  # `work` raises nothing: a worker was lost
+        done = []
+        for job, future in ended:
+            try:
+                done.append(future.result())
+            except Exception as error:
+                died(job, _reason(error))
+        return done
+
+
+def _submit(client: Any, jobs: list[Job], work: Work, shared: dict[str, list[Any]]) -> list[Any]:
+    """Hands out jobs, all in one message: what a message costs the client and the scheduler is the first
+    limit of a large cluster.
+
+    Each handing out has a name of its own: Dask remembers what failed by name.
+    """
+    befores = [_begun(client, job, work, shared) for job in jobs]
+    names = [f"design-{job.key}-{uuid.uuid4().hex}" for job in jobs]
+    handed: list[Any] = client.map(work, jobs, befores, key=names, pure=False) if jobs else []
+    return handed
+
+
+def _begun(client: Any, job: Job, work: Work, shared: dict[str, list[Any]]) -> Any:
+    """The last job that a job builds on, handed out unless it already was."""
+    before = None
+    for each in job.before:
+        if each.key not in shared:
+            shared[each.key] = [
+                client.submit(work, each, before, key=f"stage-{each.key}-{uuid.uuid4().hex}"),
+                0,
+            ]
+        shared[each.key][1] += 1
+        before = shared[each.key][0]
+    return before
+
+
+def _crashed(job: Job, reason: str) -> Outcome:
+    return {"key": job.key, "status": CRASHED, "reason": reason, "summary": {}, "seconds": {}, "worker": ""}
+
+
+def _reason(error: Exception) -> str:
+    """Why there is no outcome."""
+    from distributed.scheduler import KilledWorker
+
+    if isinstance(error, KilledWorker):
+        return f"took {_DEATHS + 1} workers with it: out of memory, or a fault in a library"
+    return f"{type(error).__name__}: {error}"
+
+
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

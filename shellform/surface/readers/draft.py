@@ -1,0 +1,192 @@
+"""What a reader hands over: triangles in the file's own unit and axes, not yet mended, and the choice among a
+file's objects.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.errors import InputError
+
+_MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
+MOST_TRIANGLES = 2_000_000
+_NAMES_TOLD = 12
+
+
+@dataclass(frozen=True)
+class Draft:
+    """`points` (v, 3) in units of `metres` m (None: the file doesn't say) with the vertical axis `up`;
+    `triangles` (t, 3); unit `normals` (v, 3) where the source knows them; `notes`, a sentence for each thing
+    left out or chosen."""
+
+    points: Reals
+    triangles: Indices
+    normals: Reals | None = None
+    metres: float | None = None
+    up: str = "z"
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Part:
+    """One object of a file: `points` (v, 3) and its `faces`, arrays (f, k) of polygons with k corners
+    each.
+    """
+
+    name: str
+    layer: str
+    points: Reals
+    faces: tuple[Indices, ...]
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which objects of a file are the surface: those on a `layer`, or of a `name`; "" stands for any."""
+
+    layer: str = ""
+    name: str = ""
+
+
+def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flags:
+    """Which of the objects with these (layer, name) `labels` are meant (n,). Raises InputError that lists
+    what there is.
+    """
+    kept = np.ones(len(labels), dtype=bool)
+    for column, wanted, entry in [(0, choice.layer, "surface.layer"), (1, choice.name, "surface.object")]:
+        if not wanted:
+            continue
+        kept &= [_is_called(label[column], wanted) for label in labels]
+        if not kept.any():
+            known = Counter(label[column] for label in labels if label[column])
+            told = ", ".join(
+                f"{name!r}" + (f" ({n})" if n > 1 else "") for name, n in known.most_common(_NAMES_TOLD)
+            )
+            more = f" and {len(known) - _NAMES_TOLD} more" if len(known) > _NAMES_TOLD else ""
+            raise InputError(
+                f"{where} has no such surface",
+                where=entry,
+                value=wanted,
+                remedy=f"There are {told}{more}." if told else "None has a name.",
+            )
+    return kept
+
+
+def _is_called(name: str, wanted: str) -> bool:
+    """Whether a full name, or the last part of a layer's path "A::B", is the one wanted, in whatever case."""
+    return wanted.casefold() in (name.casefold(), name.rsplit("::", 1)[-1].casefold())
+
+
+def joined(parts: Sequence[Part], choice: Choice, where: str) -> Draft:
+    """All chosen parts as one mesh of triangles. Raises InputError where there is no face."""
+    if not any(len(block) for part in parts for block in part.faces):
+        raise InputError(
+            "holds no faces, only points or lines", where=where, remedy="Export the surface, or a mesh of it."
+        )
+    kept = [
+        part
+        for part, meant in zip(parts, among([(p.layer, p.name) for p in parts], choice, where), strict=True)
+        if meant
+    ]
+    points, triangles, count = [], [], 0
+    for part in kept:
+        check_points(part.points, where)
+        for block in part.faces:
+            if len(block) and not (block.min() >= 0 and block.max() < len(part.points)):
+                raise InputError(
+                    f"a face names vertex {1 + int(block.max() if block.min() >= 0 else block.min())}, of {len(part.points)}",
+                    where=where,
+                    remedy="Export the mesh anew.",
+                )
+            if block.shape[1] > _MOST_CORNERS:
+                raise InputError(
+                    f"has a face of {block.shape[1]:,} corners; up to {_MOST_CORNERS:,} are read",
+                    where=where,
+                    remedy="Export triangles.",
+                )
+            triangles.append(triangulated(part.points, block) + count)
+        points.append(part.points)
+        count += len(part.points)
+    faces = np.vstack([np.zeros((0, 3), dtype=np.int64), *triangles])
+    if len(faces) > MOST_TRIANGLES:
+        raise InputError(
+            f"has {len(faces):,} triangles; up to {MOST_TRIANGLES:,} are read",
+            where=where,
+            remedy="Export a coarser mesh.",
+        )
+    return Draft(np.vstack(points), faces)
+
+
+def check_points(points: Reals, where: str) -> None:
+    """Raises InputError that names the first vertex whose coordinates are no numbers."""
+    bad = ~np.isfinite(points).all(axis=1)
+    if bad.any():
+        vertex = int(np.argmax(bad))
+        raise InputError(
+            f"vertex {vertex + 1} has a coordinate that is no number, as have {int(bad.sum()) - 1} others",
+            where=where,
+            remedy="Export the mesh anew.",
+        )
+
+
+def triangulated(points: Reals, faces: Indices) -> Indices:
+    """Triangles (t, 3) of polygons (f, k), no vertex moved: quadrilaterals along the diagonal that folds
+    less, others by cutting ears.
+    """
+    if faces.shape[1] < 3:
+        return np.zeros((0, 3), dtype=np.int64)
+    if faces.shape[1] == 3:
+        return faces.astype(np.int64)
+    if faces.shape[1] > 4:
+        return np.vstack([_ears(points, face) for face in faces]).astype(np.int64)
+    first = np.stack([faces[:, [0, 1, 2]], faces[:, [0, 2, 3]]], axis=1)
+    second = np.stack([faces[:, [0, 1, 3]], faces[:, [1, 2, 3]]], axis=1)
+    flatter = (_fold(points, first) >= _fold(points, second))[:, None, None]
+    return np.where(flatter, first, second).reshape(-1, 3).astype(np.int64)
+
+
+def _fold(points: Reals, pairs: Indices) -> Reals:
+    """Cosine (f,) of the angle between the normals of two triangles each (f, 2, 3)."""
+    corner = points[pairs]
+    normal = np.cross(corner[:, :, 1] - corner[:, :, 0], corner[:, :, 2] - corner[:, :, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=2, keepdims=True), 1e-300)
+    return np.asarray(np.sum(normal[:, 0] * normal[:, 1], axis=1))
+
+
+def _ears(points: Reals, face: Indices) -> Indices:
+    """Triangles (k - 2, 3) of one polygon, which may be concave: always the ear with the widest smallest
+    angle is cut off.
+    """
+    corner = points[face]
+    normal = 0.5 * np.cross(corner, np.roll(corner, -1, axis=0)).sum(axis=0)
+    left, cut = list(range(len(face))), []
+    while len(left) > 3:
+        best, worth = 0, -np.inf
+        for k in range(len(left)):
+            a, b, c = left[k - 1], left[k], left[(k + 1) % len(left)]
+            ear = corner[[a, b, c]]
+            quality = _smallest_angle(ear)
+            if np.dot(np.cross(ear[1] - ear[0], ear[2] - ear[0]), normal) <= 0.0:
+                quality -= 10.0  # turned over: only where nothing else is left
+            elif _any_inside(corner[[i for i in left if i not in (a, b, c)]], ear, normal):
+                quality -= 5.0
+            if quality > worth:
+                best, worth = k, quality
+        cut.append([left[best - 1], left[best], left[(best + 1) % len(left)]])
+        del left[best]
+    return face[np.array([*cut, left])]
+
+
+def _smallest_angle(ear: Reals) -> float:
+    sides = np.roll(ear, -1, axis=0) - ear
+    unit = sides / np.maximum(np.linalg.norm(sides, axis=1, keepdims=True), 1e-300)
+    return float(np.arccos(np.clip(-np.sum(unit * np.roll(unit, 1, axis=0), axis=1), -1.0, 1.0)).min())
+
+
+def _any_inside(others: Reals, ear: Reals, normal: Reals) -> bool:
+    side = [np.cross(ear[(k + 1) % 3] - ear[k], others - ear[k]) @ normal for k in range(3)]
+    return bool((np.min(side, axis=0) > 0.0).any())

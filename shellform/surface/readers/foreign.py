@@ -1,0 +1,148 @@
+"""Foreign readers in a process of their own, so that a crash, a hang or a flood of memory in them becomes a
+message.
+
+The child imports one reader (gmsh, rhino3dm, meshio or VTK; 0.3 to 0.7 s), reads, and leaves its arrays in a
+file.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shellform.errors import InputError, ShellformError
+from shellform.surface.readers.draft import Choice, Draft
+
+_LONGEST = 600.0  # seconds for one file
+_MEMORY = 0.8  # of the machine's, for the reader
+_ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
+_LIBRARIES = {
+    "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "meshio", "msh": "meshio",
+    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK",
+}  # fmt: skip
+KINDS = tuple(_LIBRARIES)
+
+
+def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest: float = _LONGEST) -> Draft:
+    """What the reader of `kind` makes of a file. Raises InputError for what it refuses, and where it crashes,
+    hangs or fills the memory.
+
+    `settings` are `unit`, `size`, `up`, `layer`, `name` and `face`, as `read_surface` has them.
+    """
+    with tempfile.TemporaryDirectory(prefix="shellform-") as folder:
+        answer = Path(folder) / "answer.npz"
+        request = json.dumps(
+            {"file": str(file), "kind": kind, "answer": str(answer), "settings": dict(settings)}
+        )
+        package = str(Path(__file__).parents[3])
+        path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+        try:
+            child = subprocess.run(
+                [sys.executable, "-P", "-m", "shellform.surface.readers.foreign"],
+                input=request,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                errors="replace",
+                timeout=longest,
+                env={**os.environ, "PYTHONPATH": path},
+                check=False,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise InputError(
+                f"{_LIBRARIES[kind]} hadn't read it after {longest:g} s", where=str(file), remedy=_ANEW
+            ) from error
+        if child.returncode < 0:
+            name = signal.Signals(-child.returncode).name
+            raise InputError(f"{_LIBRARIES[kind]} crashed on it ({name})", where=str(file), remedy=_ANEW)
+        if not answer.is_file():
+            said = (child.stderr.strip().splitlines() or ["without a word"])[-1]
+            raise InputError(f"{_LIBRARIES[kind]} failed on it: {said}", where=str(file), remedy=_ANEW)
+        with np.load(answer, allow_pickle=False) as data:
+            told = json.loads(str(data["told"]))
+            if "refused" in told:
+                raise InputError(**told["refused"])
+            normals = data.get("normals")
+            return Draft(
+                data["points"], data["triangles"], normals, told["metres"], told["up"], tuple(told["notes"])
+            )
+
+
+def _serve() -> None:
+    """The child's whole life: one request from standard input, one answer."""
+    request = json.loads(sys.stdin.read())
+    _limit_memory()
+    arrays: dict[str, Any] = {}
+    try:
+        draft = _read(Path(request["file"]), request["kind"], request["settings"])
+        told: dict[str, Any] = {"metres": draft.metres, "up": draft.up, "notes": list(draft.notes)}
+        arrays = {"points": draft.points, "triangles": draft.triangles}
+        if draft.normals is not None:
+            arrays["normals"] = draft.normals
+    except InputError as error:
+        value = (
+            error.value
+            if isinstance(error.value, str | int | float)
+            else None
+            if error.value is None
+            else repr(error.value)
+        )
+        told = {"refused": {"what": error.what, "where": error.where, "value": value, "remedy": error.remedy}}
+    except MemoryError:
+        what = "needs more memory to read than this machine has"
+        told = {"refused": {"what": what, "where": request["file"], "remedy": "Export a coarser mesh."}}
+    np.savez(request["answer"], told=np.array(json.dumps(told)), **arrays)
+
+
+def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
+    choice = Choice(settings["layer"], settings["name"])
+    if _LIBRARIES[kind] == "gmsh":
+        from shellform.surface import cad
+
+        return cad.read_cad(
+            file, kind, unit=settings["unit"], size=settings["size"], up=settings["up"], face=settings["face"]
+        )
+    if kind == "3dm":
+        from shellform.surface.readers import rhino
+
+        return rhino.read_rhino(
+            file,
+            choice,
+            unit=settings["unit"],
+            size=settings["size"],
+            up=settings["up"],
+            face=settings["face"],
+        )
+    if _LIBRARIES[kind] == "meshio":
+        from shellform.surface.readers import meshes
+
+        return meshes.read_meshio(file, choice, kind)
+    from shellform.surface.readers import vtkfiles
+
+    return vtkfiles.read_vtk(file, choice, kind)
+
+
+def _limit_memory() -> None:
+    try:
+        import resource
+    except ImportError:  # not on Windows, where the system's own limit has to do
+        return
+    most = int(_MEMORY * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+if __name__ == "__main__":
+    try:
+        _serve()
+    except ShellformError as refusal:  # a library that can't be loaded
+        sys.exit(str(refusal))

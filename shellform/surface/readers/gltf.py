@@ -1,0 +1,270 @@
+"""GLTF and GLB scenes (Khronos glTF 2.0): their meshes, placed by their nodes; and GLB files written.
+
+The format's unit is the metre (many programs write others all the same: state it) and its vertical axis y.
+Buffers may stand in the GLB, in the text as base64, or in files beside it. Compressed meshes (Draco, meshopt)
+and sparse accessors are refused by name.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.surface.readers.draft import Choice, Draft, Part, check_points, joined
+
+_TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+_WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+_JSON, _BIN = 0x4E4F534A, 0x004E4942
+_TRIANGLES, _STRIP, _FAN = 4, 5, 6
+_DEEPEST = 64
+_VERTICES, _ELEMENTS = 34962, 34963  # what a buffer view is for
+
+
+def read_gltf(file: Path, choice: Choice) -> Draft:
+    """The meshes of a scene; nodes' names are the objects' names. Raises InputError for what can't be
+    used.
+    """
+    try:
+        tree, inside = _opened(file)
+        scene = _Scene(file, tree, inside)
+        roots = (
+            tree["scenes"][tree.get("scene", 0)].get("nodes", [])
+            if tree.get("scenes")
+            else range(len(tree.get("nodes", [])))
+        )
+        parts = [part for root in roots for part in scene.parts(root, np.eye(4), 0)]
+    except InputError:
+        raise
+    except (
+        KeyError,
+        IndexError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        struct.error,
+        OSError,
+        RecursionError,
+    ) as error:
+        said = f"{type(error).__name__}: {error}"
+        raise InputError(
+            f"can't be read as glTF: {said}", where=str(file), remedy="Export it anew, uncompressed."
+        ) from error
+    draft = joined(parts, choice, str(file))
+    return Draft(draft.points, draft.triangles, up="y")
+
+
+def _opened(file: Path) -> tuple[dict[str, Any], bytes]:
+    """The scene's JSON and the GLB's binary part."""
+    data = file.read_bytes()
+    if data[:4] != b"glTF":
+        return json.loads(data.decode("utf-8")), b""
+    length = struct.unpack_from("<I", data, 8)[0]
+    if length > len(data):
+        raise InputError(
+            f"ends after {len(data)} of {length} bytes", where=str(file), remedy="Copy or export it anew."
+        )
+    at, tree, inside = 12, {}, b""
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, at)
+        chunk = data[at + 8 : at + 8 + size]
+        if kind == _JSON:
+            tree = json.loads(chunk.decode("utf-8"))
+        elif kind == _BIN:
+            inside = chunk
+        at += 8 + size
+    return tree, inside
+
+
+@dataclass(frozen=True)
+class Solid:
+    """What is written: triangles under a `name`, `points` (n, 3), m, z upwards, with `normals` (n, 3), in a
+    `colour` (r, g, b, opacity), 0 to 1.
+    """
+
+    name: str
+    points: Reals
+    normals: Reals
+    triangles: Indices
+    colour: tuple[float, float, float, float]
+
+
+def write_glb(path: Path, solids: Sequence[Solid]) -> None:
+    """Writes the solids as one GLB, a node, a mesh and a material each; turned so that y is upwards, as the
+    format has it.
+    """
+    data = b""
+    views, accessors, meshes, materials = [], [], [], []
+
+    def stored(array: NDArray[Any], kind: str, target: int) -> int:
+        nonlocal data
+        content = array.tobytes()
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(content), "target": target})
+        data += content + b"\0" * (-len(content) % 4)
+        code = next(number for number, name in _TYPES.items() if np.dtype(name) == array.dtype)
+        entry = {"bufferView": len(views) - 1, "componentType": code, "count": len(array), "type": kind}
+        if target == _VERTICES:
+            entry |= {"min": array.min(axis=0).tolist(), "max": array.max(axis=0).tolist()}
+        accessors.append(entry)
+        return len(accessors) - 1
+
+    for solid in solids:
+        upright = [
+            np.ascontiguousarray(each[:, [0, 2, 1]] * [1.0, 1.0, -1.0], dtype="<f4")
+            for each in (solid.points, solid.normals)
+        ]
+        place, normal = (stored(each, "VEC3", _VERTICES) for each in upright)
+        order = stored(solid.triangles.astype("<u4").ravel(), "SCALAR", _ELEMENTS)
+        surface = {"baseColorFactor": list(solid.colour), "metallicFactor": 0.0, "roughnessFactor": 0.7}
+        material: dict[str, Any] = {
+            "name": solid.name,
+            "pbrMetallicRoughness": surface,
+            "doubleSided": solid.colour[3] < 1.0,
+        }
+        if solid.colour[3] < 1.0:
+            material["alphaMode"] = "BLEND"
+        materials.append(material)
+        primitive = {
+            "attributes": {"POSITION": place, "NORMAL": normal},
+            "indices": order,
+            "material": len(materials) - 1,
+        }
+        meshes.append({"name": solid.name, "primitives": [primitive]})
+    tree = {
+        "asset": {"version": "2.0", "generator": "shellform"},
+        "scene": 0,
+        "scenes": [{"nodes": list(range(len(meshes)))}],
+        "nodes": [{"name": mesh["name"], "mesh": k} for k, mesh in enumerate(meshes)],
+        "meshes": meshes,
+        "materials": materials,
+        "accessors": accessors,
+        "bufferViews": views,
+        "buffers": [{"byteLength": len(data)}],
+    }
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), _JSON) + text + struct.pack("<II", len(data), _BIN) + data
+    path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
+
+
+class _Scene:
+    """A scene's tables and its buffers, each loaded once."""
+
+    def __init__(self, file: Path, tree: dict[str, Any], inside: bytes) -> None:
+        self._file, self._tree, self._inside = file, tree, inside
+        self._loaded: dict[int, bytes] = {}
+        for name in tree.get("extensionsRequired", []):
+            if "draco" in name or "meshopt" in name:
+                raise InputError(
+                    f"is compressed ({name})", where=str(file), remedy="Export it without compression."
+                )
+
+    def parts(self, node: int, above: Reals, depth: int) -> list[Part]:
+        """The meshes of a node and of those below it, placed by the transformation (4, 4) from `above`."""
+        if depth > _DEEPEST:
+            raise InputError(
+                "its nodes go round in a circle", where=str(self._file), remedy="Export it anew."
+            )
+        entry = self._tree["nodes"][node]
+        here = above @ _placement(entry)
+        found = []
+        if "mesh" in entry:
+            mesh = self._tree["meshes"][entry["mesh"]]
+            name = str(entry.get("name") or mesh.get("name") or "")
+            for primitive in mesh["primitives"]:
+                found += self._part(primitive, name, str(mesh.get("name") or ""), here)
+        for child in entry.get("children", []):
+            found += self.parts(child, here, depth + 1)
+        return found
+
+    def _part(self, primitive: dict[str, Any], name: str, layer: str, place: Reals) -> list[Part]:
+        mode = primitive.get("mode", _TRIANGLES)
+        if mode not in (_TRIANGLES, _STRIP, _FAN) or "POSITION" not in primitive["attributes"]:
+            return []
+        points = np.asarray(self._accessor(primitive["attributes"]["POSITION"]), dtype=float)
+        check_points(points, str(self._file))
+        order = (
+            np.asarray(self._accessor(primitive["indices"]), dtype=np.int64).ravel()
+            if "indices" in primitive
+            else np.arange(len(points))
+        )
+        placed = points @ place[:3, :3].T + place[:3, 3]
+        return [Part(name, layer, placed, (_faces(order, mode),))]
+
+    def _accessor(self, index: int) -> NDArray[Any]:
+        entry = self._tree["accessors"][index]
+        if "sparse" in entry or "bufferView" not in entry:
+            raise InputError(
+                "has sparse accessors", where=str(self._file), remedy="Export it with plain ones."
+            )
+        view = self._tree["bufferViews"][entry["bufferView"]]
+        kind, width, count = (
+            np.dtype(_TYPES[entry["componentType"]]),
+            _WIDTH[entry["type"]],
+            int(entry["count"]),
+        )
+        stride = view.get("byteStride") or kind.itemsize * width
+        begin = view.get("byteOffset", 0) + entry.get("byteOffset", 0)
+        data = self._buffer(view["buffer"])
+        if begin + (count - 1) * stride + kind.itemsize * width > len(data):
+            raise InputError(
+                "its buffers are shorter than it says",
+                where=str(self._file),
+                remedy="Copy or export it anew.",
+            )
+        return np.ndarray((count, width), kind, data, begin, (stride, kind.itemsize)).copy()
+
+    def _buffer(self, index: int) -> bytes:
+        if index not in self._loaded:
+            uri = self._tree["buffers"][index].get("uri")
+            if uri is None:
+                self._loaded[index] = self._inside
+            elif uri.startswith("data:"):
+                self._loaded[index] = base64.b64decode(uri.partition(",")[2])
+            else:
+                beside = self._file.parent / uri
+                if not beside.is_file():
+                    raise InputError(
+                        f"its buffer {uri} isn't beside it",
+                        where=str(self._file),
+                        remedy="Copy both, or export a GLB.",
+                    )
+                self._loaded[index] = beside.read_bytes()
+        return self._loaded[index]
+
+
+def _placement(entry: dict[str, Any]) -> Reals:
+    """A node's transformation (4, 4)."""
+    if "matrix" in entry:
+        return np.array(entry["matrix"], dtype=float).reshape(4, 4).T
+    x, y, z, w = entry.get("rotation", (0.0, 0.0, 0.0, 1.0))
+    turn = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    result = np.eye(4)
+    result[:3, :3] = turn * np.array(entry.get("scale", (1.0, 1.0, 1.0)), dtype=float)
+    result[:3, 3] = entry.get("translation", (0.0, 0.0, 0.0))
+    return result
+
+
+def _faces(order: Indices, mode: int) -> Indices:
+    if mode == _TRIANGLES:
+        return order[: len(order) // 3 * 3].reshape(-1, 3)
+    if mode == _FAN:
+        return np.column_stack([np.full(len(order) - 2, order[0]), order[1:-1], order[2:]])
+    strip = np.column_stack([order[:-2], order[1:-1], order[2:]])
+    strip[1::2] = strip[1::2, ::-1]  # every second triangle of a strip runs the other way
+    return strip

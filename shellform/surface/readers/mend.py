@@ -1,0 +1,275 @@
+"""Mending a draft into one clean skin, each thing that is done told in a sentence.
+
+In this order: vertices at one place are merged, faces that shrink to nothing or are given twice and points of
+no face dropped; edges of neighbouring patches that nearly touch are sewn (seams.py); a piece is chosen; faces
+are turned alike; slivers are collapsed or flipped; of a closed skin the upper or lower face is taken
+(sides.py); and a vertex at which the edge meets itself is parted.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.seams import sewn, without_slivers
+from shellform.surface.readers.sides import shared_edges, side_of
+
+_SAME = 1e-8  # of the size: vertices nearer than that are one
+_FLAT = 1e-9  # of the squared size: a surface smaller than that has no area
+_FURTHEST = 1e9  # m from the origin
+_PIECES_TOLD = 5
+_PARTED = 1e-6  # of the size: how far the two sides of a parted vertex move into their faces
+
+
+def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | None = None) -> Draft:
+    """The draft as one connected skin with an edge, faces turned alike. Raises InputError for what can't be
+    mended and lacks a choice.
+    """
+    largest = float(np.abs(draft.points).max(initial=0.0))
+    if largest > _FURTHEST:
+        raise InputError(
+            f"has coordinates of up to {largest:.3g} m",
+            where=where,
+            remedy="Check its unit, and move it to the origin.",
+        )
+    extent = np.ptp(draft.points, axis=0) if len(draft.points) else np.zeros(3)
+    size = float(extent.max())
+    if not size > 0.0:
+        raise InputError("has no extent", where=where, remedy="Export the surface as a mesh.")
+    draft = _merged(draft, size)
+    corner = draft.points[draft.triangles]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1).sum()
+    if not area > _FLAT * size * size:
+        raise InputError(
+            "the mesh has no triangle with an area", where=where, remedy="Export the surface as a mesh."
+        )
+    draft = sewn(draft, size)
+    _refuse_branches(draft, where)
+    draft = _one_piece(draft, piece, where)
+    turned = turned_alike(draft.triangles, where)
+    flipped = int((turned != draft.triangles).any(axis=1).sum())
+    draft = replace(draft, triangles=turned)
+    if flipped:
+        draft = noted(draft, f"{flipped} faces were turned the same way as the others")
+    return _parted(_open(without_slivers(draft), face, where), size)
+
+
+def turned_alike(triangles: Indices, where: str) -> Indices:
+    """Triangles (t, 3) turned so that neighbours pass their common edge in opposite directions, in each piece
+    as most were.
+
+    Raises InputError for a skin with one side only.
+    """
+    first, second, clash = shared_edges(triangles)
+    if not clash.any():
+        return triangles
+    # Each triangle twice, as it is (i) and turned over (i + count): what agrees hangs together.
+    count = len(triangles)
+    one = np.concatenate([first, first + count])
+    other = np.concatenate([np.where(clash, second + count, second), np.where(clash, second, second + count)])
+    graph = sp.csr_array((np.ones(len(one)), (one, other)), shape=(2 * count, 2 * count))
+    label = connected_components(graph, directed=False)[1]
+    if (label[:count] == label[count:]).any():
+        raise InputError(
+            "the surface has one side only, like a Möbius strip", where=where, remedy="Check the faces."
+        )
+    pieces, piece = _pieces(triangles)
+    start = np.zeros(pieces, dtype=np.int64)
+    start[piece[::-1]] = np.arange(count)[::-1]
+    turned = label[:count] != label[start[piece]]
+    most = np.bincount(piece, weights=turned, minlength=pieces) * 2 > np.bincount(piece, minlength=pieces)
+    turned ^= most[piece]
+    result = triangles.copy()
+    result[turned] = result[turned][:, ::-1]
+    return result
+
+
+def _merged(draft: Draft, size: float) -> Draft:
+    """Vertices at one place merged, whatever their last digits; no triangle without area or given twice; no
+    vertex without triangle.
+    """
+    unused = without_unused(draft)[1]
+    if unused:
+        draft = noted(without_unused(draft)[0], f"{unused} points of no face were dropped")
+    draft = _without_points(draft)
+    same = _same_places(draft.points, _SAME * size)
+    merged = int((same != np.arange(len(same))).sum())
+    if merged:
+        draft = noted(draft, f"{merged} vertices lay on others and were merged")
+        draft = _without_points(replace(draft, triangles=same[draft.triangles]))
+    _, once = np.unique(np.sort(draft.triangles, axis=1), axis=0, return_index=True)
+    if len(once) < len(draft.triangles):
+        note = f"{len(draft.triangles) - len(once)} faces given twice were dropped"
+        draft = noted(replace(draft, triangles=draft.triangles[np.sort(once)]), note)
+    return without_unused(draft)[0]
+
+
+def _same_places(points: Reals, reach: float) -> Indices:
+    """For each point (v,) the first of those that lie within `reach` m of it, of each other, and so on."""
+    count = len(points)
+    # Equal ones first, in whatever numbers; then what few are nearly equal.
+    order = np.lexsort(points.T)
+    new = (
+        np.append(True, (points[order][1:] != points[order][:-1]).any(axis=1))
+        if count
+        else np.zeros(0, dtype=bool)
+    )
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.cumsum(new) - 1
+    apart = points[order[new]]
+    pairs = cKDTree(apart).query_pairs(reach, output_type="ndarray")
+    links = sp.csr_array((np.ones(len(pairs)), pairs.T), shape=(len(apart), len(apart)))
+    groups, label = connected_components(links, directed=False)
+    first = np.full(groups, count)
+    np.minimum.at(first, label[place], np.arange(count))
+    return np.asarray(first[label[place]])
+
+
+def _without_points(draft: Draft) -> Draft:
+    """The draft without triangles that have a vertex twice, and without what is then unused."""
+    a, b, c = draft.triangles.T
+    whole = (a != b) & (b != c) & (c != a)
+    if not whole.all():
+        draft = noted(
+            replace(draft, triangles=draft.triangles[whole]),
+            f"{int((~whole).sum())} faces without area were dropped",
+        )
+    return without_unused(draft)[0]
+
+
+def _refuse_branches(draft: Draft, where: str) -> None:
+    edges = np.sort(np.vstack([draft.triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    pairs, counts = np.unique(edges, axis=0, return_counts=True)
+    if (counts > 2).any():
+        place = draft.points[pairs[np.argmax(counts > 2), 0]]
+        raise InputError(
+            f"{int((counts > 2).sum())} edges belong to more than two faces, the first at {place.round(4).tolist()} m",
+            where=where,
+            remedy="Remove the faces inside or behind the surface and export it again.",
+        )
+
+
+def _pieces(triangles: Indices) -> tuple[int, Indices]:
+    """The number of pieces that hang together by edges, and the piece of each triangle (t,)."""
+    first, second, _ = shared_edges(triangles)
+    links = sp.csr_array((np.ones(len(first)), (first, second)), shape=(len(triangles), len(triangles)))
+    count, label = connected_components(links, directed=False)
+    return int(count), label.astype(np.int64)
+
+
+def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
+    count, label = _pieces(draft.triangles)
+    if piece is not None and not 1 <= piece <= count:
+        raise InputError(
+            f"{where} has no such piece",
+            where="surface.piece",
+            value=piece,
+            remedy=f"There are {count}, 1 the largest.",
+        )
+    if count == 1:
+        return draft
+    corner = draft.points[draft.triangles]
+    area = np.bincount(
+        label,
+        0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1),
+    )
+    order = np.argsort(-area, kind="stable")
+    if piece is None:
+        told = ", ".join(f"{area[k]:.3g}" for k in order[:_PIECES_TOLD]) + (
+            " …" if count > _PIECES_TOLD else ""
+        )
+        raise InputError(
+            f"has {count} separate pieces, of {told} m²",
+            where=where,
+            remedy="Choose one (surface.piece, --piece, 1 is the largest; or by object or layer), or join their edges.",
+        )
+    kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
+    return noted(
+        without_unused(kept)[0], f"piece {piece} of {count} was taken, {area[order[piece - 1]]:.3g} m²"
+    )
+
+
+def _open(draft: Draft, face: str | None, where: str) -> Draft:
+    """The draft, or of a closed skin its upper or lower face."""
+    if 2 * len(shared_edges(draft.triangles)[0]) < 3 * len(draft.triangles):
+        return draft
+    if face is None:
+        raise InputError(
+            "is closed, like a solid's skin: it has no edge at which rods could end",
+            where=where,
+            remedy="Choose its upper or lower face (surface.face, --face), or export that face alone.",
+        )
+    kept = replace(draft, triangles=draft.triangles[side_of(draft.points, draft.triangles, face, where)])
+    return _one_piece(
+        noted(without_unused(kept)[0], f"the {face} face of a closed skin was taken"), None, where
+    )
+
+
+def _parted(draft: Draft, size: float) -> Draft:
+    """Vertices at which several fans of triangles meet only in a point, one for each fan, a little inside
+    it.
+    """
+    faces, count = draft.triangles, len(draft.triangles)
+    at = faces.T.ravel()  # corner k of triangle t is row k * count + t
+    row = np.arange(3 * count).reshape(3, count)
+    edges = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    ends = np.column_stack(
+        [np.concatenate([row[0], row[1], row[2]]), np.concatenate([row[1], row[2], row[0]])]
+    )
+    order = np.lexsort((edges.max(axis=1), edges.min(axis=1)))
+    both = (np.sort(edges[order][1:], axis=1) == np.sort(edges[order][:-1], axis=1)).all(axis=1)
+    one, other = order[:-1][both], order[1:][both]
+    straight = edges[one, 0] == edges[other, 0]
+    links = np.vstack(
+        [
+            np.column_stack([ends[one, k], np.where(straight, ends[other, k], ends[other, 1 - k])])
+            for k in range(2)
+        ]
+    )
+    graph = sp.csr_array((np.ones(len(links)), links.T), shape=(3 * count, 3 * count))
+    fans, fan = connected_components(graph, directed=False)
+    if fans == len(draft.points):
+        return draft
+    of_fan = np.zeros(fans, dtype=np.int64)
+    of_fan[fan] = at
+    corners = np.bincount(fan, minlength=fans)
+    by_vertex = np.lexsort((-corners, of_fan))
+    extra = by_vertex[1:][
+        of_fan[by_vertex][1:] == of_fan[by_vertex][:-1]
+    ]  # all but the largest fan of a vertex
+    number = of_fan.copy()
+    number[extra] = len(draft.points) + np.arange(len(extra))
+    centre = draft.points[faces].mean(axis=1)
+    inside = (
+        np.column_stack([np.bincount(fan, np.tile(centre[:, k], 3), fans) for k in range(3)])
+        / corners[:, None]
+    )
+    step = inside[extra] - draft.points[of_fan[extra]]
+    step *= _PARTED * size / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300)
+    points = np.vstack([draft.points, draft.points[of_fan[extra]] + step])
+    normals = None if draft.normals is None else np.vstack([draft.normals, draft.normals[of_fan[extra]]])
+    parted = replace(draft, points=points, triangles=number[fan].reshape(3, count).T.copy(), normals=normals)
+    return noted(
+        parted, f"{len(extra)} vertices at which the edge met itself were parted, by {_PARTED * size:.1g} m"
+    )
+
+
+def noted(draft: Draft, note: str) -> Draft:
+    """The draft with one more note."""
+    return replace(draft, notes=(*draft.notes, note))
+
+
+def without_unused(draft: Draft) -> tuple[Draft, int]:
+    """The draft without vertices that no triangle has, and their number."""
+    used = np.zeros(len(draft.points), dtype=bool)
+    used[draft.triangles.ravel()] = True
+    normals = None if draft.normals is None else draft.normals[used]
+    faces = (np.cumsum(used) - 1)[draft.triangles]
+    return replace(draft, points=draft.points[used], triangles=faces, normals=normals), int((~used).sum())

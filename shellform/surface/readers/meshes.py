@@ -1,0 +1,87 @@
+"""PLY and MSH files, and meshes and lines written; the door to meshio."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import meshio
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.surface.readers.draft import Choice, Draft, Part, joined
+
+if TYPE_CHECKING:  # which loads numba, and the reader's process does without
+    from shellform.surface.shape.target import Surface
+
+_WRITTEN = {
+    ".stl": "stl",
+    ".obj": "obj",
+    ".ply": "ply",
+    ".off": "off",
+    ".vtk": "vtk",
+    ".vtu": "vtu",
+    ".msh": "gmsh",
+}
+_CORNERS = {"triangle6": 3, "triangle7": 3, "quad8": 4, "quad9": 4}  # of curved elements, which come first
+
+
+def read_meshio(file: Path, choice: Choice, kind: str) -> Draft:
+    """The polygons of a file of `kind` "ply" or "msh". Raises InputError for what can't be used."""
+    try:
+        mesh = meshio.read(file, file_format={"ply": "ply", "msh": "gmsh"}[kind])
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # meshio raises whatever its readers stumble over, and even exits
+        raise InputError(
+            f"can't be read as {kind.upper()}: {error or type(error).__name__}",
+            where=str(file),
+            remedy="Check that the file is whole and that its ending fits its content.",
+        ) from error
+    points = np.asarray(mesh.points, dtype=float)
+    if points.ndim != 2 or points.shape[1] not in (2, 3) or not len(points):
+        raise InputError("holds no points", where=str(file), remedy="Export the surface as a mesh.")
+    if points.shape[1] == 2:
+        points = np.column_stack([points, np.zeros(len(points))])
+    faces = tuple(
+        np.asarray(block.data, dtype=np.int64)[:, : _CORNERS.get(block.type)]
+        for block in mesh.cells
+        if block.type.startswith(("triangle", "quad", "polygon"))
+    )
+    return joined([Part("", "", points, faces)], choice, str(file))
+
+
+def write_mesh(path: str | Path, surface: Surface) -> None:
+    """Writes the triangles in metres, in the format of the path's ending. Raises InputError for an ending
+    that isn't known.
+    """
+    kind = _WRITTEN.get(Path(path).suffix.lower())
+    if kind is None:
+        raise InputError(
+            "isn't a mesh format that is written", where=str(path), remedy=f"Known: {', '.join(_WRITTEN)}."
+        )
+    try:
+        meshio.Mesh(surface.vertices, [("triangle", surface.triangles)]).write(path, file_format=kind)
+    except OSError as error:
+        raise InputError(
+            f"can't be written: {error}", where=str(path), remedy="Choose another folder."
+        ) from error
+
+
+def write_lines(
+    path: Path,
+    points: Reals,
+    lines: Indices,
+    point_data: Mapping[str, Reals],
+    cell_data: Mapping[str, Reals | Indices],
+) -> None:
+    """Writes `lines` (m, 2) between `points` (n, 3), m, as an unstructured grid (.vtu) with data of n and of
+    m rows.
+    """
+    cells = [("line", lines)]
+    meshio.Mesh(
+        points, cells, dict(point_data), {name: [values] for name, values in cell_data.items()}
+    ).write(path, "vtu")

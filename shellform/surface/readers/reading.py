@@ -1,0 +1,201 @@
+"""Any surface file to a Surface: the reader chosen by the file's ending and its content, then mended, one
+piece, one side, closed.
+
+A file's first bytes say what it is in all formats but BREP's and OBJ's, whose lines do. Where ending and
+content disagree the file is refused; where the ending is unknown, the content decides.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from shellform.errors import InputError
+from shellform.surface.readers import compas, foreign, gltf, plain
+from shellform.surface.readers.draft import Choice, Draft
+from shellform.surface.readers.fills import filled
+from shellform.surface.readers.mend import mended
+from shellform.surface.shape.target import Surface, make_surface
+from shellform.surface.units import turned_up, unit_factor
+
+ENDINGS = {
+    ".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep", ".3dm": "3dm",
+    ".stl": "stl", ".obj": "obj", ".ply": "ply", ".off": "off", ".gltf": "gltf", ".glb": "gltf", ".vtk": "vtk", ".vtu": "vtu",
+    ".vtp": "vtp", ".msh": "msh", ".json": "compas",
+}  # fmt: skip
+FORMATS = {
+    "step": "STEP", "iges": "IGES", "brep": "OpenCASCADE BREP", "3dm": "Rhino 3DM", "stl": "STL", "obj": "OBJ", "ply": "PLY",
+    "off": "OFF", "gltf": "glTF", "vtk": "VTK", "vtu": "VTU", "vtp": "VTP", "msh": "MSH", "compas": "COMPAS JSON",
+}  # fmt: skip
+MOST_BYTES = 512 * 1024**2
+_HEAD = 65536
+_UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
+_OWN = {
+    "obj": plain.read_obj,
+    "off": plain.read_off,
+    "stl": plain.read_stl,
+    "gltf": gltf.read_gltf,
+    "compas": compas.read_compas,
+}
+_OTHERS = {  # the first bytes of what people also send
+    b"PK\x03\x04": "a zip archive (3MF, IFCZIP and others)",
+    b"\x1f\x8b": "compressed with gzip",
+    b"AC10": "an AutoCAD drawing",
+    b"Kaydara FBX": "an FBX scene",
+    b"BLENDER": "a Blender file",
+    b"%PDF": "a PDF",
+}
+
+
+def read_surface(
+    path: str | Path,
+    *,
+    unit: str | None = None,
+    up: str | None = None,
+    size: float | None = None,
+    layer: str = "",
+    name: str = "",
+    face: str | None = None,
+    piece: int | None = None,
+    fill: str | None = None,
+    ground: float | None = None,
+) -> Surface:
+    """The surface in a file, in metres, z up.
+
+    `unit` of files that state none ("m" if left out); `up`, the file's vertical axis, "y" or "z" (left out:
+    the format's); `size`, m, of the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a
+    closed solid its "upper" or "lower" `face`; of several separate pieces the `piece` with that number, 1
+    being the largest; `fill` "holes", "edges" or "all" closes openings (fill.py), edges down to the `ground`,
+    m (left out: the edge's lowest point). `mended` of the result tells what was done. Raises InputError.
+    """
+    file = Path(path)
+    kind = kind_of(file)
+    if unit is not None:
+        unit_factor(unit)
+    turned_up(np.zeros((0, 3)), up or "z")  # refuses an unknown axis before the work
+    if face not in (None, "upper", "lower"):
+        raise InputError("must be upper or lower", where="surface.face", value=face)
+    if kind in _OWN:
+        draft = _OWN[kind](file, Choice(layer, name))
+    else:
+        settings = {"unit": unit, "size": size, "up": up or "z", "layer": layer, "name": name, "face": face}
+        draft = foreign.read_foreign(file, kind, settings)
+    return surface_of(_upright(draft, unit, up), str(file), face=face, piece=piece, fill=fill, ground=ground)
+
+
+def surface_of(
+    draft: Draft,
+    source: str,
+    *,
+    face: str | None = None,
+    piece: int | None = None,
+    fill: str | None = None,
+    ground: float | None = None,
+) -> Surface:
+    """A draft in metres, z up, mended and closed as `read_surface` says."""
+    whole = mended(draft, source, face=face, piece=piece)
+    if fill is not None:
+        whole = filled(whole, source, what=fill, ground=ground)
+    surface = make_surface(whole.points, whole.triangles, normals=whole.normals, source=source)
+    notes = whole.notes + surface.mended
+    corner = surface.vertices[surface.triangles]
+    plan = 0.5 * abs(float(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].sum()))
+    if plan < _UPRIGHT * surface.area:
+        share = f"{100.0 * plan / surface.area:.0f} %"
+        notes = (
+            *notes,
+            f"it stands upright, with a plan of {share} of its area: check the vertical axis (surface.up, --up)",
+        )
+    return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
+
+
+def kind_of(file: Path) -> str:
+    """The format of a file, one of ENDINGS' values. Raises InputError for what can't be read here."""
+    if not file.is_file():
+        raise InputError("there is no such file", where=str(file))
+    size = file.stat().st_size
+    if size == 0:
+        raise InputError("is empty", where=str(file), remedy="Copy or export it anew.")
+    if size > MOST_BYTES:
+        raise InputError(
+            f"is {size / 1024**2:,.0f} MB large; up to {MOST_BYTES / 1024**2:.0f} MB are read",
+            where=str(file),
+            remedy="Export a coarser mesh, or the surface alone.",
+        )
+    told = ENDINGS.get(file.suffix.lower())
+    try:
+        with file.open("rb") as opened:
+            head = opened.read(_HEAD)
+    except OSError as error:
+        raise InputError(
+            f"can't be read: {error.strerror}", where=str(file), remedy="Check its permissions."
+        ) from error
+    for first, what in _OTHERS.items():
+        if head.startswith(first):
+            raise InputError(
+                f"is {what}, which isn't read here", where=str(file), remedy=f"Known: {', '.join(ENDINGS)}."
+            )
+    found = _content(head, file)
+    if told is None and found is None:
+        raise InputError(
+            "is in no format that is read here",
+            where=str(file),
+            value=file.suffix,
+            remedy=f"Known: {', '.join(ENDINGS)}.",
+        )
+    if told is not None and found is not None and told != found:
+        ending = next(each for each, kind in ENDINGS.items() if kind == found)
+        raise InputError(
+            f"is {FORMATS[found]} by its content, though its ending is {file.suffix}",
+            where=str(file),
+            remedy=f"Rename it to {file.stem}{ending}, or export it anew.",
+        )
+    return told or found or ""
+
+
+def _content(head: bytes, file: Path) -> str | None:
+    """What the first bytes say; None where they say nothing."""
+    text = head.lstrip(b"\xef\xbb\xbf \t\r\n")
+    marks = {
+        b"ISO-10303-21": "step",
+        b"3D Geometry File Format": "3dm",
+        b"glTF": "gltf",
+        b"# vtk DataFile": "vtk",
+        b"ply\n": "ply",
+        b"ply\r": "ply",
+        b"$MeshFormat": "msh",
+        b"$NOD": "msh",
+        b"DBRep_DrawableShape": "brep",
+        b"CASCADE Topology": "brep",
+    }
+    for mark, kind in marks.items():
+        if text.startswith(mark):
+            return kind
+    if re.match(rb"(ST|C|N|4|n)*OFF\s", text):
+        return "off"
+    if b"<VTKFile" in text[:1024]:
+        xml = {b'type="PolyData"': "vtp", b'type="UnstructuredGrid"': "vtu"}
+        return next((kind for mark, kind in xml.items() if mark in text[:2048]), None)
+    if text.startswith(b"{"):
+        data = file.read_bytes()
+        return "gltf" if b'"asset"' in data and b'"bufferViews"' in data else "compas"
+    if re.match(rb"[^\r\n]{72}S[ 0]*1\s", head):
+        return "iges"
+    facets = int.from_bytes(head[80:84], "little")
+    if len(head) >= 84 and file.stat().st_size == 84 + 50 * facets:
+        return "stl"
+    if text[:5].lower() == b"solid" and b"facet" in text:
+        return "stl"
+    if b"\0" not in head and re.search(rb"(?m)^v[ \t]+[-+\d.]", head):
+        return "obj"
+    return None
+
+
+def _upright(draft: Draft, unit: str | None, up: str | None) -> Draft:
+    """The draft in metres and z up."""
+    factor = unit_factor(unit or "m") if draft.metres is None else draft.metres
+    axis = up or draft.up
+    normals = None if draft.normals is None else turned_up(draft.normals, axis)
+    return Draft(factor * turned_up(draft.points, axis), draft.triangles, normals, 1.0, "z", draft.notes)

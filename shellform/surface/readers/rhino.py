@@ -1,0 +1,317 @@
+"""Rhino's 3DM files, read and written; the door to rhino3dm.
+
+The unit is the file's. Meshes are taken as they are; NURBS surfaces, extrusions and the trimmed faces of
+breps are rebuilt in gmsh's OpenCASCADE from their control points and edges, and meshed there with exact
+normals; SubDs are subdivided. Blocks are placed by their instances. Hidden objects and layers count, since
+what is hidden on one screen is the surface on another: choose by layer or name.
+
+rhino3dm leaves out each knot vector's first and last knot, which no curve depends on, and its control points
+are homogeneous.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import rhino3dm
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.surface.readers.draft import Choice, Draft, Part, among, joined
+
+_METRES = {
+    "Microns": 1e-6, "Millimeters": 1e-3, "Centimeters": 1e-2, "Decimeters": 0.1, "Meters": 1.0, "Kilometers": 1e3,
+    "Inches": 0.0254, "Feet": 0.3048, "Yards": 0.9144,
+}  # fmt: skip
+_DEEPEST = 16  # blocks within blocks
+_SUBDIVISIONS = 3
+_ON_EDGE = 1e-4  # of the size: a trim nearer to the patch's own edge than that doesn't cut it
+_SAMPLES = 161  # along each side, whose chords are then nearer to it than that
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A NURBS curve: `control` (n, 3), m, `weights` (n,), `knots` (n + degree + 1,)."""
+
+    control: Reals
+    weights: Reals
+    knots: Reals
+    degree: int
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A NURBS surface: `control` (m, n, 3), m, `weights` (m, n), `knots` along u and v, `degree` along u and
+    v; it is trimmed by `loops` of curves, the outer one first, or whole where there are none.
+    """
+
+    control: Reals
+    weights: Reals
+    knots: tuple[Reals, Reals]
+    degree: tuple[int, int]
+    loops: tuple[tuple[Curve, ...], ...] = ()
+
+
+@dataclass(frozen=True)
+class Item:
+    """What is written: on `layer`, under a `name`, a polyline through `points` (n, 3), m, a point where there
+    is one, or where `triangles` are given their mesh; `told` are its user strings."""
+
+    layer: str
+    name: str
+    points: Reals
+    triangles: Indices | None = None
+    told: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -> None:
+    """Writes the items in metres, each layer in its colour (#rrggbb). Raises OSError where the file can't be
+    written.
+    """
+    model = rhino3dm.File3dm()
+    model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
+    model.Settings.ModelAbsoluteTolerance = 1e-6
+    layers = {}
+    for name, colour in colours.items():
+        layer = rhino3dm.Layer()
+        layer.Name, layer.Color = name, (*bytes.fromhex(colour[1:]), 255)
+        layers[name] = model.Layers.Add(layer)
+    for item in items:
+        own = rhino3dm.ObjectAttributes()
+        own.Name, own.LayerIndex = item.name, layers[item.layer]
+        for key, value in item.told.items():
+            own.SetUserString(key, value)
+        if item.triangles is not None:
+            mesh = rhino3dm.Mesh()
+            for point in item.points.tolist():
+                mesh.Vertices.Add(*point)
+            for corners in item.triangles.tolist():
+                mesh.Faces.AddFace(*corners)
+            mesh.Normals.ComputeNormals()
+            model.Objects.AddMesh(mesh, own)
+        elif len(item.points) == 1:
+            model.Objects.AddPoint(rhino3dm.Point3d(*item.points[0].tolist()), own)
+        else:
+            line = rhino3dm.Polyline([rhino3dm.Point3d(*point) for point in item.points.tolist()])
+            model.Objects.AddPolyline(line, own)
+    if not model.Write(str(path), 7):
+        raise OSError(f"rhino3dm can't write {path}")
+
+
+def read_rhino(
+    file: Path, choice: Choice, *, unit: str | None, size: float | None, up: str, face: str | None
+) -> Draft:
+    """The surfaces and meshes of a 3DM file that `choice` means, in m.
+
+    Surfaces are meshed at about `size`, m, as `cad.read_cad` does. Raises InputError for what can't be read,
+    for a stated `unit` where the file has its own, and where no object is a surface.
+    """
+    model = rhino3dm.File3dm.Read(str(file))
+    if model is None:
+        raise InputError(
+            "can't be read as a Rhino file",
+            where=str(file),
+            remedy="Save it anew in Rhino, as version 5 or later.",
+        )
+    factor = _factor(model, unit, file)
+    found = _numbered([each for each in _objects(model) if _is_surface(each[2])])
+    if not found:
+        said = (
+            ", ".join(sorted({str(each.Geometry.ObjectType).rpartition(".")[2] for each in model.Objects}))
+            or "nothing"
+        )
+        raise InputError(
+            f"holds no surface, only {said}",
+            where=str(file),
+            remedy="Save the surface, or a mesh of it, with it.",
+        )
+    kept = among([(layer, name) for layer, name, _ in found], choice, str(file))
+    chosen = [each for each, meant in zip(found, kept, strict=True) if meant]
+    parts, patches = [], []
+    for layer, name, shape in chosen:
+        if isinstance(shape, rhino3dm.Mesh | rhino3dm.SubD):
+            parts.append(_mesh(shape, layer, name, factor))
+        else:
+            patches += list(_patches(shape, factor, file))
+    if parts and patches:
+        told = ", ".join(f"{name!r} on layer {layer!r}" for layer, name, _ in chosen[:6])
+        raise InputError(
+            f"holds both meshes and surfaces: {told}",
+            where=str(file),
+            remedy="Choose by surface.object or surface.layer (--object, --layer).",
+        )
+    if parts:
+        return replace(joined(parts, Choice(), str(file)), metres=1.0, up=up)
+    from shellform.surface import cad
+
+    return cad.mesh_patches(patches, size=size, up=up, face=face, where=file)
+
+
+def _numbered(found: list[tuple[str, str, Any]]) -> list[tuple[str, str, Any]]:
+    """The objects with those without a name called by kind and number: "brep 1"."""
+    counts: Counter[str] = Counter()
+    result = []
+    for layer, name, shape in found:
+        kind = type(shape).__name__.lower()
+        counts[kind] += not name
+        result.append((layer, name or f"{kind} {counts[kind]}", shape))
+    return result
+
+
+def _factor(model: Any, unit: str | None, file: Path) -> float:
+    from shellform.surface.units import unit_factor
+
+    said = str(model.Settings.ModelUnitSystem).rpartition(".")[2]
+    if said in _METRES:
+        if unit is not None and unit_factor(unit) != _METRES[said]:
+            raise InputError(
+                f"is in {said.lower()}", where=str(file), value=unit, remedy="Leave the unit out."
+            )
+        return _METRES[said]
+    if unit is None:
+        raise InputError(
+            f"has no usable unit ({said})", where=str(file), remedy="State it: surface.unit, --unit."
+        )
+    return unit_factor(unit)
+
+
+def _objects(model: Any) -> Iterator[tuple[str, str, Any]]:
+    """Layer, name and geometry of the file's objects, those in blocks where their instances are."""
+    layers = {layer.Index: str(layer.FullPath or layer.Name) for layer in model.Layers}
+    members = {str(each.Attributes.Id): each for each in model.Objects}
+    blocks = {str(block.Id): [str(i) for i in block.GetObjectIds()] for block in model.InstanceDefinitions}
+    for each in model.Objects:
+        if not each.Attributes.IsInstanceDefinitionObject:
+            yield from _placed(each, [], members, blocks, layers)
+
+
+def _placed(
+    each: Any,
+    places: list[Any],
+    members: dict[str, Any],
+    blocks: dict[str, list[str]],
+    layers: dict[int, str],
+) -> Iterator[Any]:
+    shape = each.Geometry
+    if isinstance(shape, rhino3dm.InstanceReference) and len(places) < _DEEPEST:
+        for member in blocks.get(str(shape.ParentIdefId), []):
+            if member in members:
+                yield from _placed(members[member], [shape.Xform, *places], members, blocks, layers)
+        return
+    if places:
+        shape = shape.Duplicate()
+        for place in places:
+            shape.Transform(place)
+    yield layers.get(each.Attributes.LayerIndex, ""), str(each.Attributes.Name or ""), shape
+
+
+def _is_surface(shape: Any) -> bool:
+    return isinstance(shape, rhino3dm.Mesh | rhino3dm.SubD | rhino3dm.Brep | rhino3dm.Surface)
+
+
+def _mesh(shape: Any, layer: str, name: str, factor: float) -> Part:
+    if isinstance(shape, rhino3dm.SubD):
+        shape = shape.Duplicate()
+        shape.Subdivide(_SUBDIVISIONS)
+        shape = rhino3dm.Mesh.CreateFromSubDControlNet(shape, False)
+    points = np.array(
+        [(p.X, p.Y, p.Z) for p in (shape.Vertices.Point3dAt(k) for k in range(len(shape.Vertices)))],
+        dtype=float,
+    )
+    faces = np.array([shape.Faces[k] for k in range(shape.Faces.Count)], dtype=np.int64).reshape(-1, 4)
+    triangle = faces[:, 2] == faces[:, 3]
+    return Part(name, layer, factor * points.reshape(-1, 3), (faces[triangle, :3], faces[~triangle]))
+
+
+def _patches(shape: Any, factor: float, file: Path) -> Iterator[Patch]:
+    if isinstance(shape, rhino3dm.Extrusion):
+        shape = shape.ToBrep(False)
+    if not isinstance(shape, rhino3dm.Brep):
+        yield _patch(shape, (), factor)
+        return
+    for number in range(len(shape.Faces)):
+        face = shape.Faces[number]
+        surface = face.UnderlyingSurface()
+        if surface is None:
+            raise InputError(
+                f"its face {number + 1} has no surface",
+                where=str(file),
+                remedy="Check it in Rhino (SelBadObjects).",
+            )
+        loops = [
+            (loop.LoopType, _edges(shape, loop)) for loop in (face.Loops[k] for k in range(len(face.Loops)))
+        ]
+        if len(loops) == 1 and _along_edge(surface, loops[0][1]):
+            yield _patch(surface, (), factor)
+        else:
+            loops.sort(key=lambda loop: loop[0] != rhino3dm.BrepLoopType.Outer)
+            yield _patch(
+                surface,
+                [tuple(_curve(edge, factor) for edge in edges) for _, edges in loops if edges],
+                factor,
+            )
+
+
+def _edges(brep: Any, loop: Any) -> list[Any]:
+    """The edges of a trimming loop; a pole's trim has none."""
+    numbers = [loop.Trims[k].EdgeIndex for k in range(loop.TrimCount)]
+    return [brep.Edges[number] for number in numbers if number >= 0]
+
+
+def _curve(edge: Any, factor: float) -> Curve:
+    nurbs = edge.ToNurbsCurve()
+    points = np.array([(p.X, p.Y, p.Z, p.W) for p in (nurbs.Points[k] for k in range(len(nurbs.Points)))])
+    return Curve(
+        factor * points[:, :3] / points[:, 3:],
+        points[:, 3],
+        _full([k for k in nurbs.Knots], nurbs.Degree),
+        nurbs.Degree,
+    )
+
+
+def _patch(surface: Any, loops: Sequence[tuple[Curve, ...]], factor: float) -> Patch:
+    nurbs = surface.ToNurbsSurface()
+    rows, columns = nurbs.Points.CountU, nurbs.Points.CountV
+    points = np.array(
+        [[(p.X, p.Y, p.Z, p.W) for p in (nurbs.Points[i, j] for j in range(columns))] for i in range(rows)]
+    )
+    degree = (nurbs.OrderU - 1, nurbs.OrderV - 1)
+    knots = _full([k for k in nurbs.KnotsU], degree[0]), _full([k for k in nurbs.KnotsV], degree[1])
+    return Patch(factor * points[..., :3] / points[..., 3:], points[..., 3], knots, degree, tuple(loops))
+
+
+def _full(knots: Sequence[float], degree: int) -> Reals:
+    """The knot vector with its first and last knot, which the curve doesn't depend on."""
+    inner = np.array(knots, dtype=float)
+    first = inner[0] if np.all(inner[:degree] == inner[0]) else inner[0] - (inner[degree] - inner[degree - 1])
+    last = (
+        inner[-1]
+        if np.all(inner[-degree:] == inner[-1])
+        else inner[-1] + (inner[-degree] - inner[-degree - 1])
+    )
+    return np.concatenate([[first], inner, [last]])
+
+
+def _along_edge(surface: Any, edges: Sequence[Any]) -> bool:
+    """Whether a trimming loop runs along the untrimmed surface's own edge."""
+    (u0, u1), (v0, v1) = ((d.T0, d.T1) for d in (surface.Domain(0), surface.Domain(1)))
+    t = np.linspace(0.0, 1.0, _SAMPLES)
+    sides = [[(u0 + (u1 - u0) * s, v) for s in t] for v in (v0, v1)] + [
+        [(u, v0 + (v1 - v0) * s) for s in t] for u in (u0, u1)
+    ]
+    rim = np.array([[(p.X, p.Y, p.Z) for p in (surface.PointAt(u, v) for u, v in side)] for side in sides])
+    begin, along = rim[:, :-1].reshape(-1, 3), np.diff(rim, axis=1).reshape(-1, 3)
+    for edge in edges:
+        for s in np.linspace(edge.Domain.T0, edge.Domain.T1, 9):
+            point = edge.PointAt(s)
+            away = np.array([point.X, point.Y, point.Z]) - begin
+            share = np.sum(away * along, axis=1) / np.maximum(np.sum(along * along, axis=1), 1e-300)
+            gap = np.linalg.norm(away - np.clip(share, 0.0, 1.0)[:, None] * along, axis=1).min()
+            if gap > _ON_EDGE * float(np.ptp(rim.reshape(-1, 3), axis=0).max()):
+                return False
+    return True

@@ -1,0 +1,72 @@
+"""Builder scripts: Python files with a function `build(gmsh, *, name=default, ...)`, and perhaps `form` (see
+cad.py).
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib.util
+import inspect
+import math
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from shellform.errors import InputError
+
+
+def load_script(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise InputError("there is no such file", where=str(path))
+    spec = importlib.util.spec_from_file_location(f"surface_{path.stem}", path)
+    if spec is None or spec.loader is None:
+        raise InputError("isn't a Python script", where=str(path), remedy="Builder scripts end in .py.")
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except (Exception, SystemExit) as error:  # whatever somebody's script raises
+        raise InputError(f"the script fails: {type(error).__name__}: {error}", where=str(path)) from error
+    return module
+
+
+def function_of(module: ModuleType, name: str, path: Path) -> Callable[..., Any]:
+    found = getattr(module, name, None)
+    if not callable(found):
+        raise InputError(
+            f"has no function {name}(gmsh, *, ...)", where=str(path), remedy="See surfaces/dome.py."
+        )
+    return found  # type: ignore[no-any-return]
+
+
+def named_dimensions(build: Callable[..., Any], given: dict[str, float], path: Path) -> dict[str, float]:
+    parameters = inspect.signature(build).parameters.values()
+    known = {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
+    for name, value in known.items():
+        if not _is_length(value):
+            raise InputError(
+                f"its dimension {name!r} has no positive default",
+                where=str(path),
+                remedy=f"Write {name}=0.90, say, m.",
+            )
+    for name, value in given.items():
+        if name not in known:
+            near = difflib.get_close_matches(name, known, n=1)
+            hint = f"Did you mean {near[0]!r}? " if near else ""
+            raise InputError(
+                f"{path.name} has no dimension {name!r}",
+                where="surface.dimensions",
+                remedy=f"{hint}Known: {', '.join(known)}.",
+            )
+        if not _is_length(value):
+            raise InputError("must be a positive number", where=f"surface.dimensions.{name}", value=value)
+    return {name: float(value) for name, value in {**known, **given}.items()}
+
+
+def _is_length(value: object) -> bool:
+    return (
+        isinstance(value, int | float)
+        and not isinstance(value, bool)
+        and math.isfinite(value)
+        and value > 0.0
+    )

@@ -1,0 +1,63 @@
+"""The upper or the lower face of a closed skin, such as a solid shell's: what lies between its sharp edges.
+
+Triangles that meet at less than 35° belong together; of the regions so found, the one with the largest area
+in plan on the side asked for is the face, and with it those of the same side that have at least a quarter of
+its plan area: a skin with a few folds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.errors import InputError
+
+_SHARP = np.cos(np.deg2rad(35.0))
+_ALSO = 0.25
+_BOTH = 0.75  # of a face's area that has to point to its side
+
+
+def side_of(points: Reals, triangles: Indices, face: str, where: str) -> Flags:
+    """Which triangles (t,) of a closed skin, turned consistently, are its "upper" or "lower" `face`.
+
+    Raises InputError where no sharp edge sets it off from the rest.
+    """
+    corner = points[triangles]
+    area = 0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    if np.sum(area * (corner[:, 0] - points.mean(axis=0))) < 0.0:
+        area = -area  # turned inwards
+    size = np.linalg.norm(area, axis=1)
+    unit = area / np.maximum(size, 1e-300)[:, None]
+    first, second, _ = shared_edges(triangles)
+    smooth = np.sum(unit[first] * unit[second], axis=1) > _SHARP
+    count = len(triangles)
+    links = sp.csr_array((np.ones(int(smooth.sum())), (first[smooth], second[smooth])), shape=(count, count))
+    _, label = connected_components(links, directed=False)
+    up = 1.0 if face == "upper" else -1.0
+    plan = np.bincount(label, weights=up * area[:, 2])
+    best = float(plan.max())
+    chosen = plan >= _ALSO * best
+    kept = np.asarray(chosen[label])
+    pointing = float(size[kept & (up * area[:, 2] > 0.0)].sum())
+    if best <= 0.0 or kept.all() or pointing < _BOTH * float(size[kept].sum()):
+        raise InputError(
+            f"its {face} face isn't set off from the rest by an edge",
+            where=where,
+            remedy=f"Export the {face} face alone, as a surface.",
+        )
+    return kept
+
+
+def shared_edges(triangles: Indices) -> tuple[Indices, Indices, Flags]:
+    """The triangles on the two sides of each edge that two share, (e,) and (e,), and whether both pass it in
+    the same direction (e,).
+    """
+    edges = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    owner = np.tile(np.arange(len(triangles)), 3)
+    low, high = edges.min(axis=1), edges.max(axis=1)
+    order = np.lexsort((high, low))
+    same = (low[order][1:] == low[order][:-1]) & (high[order][1:] == high[order][:-1])
+    first, second = order[:-1][same], order[1:][same]
+    return owner[first], owner[second], np.asarray(edges[first, 0] == edges[second, 0])

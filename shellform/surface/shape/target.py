@@ -1,0 +1,296 @@
+"""The target surface: triangles with a normal at every vertex.
+
+Triangles are only the skeleton: between them the surface is taken as smooth (locate.py), so that what matters
+about the mesh are its vertices and their normals. Where a CAD kernel doesn't give these, they come from local
+jets (jets.py).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike
+from scipy.sparse.csgraph import connected_components
+
+from shellform.arrays import Indices, Reals, indices, reals
+from shellform.compiled import njit
+from shellform.errors import InputError
+from shellform.surface.shape.jets import jets
+
+_SAME = 1e-9  # of the size: vertices nearer than that are one
+_FLAT = 1e-12  # of the squared size: triangles smaller than that have no area
+
+
+@dataclass(frozen=True)
+class Surface:
+    """`vertices` (v, 3), m; `triangles` (t, 3), all turned the same way; unit `normals` (v, 3) to the upper
+    side, on which the concrete is poured; `source`, the file or script it came from; `mended`, a sentence for
+    each defect that was mended."""
+
+    vertices: Reals
+    triangles: Indices
+    normals: Reals
+    source: str = ""
+    mended: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        put = object.__setattr__
+        put(self, "vertices", reals("vertices", self.vertices, (None, 3)))
+        count = len(self.vertices)
+        put(self, "triangles", indices("triangles", self.triangles, (None, 3), below=count))
+        put(self, "normals", reals("normals", self.normals, (count, 3)))
+
+    @property
+    def area(self) -> float:
+        """m², of the triangles."""
+        return float(np.linalg.norm(_area_vectors(self.vertices, self.triangles), axis=1).sum())
+
+    @property
+    def size(self) -> Reals:
+        """Extents (3,), m, along x, y and z."""
+        return np.asarray(np.ptp(self.vertices, axis=0))
+
+    @property
+    def boundary(self) -> list[Indices]:
+        """The closed loops of vertices round the surface and round its holes, the longest, in metres,
+        first.
+        """
+        across = across_edges(self.triangles, len(self.vertices))
+        at = np.argwhere(across < 0)
+        rim = np.column_stack([self.triangles[at[:, 0], (at[:, 1] + k) % 3] for k in (0, 1)])
+        following = dict(zip(rim[:, 0].tolist(), rim[:, 1].tolist(), strict=True))
+        loops = []
+        while following:
+            start, here = following.popitem()
+            loop = [start]
+            while here != start:
+                loop.append(here)
+                here = following.pop(here)
+            loops.append(np.array(loop))
+        return sorted(loops, key=lambda loop: -_length(self.vertices[loop]))
+
+    @property
+    def holes(self) -> int:
+        """The number of openings inside the edge."""
+        return len(self.boundary) - 1
+
+
+def make_surface(
+    vertices: ArrayLike, triangles: ArrayLike, *, normals: ArrayLike | None = None, source: str = ""
+) -> Surface:
+    """The surface of a triangle mesh, `vertices` (v, 3), m, and `triangles` (t, 3), cleaned and turned
+    upwards.
+
+    Vertices at one place are merged, unused ones and triangles without area or given twice are dropped
+    (`mended` says so). `normals` (v, 3) where the source knows them; else they are estimated. Raises
+    InputError for an empty mesh, edges with more than two triangles, several separate pieces, a closed
+    surface, and one with a single side.
+    """
+    points = reals("vertices", vertices, (None, 3))
+    faces = indices("triangles", triangles, (None, 3), below=max(len(points), 1))
+    where = source or "surface"
+    given = None if normals is None else reals("normals", normals, (len(points), 3))
+    points, faces, given, mended = _cleaned(points, faces, given)
+    if not len(faces):
+        raise InputError(
+            "the mesh has no triangle with an area", where=where, remedy="Export the surface as a mesh."
+        )
+    _refuse_pieces(points, faces, where)
+    faces = _oriented(faces, len(points), where)
+    up = _area_vectors(points, faces).sum(axis=0)
+    if up[2] < 0.0:
+        faces = faces[:, ::-1].copy()
+    rough = rough_normals(points, faces)
+    if given is None:
+        unit = jets(points, faces, rough)[0]
+    else:
+        unit = given / np.linalg.norm(given, axis=1, keepdims=True)
+        unit = unit * np.where(np.sum(unit * rough, axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    return Surface(points, faces, unit, source, tuple(mended))
+
+
+def curvature(surface: Surface) -> Reals:
+    """Principal curvatures (v, 2), 1/m, positive where the surface bends away from its upper side."""
+    return jets(surface.vertices, surface.triangles, surface.normals)[1]
+
+
+def largest_curvature(surface: Surface) -> float:
+    """The largest principal curvature, 1/m, but for the two hundredth of the inner vertices where it is
+    largest: mesh noise.
+
+    Vertices at the edge don't count, where jets know one side only.
+    """
+    bent = np.abs(curvature(surface)).max(axis=1)
+    inner = np.ones(len(bent), dtype=bool)
+    inner[np.concatenate(surface.boundary)] = False
+    return float(np.percentile(bent[inner], 99.5)) if inner.any() else 0.0
+
+
+def _cleaned(
+    points: Reals, faces: Indices, normals: Reals | None
+) -> tuple[Reals, Indices, Reals | None, list[str]]:
+    """Merged vertices, triangles with an area, each once; and what was done."""
+    mended = []
+    size = float(np.ptp(points, axis=0).max()) if len(points) else 0.0
+    if size > 0.0:
+        grid = np.round(points / (_SAME * size)).astype(np.int64)
+        first, same = _distinct(grid)
+        order = np.argsort(first)
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        if len(first) < len(points):
+            mended.append(f"{len(points) - len(first)} vertices lay on others and were merged")
+        points, faces = points[first[order]], rank[same][faces]
+        normals = None if normals is None else normals[first[order]]
+    area = np.linalg.norm(_area_vectors(points, faces), axis=1)
+    thin = area <= _FLAT * size * size
+    if thin.any():
+        mended.append(f"{int(thin.sum())} triangles without area were dropped")
+        faces = faces[~thin]
+    once, _ = _distinct(np.sort(faces, axis=1))
+    if len(once) < len(faces):
+        mended.append(f"{len(faces) - len(once)} triangles given twice were dropped")
+        faces = faces[np.sort(once)]
+    used = np.zeros(len(points), dtype=bool)
+    used[faces.ravel()] = True
+    if not used.all():
+        mended.append(f"{int((~used).sum())} vertices without triangle were dropped")
+        faces = (np.cumsum(used) - 1)[faces]
+        points = points[used]
+        normals = None if normals is None else normals[used]
+    return points, faces, normals, mended
+
+
+def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
+    edges = np.sort(_directed_edges(faces), axis=1)
+    keys, counts = np.unique(edges[:, 0] * len(points) + edges[:, 1], return_counts=True)
+    if (counts > 2).any():
+        a = keys[np.argmax(counts > 2)] // len(points)
+        raise InputError(
+            f"{int((counts > 2).sum())} edges belong to more than two triangles, the first at {points[a].round(4).tolist()}",
+            where=where,
+            remedy="Remove the faces inside or behind the surface and export it again.",
+        )
+    adjacency = _adjacency(faces, len(points))
+    pieces, label = connected_components(adjacency, directed=False)
+    if pieces > 1:
+        sizes = np.sort(np.bincount(label[faces[:, 0]], minlength=pieces))[::-1]
+        raise InputError(
+            f"the mesh has {pieces} separate pieces of {', '.join(str(s) for s in sizes[:5])} triangles",
+            where=where,
+            remedy="Export one connected surface, or join its edges first.",
+        )
+    if (counts == 2).all():
+        raise InputError(
+            "the surface is closed, like a solid's skin: it has no edge at which rods could end",
+            where=where,
+            remedy="Export its upper face only.",
+        )
+
+
+def _oriented(faces: Indices, count: int, where: str) -> Indices:
+    """Faces turned so that neighbours pass their common edge in opposite directions, from the first face
+    outwards.
+    """
+    turned = np.zeros(len(faces), dtype=np.bool_)
+    if not _turn(faces, across_edges(faces, count), turned):
+        raise InputError(
+            "the surface has one side only, like a Möbius strip", where=where, remedy="Check the faces."
+        )
+    if not turned.any():
+        return faces
+    result = faces.copy()
+    result[turned] = result[turned][:, ::-1]
+    return result
+
+
+@njit(cache=True)
+def _turn(faces, across, turned):  # type: ignore[no-untyped-def]
+    """Writes which faces (t,) are to be turned over; False where that can't be done."""
+    seen = np.zeros(len(faces), dtype=np.bool_)
+    queue = np.empty(len(faces), dtype=np.int64)
+    queue[0], head, tail = 0, 0, 1
+    seen[0] = True
+    while head < tail:
+        t = queue[head]
+        head += 1
+        for k in range(3):
+            other = across[t, k]
+            if other < 0:
+                continue
+            a, b = faces[t, k], faces[t, (k + 1) % 3]
+            clash = False
+            for j in range(3):
+                if faces[other, j] == a and faces[other, (j + 1) % 3] == b:
+                    clash = True
+            wanted = turned[t] != clash
+            if not seen[other]:
+                seen[other], turned[other] = True, wanted
+                queue[tail] = other
+                tail += 1
+            elif turned[other] != wanted:
+                return False
+    return True
+
+
+def rough_normals(points: Reals, faces: Indices) -> Reals:
+    """Unit vertex normals (v, 3): triangle normals weighted by the angle at the vertex."""
+    corner = points[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    total = np.zeros_like(points)
+    for k in range(3):
+        a, b = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
+        cosine = np.sum(a * b, axis=1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+        share = np.arccos(np.clip(cosine, -1.0, 1.0))[:, None] * normal
+        for i in range(3):
+            total[:, i] += np.bincount(faces[:, k], share[:, i], len(points))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return total / np.maximum(length, 1e-300)
+
+
+def _distinct(rows: Indices) -> tuple[Indices, Indices]:
+    """The places of the first of each kind of rows (k, 3), and for each row the number of its kind."""
+    order = np.lexsort(rows.T[::-1])
+    new = np.ones(len(rows), dtype=bool)
+    new[1:] = (np.diff(rows[order], axis=0) != 0).any(axis=1)
+    kind = np.empty(len(rows), dtype=np.int64)
+    kind[order] = np.cumsum(new) - 1
+    return order[new], kind
+
+
+def _area_vectors(points: Reals, faces: Indices) -> Reals:
+    corner = points[faces]
+    return np.asarray(0.5 * np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]))
+
+
+def _directed_edges(faces: Indices) -> Indices:
+    """Edges (3 t, 2): of all triangles their first, then their second, then their third."""
+    return np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+
+
+def _length(loop: Reals) -> float:
+    return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
+
+
+def across_edges(faces: Indices, count: int) -> Indices:
+    """The triangle (t, 3) across the edge from corner k to corner k + 1, -1 at the surface's edge; of `count`
+    vertices.
+    """
+    a, b = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    key = low * count + high
+    order = np.argsort(key, kind="stable")
+    pair = np.flatnonzero(key[order][1:] == key[order][:-1])
+    first, second = order[pair], order[pair + 1]
+    result = np.full(len(key), -1)
+    result[first], result[second] = second // 3, first // 3
+    return result.reshape(-1, 3)
+
+
+def _adjacency(faces: Indices, count: int) -> sp.csr_array:
+    edges = _directed_edges(faces)
+    graph = sp.csr_array((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(count, count))
+    return sp.csr_array((graph + graph.T) > 0).astype(float)

@@ -1,0 +1,113 @@
+"""Tables that leave the house: CSV files, and one workbook of them; the door to openpyxl.
+
+Values are in SI units, said in the column's head: "length [m]". An empty cell means that the value isn't
+known.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from shellform.errors import InputError
+from shellform.written import whole, write_text
+
+Value = str | float | int | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table's `name`, the heads of its `columns`, its `rows`, and `notes` that belong to it, a sentence
+    each.
+    """
+
+    name: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Value, ...], ...]
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for number, row in enumerate(self.rows):
+            if len(row) != len(self.columns):
+                raise InputError(
+                    f"row {number} has another length than the heads", where=self.name, value=len(row)
+                )
+
+    def column(self, head: str) -> list[Value]:
+        """The values under a head. Raises InputError where there is no such head."""
+        if head not in self.columns:
+            raise InputError(
+                "is no column", where=self.name, value=head, remedy=f"Columns: {', '.join(self.columns)}."
+            )
+        place = self.columns.index(head)
+        return [row[place] for row in self.rows]
+
+
+def table_text(table: Table) -> str:
+    """The table as CSV: heads, then rows, numbers to six decimals."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(table.columns)
+    for row in table.rows:
+        writer.writerow(
+            [f"{value:.6f}" if isinstance(value, float) else "" if value is None else value for value in row]
+        )
+    return text.getvalue()
+
+
+def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:
+    """Writes NAME.csv for each table, and all of them as the sheets of schedules.xlsx; returns the files.
+
+    Raises InputError where the folder can't be written to.
+    """
+    files = []
+    for table in tables:
+        files.append(Path(folder) / f"{table.name}.csv")
+        write_text(files[-1], table_text(table))
+    files.append(Path(folder) / "schedules.xlsx")
+    with whole(files[-1]) as partial:
+        _workbook(tables).save(partial)
+    return files
+
+
+def _workbook(tables: Sequence[Table]) -> Any:
+    from openpyxl import Workbook
+    from openpyxl.styles import Alignment, Font, PatternFill
+    from openpyxl.utils import get_column_letter
+
+    book = Workbook()
+    book.remove(book.active)
+    for table in tables:
+        sheet = book.create_sheet(table.name[:31])
+        for line in table.notes:
+            sheet.append([line])
+        head = len(table.notes) + 1
+        sheet.append(list(table.columns))
+        for cell in sheet[head]:
+            cell.font = Font(bold=True)
+            cell.fill = PatternFill("solid", fgColor="DDE7EE")
+            cell.alignment = Alignment(wrap_text=True, vertical="top")
+        for row in table.rows:
+            sheet.append(list(row))
+        for number, name in enumerate(table.columns, 1):
+            letter = get_column_letter(number)
+            decimals = "0.0000" if "[m]" in name else "0.00"
+            longest = len(name) // 2
+            for (cell,) in sheet.iter_rows(
+                min_row=head + 1, max_row=head + len(table.rows), min_col=number, max_col=number
+            ):
+                if isinstance(cell.value, float):
+                    cell.number_format = decimals
+                longest = max(longest, len(str(cell.value)) if isinstance(cell.value, str) else 8)
+            sheet.column_dimensions[letter].width = min(longest + 2, 80)
+        sheet.freeze_panes = f"B{head + 1}"
+        sheet.auto_filter.ref = f"A{head}:{get_column_letter(len(table.columns))}{head + len(table.rows)}"
+        sheet.page_setup.orientation = "landscape"
+        sheet.page_setup.fitToHeight = 0
+        sheet.sheet_properties.pageSetUpPr.fitToPage = True
+        sheet.print_title_rows = f"{head}:{head}"
+    return book

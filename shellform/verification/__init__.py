@@ -1,0 +1,72 @@
+"""Published and exact cases that `shellform verify` and the tests run on the installed package.
+
+Each case is a function that yields rows; its docstring states citation, units, mesh and the reason for the
+tolerance. References are closed forms evaluated here (`exact.py`) or numbers that
+tests/literature/test_references.py recomputes by other means.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from shellform.verification import beams, bent, buckling, cables, invariances, limit_points
+from shellform.verification.cables import slack_pair
+from shellform.verification.compared import Row
+from shellform.verification.invariances import turned_forces
+from shellform.verification.models import chain
+
+__all__ = ["CASES", "Row", "chain", "slack_pair", "turned_forces", "verify"]
+
+CASES: tuple[Callable[[], Iterator[Row]], ...] = (
+    beams.cantilevers,
+    beams.cantilever_order,
+    beams.diamonds,
+    beams.roll_ups,
+    beams.bends,
+    beams.bend_order,
+    beams.helices,
+    beams.quarter_ring,
+    beams.helical_spring,
+    beams.twisted_rod,
+    beams.beam_columns,
+    beams.lee_frames,
+    limit_points.lee_limits,
+    limit_points.toggles,
+    limit_points.mises_truss,
+    limit_points.arches,
+    limit_points.domes,
+    buckling.columns,
+    buckling.braced,
+    buckling.lateral,
+    buckling.right_angle,
+    buckling.ring_pressure,
+    buckling.greenhill,
+    buckling.michell,
+    bent.strips,
+    bent.bows,
+    bent.bow_in_space,
+    bent.rings,
+    bent.laths,
+    bent.torsion_constants,
+    cables.slack,
+    cables.tripod,
+    cables.two_links,
+    cables.catenaries,
+    cables.opensees,
+    cables.force_densities,
+    cables.nets,
+    invariances.turns,
+    invariances.invariances,
+    invariances.statics,
+    invariances.work,
+    invariances.betti,
+    invariances.gradients,
+    invariances.assembled,
+    invariances.sensitivities,
+)
+
+
+def verify() -> Iterator[Row]:
+    """All cases, one row a compared number."""
+    for case in CASES:
+        yield from case()

@@ -1,0 +1,73 @@
+"""The case file: defaults, round trip, and every message."""
+
+from pathlib import Path
+
+import pytest
+
+from shellform.case.case import check_script, dump_case, load_case, shipped_surfaces
+from shellform.errors import InputError
+
+ROOT = Path(__file__).parent.parent.parent
+GOOD = (ROOT / "scripts/scale_model.toml").read_text(encoding="utf-8")
+
+
+def write(tmp_path, text):
+    file = tmp_path / "case.toml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+@pytest.mark.parametrize(
+    "name", ["scale_model", "scale_model_radius", "scale_model_rounded", "full_size", "full_size_poured"]
+)
+def test_shipped_cases_are_valid_and_survive_being_written(tmp_path, name):
+    case = load_case(ROOT / f"scripts/{name}.toml")
+    again = load_case(write(tmp_path, dump_case(case)))
+    assert again == case
+    assert Path(case.surface.file).is_file()
+
+
+def test_settings_take_the_place_of_entries():
+    case = load_case(
+        ROOT / "scripts/scale_model.toml", ["net.spacing=0.06", "title=other", "rod.radius=0.0012"]
+    )
+    assert (case.net.spacing, case.title, case.rod.radius) == (0.06, "other", 0.0012)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("spacing = 0.055", "spacin = 0.055", "did you mean 'spacing'"),
+        ("[cable]", "[cabel]", "did you mean 'cable'"),
+        ("stiffness = 187.0", "stiffness = -187.0", "cable.stiffness.*greater than 0.*-187"),
+        ("stiffness = 187.0", "stiffness = nan", "cable.stiffness.*finite"),
+        ("young = 40e9", "", "rod.young is missing"),
+        ("misfit = 0.7", "misfit = 0.8", "add up to 1"),
+        ("gap = 0.002", "gap = 0.2", "well below net.spacing"),
+        ("spacing = 0.055", 'spacing = "wide"', "net.spacing.*'wide'"),
+        ("[net]", "[net", "isn't valid TOML.*line"),
+        ("additional = 1.2", "additional = 0.5", "load.additional"),
+    ],
+)
+def test_wrong_entries_are_named_with_a_remedy(tmp_path, old, new, said):
+    assert old in GOOD
+    with pytest.raises(InputError, match=said):
+        load_case(write(tmp_path, GOOD.replace(old, new, 1)))
+
+
+def test_missing_files_and_malformed_settings_are_refused(tmp_path):
+    with pytest.raises(InputError, match="can't be read"):
+        load_case(tmp_path / "none.toml")
+    with pytest.raises(InputError, match="KEY=VALUE"):
+        load_case(ROOT / "scripts/scale_model.toml", ["net.spacing"])
+
+
+def test_scripts_from_elsewhere_are_not_run_unasked(tmp_path):
+    mine = tmp_path / "shell.py"
+    mine.write_text("raise SystemExit", encoding="utf-8")
+    with pytest.raises(InputError, match="--allow-scripts"):
+        check_script(mine, allow_scripts=False)
+    check_script(mine, allow_scripts=True)
+    check_script(shipped_surfaces() / "vault.py", allow_scripts=False)
+    with pytest.raises(InputError, match="--allow-scripts"):
+        check_script(shipped_surfaces() / ".." / "tests" / "conftest.py", allow_scripts=False)

@@ -1,0 +1,238 @@
+"""The engineer's limits, scatter and rounding, from the case file to the summary."""
+
+import csv
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.case.build_problem import below_factor, case_problem, critical_factors, shown
+from shellform.case.case import load_case
+from shellform.errors import InputError, NotConverged
+from shellform.optimiser import rounding
+from shellform.problem.robust import RobustMisfit
+from shellform.problem.terms import AtMost
+from shellform.run.folder import read_run
+from shellform.run.run import run_case
+
+ROOT = Path(__file__).parent.parent.parent
+CASE = ROOT / "scripts/scale_model.toml"
+LIMITS = [
+    "limits.utilisation=0.9",
+    "limits.connector_turn=0.4",
+    "limits.uplift=7.0",
+    "limits.slack_min=0.05",
+    "limits.critical_factor=1.25",
+]
+
+
+@pytest.fixture(scope="module")
+def loads(shell):
+    design = shell.point_load(4.0, every=2)
+    return {"none": np.zeros_like(design), "design": design, "additional": 1.2 * design}
+
+
+def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loads):
+    case = load_case(
+        CASE,
+        [
+            *LIMITS,
+            'limits.critical_loads=["design","additional"]',
+            'limits.slack_loads=["none","additional"]',
+            "robust.supports=1e-4",
+            "robust.limit=0.003",
+        ],
+    )
+    problem = case_problem(case, shell, loads, shell.design())
+    assert list(problem.loads) == ["design", "none", "additional", "critical additional", "critical design"]
+    np.testing.assert_allclose(problem.loads["critical design"], 1.25 * loads["design"])
+    kinds = [(type(each.term).__name__, each.term.load) for each in problem.limits]
+    for kind in ("RodUtilisation", "ConnectorTurn", "Uplift"):
+        assert [load for name, load in kinds if name == kind] == ["none", "design", "additional"]
+    assert [load for name, load in kinds if name == "Slackness"] == ["none", "additional"]
+    assert ("LargestCableForce", "additional") in kinds
+    assert ("Softness", "critical design") in kinds
+    assert ("RobustMisfit", "design") in kinds
+    plain = case_problem(load_case(CASE), shell, loads, shell.design())
+    assert list(plain.loads) == ["design", "none", "additional"]
+    assert len(plain.limits) == 3
+
+
+def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
+    case = load_case(CASE, ["optimise.misfit=0.4", "optimise.robust=0.3", "robust.loads_all=0.1"])
+    shares = case_problem(case, shell, loads, shell.design()).minimize
+    assert [each.share for each in shares] == [0.4, 0.3, 0.3]
+    assert isinstance(shares[2].term, RobustMisfit)
+    free = load_case(ROOT / "scripts/scale_model_radius.toml")
+    fixed = case_problem(free, shell, loads, shell.design(), frees_radius=False)
+    assert [each.share for each in fixed.minimize] == pytest.approx([0.75, 0.25])
+    assert not fixed.frees_radius
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (["limits.utilisaton=0.9"], "did you mean 'utilisation'"),
+        (["limits.utilisation=0"], "limits.utilisation.*greater than 0"),
+        (["limits.uplift=-1"], "limits.uplift"),
+        (["limits.critical_factor=0.9"], "limits.critical_factor.*greater than 1"),
+        (["robust.suports=0.1"], "did you mean 'supports'"),
+        (["robust.limit=0.1"], "nothing scatters"),
+        (["optimise.robust=0.3", "optimise.misfit=0.4"], "needs a table"),
+        (["optimise.catalogue=gfrp_rods"], "catalogue is for a free radius"),
+        (["optimise.catalogue=none", "optimise.misfit=0.5", "optimise.rod_radius=0.2"], "can't be read"),
+        (["optimise.neighbours=-1"], "optimise.neighbours"),
+    ],
+)
+def test_wrong_entries_of_limits_and_scatter_are_named(settings, said):
+    with pytest.raises(InputError, match=said):
+        load_case(CASE, settings)
+
+
+def test_limits_that_can_t_be_are_refused_when_the_problem_is_made(shell, loads):
+    case = load_case(CASE, ["limits.slack_min=0.1", 'limits.slack_loads=["storm"]'])
+    with pytest.raises(InputError, match=r"limits\.slack_loads.*storm"):
+        case_problem(case, shell, loads, shell.design())
+    case = load_case(CASE, ["limits.critical_factor=1.3", 'limits.critical_loads=["none"]'])
+    with pytest.raises(InputError, match=r"limits\.critical_loads.*none"):
+        case_problem(case, shell, loads, shell.design())
+    heavy = {name: 5.0 * load for name, load in loads.items()}
+    with pytest.raises(NotConverged, match="no critical factor can be kept"):
+        case_problem(load_case(CASE, ["limits.critical_factor=1.3"]), shell, heavy, shell.design())
+
+
+def test_the_critical_factor_told_is_where_the_loaded_path_ends(shell, loads):
+    design = shell.design()
+    unloaded = sf.follow(shell, design, {"none": loads["none"]})["none"].equilibrium.state
+    told = critical_factors(shell, design, unloaded, loads, wanted=None)
+    assert set(told) == {"design", "additional"}
+    factor = told["design"]["critical_factor"]
+    assert told["additional"]["critical_factor"] == pytest.approx(factor / 1.2, rel=1e-3)
+    # Alone, each case is followed itself; a share of another has its path, up to the factor sought; what is
+    # none is followed.
+    alone = critical_factors(shell, design, unloaded, {"design": loads["design"]}, wanted=None)
+    assert alone["design"] == {**told["design"], "critical_factor": pytest.approx(factor, rel=1e-3)}
+    light = critical_factors(
+        shell, design, unloaded, {"light": 0.01 * loads["design"], "design": loads["design"]}, wanted=None
+    )
+    assert list(light) == ["light", "design"]
+    assert light["light"] == {**told["design"], "critical_factor": None, "critical_kind": None}
+    lifted = critical_factors(
+        shell, design, unloaded, {"up": -0.5 * loads["design"], "design": loads["design"]}, wanted=None
+    )
+    assert lifted["up"]["critical_factor"] != pytest.approx(2.0 * factor)
+    assert below_factor(told, 1.1 * factor, ["design"]) == ["design"]
+    assert below_factor(told, 0.9 * factor, ["design"]) == []
+    below = sf.follow(shell, design, {"near": 0.995 * factor * loads["design"]}, stay=True)["near"]
+    beyond = sf.follow(shell, design, {"past": 1.01 * factor * loads["design"]}, stay=True)["past"]
+    assert below.on_branch
+    assert not beyond.on_branch
+    seen = shown(shell, design, unloaded, loads["none"])
+    assert seen["cables_slack"] == 0
+    assert seen["cable_force_min"] > 1.0
+    assert 0.7 < seen["stress_utilisation_max"] < 0.8
+
+
+def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
+    case = load_case(
+        CASE,
+        [
+            *LIMITS,
+            "optimise.evaluations=5",
+            "optimise.polish=0",
+            "robust.supports=5e-5",
+            "robust.loads_all=0.05",
+            "robust.samples=5",
+        ],
+    )
+    summary = run_case(case, tmp_path, until="optimise")
+    with (tmp_path / "history.csv").open(encoding="utf-8", newline="") as file:
+        row = next(csv.DictReader(file))
+    named = [
+        "utilisation.none",
+        "utilisation",
+        "connector_turn.additional",
+        "uplift",
+        "slackness.none",
+        "softness.critical design",
+        "cable_force.additional",
+    ]
+    assert {f"constraint.{name}" for name in named} <= set(row)
+    best = summary["designs"]["optimised"]["loads"]
+    assert summary["optimisation"]["feasible"]
+    assert best["design"]["critical_factor"] > 1.25
+    assert best["none"]["cable_force_min"] > 0.05
+    assert max(each["stress_utilisation_max"] for each in best.values()) < 0.9
+    assert max(each["uplift_max"] for each in best.values()) < 7.0
+    assert summary["robust"]["design"] == "optimised"
+    assert summary["robust"]["misfit_mean"] > summary["robust"]["misfit"]
+    assert summary["robust"]["sample"]["count"] == 5
+    with (tmp_path / "schedules/robust.csv").open(encoding="utf-8", newline="") as file:
+        causes = list(csv.DictReader(file))
+    assert {each["cause"] for each in causes} == {"supports", "loads_all"}
+    assert sum(float(each["share of the scatter of the shape"]) for each in causes) == pytest.approx(
+        1.0, abs=1e-3
+    )
+
+
+def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried(tmp_path):
+    settings = ["optimise.evaluations=5", "optimise.rounded=2", "optimise.polish=0"]
+    summary = run_case(
+        load_case(ROOT / "scripts/scale_model_rounded.toml", settings), tmp_path, until="optimise"
+    )
+    designs, sections = summary["designs"], summary["sections"]
+    free = designs["optimised"]["rod_radius"]
+    up = next(each for each in sections if each["rounded_up"])
+    assert up["rod_radius"] >= free
+    assert all(each["rod_radius"] < free for each in sections if each["rod_radius"] < up["rod_radius"])
+    assert 2 <= len(sections) <= 3
+    assert designs["rounded"]["rod_radius"] in [each["rod_radius"] for each in sections]
+    with (tmp_path / "schedules/sections.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["section"] for row in rows] == [each["section"] for each in sections]
+    for each in sections:
+        assert each["feasible"] == (not each["why_not"])
+    run = read_run(tmp_path)
+    assert run.best == "rounded"
+    assert run.shell_of("rounded").rod.radius == designs["rounded"]["rod_radius"]
+    # Another case in the same folder leaves nothing of this one behind.
+    again = run_case(
+        load_case(
+            ROOT / "scripts/scale_model_rounded.toml",
+            [*settings, "optimise.evaluations=1", "optimise.rounded=0"],
+        ),
+        tmp_path,
+        until="optimise",
+    )
+    assert "rounded" not in again["designs"]
+    assert "sections" not in json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert read_run(tmp_path).best == "optimised"
+
+
+def test_sections_that_bear_nothing_are_told_with_the_reason(shell, loads):
+    start = shell.design()
+    problem = sf.Problem(
+        shell,
+        {"wet": loads["design"]},
+        [sf.Share(1.0, sf.Misfit("wet"))],
+        [AtMost(20.0, sf.CableForces("wet"))],
+    )
+    best = sf.mma.optimize(problem, start, evaluations=2, thin=False)
+    heavy = {"wet": 3.0 * loads["design"]}
+    stock = sf.read_catalogue(ROOT / "scripts/scale_model_rods.toml")
+    trials = rounding.tried(
+        best,
+        start,
+        stock,
+        lambda other: dataclasses.replace(problem, shell=other, loads=heavy),
+        evaluations=2,
+        beside=0,
+    )
+    assert [each.section for each in trials] == ["⌀ 2 mm"]
+    assert "loses stability" in trials[0].why
+    assert trials[0].row()["objective"] is None
+    assert rounding.chosen(trials) is None
+    assert rounding.table(trials).count("\n") == 2

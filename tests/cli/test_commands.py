@@ -1,0 +1,258 @@
+"""The commands, as a user calls them: results, exit status, and messages without traceback."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shellform.cli import program
+from shellform.run.run import STAGES
+
+ROOT = Path(__file__).parent.parent.parent
+MODEL = {
+    "format": "shellform-model",
+    "version": 1,
+    "nodes": [[0, 0, 0], [1, 0, 0], [2, 0, 0]],
+    "beams": [{"nodes": [k, k + 1], "EA": 1e6, "GJ": 10, "EIy": 20, "EIz": 20} for k in range(2)],
+    "supports": [{"node": 0, "fixed": [True] * 6}],
+    "loads": {"tip": [{"node": 2, "force": [0, 0, -1]}], "side": [{"node": 2, "force": [0, 1, 0]}]},
+}
+
+
+def shellform(*arguments, timeout=300):
+    return subprocess.run(
+        [sys.executable, "-m", "shellform", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        cwd=ROOT,
+    )
+
+
+def refused(result, *words):
+    assert result.returncode == 2, result.stderr
+    assert "Traceback" not in result.stderr
+    for word in words:
+        assert word in result.stderr
+
+
+def model_file(tmp_path, **changes):
+    file = tmp_path / "model.json"
+    file.write_text(json.dumps({**MODEL, **changes}), encoding="utf-8")
+    return file
+
+
+def test_analyse_writes_the_result_of_the_contract(tmp_path):
+    result = shellform("analyse", model_file(tmp_path), "--load", "tip", "--increments", 2)
+    assert result.returncode == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["converged"]
+    assert found["stable"]
+    assert found["negative_pivots"] == 0
+    # PL³/3EI = 0.1333, less what large displacement and two elements take.
+    assert found["displacements"][2][2] == pytest.approx(-0.1333, abs=2e-3)
+    assert found["reactions"][0]["force"][2] == pytest.approx(1.0, abs=1e-6)
+    assert [step["factor"] for step in found["increments"]] == [0.5, 1.0]
+    keys = "beam_forces cable_forces energy iterations residual rotations seconds"
+    assert set(keys.split()) < set(found)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"format": "other"}, ["format"]),
+        ({"beems": []}, ["Did you mean 'beams'"]),
+        ({"nodes": [[0, 0, 0], [1, 0, "x"], [2, 0, 0]]}, ["nodes"]),
+        (
+            {"beams": [{"nodes": [0, 7], "EA": 1, "GJ": 1, "EIy": 1, "EIz": 1}]},
+            ["beams[0].nodes", "out of range"],
+        ),
+        ({"beams": [{"nodes": [0, 1], "EA": -1, "GJ": 1, "EIy": 1, "EIz": 1}]}, ["beams[0].EA", "positive"]),
+        ({"beams": [{"nodes": [0, 0], "EA": 1, "GJ": 1, "EIy": 1, "EIz": 1}]}, ["beams[0]", "coincide"]),
+        ({"supports": []}, ["nothing restrains"]),
+        ({"supports": [{"node": 0, "fixed": [True]}]}, ["supports[0].fixed"]),
+        ({"cables": [{"nodes": [1, 1], "EA": 5}]}, ["cables[0]", "itself"]),
+        ({"loads": {"tip": [{"node": 9}]}}, ["loads.tip[0].node"]),
+    ],
+)
+def test_bad_models_are_refused_by_field_and_element(tmp_path, changes, words):
+    refused(shellform("analyse", model_file(tmp_path, **changes), "--load", "tip"), *words)
+
+
+def test_analyse_asks_for_the_case_where_there_are_several(tmp_path):
+    refused(shellform("analyse", model_file(tmp_path)), "several load cases", "tip, side")
+    refused(shellform("analyse", model_file(tmp_path), "--load", "top"), "no such load case")
+    broken = tmp_path / "broken.json"
+    broken.write_text('{"nodes": [NaN', encoding="utf-8")
+    refused(shellform("analyse", broken))
+    refused(shellform("analyse", tmp_path / "none.json"), "can't be read")
+
+
+def test_check_tells_size_area_and_counts():
+    result = shellform("check", "scripts/scale_model.toml")
+    assert result.returncode == 0, result.stderr
+    assert "0.902" in result.stdout
+    assert "crossings to expect" in result.stdout
+
+
+def test_bad_surfaces_and_cases_are_refused_without_a_traceback(tmp_path):
+    refused(shellform("check", tmp_path / "none.obj"), "no such file")
+    case = tmp_path / "case.toml"
+    text = (
+        (ROOT / "scripts/scale_model.toml")
+        .read_text(encoding="utf-8")
+        .replace("../surfaces", str(ROOT / "surfaces"))
+    )
+    case.write_text(text.replace("spacing = 0.055", "spacin = 0.055"), encoding="utf-8")
+    refused(shellform("design", case, "--output", tmp_path / "run"), "did you mean 'spacing'")
+    case.write_text(text.replace("vault.py", "none.py"), encoding="utf-8")
+    refused(shellform("design", case, "--output", tmp_path / "run"), "no such file")
+    case.write_text(text, encoding="utf-8")
+    wide = ["--set", "surface.dimensions.length=900", "--set", "surface.dimensions.width=550"]
+    refused(
+        shellform("design", case, "--output", tmp_path / "run", *wide, "--set", "surface.size=10"), "unit"
+    )
+    refused(shellform("design", case, "--output", tmp_path / "run", "--set", "rod.radius=0.01"), "they break")
+    refused(shellform("design", case, "--output", tmp_path / "run", "--until", "lunch"), "Stages")
+    refused(shellform("render", tmp_path / "none"), "no run folder")
+    refused(shellform("report", tmp_path / "none"), "no run folder")
+    own = tmp_path / "own.py"
+    own.write_text("raise SystemExit(0)", encoding="utf-8")
+    refused(shellform("net", own, "--spacing", 0.1, "--output", tmp_path / "net"), "--allow-scripts")
+
+
+def test_check_takes_what_a_file_leaves_open_and_tells_what_was_mended(tmp_path):
+    standing = shellform("check", "surfaces/hypar.obj", "--unit", "cm", "--up", "y")
+    assert standing.returncode == 0, standing.stderr
+    assert "0.05 × 0.03 × 0.05 m (is the unit right?)" in standing.stdout
+    closed = shellform("check", "tests/data/rhinovault_holes.json", "--fill", "all")
+    assert "1 holes were closed" in closed.stdout
+    assert "COMPAS JSON" in closed.stdout
+    one = shellform("check", "tests/data/tna_tutorial.3dm", "--object", "mesh 1")
+    assert "0.01 × 0.01 × 0 m" in one.stdout
+    refused(shellform("check", "surfaces/hypar.obj", "--piece", 2), "surface.piece", "There are 1")
+    refused(shellform("check", "surfaces/hypar.obj", "--piece", 0), "surface.piece")
+    refused(shellform("check", "surfaces/hypar.obj", "--up", "x"), "surface.up")
+
+
+def test_a_refused_surface_leaves_nothing_behind(tmp_path):
+    bad = tmp_path / "bad.stl"
+    bad.write_text("solid cut off\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n")
+    case = tmp_path / "case.toml"
+    text = (
+        (ROOT / "scripts/scale_model.toml")
+        .read_text(encoding="utf-8")
+        .replace("../surfaces/vault.py", "bad.stl")
+    )
+    before, _, after = text.partition("[surface.dimensions]")
+    case.write_text(before + after[after.index("[net]") :], encoding="utf-8")
+    refused(shellform("net", bad, "--spacing", 0.5, "--output", tmp_path / "net"), "bad.stl")
+    refused(shellform("design", case, "--output", tmp_path / "run"), "bad.stl")
+    refused(shellform("check", bad), "bad.stl")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.stl", "case.toml"]
+
+
+def test_net_alone_writes_the_contract_s_file_for_a_mesh(tmp_path):
+    result = shellform("net", "surfaces/hypar.obj", "--spacing", 0.5, "--angle", 20, "--output", tmp_path)
+    assert result.returncode == 0, result.stderr
+    net = json.loads((tmp_path / "net.json").read_text(encoding="utf-8"))
+    assert len(net["crossings"]) > 50
+    assert {"direction", "index", "length", "marks", "crossings", "ends"} == set(net["rods"][0])
+
+
+def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
+    arguments = [
+        sys.executable,
+        "-m",
+        "shellform",
+        "design",
+        "scripts/scale_model.toml",
+        "--output",
+        str(tmp_path),
+    ]
+    job = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    assert job.stderr is not None
+    for line in job.stderr:
+        if line.startswith("net: done"):
+            job.send_signal(signal.SIGINT)
+            break
+    said = job.stderr.read()
+    assert job.wait(60) == 130
+    assert "stopped" in said
+    assert "Traceback" not in said
+    again = shellform("design", "scripts/scale_model.toml", "--output", tmp_path, "--until", "net")
+    assert again.stderr.count("kept") == 2
+
+
+def test_ctrl_c_within_compiled_code_stops_as_anywhere_else(monkeypatch, capsys):
+    def interrupted(standalone_mode):
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        raise SystemError("CPUDispatcher returned a result with an exception set")  # what numba makes of it
+
+    before = signal.getsignal(signal.SIGINT)
+    monkeypatch.setattr(program, "app", interrupted)
+    with pytest.raises(SystemExit) as end:
+        program.main()
+    assert end.value.code == 130
+    assert "the same command goes on from there" in capsys.readouterr().err
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
+    run = tmp_path / "run"
+    arguments = [
+        "design",
+        "scripts/scale_model.toml",
+        "--output",
+        run,
+        "--set",
+        "optimise.evaluations=5",
+        "--set",
+        "optimise.polish=3",
+    ]
+    result = shellform(*arguments)
+    assert result.returncode == 0, result.stderr
+    summary = json.loads((run / "summary.json").read_text(encoding="utf-8"))
+    designs = summary["designs"]
+    assert set(designs) == {"unbraced", "initial", "unloaded", "optimised", "polished"}
+    assert summary["optimisation"]["objective_end"] < 0.5
+    assert max(summary["optimisation"]["constraints"].values()) <= 1e-3
+    optimised = designs["optimised"]["loads"]
+    assert all(optimised[load]["stable"] and optimised[load]["on_branch"] for load in optimised)
+    # The orderings of verification.md F.
+    assert not designs["unbraced"]["loads"]["design"]["on_branch"]
+    braced = ["initial", "unloaded", "optimised"]
+    mean = {
+        name: {load: designs[name]["loads"][load]["deviation_mean"] for load in optimised} for name in braced
+    }
+    assert min(braced, key=lambda name: mean[name]["none"]) == "unloaded"
+    assert max(braced, key=lambda name: mean[name]["none"]) == "optimised"
+    assert min(braced, key=lambda name: mean[name]["design"]) == "optimised"
+    for name in (
+        "case.toml",
+        "history.csv",
+        "net.json",
+        "figures/deviations.png",
+        "figures/objective.png",
+        "drawings/grid.dxf",
+        "report.html",
+    ):
+        assert (run / name).stat().st_size > 0
+    again = shellform(*arguments, timeout=60)
+    assert again.returncode == 0
+    assert again.stderr.count("kept") == len(STAGES)
+    page = shellform("report", run, "--output", tmp_path / "page.html")
+    assert page.stdout.strip() == str(tmp_path / "page.html"), page.stderr
+    assert (run / "report.html").stat().st_size < 15e6
+    for name in ("optimised", "unbraced"):
+        found = shellform("analyse", run / f"designs/{name}.json", "--load", "design")
+        assert found.returncode == 0, found.stderr
+        moved = np.array(json.loads(found.stdout)["displacements"])
+        model = json.loads((run / f"designs/{name}.json").read_text(encoding="utf-8"))
+        away = np.linalg.norm(np.array(model["nodes"]) + moved - model["start"]["positions"], axis=1)
+        assert away.max() == pytest.approx(designs[name]["loads"]["design"]["deviation_max"], abs=0.9e-6)

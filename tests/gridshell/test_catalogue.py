@@ -1,0 +1,254 @@
+"""Rods of any section, catalogues, and rounding to them (operation 4)."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.gridshell.catalogue import (
+    allowed,
+    label,
+    largest,
+    named,
+    neighbours,
+    read_catalogue,
+    rounded_up,
+    shipped_catalogues,
+    with_section,
+)
+from shellform.gridshell.gridshell import erection_stress, max_radius
+from shellform.problem.engineering import RodUtilisation
+from shellform.structure.elements.sections import Rectangle, Round, Tube, isotropic, stiffness
+
+GLASS = isotropic(young=40e9, density=2000.0, strength=255e6)
+SECTIONS = [
+    Round(0.001, GLASS),
+    Tube(0.001, 0.0003, GLASS),
+    Rectangle(0.002, 0.001, GLASS),
+    Rectangle(0.001, 0.002, GLASS),
+]
+
+
+def small(tmp_path, text):
+    file = tmp_path / "mine.toml"
+    file.write_text(text, encoding="utf-8")
+    return file
+
+
+MINE = """
+title = "Mine"
+[material]
+young = 40e9
+poisson = 0.3
+density = 2000.0
+strength = 255e6
+[sizes]
+round = [0.0024, 0.002, 0.0022, 0.004]
+"""
+
+
+@pytest.fixture(scope="module")
+def mine(tmp_path_factory):
+    return read_catalogue(small(tmp_path_factory.mktemp("catalogue"), MINE))
+
+
+def test_a_round_rod_has_its_closed_forms():
+    rod = sf.Rod.round(young=40e9, radius=0.001, strength=255e6)
+    area, inertia = np.pi * 1e-6, 0.25 * np.pi * 1e-12
+    np.testing.assert_allclose(
+        rod.stiffness, [40e9 * area, 2 * inertia * 40e9 / 2.6, 40e9 * inertia, 40e9 * inertia]
+    )
+    assert (rod.radius, rod.young, rod.strength) == (0.001, 40e9, 255e6)
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=label)
+def test_stiffness_by_radius_is_the_derivative_among_similar_sections(section):
+    rod = sf.Rod(section)
+    assert rod.resized(rod.radius) == rod
+    step = 1e-6 * rod.radius
+    slope = (
+        np.array(rod.resized(rod.radius + step).stiffness) - rod.resized(rod.radius - step).stiffness
+    ) / (2.0 * step)
+    np.testing.assert_allclose(rod.stiffness_by_radius, slope, rtol=1e-8)
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=label)
+def test_a_resized_rod_keeps_its_proportions_and_has_the_radius_asked_for(section):
+    rod = sf.Rod(section).resized(0.0031)
+    assert rod.radius == pytest.approx(0.0031, rel=1e-15)
+    np.testing.assert_allclose(
+        np.array(rod.section.sizes) / rod.radius, np.array(section.sizes) / max(section.fibres)
+    )
+
+
+def test_equation_1_for_round_rods_is_the_net_s(net):
+    rod = sf.Rod.round(young=40e9, radius=0.001, strength=255e6)
+    assert max_radius(net, rod) == pytest.approx(net.max_radius(young=40e9, strength=255e6), rel=1e-12)
+    assert erection_stress(net, rod.section) == pytest.approx(
+        40e9 * 0.001 * net.quality.curvature_max, rel=1e-12
+    )
+    assert max_radius(net, sf.Rod(Tube(0.001, 0.0002, GLASS))) == pytest.approx(
+        max_radius(net, rod), rel=1e-12
+    )
+
+
+def test_a_lath_is_stressed_in_its_corner_by_curvature_in_and_out_of_the_surface(net):
+    bent = np.abs(net.quality.curvature)
+    lath = Rectangle(0.003, 0.001, GLASS)
+    stress = 40e9 * (0.0005 * bent[..., 0] + 0.0015 * bent[..., 1])
+    assert erection_stress(net, lath) == pytest.approx(stress.max(), rel=1e-12)
+    bearable = max_radius(net, sf.Rod(lath))
+    assert erection_stress(net, sf.Rod(lath).resized(bearable).section) == pytest.approx(255e6, rel=1e-12)
+
+
+def test_a_straight_net_bears_any_rod(net):
+    straight = replace(net, quality=replace(net.quality, curvature=0.0 * net.quality.curvature))
+    assert max_radius(straight, sf.Rod.round(young=40e9, radius=1.0, strength=1.0)) == np.inf
+
+
+def test_laths_and_tubes_brace_a_net_and_too_thick_ones_are_refused(net, vault, shell):
+    for section in SECTIONS[1:3]:
+        rod = sf.Rod(section)
+        made = sf.brace(net, rod, shell.joint, shell.cable, below=vault)
+        rods = made.beams(rod.radius)
+        assert rods.bending_y[0] == stiffness(section)[2]
+        assert rods.bending_z[0] == stiffness(section)[3]
+        with pytest.raises(InputError, match="they break"):
+            sf.brace(net, rod.resized(1.001 * max_radius(net, rod)), shell.joint, shell.cable, below=vault)
+
+
+@pytest.mark.parametrize("name", shipped_catalogues())
+def test_shipped_catalogues_are_sorted_by_stiffness_and_of_one_material(name):
+    catalogue = read_catalogue(name)
+    bending = [stiffness(section)[2] for section in catalogue.sections]
+    assert bending == sorted(bending)
+    assert len(bending) >= 12
+    assert catalogue.material.density > 0.0
+    assert np.isfinite(catalogue.material.strength)
+    for section in catalogue.sections:
+        assert named(catalogue, label(section)) == section
+
+
+def test_there_are_rods_tubes_and_laths():
+    kinds = {type(section) for name in shipped_catalogues() for section in read_catalogue(name).sections}
+    assert kinds == {Round, Tube, Rectangle}
+
+
+def test_a_catalogue_is_read_as_it_is_written(mine):
+    assert [section.radius for section in mine.sections] == pytest.approx([0.001, 0.0011, 0.0012, 0.002])
+    assert (mine.title, mine.material) == ("Mine", GLASS)
+    assert label(named(mine, "2.2mm")) == "⌀ 2.2 mm"
+
+
+def test_strength_counts_as_far_as_it_lasts(tmp_path):
+    lasting = read_catalogue(small(tmp_path, MINE.replace("255e6", "255e6\nlasting = 0.4")))
+    assert lasting.material.strength == pytest.approx(102e6)
+
+
+def test_sections_that_the_net_would_break_are_not_allowed(mine, net):
+    bearable = net.max_radius(young=40e9, strength=255e6)
+    assert 0.0012 < bearable < 0.002  # else the test says nothing
+    assert [section.radius for section in allowed(mine, net)] == pytest.approx([0.001, 0.0011, 0.0012])
+    assert largest(mine, net).radius == pytest.approx(0.0012)
+
+
+@pytest.mark.parametrize(
+    ("radius", "higher"), [(0.0009, 0.001), (0.001, 0.001), (0.00101, 0.0011), (0.0012, 0.0012)]
+)
+def test_a_radius_is_rounded_to_the_next_higher_one(mine, shell, radius, higher):
+    design = replace(shell.design(), radius=radius)
+    made, rounded = rounded_up(shell, design, mine)
+    assert rounded.radius == pytest.approx(higher)
+    assert made.rod.radius == rounded.radius
+    np.testing.assert_array_equal(rounded.rest_length, design.rest_length)
+    assert made.net is shell.net
+
+
+def test_a_tube_or_lath_is_rounded_to_one_that_bends_no_more_easily_about_either_axis(shell):
+    for name, section in [
+        ("gfrp_tubes", Tube(0.003, 0.0011, GLASS)),
+        ("timber_laths", Rectangle(0.012, 0.004, GLASS)),
+    ]:
+        catalogue = read_catalogue(name)
+        flatter = replace(
+            shell.net, quality=replace(shell.net.quality, curvature=0.02 * shell.net.quality.curvature)
+        )
+        first, design = with_section(replace(shell, net=flatter), shell.design(), section)
+        made, _ = rounded_up(first, design, catalogue)
+        assert (np.array(made.rod.stiffness[2:]) >= first.rod.stiffness[2:]).all()
+        softer = [s for s in catalogue.sections if stiffness(s)[2] < made.rod.stiffness[2]]
+        assert softer
+        assert all((np.array(stiffness(s)[2:]) < first.rod.stiffness[2:]).any() for s in softer)
+
+
+def test_neighbours_are_the_sizes_below_at_and_above_the_rounded_one(mine, shell):
+    def sizes(radius, count=1):
+        found = neighbours(shell, replace(shell.design(), radius=radius), mine, count=count)
+        return [round(2e3 * design.radius, 3) for _, design in found]
+
+    assert sizes(0.00105) == [2.0, 2.2, 2.4]
+    assert sizes(0.0009) == [2.0, 2.2]
+    assert sizes(0.00115) == [2.2, 2.4]
+    assert sizes(0.00105, 0) == [2.2]
+    assert sizes(0.0013) == [2.4]  # nothing is stiff enough: what lies below it
+    with pytest.raises(InputError, match="negative"):
+        sizes(0.001, -1)
+
+
+def test_a_design_stiffer_than_the_catalogue_is_refused(mine, shell):
+    with pytest.raises(InputError, match=r"as stiff as the design's.*⌀ 2.4 mm"):
+        rounded_up(shell, replace(shell.design(), radius=0.0013), mine)
+
+
+def test_a_catalogue_that_the_net_breaks_altogether_is_refused(net):
+    with pytest.raises(InputError, match=r"none of the sections.*would be stressed to.*MPa"):
+        allowed(read_catalogue("timber_laths"), net)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("young = 40e9\n", "", "mine.toml: material.*young"),
+        ("[sizes]", "[size]", "unknown field.*size"),
+        ("[0.0024,", '["wide",', r"sizes.round\[0\].*expected `float`"),
+        ("[0.0024,", "[-0.0024,", r"sizes.round\[0\].*positive.*-0.0012"),
+        ("poisson = 0.3", "poisson = 0.3\nshear = 1e9", "either shear or poisson"),
+        ("poisson = 0.3", "", "either shear or poisson"),
+        ("poisson = 0.3", "poisson = 0.7", "poisson.*0.7"),
+        ("255e6", "255e6\nlasting = 1.4", "material.lasting.*1.4"),
+        ("255e6", "-1.0", "material.strength.*positive"),
+        ("[0.0024, 0.002, 0.0022, 0.004]", "[]", "has no sizes"),
+        ("[material]", "[material", "isn't valid TOML"),
+        ("[material]", f"x = {'[' * 3000}\n[material]", "isn't valid TOML"),
+    ],
+)
+def test_wrong_catalogues_are_refused_with_their_entry(tmp_path, old, new, said):
+    assert old in MINE
+    with pytest.raises(InputError, match=said):
+        read_catalogue(small(tmp_path, MINE.replace(old, new, 1)))
+
+
+def test_unknown_catalogues_and_sections_are_answered_with_the_known_ones(mine):
+    with pytest.raises(InputError, match=r"can't be read.*gfrp_rods, gfrp_tubes, timber_laths"):
+        read_catalogue("bamboo")
+    with pytest.raises(InputError, match=r"'3 mm'.*Known: ⌀ 2 mm, ⌀ 2.2 mm"):
+        named(mine, "3 mm")
+
+
+@pytest.mark.parametrize("section", SECTIONS, ids=label)
+def test_the_stress_of_any_section_follows_its_radius(shell, section):
+    term = RodUtilisation("wet")
+    made, design = with_section(shell, shell.design(), section)
+    measured = term.measure(made, design, made.target)
+    step = 1e-6 * design.radius
+    up, down = (
+        term.measure(made, replace(design, radius=design.radius + s * step), made.target).value[0]
+        for s in (1, -1)
+    )
+    assert measured.by_radius[0] == pytest.approx((up - down) / (2.0 * step), rel=1e-6)
+    bending = erection_stress(shell.net, section) / section.material.strength
+    assert measured.value[0] == pytest.approx(
+        bending, rel=0.15
+    )  # axial stress and the smooth maximum come on top

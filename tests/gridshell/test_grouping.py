@@ -1,0 +1,86 @@
+"""Cables alike: groups by symmetry with one rest length each, fewest lengths to cut, a cap on their
+number.
+"""
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+
+import shellform as sf
+from shellform import mma
+from shellform.errors import InputError
+from shellform.gridshell.grouping import averaged, cut_lengths, symmetric_groups
+
+
+def cap(*, offset=(0.0, 0.0), radius=1.0, rise=0.3, rings=16):
+    points = [(0.0, 0.0)]
+    for k in range(1, rings + 1):
+        turn = np.linspace(0.0, 2.0 * np.pi, 6 * k, endpoint=False)
+        points += list(zip(radius * k / rings * np.cos(turn), radius * k / rings * np.sin(turn), strict=True))
+    plan = np.array(points)
+    ball = (radius**2 + rise**2) / (2.0 * rise)
+    height = np.sqrt(ball**2 - (plan**2).sum(axis=1)) - (ball - rise)
+    surface = sf.make_surface(np.column_stack([plan, height]), Delaunay(plan).simplices)
+    net = sf.pull_net(surface, spacing=0.2, gap=0.006, offset=offset)
+    rod = sf.Rod.round(young=40e9, radius=0.004, strength=400e6)
+    joint = sf.Joint(axial=1e6, torsion=0.2, bending=0.2, gap=0.006)
+    return sf.brace(net, rod, joint, sf.Cable(stiffness=3000.0), below=surface)
+
+
+@pytest.fixture(scope="module")
+def dome():
+    return cap()
+
+
+@pytest.fixture(scope="module")
+def problem(dome):
+    wet = dome.point_load(30.0)
+    shares = [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))]
+    limits = [sf.AtMost(600.0, sf.CableForces("wet")), sf.AtMost(0.01, sf.RmsMisfit("wetter"))]
+    return sf.Problem(dome, {"wet": wet, "wetter": 1.2 * wet}, shares, limits)
+
+
+def test_a_round_net_s_cables_come_in_groups_of_four_that_lie_on_each_other(dome):
+    groups = symmetric_groups(dome)
+    assert groups.max() + 1 == len(groups) / 4
+    middle = dome.target.positions[dome.cable_ends].mean(axis=1)
+    for group in range(groups.max() + 1):
+        folded = np.abs(middle[groups == group])
+        np.testing.assert_allclose(folded, np.broadcast_to(folded[0], folded.shape), atol=0.02 * 0.2)
+
+
+def test_a_net_without_symmetry_is_refused():
+    with pytest.raises(InputError, match="no mirror or half turn"):
+        symmetric_groups(cap(offset=(0.37, 0.21)))
+
+
+def test_polished_groups_keep_one_length_each_lower_the_misfit_and_keep_the_limits(dome, problem):
+    best = mma.optimize(problem, dome.design(), evaluations=6, thin=False)
+    groups = symmetric_groups(dome)
+    polished = mma.polish(best, evaluations=6, groups=groups)
+    design = polished.design
+    np.testing.assert_allclose(
+        averaged(design.rest_length, groups, design.present), design.rest_length, rtol=1e-12
+    )
+    assert polished.objective < polished.objective_start
+    assert max(polished.constraints.values()) <= mma.FEASIBLE
+
+
+def test_cables_are_taken_away_down_to_the_number_asked_for(dome, problem):
+    free = mma.optimize(problem, dome.design(), evaluations=10, thin=False)
+    capped = mma.optimize(problem, dome.design(), evaluations=60, most_cables=60)
+    assert capped.design.present.sum() <= 60 < free.design.present.sum()
+    assert max(capped.constraints.values()) <= mma.FEASIBLE
+
+
+def test_a_number_of_cables_that_cannot_be_reached_is_told(dome, problem):
+    capped = mma.optimize(problem, dome.design(), evaluations=12, most_cables=1)
+    assert "no design with 1 cables was found" in capped.status
+
+
+def test_cut_lengths_are_the_fewest_that_the_turnbuckles_allow():
+    rest = np.array([1.0, 1.004, 1.009, 1.012, 1.03])
+    np.testing.assert_array_equal(cut_lengths(rest[::-1], 0.01)[::-1], [1.0, 1.0, 1.0, 1.012, 1.03])
+    np.testing.assert_array_equal(cut_lengths(rest, 0.0), rest)
+    with pytest.raises(InputError, match="0 or positive"):
+        cut_lengths(rest, -1.0)

@@ -1,0 +1,114 @@
+"""The engineer's limits against re-solved neighbours."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.problem.engineering import (
+    SHARPNESS,
+    ConnectorTurn,
+    LargestCableForce,
+    RodUtilisation,
+    Slackness,
+    Softness,
+    Uplift,
+)
+from shellform.problem.problem import Evaluator
+
+
+@pytest.fixture(scope="module")
+def wet(shell):
+    return shell.point_load(3.0, every=2)
+
+
+def limited(shell, wet, term):
+    shares = [sf.Share(0.6, sf.Misfit("wet")), sf.Share(0.4, sf.RodRadius())]
+    return sf.Problem(shell, {"wet": wet}, shares, [sf.AtMost(1.0, term)], radius_bounds=(0.0005, 0.0014))
+
+
+@pytest.mark.parametrize("name", ["stress", "connectors", "cables", "slackness", "uplift", "softness"])
+def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet, name):
+    term = {
+        "stress": RodUtilisation("wet"),
+        "connectors": ConnectorTurn("wet"),
+        "cables": LargestCableForce("wet", 5.0),
+        "slackness": Slackness("wet", 0.5),
+        "uplift": Uplift("wet", wet, 2.0),
+        "softness": Softness("wet", 1.0),
+    }[name]
+    evaluator = Evaluator(limited(shell, wet, term), shell.design())
+    states = {key: loaded.equilibrium.state for key, loaded in evaluator.begin().items()}
+    point = evaluator.seed(shell.design(), states, 1.0)
+    rng = np.random.default_rng(3)
+    direction = np.append(rng.normal(size=len(point.variables) - 1), 0.7)
+    slopes = []  # central differences at two steps, whose error falls with the square of the step
+    for step in (2e-5, 1e-5):
+        plus, minus = (
+            evaluator.evaluate(point.variables + s * step * direction, states, 1.0) for s in (1, -1)
+        )
+        slopes.append((plus.constraints[0] - minus.constraints[0]) / (2 * step))
+    # Extrapolated to a step of 0, what is left is the gradient's own error.
+    best = (4.0 * slopes[1] - slopes[0]) / 3.0
+    assert point.constraints_by_variables[0] @ direction == pytest.approx(best, rel=1e-5)
+
+
+def test_the_smooth_maximum_is_never_below_the_largest_and_little_above(shell, wet):
+    evaluator = Evaluator(limited(shell, wet, RodUtilisation("wet")), shell.design())
+    state = evaluator.begin()["wet"].equilibrium.state
+    design = shell.design()
+    told = RodUtilisation("wet").measure(shell, design, state).value[0]
+    beams = shell.beams(design.radius)
+    forces = beams.local_forces(state)[beams.kind == 0]
+    inertia = 0.25 * np.pi * design.radius**4
+    stress = [
+        np.abs(forces[:, 0]) / (np.pi * design.radius**2)
+        + np.hypot(forces[:, 2 + e], forces[:, 3 + e]) * design.radius / inertia
+        for e in (0, 3)
+    ]
+    largest = np.max(stress) / shell.rod.strength
+    assert largest <= told <= largest + np.log(2 * len(forces)) / SHARPNESS
+
+
+def test_supports_that_would_lift_are_told_with_their_force(shell, wet):
+    evaluator = Evaluator(limited(shell, wet, Uplift("wet", wet, 2.0)), shell.design())
+    state = evaluator.begin()["wet"].equilibrium.state
+    told = Uplift("wet", wet, 2.0).measure(shell, shell.design(), state).value[0] - 2.0
+    assembly = evaluator.assembly(shell.design())
+    reaction = (assembly.evaluate(state, tangent=False).force - wet)[shell.net.supports, 2]
+    assert reaction.sum() == pytest.approx(-wet[:, 2].sum(), rel=1e-6)
+    assert -reaction.min() <= told <= -reaction.min() + 2.0 * np.log(len(reaction)) / SHARPNESS
+
+
+def test_limits_that_make_no_sense_are_refused(shell, wet):
+    with pytest.raises(InputError, match=r"slackness\.least"):
+        Slackness("wet", 0.0)
+    with pytest.raises(InputError, match=r"largest_cable_force\.scale"):
+        LargestCableForce("wet", 0.0)
+    with pytest.raises(InputError, match=r"softness\.least"):
+        Softness("wet", -1.0)
+    unknown = dataclasses.replace(shell, rod=sf.Rod.round(young=40e9, radius=0.001))
+    state = shell.target
+    with pytest.raises(InputError, match="strength"):
+        RodUtilisation("wet").measure(unknown, shell.design(), state)
+
+
+def test_the_largest_cable_force_is_told_little_above_and_cables_let_out_are_not_slack(shell, wet):
+    design = shell.design()
+    state = (
+        Evaluator(limited(shell, wet, LargestCableForce("wet", 5.0)), design).begin()["wet"].equilibrium.state
+    )
+    pull = shell.cables(design).tension(state)
+    told = LargestCableForce("wet", 5.0).measure(shell, design, state).value[0]
+    assert pull.max() <= told <= pull.max() + 5.0 * np.log(len(pull)) / SHARPNESS
+    lengths = design.rest_length.copy()
+    lengths[7] = 1.08 * shell.cable_lengths[7]
+    loose = dataclasses.replace(design, rest_length=lengths)
+    assert Slackness("wet", 0.5).measure(shell, loose, state).value[0] > 10.0
+    others = Slackness("wet", 0.5, let_out=1.05).measure(shell, loose, state).value[0]
+    assert others <= Slackness("wet", 0.5).measure(shell, design, state).value[0] + 1e-12
+    none = shell.unbraced()
+    assert LargestCableForce("wet", 5.0).measure(shell, none, state).value[0] == 0.0
+    assert Slackness("wet", 0.5).measure(shell, none, state).value[0] == 0.0

@@ -1,0 +1,179 @@
+"""Runs made again with other wishes, wishes for fewer or equal cables, and stages that fail: on a small dome,
+in seconds.
+"""
+
+import csv
+import json
+
+import pytest
+
+from shellform.case.case import load_case
+from shellform.errors import InputError, NotConverged
+from shellform.run import checkpoint, documents, optimising
+from shellform.run.folder import read_run
+from shellform.run.run import STAGES, run_case
+from tests.stubs import CASE
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    place = tmp_path_factory.mktemp("again") / "dome.toml"
+    place.write_text(CASE, encoding="utf-8")
+    return place
+
+
+def listed(folder):
+    return json.loads((folder / "stages.json").read_text(encoding="utf-8"))
+
+
+def test_a_design_that_is_not_asked_for_again_is_gone_with_all_its_pictures(file, tmp_path):
+    run_case(load_case(file, ["optimise.polish=2"]), tmp_path, until="optimise")
+    assert read_run(tmp_path).best == "polished"
+    for name in (
+        "mode-polished-design.png",
+        "polished-design-top.svg",
+        "pour-polished-design.gif",
+        "initial-design.png",
+    ):
+        (tmp_path / "figures" / name).write_bytes(b"drawn")
+    run_case(load_case(file), tmp_path, until="optimise")
+    assert read_run(tmp_path).best == "optimised"
+    assert not list(tmp_path.rglob("*polished*"))
+    assert (tmp_path / "figures/initial-design.png").is_file()
+
+
+def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, tmp_path):
+    most = 80
+    case = load_case(
+        file,
+        [
+            f"optimise.cables_max={most}",
+            "optimise.symmetric=true",
+            "optimise.polish=2",
+            "cable.adjustment=0.004",
+        ],
+    )
+    summary = run_case(case, tmp_path, until="optimise")
+    found = summary["optimisation"]
+    cables = summary["designs"]["polished"]["cables"]
+    assert found["cables_max"] == {"asked": most, "cables": cables, "kept": cables <= most}
+    run = read_run(tmp_path)
+    lengths = run.designs["polished"].rest_length[run.designs["polished"].present]
+    assert found["symmetric"] == {"groups": len(set(lengths.round(9))), "kept": True}
+    told = documents.write_documents(run)
+    assert told["rest_lengths"] == found["symmetric"]["groups"]
+    with (tmp_path / "schedules/cables.csv").open(encoding="utf-8") as text:
+        rows = list(csv.DictReader(text))
+    cut = [float(row["cut length [m]"]) for row in rows]
+    assert told["cut_lengths"] == len(set(cut)) < told["rest_lengths"]
+    assert all(
+        0.0 <= float(row["rest length [m]"]) - each <= 0.004 + 1e-6
+        for row, each in zip(rows, cut, strict=True)
+    )
+    run_case(case, tmp_path, until="documents")
+    from shellform.run.pages import write_report
+
+    page = write_report([tmp_path]).read_text(encoding="utf-8")
+    assert "Symmetric cables have one length" in page
+    assert f"cut to {told['cut_lengths']} different lengths" in page
+    before = listed(tmp_path)
+    run_case(
+        load_case(file, [f"optimise.cables_max={most}", "optimise.symmetric=true", "optimise.polish=2"]),
+        tmp_path,
+        until="initial",
+    )
+    assert listed(tmp_path)["optimise"] == before["optimise"], "no design depends on the turnbuckles' range"
+
+
+def test_a_number_of_cables_that_cannot_be_reached_is_said(file, tmp_path):
+    lines = []
+    case = load_case(file, ["optimise.cables_max=1"])
+    summary = run_case(case, tmp_path, until="optimise", report=lambda stage, text: lines.append(text))
+    found = summary["optimisation"]["cables_max"]
+    assert found["kept"] is False
+    assert f"note: {found['cables']} cables are left, not 1: with fewer a limit is broken" in lines
+
+
+def test_lengths_that_cannot_be_made_equal_leave_the_design_before_them(file, tmp_path, monkeypatch):
+    from shellform.optimiser import solver
+
+    def refused(*_, **__):
+        raise NotConverged("the load isn't borne")
+
+    monkeypatch.setattr(solver, "polish", refused)
+    case = load_case(file, ["optimise.symmetric=true", "optimise.polish=2"])
+    summary = run_case(case, tmp_path, until="optimise")
+    assert summary["optimisation"]["not_polished"] == "the load isn't borne"
+    assert summary["optimisation"]["symmetric"]["kept"] is False
+    assert read_run(tmp_path).best == "optimised"
+
+
+@pytest.mark.parametrize("stage", ["figures", "documents"])
+def test_a_stage_that_fails_leaves_the_others_to_be_made_and_is_made_by_the_next_run(
+    file, tmp_path, monkeypatch, stage
+):
+    from shellform.run import run
+
+    def failing(*_):
+        raise InputError("is full", where=stage)
+
+    monkeypatch.setattr(optimising, "optimise", lambda *_: None)
+    with monkeypatch.context() as broken:
+        broken.setattr(run, "_figures", lambda *_: None)
+        broken.setattr(run, f"_{stage}", failing)
+        with pytest.raises(InputError, match="is full"):
+            run_case(load_case(file), tmp_path)
+    assert set(listed(tmp_path)) == set(STAGES) - {stage}
+    assert read_run(tmp_path).summary["failed"] == {stage: f"{stage}: is full"}
+    assert f"The stage “{stage}” failed" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    monkeypatch.setattr(run, "_figures", lambda *_: None)
+    run_case(load_case(file), tmp_path)
+    assert set(listed(tmp_path)) == set(STAGES)
+    assert "failed" not in read_run(tmp_path).summary
+
+
+def test_an_optimisation_broken_off_goes_on_from_its_checkpoint_to_the_same_bytes(file, tmp_path):
+    case = load_case(file, ["optimise.evaluations=8"])
+    whole = run_case(case, tmp_path / "whole", until="optimise")
+    assert not (tmp_path / "whole" / checkpoint.FILE).exists()
+
+    def stop(stage, text):
+        if text.startswith("evaluation 4/"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path / "broken", until="optimise", report=stop)
+    assert (tmp_path / "broken" / checkpoint.FILE).is_file()
+    lines = []
+    again = run_case(
+        case, tmp_path / "broken", until="optimise", report=lambda stage, text: lines.append(text)
+    )
+    assert any(line.startswith("going on after evaluation") for line in lines)
+    assert again["optimisation"] == whole["optimisation"]
+    for name in ("optimised.json", "unloaded.json"):
+        assert (tmp_path / "broken/designs" / name).read_bytes() == (
+            tmp_path / "whole/designs" / name
+        ).read_bytes()
+
+
+def test_a_fresh_run_takes_no_checkpoint_up(file, tmp_path):
+    case = load_case(file, ["optimise.evaluations=8"])
+
+    def stop(stage, text):
+        if text.startswith("evaluation 4/"):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(case, tmp_path, until="optimise", report=stop)
+    lines = []
+    run_case(case, tmp_path, until="optimise", fresh=True, report=lambda stage, text: lines.append(text))
+    assert not any(line.startswith("going on") for line in lines)
+
+
+def test_the_log_tells_every_step_and_how_a_stage_ended(file, tmp_path):
+    with pytest.raises(NotConverged):
+        run_case(load_case(file, ["load.force=1e6"]), tmp_path, until="initial")
+    told = (tmp_path / "log.txt").read_text(encoding="utf-8")
+    assert " run: shellform " in told
+    assert " surface: done in " in told
+    assert " initial: ended: The initial design " in told

@@ -1,0 +1,151 @@
+"""`shellform render`: which files it writes for which wish, and what it refuses."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from shellform.case.case import load_case
+from shellform.errors import InputError
+from shellform.run import films
+from shellform.run.figures import Wish, draw_designs, draw_run, look_of, panel_of, wish
+from shellform.run.films import draw_film
+from shellform.run.folder import read_run
+
+ROOT = Path(__file__).parent.parent.parent
+NOTHING = {
+    "design": None, "load": None, "quantity": None, "limit": None, "view": "best", "size": None, "thickness": 0.0, "transparent": False,
+    "kind": None, "film": None,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(begun, tmp_path_factory):
+    return read_run(shutil.copytree(begun, tmp_path_factory.mktemp("pictures") / "run"))
+
+
+def names(files: list[Path]) -> list[str]:
+    return [file.name for file in files]
+
+
+def test_all_designs_under_all_loads_are_drawn_with_a_sheet_of_them(run):
+    files = draw_run(run.folder, Wish(size=(320, 200)))
+    designs = [
+        f"{design}-{load}.png"
+        for design in ("unbraced", "initial")
+        for load in ("none", "design", "additional")
+    ]
+    assert names(files) == [*designs, "deviations.png"]
+    sheet = Image.open(files[-1])
+    assert sheet.size[0] == 3 * 160
+    assert Image.open(files[0]).size == (320, 200)
+
+
+@pytest.mark.parametrize("quantity", ["utilisation", "curvature", "shear", "mode", "spring"])
+def test_a_quantity_and_a_view_stand_in_the_file_s_name(run, quantity):
+    files = draw_designs(run, Wish("initial", "design", quantity, view="top", size=(320, 200)))
+    assert names(files) == [
+        "net-springs.png" if quantity == "spring" else f"{quantity}-initial-design-top.png"
+    ]
+    assert np.ptp(np.asarray(Image.open(files[0]))) > 100
+
+
+def test_histories_are_drawn_from_the_run_s_file_and_missed_where_nothing_was_optimised(run):
+    with pytest.raises(InputError, match=r"history.csv: isn't there: nothing was optimised yet"):
+        draw_designs(run, Wish(quantity="history"))
+    text = "evaluation,accepted,objective,term.misfit,constraint.cable_force,cables\n0,1,1.0,1.0,-0.7,293\n1,1,0.6,0.6,0.0,130\n"
+    (run.folder / "history.csv").write_text(text, encoding="utf-8")
+    assert names(draw_designs(run, Wish(quantity="history", endings=(".pdf",)))) == [
+        "objective.pdf",
+        "constraints.pdf",
+    ]
+    (run.folder / "history.csv").unlink()
+
+
+def test_one_scale_of_colours_and_one_of_forces_hold_for_all_panels(run):
+    panels = [panel_of(run, "initial", load) for load in run.loads]
+    look = look_of(run, Wish(), panels)
+    assert look.limit == run.case.figures.limit
+    assert look.force == max(panel.cable_forces.max() for panel in panels)
+    assert look_of(run, Wish(limit=0.02), panels).limit == 0.02
+    bent = [panel_of(run, "initial", "design", "curvature")]
+    assert look_of(run, Wish(quantity="curvature"), bent).limit == pytest.approx(
+        run.shell.rod.strength / (run.shell.rod.young * 0.001)
+    )
+
+
+def test_titles_name_design_and_load(run):
+    assert panel_of(run, "initial", "additional").title == "initial design, additional load"
+
+
+def test_the_pour_and_the_erection_are_filmed_from_the_first_state_to_the_last(run):
+    asked = Wish("initial", size=(240, 160), endings=(".gif",))
+    (pour,) = draw_film(run, "pour", asked)
+    assert pour.name == "pour-initial-design.gif"
+    assert Image.open(pour).n_frames == 25
+    (rise,) = draw_film(
+        run, "erection", Wish("initial", quantity="utilisation", size=(240, 160), endings=(".gif",))
+    )
+    assert rise.name == "erection-initial.gif"
+    assert Image.open(rise).n_frames > 25
+
+
+def test_a_shell_poured_in_stages_is_filmed_through_all_of_them(run, monkeypatch):
+    text = (
+        (ROOT / "scripts/full_size_poured.toml")
+        .read_text(encoding="utf-8")
+        .replace("../surfaces", str(ROOT / "surfaces"))
+    )
+    file = run.folder / "staged.toml"
+    file.write_text(
+        text + '\n[[load]]\nname = "pour"\nfactors = { rods = 1.0 }\nstages = ["west", "east"]\n',
+        encoding="utf-8",
+    )
+    staged = replace(run, case=load_case(file))
+    assert films._stages(staged, None) == ["pour 1", "pour 2"]
+    assert films._stages(staged, "pour 1") == ["pour 1"]
+    assert films._stages(staged, "additional") == ["additional"]
+    assert films._stages(run, None) == ["design"]
+    monkeypatch.setattr(films, "_stages", lambda *_: ["design", "additional"])
+    (film,) = draw_film(run, "pour", Wish("initial", size=(240, 160), endings=(".gif",)))
+    assert film.name == "pour-initial-additional.gif"
+    assert Image.open(film).n_frames == 2 * 24 + 1
+
+
+def test_the_options_of_the_command_become_a_wish():
+    assert wish(**NOTHING) == Wish()
+    asked = wish(**{**NOTHING, "size": "640x400", "kind": "pdf", "quantity": "mode", "transparent": True})
+    assert asked == Wish(quantity="mode", size=(640, 400), transparent=True, endings=(".pdf",))
+    assert wish(**{**NOTHING, "film": "pour"}).endings == (".gif", ".mp4")
+    assert wish(**{**NOTHING, "film": "erection", "kind": "mp4"}) == Wish(
+        quantity="utilisation", endings=(".mp4",)
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"film": "lunch"}, "Known: pour, erection"),
+        ({"film": "pour", "quantity": "mode"}, "can't be filmed"),
+        ({"film": "pour", "transparent": True}, "can't be filmed"),
+        ({"film": "pour", "kind": "png"}, "Known: gif, mp4"),
+        ({"kind": "gif"}, "Known: png, svg, pdf"),
+        ({"quantity": "colour"}, "Known: deviation, utilisation, curvature, shear, spring, mode, history"),
+        ({"size": "640"}, "WIDTHxHEIGHT"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(given, message):
+    with pytest.raises(InputError, match=message):
+        wish(**{**NOTHING, **given})
+
+
+def test_unknown_designs_and_loads_are_refused(run):
+    with pytest.raises(InputError, match=r"--design: isn't there.*Known: unbraced, initial"):
+        draw_designs(run, Wish(design="polished"))
+    with pytest.raises(InputError, match="--load: isn't there"):
+        draw_designs(run, Wish(load="snow"))
+    with pytest.raises(InputError, match="--load: isn't there"):
+        draw_film(run, "pour", Wish(load="snow", endings=(".gif",)))

@@ -1,0 +1,109 @@
+"""From the flat grid to the braced shell, and what the rods bear on the way."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError, NotConverged
+from shellform.site.erection import erect, laid_out
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.loading import Drive, advance
+
+
+@pytest.fixture(scope="module")
+def erection(shell):
+    return erect(shell, shell.design())
+
+
+def test_erection_begins_flat_and_free_of_stress_and_ends_in_the_design_s_equilibrium(shell, erection):
+    first, last = erection.steps[0], erection.steps[-1]
+    assert first.stage == "moving supports"
+    assert first.share == 0.0
+    # The supports lie on the target, whose edge isn't exactly level; laid out they are.
+    np.testing.assert_allclose(first.state.positions, laid_out(shell).positions, atol=1e-9)
+    assert first.stress < 1.0
+    none = np.zeros((len(shell.net.grid.flat), 6))
+    expected = find_equilibrium(assemble(shell.network(shell.design())), shell.target, none).state
+    np.testing.assert_allclose(last.state.positions, expected.positions, atol=1e-8)
+    assert last.tension == pytest.approx(shell.cables(shell.design()).tension(expected).max(), rel=1e-5)
+
+
+def test_rods_bear_more_on_the_way_than_when_erected_and_heights_rise(shell, erection):
+    moving = [each for each in erection.steps if each.stage == "moving supports"]
+    heights = [each.height for each in moving]
+    assert heights == sorted(heights)
+    assert erection.worst.stress > 1.05 * moving[-1].stress
+    assert 0.0 < erection.worst.share < 1.0
+    assert erection.utilisation == pytest.approx(erection.worst.stress / 255e6)
+    assert erection.table().count("\n") == 1 + len(erection.steps)
+
+
+def test_the_way_up_passes_the_states_found_on_the_way_down(shell, erection):
+    moving = [each for each in erection.steps if each.stage == "moving supports"]
+    low, high = moving[2], moving[-1]
+    assembly = assemble(shell.network(shell.unbraced()))
+    imposed = np.zeros((len(shell.net.grid.flat), 6))
+    supports = shell.net.supports
+    imposed[supports, :3] = (high.state.positions - low.state.positions)[supports]
+    none = np.zeros_like(imposed)
+    reached = advance(assembly, low.state, Drive(none, imposed, none), step=0.1, stay=True)
+    assert reached.on_branch
+    np.testing.assert_allclose(reached.equilibrium.state.positions, high.state.positions, atol=1e-7)
+
+
+def test_the_largest_stress_is_that_of_a_curvature_like_the_net_s(shell, erection):
+    # Rods bend rather than stretch: stress over E r is a curvature.
+    curvature = erection.worst.stress / (shell.rod.young * shell.rod.radius)
+    assert 0.5 * shell.net.quality.curvature_max < curvature < 2.0 * shell.net.quality.curvature_max
+
+
+def test_groups_lift_way_points_weight_and_a_load_are_stages_of_their_own(shell):
+    design = replace(shell.design(), present=np.arange(len(shell.cable_ends)) % 2 == 0)
+    cables = np.flatnonzero(design.present)
+    supports = shell.net.supports
+    half = 0.5 * (laid_out(shell).positions[supports] + shell.target.positions[supports])
+    lift, weight = 0.1 * shell.point_load(-0.1), shell.point_load(0.01)
+    done = erect(
+        shell,
+        design,
+        way=[half],
+        groups=[cables[:70], cables[70:]],
+        lift=lift,
+        weight=weight,
+        load=shell.point_load(0.1),
+        step=0.25,
+    )
+    stages = list(dict.fromkeys(each.stage for each in done.steps))
+    assert stages == [
+        "lifting",
+        "moving supports",
+        "lowering",
+        "tightening group 1",
+        "tightening group 2",
+        "loading",
+    ]
+    expected = sf.follow(shell, design, {"all": weight + shell.point_load(0.1)})["all"].equilibrium.state
+    np.testing.assert_allclose(done.steps[-1].state.positions, expected.positions, atol=1e-6)
+    for stage in stages:
+        shares = [each.share for each in done.steps if each.stage == stage]
+        assert shares == sorted(shares)
+        assert shares[-1] == 1.0
+        assert shares[0] == 0.0 or stage.startswith("tightening") or stage == "loading"
+
+
+def test_erections_that_can_t_be_are_refused(shell):
+    design = shell.design()
+    with pytest.raises(InputError, match="between 0 and 1"):
+        erect(shell, design, step=0.0)
+    with pytest.raises(InputError, match="every cable of the design once"):
+        erect(shell, design, groups=[[0, 1]], step=1.0)
+    with pytest.raises(NotConverged, match="bears 0"):
+        erect(shell, shell.unbraced(), load=shell.point_load(30.0), step=0.5)
+    with pytest.raises(NotConverged, match="loses stability"):
+        erect(shell, replace(design, rest_length=0.6 * design.rest_length), step=0.5)
+    apart = 1.2 * shell.target.positions[shell.net.supports]
+    with pytest.raises(NotConverged, match="No stable path"):
+        erect(shell, shell.unbraced(), way=[-apart], step=0.5)
