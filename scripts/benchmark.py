@@ -42,7 +42,7 @@ from shellform.structure.solve.equilibrium import _Walk, find_equilibrium  # noq
 from shellform.structure.solve.residual import Measure, held  # noqa: E402
 
 HERE = Path(__file__).parent
-SIZES = (12, 25, 51)  # rods in each direction: 7,488, 31,200 and 127,296 freedoms
+SIZES = (12, 25, 51)  # rods in each direction: 7,488, 31,200 and 127,296 degrees of freedom
 CABLES = 13  # rods, for 288 cables
 MULTIHALLE = (184, 3)  # rods and elements: 33,856 crossings
 # of the largest force, moments over the length of an element; the peers compute in that unit of length
@@ -88,7 +88,7 @@ def walk(assembly: Assembly, model: Model) -> _Walk:
 
 def iterations(rods: int) -> tuple[list[Row], float, int]:
     """One iteration beside the bare factorisations of its matrix: rows, the iteration's median time, and the
-    number of freedoms.
+    number of degrees of freedom.
     """
     model = model_of(rods)
     assembly = assemble(model.network)
@@ -264,9 +264,9 @@ def sensitivities() -> list[Row]:
     number = np.full(6 * assembly.count, -1)
     number[assembly.free] = np.arange(len(assembly.free))
     target = np.flatnonzero(load.any(axis=1))
-    freedoms = (6 * target[:, None] + np.arange(3)).ravel()
+    dofs = (6 * target[:, None] + np.arange(3)).ravel()
     misfit = np.zeros((1, len(assembly.free)))
-    misfit[0, number[freedoms]] = 2.0 * (found.state.positions - network.nodes)[target].ravel()
+    misfit[0, number[dofs]] = 2.0 * (found.state.positions - network.nodes)[target].ravel()
     step: list[float] = []
     whole: list[float] = []
     single: list[float] = []

@@ -4,7 +4,7 @@ study undisturbed.
     scripts/study_faults.py [--kills 30] [--folder DIR] [--seed 1] [--until STAGE]
 
 Passes when both tables are the same to the byte, no design has two rows, and every file of the folders can be
-read. The designs are real ones: a dome of about 1,200 freedoms, from surface to optimised cables.
+read. The designs are real ones: a dome of about 1,200 degrees of freedom, from surface to optimised cables.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What a study costs besides its designs: one command, a few numbers each.
 
     scripts/study_measure.py soak [--designs 200]     real small designs on two workers and on one, in turns: throughput, memory over time
-    scripts/study_measure.py thousand [--designs 1000] a whole study of a small dome, 1,500 freedoms, 15 evaluations each
+    scripts/study_measure.py thousand [--designs 1000] a whole study of a small dome, 1,500 degrees of freedom, 15 evaluations each
     scripts/study_measure.py overhead                 the engine's time a design, with designs that take none
     scripts/study_measure.py table [--rows 100000]    a table of so many rows: written, opened, filtered
     scripts/study_measure.py many [--workers 1000]    so many workers in one process, with designs that sleep: what limits them
@@ -143,9 +143,9 @@ optimise.cable_force = "1 - optimise.misfit"
     found = run_study(file, place / "out", workers=2)
     spent = time.perf_counter() - began
     rows = read_table(place / "out", ["model.freedoms"]).to_pydict()
-    freedoms = max(each for each in rows["model.freedoms"] if each)
+    dofs = max(each for each in rows["model.freedoms"] if each)
     print(
-        f"{found.designs} designs of {freedoms:g} freedoms in {spent / 60:.1f} minutes, {found.failed} without a result: {place / 'out'}"
+        f"{found.designs} designs of {dofs:g} degrees of freedom in {spent / 60:.1f} minutes, {found.failed} without a result: {place / 'out'}"
     )
 
 

@@ -81,7 +81,7 @@ def build(model: models.Model) -> KM.ModelPart:
     KM.VariableUtils().AddDof(KM.ROTATION_X, KM.REACTION_MOMENT_X, part)
     KM.VariableUtils().AddDof(KM.ROTATION_Y, KM.REACTION_MOMENT_Y, part)
     KM.VariableUtils().AddDof(KM.ROTATION_Z, KM.REACTION_MOMENT_Z, part)
-    freedoms = [
+    dofs = [
         KM.DISPLACEMENT_X,
         KM.DISPLACEMENT_Y,
         KM.DISPLACEMENT_Z,
@@ -91,7 +91,7 @@ def build(model: models.Model) -> KM.ModelPart:
     ]
     nodes = part.Nodes
     for node, axis in np.argwhere(model.fixed).tolist():
-        nodes[node + 1].Fix(freedoms[axis])
+        nodes[node + 1].Fix(dofs[axis])
     if model.load[:, 3:].any():
         raise ValueError("this script applies forces only")
     for number, node in enumerate(np.flatnonzero(model.load.any(axis=1)).tolist(), 1):

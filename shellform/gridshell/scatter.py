@@ -54,8 +54,8 @@ class Scatter:
 
 @dataclass(frozen=True)
 class Built:
-    """The structure as built: `beams`, `cables`, the dead `load` (n, 6), and how far held freedoms are off,
-    `offset` (n, 6), m.
+    """The structure as built: `beams`, `cables`, the dead `load` (n, 6), and how far held degrees of freedom
+    are off, `offset` (n, 6), m.
     """
 
     beams: Beams
@@ -82,7 +82,7 @@ class Group(Protocol):
         """Second derivatives (6 n, k) of the internal forces, each by one variable twice."""
 
     def motion(self, nodes: int) -> sp.csc_array:
-        """Motion (6 n, k) of held freedoms."""
+        """Motion (6 n, k) of held degrees of freedom."""
 
     def by_state(self, state: State, multipliers: Reals) -> Reals:
         """Derivative (6 n, k) by the state of y_k'F_k for multipliers (6 n, k)."""
@@ -115,7 +115,7 @@ class Stiffness:
     def forces(self, state: State) -> sp.csc_array:
         """End forces of the elements with the derivative for a stiffness."""
         return self.deviation * _spread(
-            self.part.evaluate(state, tangent=False).force, self.part.freedoms(), state, self._column
+            self.part.evaluate(state, tangent=False).force, self.part.dofs(), state, self._column
         )
 
     def curvature(self, state: State) -> sp.csc_array:
@@ -130,24 +130,24 @@ class Stiffness:
         """The elements' tangents times the multipliers. Spins don't commute: the derivative of an end's
         moment m has -S(m)/2 besides, which cancels over a node in equilibrium; these moments are in no
         equilibrium."""
-        freedoms = self.part.freedoms()
+        dofs = self.part.dofs()
         found = self.part.evaluate(state, tangent=True)
         assert found.tangent is not None
-        own = multipliers[freedoms, self._column[:, None]]
+        own = multipliers[dofs, self._column[:, None]]
         result = np.zeros_like(multipliers)
-        change = np.einsum("eij,ej->ei", unpacked(found.tangent, freedoms.shape[1]), own)
+        change = np.einsum("eij,ej->ei", unpacked(found.tangent, dofs.shape[1]), own)
         if isinstance(self.part, Beams):
             for spins in (slice(3, 6), slice(9, 12)):
                 change[:, spins] -= 0.5 * np.cross(own[:, spins], found.force[:, spins])
         change *= self.deviation
-        np.add.at(result, (freedoms, self._column[:, None]), change)
+        np.add.at(result, (dofs, self._column[:, None]), change)
         return result
 
     def by_rest_length(self, state: State, multipliers: Reals) -> Reals:
         """Through the cables' forces, which are linear in EA."""
         if not isinstance(self.part, Cables):
             return np.zeros(1)
-        own = multipliers[self.part.freedoms(), self._column[:, None]]
+        own = multipliers[self.part.dofs(), self._column[:, None]]
         return self.deviation * np.asarray((own * self.part.force_by_rest_length(state)).sum(axis=1))
 
     def varied(self, built: Built, z: Reals) -> Built:
@@ -182,13 +182,13 @@ class Lengths:
     def forces(self, state: State) -> sp.csc_array:
         """(A.23)."""
         return self.deviation * _spread(
-            self.cables.force_by_rest_length(state), self.cables.freedoms(), state, np.arange(self.count)
+            self.cables.force_by_rest_length(state), self.cables.dofs(), state, np.arange(self.count)
         )
 
     def curvature(self, state: State) -> sp.csc_array:
         """By a rest length twice: 2 EA / l0³ along the chord."""
         return self.deviation**2 * _spread(
-            self._twice(state), self.cables.freedoms(), state, np.arange(self.count)
+            self._twice(state), self.cables.dofs(), state, np.arange(self.count)
         )
 
     def motion(self, nodes: int) -> sp.csc_array:
@@ -197,19 +197,19 @@ class Lengths:
 
     def by_state(self, state: State, multipliers: Reals) -> Reals:
         """The force by rest length is -EA / l0² times the chord: linear in the places of the ends."""
-        freedoms, columns = self.cables.freedoms(), np.arange(self.count)[:, None]
-        own = multipliers[freedoms, columns]
+        dofs, columns = self.cables.dofs(), np.arange(self.count)[:, None]
+        own = multipliers[dofs, columns]
         pulled = np.where(
             self._taut(state), -self.deviation * self.cables.stiffness / self.cables.rest_length**2, 0.0
         )
         away = pulled[:, None] * (own[:, 3:] - own[:, :3])
         result = np.zeros_like(multipliers)
-        np.add.at(result, (freedoms, columns), np.hstack([-away, away]))
+        np.add.at(result, (dofs, columns), np.hstack([-away, away]))
         return result
 
     def by_rest_length(self, state: State, multipliers: Reals) -> Reals:
         """By the own rest length once more."""
-        own = multipliers[self.cables.freedoms(), np.arange(self.count)[:, None]]
+        own = multipliers[self.cables.dofs(), np.arange(self.count)[:, None]]
         return self.deviation * np.asarray((own * self._twice(state)).sum(axis=1))
 
     def varied(self, built: Built, z: Reals) -> Built:
@@ -232,13 +232,13 @@ class Supports:
     """The places of the supports."""
 
     name: str
-    freedoms: Indices
+    dofs: Indices
     deviation: float
 
     @property
     def count(self) -> int:
         """Three a support."""
-        return len(self.freedoms)
+        return len(self.dofs)
 
     def forces(self, state: State) -> sp.csc_array:
         """None at a fixed state: it is the motion that strains."""
@@ -247,9 +247,9 @@ class Supports:
     curvature = forces
 
     def motion(self, nodes: int) -> sp.csc_array:
-        """Each freedom by s."""
+        """Each degree of freedom by s."""
         values = np.full(self.count, self.deviation)
-        return sp.csc_array((values, (self.freedoms, np.arange(self.count))), shape=(6 * nodes, self.count))
+        return sp.csc_array((values, (self.dofs, np.arange(self.count))), shape=(6 * nodes, self.count))
 
     def by_state(self, state: State, multipliers: Reals) -> Reals:
         """None."""
@@ -262,7 +262,7 @@ class Supports:
     def varied(self, built: Built, z: Reals) -> Built:
         """Offsets of s z."""
         offset = built.offset.copy()
-        offset.reshape(-1)[self.freedoms] += self.deviation * z
+        offset.reshape(-1)[self.dofs] += self.deviation * z
         return replace(built, offset=offset)
 
 
@@ -385,8 +385,8 @@ def _only(beams: Beams, chosen: Indices, properties: tuple[str, ...]) -> Beams:
     )
 
 
-def _spread(values: Reals, freedoms: Indices, state: State, columns: Indices) -> sp.csc_array:
+def _spread(values: Reals, dofs: Indices, state: State, columns: Indices) -> sp.csc_array:
     """Element values (m, d) as columns (6 n, k)."""
-    wide = np.broadcast_to(columns[:, None], freedoms.shape)
+    wide = np.broadcast_to(columns[:, None], dofs.shape)
     shape = (6 * len(state.positions), int(columns.max()) + 1)
-    return sp.csc_array((values.ravel(), (freedoms.ravel(), wide.ravel())), shape=shape)
+    return sp.csc_array((values.ravel(), (dofs.ravel(), wide.ravel())), shape=shape)

@@ -44,7 +44,7 @@ class SlidingSprings:
         put(self, "density", reals("springs.density", self.density, (count,), positive=True))
         put(self, "level", reals("springs.level", self.level, (count,)))
 
-    def freedoms(self) -> Indices:
+    def dofs(self) -> Indices:
         """Translations (k, 3) of the pulled nodes."""
         return 6 * self.nodes[:, None] + np.arange(3)
 

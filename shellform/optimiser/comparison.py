@@ -13,10 +13,10 @@ accepted that one isn't told, but it is on the stable branch.
 
 SciPy can't be led to a load by stages: the start must bear all loads.
 
-Measured on a gridshell of 28 candidate cables and 714 freedoms, misfit and cable forces with shares of 0.9
-and 0.1 (evaluations to the end): mma.optimize 0.4361 (8), SLSQP 0.4360 (119), trust-constr 0.4360 (79); with
-cable forces limited and the limit active 0.4461 (7), 0.4588 (90), 0.4457 (26). Where a cable goes slack the
-objective has a kink in its rest length, at which SLSQP stops early.
+Measured on a gridshell of 28 candidate cables and 714 degrees of freedom, misfit and cable forces with shares
+of 0.9 and 0.1 (evaluations to the end): mma.optimise 0.4361 (8), SLSQP 0.4360 (119), trust-constr 0.4360
+(79); with cable forces limited and the limit active 0.4461 (7), 0.4588 (90), 0.4457 (26). Where a cable goes
+slack the objective has a kink in its rest length, at which SLSQP stops early.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ class Plain:
         reached = self.evaluator.begin()
         for name in self.evaluator.used():
             if not reached[name].on_branch:
-                raise not_carried(name, reached[name], "Lead it there by stages: mma.optimize.")
+                raise not_carried(name, reached[name], "Lead it there by stages: mma.optimise.")
         states = {name: reached[name].equilibrium.state for name in self.evaluator.used()}
         point = self.evaluator.seed(start, states, 1.0)
         self.start = point.variables
@@ -149,7 +149,7 @@ def compare(
     """SciPy's optimum of the problem from the start, within a number of design `evaluations`.
 
     `tolerance`: of the objective for SLSQP; of the gradient, the trust region and the barrier for
-    trust-constr. For the same problem from mma.optimize give it `stiffness=0`, `thin=False`: both add to the
+    trust-constr. For the same problem from mma.optimise give it `stiffness=0`, `thin=False`: both add to the
     problem. Raises InputError for another method and NotConverged where the start doesn't bear all loads.
     """
     if method not in METHODS:

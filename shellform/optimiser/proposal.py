@@ -70,7 +70,7 @@ def propose(task: Task) -> tuple[Reals, float]:
     slope = task.point.objective_by_variables @ model.variables_by_y
     curvature = sum(
         weight * model.misfit_hessian
-        for weight, part in zip(task.evaluator.weights, task.evaluator.problem.minimize, strict=True)
+        for weight, part in zip(task.evaluator.weights, task.evaluator.problem.minimise, strict=True)
         if isinstance(part.term, (Misfit, RobustMisfit)) and part.term.load == task.base
     )
     slope = _exact_in_tension(slope, task)
@@ -201,7 +201,7 @@ def _exact_in_tension(slope: Reals, task: Task) -> Reals:
         return slope
     result = slope.copy()
     total = np.zeros(count)
-    for weight, part in zip(task.evaluator.weights, task.evaluator.problem.minimize, strict=True):
+    for weight, part in zip(task.evaluator.weights, task.evaluator.problem.minimise, strict=True):
         if part.term.load != task.base:
             continue
         if isinstance(part.term, (Misfit, RobustMisfit)):

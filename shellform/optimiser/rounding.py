@@ -92,7 +92,7 @@ def tried(
     first = follow(shell, start, {base: best.problem.loads[base]})[base].equilibrium.state
     weights = [
         share.share / max(float(share.term.measure(shell, start, first).value[0]), 1e-300)
-        for share in best.problem.minimize
+        for share in best.problem.minimise
     ]
     up = rounded_up(shell, best.design, catalogue)[0].rod.section
     found = []
@@ -146,7 +146,7 @@ def _optimised(
     optimum, why = None, ""
     for start in starts:
         try:
-            found = solver.optimize(
+            found = solver.optimise(
                 problem,
                 start,
                 evaluations=evaluations,
@@ -199,7 +199,7 @@ def _trial(
     away = deviations(shell, state)
     objective = sum(
         weight * float(part.term.measure(shell, optimum.design, state).value[0])
-        for weight, part in zip(weights, problem.minimize, strict=True)
+        for weight, part in zip(weights, problem.minimise, strict=True)
     )
     used = _used(shell, optimum.design, state)
     if used > 1.0:

@@ -1,4 +1,4 @@
-"""Where a search of `mma.optimize` or `mma.polish` stands, and what its phases (phases.py) do with it:
+"""Where a search of `mma.optimise` or `mma.polish` stands, and what its phases (phases.py) do with it:
 models, trials, judgement, records.
 """
 
@@ -358,7 +358,7 @@ class Search:
         pull = self.tensions(point)
         terms = {
             self._name(part.term): float(value)
-            for part, value in zip(problem.minimize, point.terms, strict=True)
+            for part, value in zip(problem.minimise, point.terms, strict=True)
         }
         constraints = {
             self._name(part.term): float(pull.max(initial=0.0)) / part.limit - 1.0 for part in self.bounded

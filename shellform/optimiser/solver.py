@@ -39,7 +39,7 @@ from shellform.problem.problem import FEASIBLE, Problem
 from shellform.problem.terms import Misfit, Share
 from shellform.structure.elements.threads import dense_on_one
 
-__all__ = ["FEASIBLE", "Checkpoint", "Optimum", "Step", "minimise", "optimize", "polish"]
+__all__ = ["FEASIBLE", "Checkpoint", "Optimum", "Step", "minimise", "optimise", "polish"]
 
 WINDOW = 0.2  # first half-width, in mean tensions of the start
 STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
@@ -48,7 +48,7 @@ POLISHING = 20  # design evaluations
 _FINEST = 0.003  # window of polishing, in mean tensions, at which no better design is to be found
 
 
-def optimize(
+def optimise(
     problem: Problem,
     start: Design,
     *,
@@ -106,7 +106,7 @@ def polish(
                 best.design, rest_length=averaged(best.design.rest_length, groups, best.design.present)
             ),
         )
-    problem = replace(best.problem, minimize=[Share(1.0, Misfit(base))])
+    problem = replace(best.problem, minimise=[Share(1.0, Misfit(base))])
     with dense_on_one():
         search = Search(problem, best.design, WINDOW, progress)
         search.keep_stiff(_POLISHED * best.stiffness)

@@ -14,11 +14,11 @@ length of
 
 gives the tension t at length l. In these variables the problem is nearly convex: the sum of tensions is
 linear and a cable dies exactly at t = 0, a bound instead of a kink; the misfit d'd is quadratic with the
-Gauss-Newton matrix X'X; limits on cable forces are bounds too. X itself, a dense matrix of all freedoms, is
-never kept: its columns are solved for in blocks, of which only what the model needs stays, the cables'
-lengths and the translations for X'X. Measured on a 10,000-freedom shell, the model predicts the change of the
-objective to within 2 % at the first step and 0.5 % later, where a separable model in the rest lengths had to
-stop after steps a hundred times smaller.
+Gauss-Newton matrix X'X; limits on cable forces are bounds too. X itself, a dense matrix of all degrees of
+freedom, is never kept: its columns are solved for in blocks, of which only what the model needs stays, the
+cables' lengths and the translations for X'X. Measured on a shell of 10,000 degrees of freedom, the model predicts
+the change of the objective to within 2 % at the first step and 0.5 % later, where a separable model in the
+rest lengths had to stop after steps a hundred times smaller.
 
 A cable without tension gets the longest rest length allowed, so that it doesn't quietly help under other
 loads; it can come back.
@@ -48,8 +48,8 @@ class TensionModel:
 
     `origin` (y,); `length` (c,), m, and `length_by_y` (c, y); `variables_by_y` (s, y) of the problem's
     variables; `misfit_by_y` (y,) and `misfit_hessian` (y, y), the slope and the Gauss-Newton matrix of d'd,
-    m²; `pull` (f, y), the forces on the free freedoms by y, and `middle` (c, y), the changes of tension that
-    make K's answer to them K_t's.
+    m²; `pull` (f, y), the forces on the free degrees of freedom by y, and `middle` (c, y), the changes of
+    tension that make K's answer to them K_t's.
     """
 
     shell: Gridshell
@@ -101,13 +101,13 @@ def tension_model(
     chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
     length = np.linalg.norm(chord, axis=1)
     unit = chord / length[:, None]
-    pull = element_columns(assembly, cables.freedoms(), np.hstack([-unit, unit]))
+    pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))
 
     right = pull
     if frees_radius:
         rate = shell.beams_by_radius(design.radius)
         change = np.zeros(6 * assembly.count)
-        np.add.at(change, rate.freedoms(), rate.evaluate(state, tangent=False).force)
+        np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
         right = sp.csc_array(sp.hstack([pull, sp.csc_array(change[assembly.free][:, None])]))
     tension = cables.tension(state)
     stiffness = np.where(tension > 0.0, cables.stiffness / cables.rest_length, 0.0)

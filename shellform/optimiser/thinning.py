@@ -35,7 +35,7 @@ def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
     length = np.linalg.norm(chord, axis=1)
     stiffness = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
     unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
-    pull = element_columns(assembly, cables.freedoms(), np.hstack([-unit, unit]))
+    pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))
     factor, kept = assembly.factor(state), np.eye(len(unit))
     for first in range(0, len(unit), _BLOCK):
         own = slice(first, min(first + _BLOCK, len(unit)))

@@ -23,7 +23,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.problem.terms import Measure
 from shellform.structure.answers.mode_stiffness import (
     quadratic,
-    stiffness_by_freedom,
+    stiffness_by_dof,
     stiffness_by_rest_length,
 )
 from shellform.structure.answers.results import end_stress, end_stress_by_force, twist
@@ -64,16 +64,14 @@ class RodUtilisation:
         own = beams.kind == 0
         values = end_stress(beams, forces, chosen)[own].ravel() / rod.strength
         by_force = end_stress_by_force(beams, forces, chosen)[own] / rod.strength
-        rows = (by_force @ beams.local_forces_by_freedom(state)[own]).reshape(len(values), 12)
+        rows = (by_force @ beams.local_forces_by_dof(state)[own]).reshape(len(values), 12)
         by_radius = (by_force @ rate.local_forces(state)[own][:, :, None])[:, :, 0]
         for end in range(2):
             at = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
             by_radius[:, end] += (
                 np.array(section.sizes) / design.radius @ stress_by_size(section, *at) / rod.strength
             )
-        return _largest(
-            shell, 1.0, values, np.repeat(beams.freedoms()[own], 2, axis=0), rows, by_radius.ravel()
-        )
+        return _largest(shell, 1.0, values, np.repeat(beams.dofs()[own], 2, axis=0), rows, by_radius.ravel())
 
 
 @dataclass(frozen=True)
@@ -91,10 +89,10 @@ class ConnectorTurn:
         turn = twist(beams.local_deformations(state))[own]
         # Mx_a = GJ (theta_a - theta_b) / l0, so that its derivative is that of the twist but for a factor.
         scale = (-beams.rest_length / beams.torsion)[own]
-        rows = scale[:, None] * beams.local_forces_by_freedom(state)[own, 1]
+        rows = scale[:, None] * beams.local_forces_by_dof(state)[own, 1]
         sign = np.where(turn < 0.0, -1.0, 1.0)
         return _largest(
-            shell, _TURN, np.abs(turn), beams.freedoms()[own], sign[:, None] * rows, np.zeros(len(turn))
+            shell, _TURN, np.abs(turn), beams.dofs()[own], sign[:, None] * rows, np.zeros(len(turn))
         )
 
 
@@ -168,7 +166,7 @@ class Softness:
         rows, by_radius, by_rest = [], [], []
         for shape in found.shapes:
             unit = shape / np.sqrt(float(mass @ shape.ravel()[assembly.free] ** 2))
-            rows.append(stiffness_by_freedom(assembly, state, unit))
+            rows.append(stiffness_by_dof(assembly, state, unit))
             by_radius.append(quadratic(rate, state, unit))
             by_rest.append(stiffness_by_rest_length(cables, state, unit))
         ratio = found.stiffness / self.least
@@ -201,14 +199,14 @@ class Uplift:
         held = 6 * np.asarray(shell.net.supports) + 2
         reaction = assembly.evaluate(state, tangent=False).force.ravel()[held] - self.force.ravel()[held]
         rows = -reaction_rows(assembly, state, held).toarray()
-        freedoms = np.broadcast_to(assembly.free, rows.shape)
+        dofs = np.broadcast_to(assembly.free, rows.shape)
         rate = shell.beams_by_radius(design.radius)
         change = np.zeros(6 * assembly.count)
-        np.add.at(change, rate.freedoms(), rate.evaluate(state, tangent=False).force)
+        np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
         cables = shell.cables(design)
         if np.isin(cables.ends, shell.net.supports).any():
             raise InputError("cables that end at supports are not provided for", where="uplift")
-        return _largest(shell, self.offset, self.offset - reaction, freedoms, rows, -change[held])
+        return _largest(shell, self.offset, self.offset - reaction, dofs, rows, -change[held])
 
 
 def _of_tensions(
@@ -231,7 +229,7 @@ def _of_tensions(
         shell,
         unit,
         values,
-        cables.freedoms(),
+        cables.dofs(),
         np.hstack([-toward, toward]),
         np.zeros(len(values)),
         chosen,
@@ -243,18 +241,18 @@ def _largest(
     shell: Gridshell,
     unit: float,
     values: Reals,
-    freedoms: np.ndarray,
+    dofs: np.ndarray,
     rows: Reals,
     by_radius: Reals,
     cables: np.ndarray | None = None,
     by_rest_length: Reals | None = None,
 ) -> Measure:
-    """KS of `values` (k,) from their derivatives `rows` (k, q) at `freedoms` (k, q), `by_radius` (k,), and
+    """KS of `values` (k,) from their derivatives `rows` (k, q) at `dofs` (k, q), `by_radius` (k,), and
     each by its own cable's rest length.
     """
     weight, value = _smooth(values, SHARPNESS / unit)
     slope = np.zeros(6 * len(shell.net.grid.flat))
-    np.add.at(slope, freedoms, weight[:, None] * rows)
+    np.add.at(slope, dofs, weight[:, None] * rows)
     by_rest = np.zeros(len(shell.cable_ends))
     if cables is not None and by_rest_length is not None:
         by_rest[cables] = weight * by_rest_length

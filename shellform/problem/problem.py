@@ -52,7 +52,7 @@ class OffBranch(Exception):
 
 @dataclass(frozen=True)
 class Problem:
-    """Minimise the sum of `minimize` subject to `limits` on `shell` under `loads` (name -> (n, 6)), the first
+    """Minimise the sum of `minimise` subject to `limits` on `shell` under `loads` (name -> (n, 6)), the first
     being the design load.
 
     `rest_length_min`, m, and `rest_length_max`, times the initial rest length, are the bounds (3);
@@ -61,7 +61,7 @@ class Problem:
 
     shell: Gridshell
     loads: Mapping[str, Reals]
-    minimize: Sequence[Share]
+    minimise: Sequence[Share]
     limits: Sequence[AtMost] = ()
     rest_length_min: float = 0.01
     rest_length_max: float = 1.1
@@ -73,21 +73,21 @@ class Problem:
             raise InputError(
                 f"there is no load case {name!r}", where="problem", remedy=f"Known: {', '.join(self.loads)}."
             )
-        total = sum(part.share for part in self.minimize)
+        total = sum(part.share for part in self.minimise)
         if abs(total - 1.0) > 1e-9:
             raise InputError(
-                "the shares of the objective must add up to 1", where="problem.minimize", value=total
+                "the shares of the objective must add up to 1", where="problem.minimise", value=total
             )
 
     @property
     def terms(self) -> list[Term]:
         """The terms of the objective, then those of the limits."""
-        return [part.term for part in self.minimize] + [part.term for part in self.limits]
+        return [part.term for part in self.minimise] + [part.term for part in self.limits]
 
     @property
     def frees_radius(self) -> bool:
         """Whether the rod radius is a variable."""
-        return any(isinstance(part.term, RodRadius) for part in self.minimize)
+        return any(isinstance(part.term, RodRadius) for part in self.minimise)
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ class Evaluator:
     def __init__(self, problem: Problem, start: Design) -> None:
         self.problem, self.start = problem, start
         self.shell = problem.shell
-        self.weights: Reals = np.ones(len(problem.minimize))
+        self.weights: Reals = np.ones(len(problem.minimise))
         self.factorisations = self.equilibria = self.evaluations = self.rejected = self.wasted = 0
         self._assembly: Assembly | None = None
         self._present: Flags | None = None
@@ -136,8 +136,8 @@ class Evaluator:
         target = self.shell.target.positions
         near = len(target) * (_NEAR * float(np.ptp(target, axis=0).max())) ** 2
         self._far = max(near, _FAR * max(float(((each.positions - target) ** 2).sum()) for each in found))
-        values = [part.term.measure(self.shell, self.start, state).value[0] for part in self.problem.minimize]
-        self.weights = np.array([part.share for part in self.problem.minimize]) / np.maximum(values, 1e-300)
+        values = [part.term.measure(self.shell, self.start, state).value[0] for part in self.problem.minimise]
+        self.weights = np.array([part.share for part in self.problem.minimise]) / np.maximum(values, 1e-300)
         return reached
 
     def variables(self, design: Design) -> Reals:
@@ -322,8 +322,8 @@ def linearise(
     )
     values: list[Reals] = [np.zeros(0)] * len(problem.limits)
     rows: list[Reals] = [np.zeros((0, size))] * len(problem.limits)
-    objective = np.zeros(len(problem.minimize))
-    objective_rows = np.zeros((len(problem.minimize), size))
+    objective = np.zeros(len(problem.minimise))
+    objective_rows = np.zeros((len(problem.minimise), size))
     any_state = next(iter(states.values()))
     for name in dict.fromkeys(term.load for term in problem.terms):
         state = states.get(name, any_state)
@@ -338,13 +338,13 @@ def linearise(
         if name:
             columns = sp.csc_array(by_rest_length(assembly, state, cables) @ spread)
             response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
-            by_state = sp.vstack([m.by_freedom for m in measures]).tocsc()[:, assembly.free].toarray()
+            by_state = sp.vstack([m.by_dof for m in measures]).tocsc()[:, assembly.free].toarray()
             total = gradients(response, by_state, partial)
         else:
             total = partial
         pieces = np.split(total * scale, np.cumsum([len(m.value) for m in measures])[:-1])
         found = dict(zip(map(id, wanted), zip(measures, pieces, strict=True), strict=True))
-        for k, part in enumerate(problem.minimize):
+        for k, part in enumerate(problem.minimise):
             if id(part.term) in found and part.term.load == name:
                 measure, piece = found[id(part.term)]
                 objective[k], objective_rows[k] = weights[k] * measure.value[0], weights[k] * piece[0]

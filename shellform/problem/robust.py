@@ -260,7 +260,7 @@ class _Line:
         )
 
     def solved(self, right: Reals) -> Reals:
-        """K⁻¹ on the free freedoms, 0 on the held ones, for (6 n,) or (6 n, k)."""
+        """K⁻¹ on the free degrees of freedom, 0 on the held ones, for (6 n,) or (6 n, k)."""
         result = np.zeros_like(right)
         result[self.assembly.free] = self.factor.solve(np.asfortranarray(right[self.assembly.free]))
         return result
@@ -269,9 +269,9 @@ class _Line:
         """Sum of d'x_kk by the adjoint (6 n,) of the distances."""
         total = 0.0
         for part, rates in ((self.built.beams, self._beam_rates), (self.built.cables, self._cable_rates)):
-            freedoms = part.freedoms()
-            weights = _weights(freedoms, self.motion, self.motion)
-            total += float((rates(weights) * adjoint[freedoms]).sum())
+            dofs = part.dofs()
+            weights = _weights(dofs, self.motion, self.motion)
+            total += float((rates(weights) * adjoint[dofs]).sum())
         for each, columns in self._columns():
             # Twice y'(dF/dx)x for what is symmetric. Spins don't commute: with w = x × y the third derivative
             # taken along y instead of x differs by 3/2 w'K x = -3/2 w'F, which with the skew part of dF/dx,
@@ -285,8 +285,8 @@ class _Line:
         """Derivative (6 n,) by the state of the sum of L_k'(K X_k + F_k) at fixed L, X."""
         result = np.zeros(len(multipliers))
         for part, rates in ((self.built.beams, self._beam_rates), (self.built.cables, self._cable_rates)):
-            freedoms = part.freedoms()
-            np.add.at(result, freedoms, rates(_weights(freedoms, multipliers, self.motion)))
+            dofs = part.dofs()
+            np.add.at(result, dofs, rates(_weights(dofs, multipliers, self.motion)))
         for each, columns in self._columns():
             result += each.by_state(self.state, multipliers[:, columns]).sum(axis=1)
         return result
@@ -296,8 +296,8 @@ class _Line:
         matrix.
         """
         cables = self.built.cables
-        freedoms = cables.freedoms()
-        weights = _weights(freedoms, multipliers, self.motion)
+        dofs = cables.dofs()
+        weights = _weights(dofs, multipliers, self.motion)
         signs = np.vstack([-np.eye(3), np.eye(3)])
         trace = np.einsum("ij,eik,kj->e", signs, weights, signs)
         taut = cables.lengths(self.state) > cables.rest_length
@@ -311,7 +311,7 @@ class _Line:
         rate = self.shell.beams_by_radius(self.radius)
         packed = rate.evaluate(self.state, tangent=True).tangent
         assert packed is not None
-        weights = _weights(rate.freedoms(), multipliers, self.motion)
+        weights = _weights(rate.dofs(), multipliers, self.motion)
         return float((unpacked(packed, weights.shape[1]) * weights).sum())
 
     def drawn(self, z: Reals, shares: Sequence[float]) -> State | None:
@@ -354,16 +354,16 @@ class _Line:
 
 
 def _places(motion: Reals) -> Reals:
-    """The nodes' translations (3 n, k) among all freedoms (6 n, k)."""
+    """The nodes' translations (3 n, k) among all degrees of freedom (6 n, k)."""
     return np.ascontiguousarray(motion.reshape(-1, 6, motion.shape[1])[:, :3]).reshape(-1, motion.shape[1])
 
 
-def _weights(freedoms: Indices, left: Reals, right: Reals) -> Reals:
-    """Symmetric sums over k of left_k right_k' (m, d, d) on each element's freedoms."""
-    size = freedoms.shape[1]
-    result = np.empty((len(freedoms), size, size))
-    for first in range(0, len(freedoms), _CHUNK):
-        part = freedoms[first : first + _CHUNK]
+def _weights(dofs: Indices, left: Reals, right: Reals) -> Reals:
+    """Symmetric sums over k of left_k right_k' (m, d, d) on each element's degrees of freedom."""
+    size = dofs.shape[1]
+    result = np.empty((len(dofs), size, size))
+    for first in range(0, len(dofs), _CHUNK):
+        part = dofs[first : first + _CHUNK]
         whole = left[part] @ right[part].transpose(0, 2, 1)
         result[first : first + _CHUNK] = 0.5 * (whole + whole.transpose(0, 2, 1))
     return result
@@ -373,13 +373,13 @@ def _add_products(part: Part, state: State, motion: Reals, forces: Reals, column
     """Adds what the part's elements answer to the motions (6 n, h) to the `columns` of the forces (6 n,
     k).
     """
-    freedoms = part.freedoms()
-    if not len(freedoms):
+    dofs = part.dofs()
+    if not len(dofs):
         return
     packed = part.evaluate(state, tangent=True).tangent
     assert packed is not None
-    moving = np.asarray(motion[freedoms].any(axis=(1, 2)))
-    own = freedoms[moving]
-    change = unpacked(packed[moving], freedoms.shape[1]) @ motion[own]
+    moving = np.asarray(motion[dofs].any(axis=(1, 2)))
+    own = dofs[moving]
+    change = unpacked(packed[moving], dofs.shape[1]) @ motion[own]
     for k, column in enumerate(columns):
         np.add.at(forces[:, column], own, change[:, :, k])

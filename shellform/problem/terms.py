@@ -20,12 +20,12 @@ from shellform.structure.elements.state import State
 
 @dataclass(frozen=True)
 class Measure:
-    """`value` (g,); `by_freedom` (g, 6 n) sparse, by the nodes' translations and spins at a fixed design;
+    """`value` (g,); `by_dof` (g, 6 n) sparse, by the nodes' translations and spins at a fixed design;
     `by_rest_length` (g, c) sparse and `by_radius` (g,) at a fixed state. Cables are all candidates; absent
     ones have zero derivatives."""
 
     value: Reals
-    by_freedom: sp.csr_array
+    by_dof: sp.csr_array
     by_rest_length: sp.csr_array
     by_radius: Reals
 
@@ -50,7 +50,7 @@ class Misfit:
         """One value, m²."""
         away = state.positions - shell.target.positions
         slope = np.hstack([2.0 * away, np.zeros_like(away)])
-        return _measure(shell, [float((away**2).sum())], by_freedom=sp.csr_array(slope.reshape(1, -1)))
+        return _measure(shell, [float((away**2).sum())], by_dof=sp.csr_array(slope.reshape(1, -1)))
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class RmsMisfit:
         """One value, m²."""
         whole = Misfit(self.load).measure(shell, design, state)
         count = len(state.positions)
-        return _measure(shell, whole.value / count, by_freedom=whole.by_freedom / count)
+        return _measure(shell, whole.value / count, by_dof=whole.by_dof / count)
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class CableForces:
         rows = list(self.chosen)
         return Measure(
             measure.value[rows],
-            measure.by_freedom[rows],
+            measure.by_dof[rows],
             measure.by_rest_length[rows],
             measure.by_radius[rows],
         )
@@ -100,7 +100,7 @@ class CableForce:
         each = _tensions(shell, design, state)
         return Measure(
             np.array([each.value.sum()]),
-            sp.csr_array(each.by_freedom.sum(axis=0).reshape(1, -1)),
+            sp.csr_array(each.by_dof.sum(axis=0).reshape(1, -1)),
             sp.csr_array(each.by_rest_length.sum(axis=0).reshape(1, -1)),
             np.zeros(1),
         )
@@ -128,7 +128,7 @@ class Share:
 
     def __post_init__(self) -> None:
         if not self.share > 0.0:
-            raise InputError("a share must be positive", where="minimize", value=self.share)
+            raise InputError("a share must be positive", where="minimise", value=self.share)
 
 
 @dataclass(frozen=True)
@@ -152,12 +152,12 @@ class AtMost:
 
 
 def _measure(
-    shell: Gridshell, value: object, *, by_freedom: sp.csr_array | None = None, by_radius: object = (0.0,)
+    shell: Gridshell, value: object, *, by_dof: sp.csr_array | None = None, by_radius: object = (0.0,)
 ) -> Measure:
     nodes, cables = len(shell.net.grid.flat), len(shell.cable_ends)
     return Measure(
         np.asarray(value, dtype=float),
-        sp.csr_array((1, 6 * nodes)) if by_freedom is None else by_freedom,
+        sp.csr_array((1, 6 * nodes)) if by_dof is None else by_dof,
         sp.csr_array((1, cables)),
         np.asarray(by_radius, dtype=float),
     )
@@ -170,9 +170,9 @@ def _tensions(shell: Gridshell, design: Design, state: State) -> Measure:
     value = np.zeros(count)
     value[present] = cables.tension(state)
     rows = np.repeat(present, 6)
-    by_freedom = sp.csr_array(
-        (cables.tension_by_position(state).ravel(), (rows, cables.freedoms().ravel())),
+    by_dof = sp.csr_array(
+        (cables.tension_by_position(state).ravel(), (rows, cables.dofs().ravel())),
         shape=(count, 6 * nodes),
     )
     by_rest = sp.csr_array((cables.tension_by_rest_length(state), (present, present)), shape=(count, count))
-    return Measure(value, by_freedom, by_rest, np.zeros(count))
+    return Measure(value, by_dof, by_rest, np.zeros(count))

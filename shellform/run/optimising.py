@@ -30,7 +30,7 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
     """Makes the designs "optimised", "rounded", "polished" and "unloaded", as the case asks for them, and
     adds to the summary what came of it.
 
-    Raises InputError and NotConverged as `solver.optimize`.
+    Raises InputError and NotConverged as `solver.optimise`.
     """
     from shellform.optimiser import solver
 
@@ -52,7 +52,7 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
     stood = load_checkpoint(making.folder, key)
     if stood is not None:
         making.report("optimise", f"going on after evaluation {stood.numbers['evaluations']}")
-    best = solver.optimize(
+    best = solver.optimise(
         problem,
         start,
         evaluations=entry.evaluations,
@@ -157,7 +157,7 @@ def _without_loads(making: Making, shell: Gridshell, start: Design, none: Reals)
         entry.rest_length_min,
         entry.rest_length_max,
     )
-    return solver.optimize(problem, start, evaluations=15, thin=False).design
+    return solver.optimise(problem, start, evaluations=15, thin=False).design
 
 
 def _rounded(

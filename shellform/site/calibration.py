@@ -286,7 +286,7 @@ class _Model:
         return result
 
     def jacobian(self, joint: Joint, states: Sequence[State], names: Sequence[str]) -> Reals:
-        """Derivatives (s, n, 6, p) of all freedoms, m and rad, by the logarithms of the joint's
+        """Derivatives (s, n, 6, p) of all degrees of freedom, m and rad, by the logarithms of the joint's
         stiffnesses.
         """
         assembly = self.assembly(joint)
@@ -319,7 +319,7 @@ class _Fit:
         self.goal = np.stack([each.places(scan.points) for each, scan in zip(matches, scans, strict=True)])
         self.seen = np.isfinite(self.goal[:, :, 0])
         self.basis = _nuisance(states, markers, [scan.frame for scan in scans], self.seen, offsets)
-        self.freedom = 3 * int(self.seen.sum()) - self.basis.shape[1]
+        self.dof = 3 * int(self.seen.sum()) - self.basis.shape[1]
 
     def residuals(self, states: Sequence[State]) -> Reals:
         """Projected distances (r,), m."""
@@ -376,7 +376,7 @@ class _Fit:
 
     def deviation(self, fitted: int) -> float:
         """Standard deviation, m, of a coordinate that the residuals show."""
-        left = self.freedom - fitted
+        left = self.dof - fitted
         return float(np.sqrt((self.residuals(self.states) ** 2).sum() / left)) if left > 0 else np.inf
 
     def _joint(self, q: Reals, names: Sequence[str]) -> Joint:

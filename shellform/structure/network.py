@@ -24,7 +24,8 @@ class Network:
     """`nodes` (n, 3), m, of the stress-free state; `beams`; `cables`; supports.
 
     `fixed` (n, 6): which translations and rotations along and about the global axes are held; `imposed` (n,
-    6), m and rad (a rotation vector): the displacement that a held freedom is given at load factor 1.
+    6), m and rad (a rotation vector): the displacement that a held degree of freedom is given at load factor
+    1.
     """
 
     nodes: Reals

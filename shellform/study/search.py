@@ -31,7 +31,7 @@ def generations(
             seed=entry.seed,
             constraints_func=_excess if entry.limit else None,
         )
-    search = optuna.create_study(directions=["minimize"] * len(signs), sampler=sampler)
+    search = optuna.create_study(directions=["minimise"] * len(signs), sampler=sampler)
     left = int(entry.count or 0)
     while left > 0:
         trials = [search.ask() for _ in range(min(left, entry.population))]

@@ -60,8 +60,8 @@ def cantilever_order() -> Iterator[Row]:
 
 
 def roll_up(elements: int, turns: float = 1.0) -> Reals:
-    """The tip (3,) of a cantilever with an end moment of `turns` · 2π EI/L in one step, all freedoms in space
-    free.
+    """The tip (3,) of a cantilever with an end moment of `turns` · 2π EI/L in one step, all degrees of
+    freedom in space free.
     """
     network = chain(line(elements), (1e6, 1.0, 1.0, 1.0), {0: CLAMP})
     return np.asarray(

@@ -31,7 +31,7 @@ from shellform.verification.models import (
 
 _BEYOND = 1.27  # of the reference, how far a load is followed in search of its critical value
 
-# Held freedoms of the ends in the x-z plane: (first end, last end), the last free to slide along x.
+# Held degrees of freedom of the ends in the x-z plane: (first end, last end), the last free to slide along x.
 _COLUMNS = {
     "clamped-free": ([True] * 6, [False] * 6, 0.25 * np.pi**2),
     "pinned-pinned": (

@@ -1,5 +1,5 @@
-"""Models that several cases share, and the ways in which they are solved: under loads, at a held freedom, at
-critical points.
+"""Models that several cases share, and the ways in which they are solved: under loads, at a held degree of
+freedom, at critical points.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ def no_cables() -> Cables:
 
 
 def chain(points: Reals, stiffness: Stiffness, held: dict[int, list[bool]]) -> Network:
-    """Beams from point to point (n, 3) with (EA, GJ, EI_y, EI_z); `held` freedoms by node."""
+    """Beams from point to point (n, 3) with (EA, GJ, EI_y, EI_z); `held` degrees of freedom by node."""
     count = len(points)
     ends = np.column_stack([np.arange(count - 1), np.arange(1, count)])
     ea, gj, ey, ez = stiffness
     fixed = np.zeros((count, 6), dtype=bool)
-    for node, freedoms in held.items():
-        fixed[node] = freedoms
+    for node, dofs in held.items():
+        fixed[node] = dofs
     beams = make_beams(points, ends, axial=ea, torsion=gj, bending_y=ey, bending_z=ez)
     return Network(points, beams, no_cables(), fixed, np.zeros((count, 6)))
 
@@ -90,14 +90,14 @@ def solved(network: Network, load: Reals | None = None, start: State | None = No
 
 
 def pushed(
-    network: Network, start: State, freedom: tuple[int, int], places: ArrayLike
+    network: Network, start: State, dof: tuple[int, int], places: ArrayLike
 ) -> list[tuple[State, float]]:
     """The equilibria where one translation (node, axis) is held at one coordinate after the other, and the
     force that holds it.
 
     Displacement control: what is unstable under a dead load is stable here, and a limit point is no obstacle.
     """
-    node, axis = freedom
+    node, axis = dof
     fixed = network.fixed.copy()
     fixed[node, axis] = True
     assembly = assemble(replace(network, fixed=fixed))

@@ -63,12 +63,12 @@ def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loa
 
 def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
     case = load_case(CASE, ["optimise.misfit=0.4", "optimise.robust=0.3", "robust.loads_all=0.1"])
-    shares = case_problem(case, shell, loads, shell.design()).minimize
+    shares = case_problem(case, shell, loads, shell.design()).minimise
     assert [each.share for each in shares] == [0.4, 0.3, 0.3]
     assert isinstance(shares[2].term, RobustMisfit)
     free = load_case(ROOT / "scripts/scale_model_radius.toml")
     fixed = case_problem(free, shell, loads, shell.design(), frees_radius=False)
-    assert [each.share for each in fixed.minimize] == pytest.approx([0.75, 0.25])
+    assert [each.share for each in fixed.minimise] == pytest.approx([0.75, 0.25])
     assert not fixed.frees_radius
 
 
@@ -220,7 +220,7 @@ def test_sections_that_bear_nothing_are_told_with_the_reason(shell, loads):
         [sf.Share(1.0, sf.Misfit("wet"))],
         [AtMost(20.0, sf.CableForces("wet"))],
     )
-    best = sf.mma.optimize(problem, start, evaluations=2, thin=False)
+    best = sf.mma.optimise(problem, start, evaluations=2, thin=False)
     heavy = {"wet": 3.0 * loads["design"]}
     stock = sf.read_catalogue(ROOT / "scripts/scale_model_rods.toml")
     trials = rounding.tried(

@@ -55,7 +55,7 @@ def test_a_net_without_symmetry_is_refused():
 
 
 def test_polished_groups_keep_one_length_each_lower_the_misfit_and_keep_the_limits(dome, problem):
-    best = mma.optimize(problem, dome.design(), evaluations=6, thin=False)
+    best = mma.optimise(problem, dome.design(), evaluations=6, thin=False)
     groups = symmetric_groups(dome)
     polished = mma.polish(best, evaluations=6, groups=groups)
     design = polished.design
@@ -67,14 +67,14 @@ def test_polished_groups_keep_one_length_each_lower_the_misfit_and_keep_the_limi
 
 
 def test_cables_are_taken_away_down_to_the_number_asked_for(dome, problem):
-    free = mma.optimize(problem, dome.design(), evaluations=10, thin=False)
-    capped = mma.optimize(problem, dome.design(), evaluations=60, most_cables=60)
+    free = mma.optimise(problem, dome.design(), evaluations=10, thin=False)
+    capped = mma.optimise(problem, dome.design(), evaluations=60, most_cables=60)
     assert capped.design.present.sum() <= 60 < free.design.present.sum()
     assert max(capped.constraints.values()) <= mma.FEASIBLE
 
 
 def test_a_number_of_cables_that_cannot_be_reached_is_told(dome, problem):
-    capped = mma.optimize(problem, dome.design(), evaluations=12, most_cables=1)
+    capped = mma.optimise(problem, dome.design(), evaluations=12, most_cables=1)
     assert "no design with 1 cables was found" in capped.status
 
 

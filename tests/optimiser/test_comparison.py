@@ -27,9 +27,9 @@ def problem(shell, force, *limits, radius=False):
 
 
 def found(asked, evaluations=60):
-    """mma.optimize without what it adds to a problem, then SciPy's methods."""
+    """mma.optimise without what it adds to a problem, then SciPy's methods."""
     start = asked.shell.design()
-    best = mma.optimize(asked, start, stiffness=0.0, thin=False)
+    best = mma.optimise(asked, start, stiffness=0.0, thin=False)
     return best, *(
         compare(asked, start, method=name, evaluations=evaluations, tolerance=1e-6) for name in METHODS
     )
@@ -37,8 +37,8 @@ def found(asked, evaluations=60):
 
 def test_all_methods_come_to_the_same_optimum_with_trials_off_the_branch_on_their_way(coarse):
     """4 N on every crossing, half of which the unbraced grid bears: trust-constr 0.2857 in 60 evaluations, 16
-    of them off the branch, mma.optimize 0.2902 in 13, SLSQP 0.2928 in 60. The optimum lies where the branch
-    ends and where cables go slack, kinks in the rest lengths: SLSQP stops there, and mma.optimize where its
+    of them off the branch, mma.optimise 0.2902 in 13, SLSQP 0.2928 in 60. The optimum lies where the branch
+    ends and where cables go slack, kinks in the rest lengths: SLSQP stops there, and mma.optimise where its
     smallest window has no better design that stays on the branch."""
     best, interior, quadratic = found(problem(coarse, 4.0))
     least = min(best.objective, interior.objective, quadratic.objective)

@@ -60,7 +60,7 @@ def test_predicted_states_are_near_to_second_order(shell, start):
 
 def test_polishing_lowers_the_misfit_with_the_same_cables_none_of_which_goes_slack(shell, start):
     evaluator, _ = start
-    best = mma.optimize(evaluator.problem, shell.design(), evaluations=12)
+    best = mma.optimise(evaluator.problem, shell.design(), evaluations=12)
     polished = mma.polish(best, evaluations=6)
     assert polished.objective < 0.9
     np.testing.assert_array_equal(polished.design.present, best.design.present)
@@ -108,7 +108,7 @@ def test_a_start_that_snaps_through_under_the_additional_load_is_led_to_a_design
     start = sf.follow(shell, shell.design(), problem.loads, stay=True)
     assert start["wet"].on_branch
     assert not start["wetter"].on_branch
-    best = mma.optimize(problem, shell.design(), evaluations=12, thin=False)
+    best = mma.optimise(problem, shell.design(), evaluations=12, thin=False)
     assert best.history[0].stage < 1.0
     assert all(each.on_branch and each.equilibrium.stable for each in best.loaded.values())
     assert max(best.constraints.values()) <= mma.FEASIBLE

@@ -1,8 +1,8 @@
 """Designs whose optimum is known in closed form: a bow, and a cable against a spring.
 
 Both are gridshells of one straight rod in the plane x-z. A gridshell's supports are pins; the one thing that
-these two need besides is a support that slides, so that `InPlane` says which freedoms are held and leaves
-everything else, from `Problem` to `mma.optimize`, as it is.
+these two need besides is a support that slides, so that `InPlane` says which degrees of freedom are held and
+leaves everything else, from `Problem` to `mma.optimise`, as it is.
 """
 
 import dataclasses
@@ -96,7 +96,7 @@ def test_a_bow_gets_the_closed_form_rest_length_for_its_height():
         shell = bow(elements)
         none = np.zeros((elements + 1, 6))
         problem = sf.Problem(shell, {"none": none}, [sf.Share(1.0, sf.Misfit("none"))])
-        best = mma.optimize(problem, shell.design(rest_ratio=0.9), thin=False)
+        best = mma.optimise(problem, shell.design(rest_ratio=0.9), thin=False)
         assert best.evaluations <= 10
         assert best.states["none"].positions[:, 2].max() == pytest.approx(HEIGHT, abs=0.2 / elements**2)
         found.append(float(best.design.rest_length[0]))
@@ -129,7 +129,7 @@ def optimum_at(share):
         {"none": np.zeros((3, 6))},
         [sf.Share(1.0 - share, sf.Misfit("none")), sf.Share(share, sf.CableForce("none"))],
     )
-    best = mma.optimize(problem, shell.design(rest_ratio=0.99), thin=False)
+    best = mma.optimise(problem, shell.design(rest_ratio=0.99), thin=False)
     return best, float(shell.cables(best.design).tension(best.states["none"]).sum())
 
 

@@ -33,12 +33,12 @@ def told(history):
 
 def test_a_search_resumed_in_any_phase_ends_with_the_same_design_and_history_to_the_bit(shell, problem):
     kept = []
-    whole = mma.optimize(problem, shell.design(), evaluations=22, keep=kept.append)
+    whole = mma.optimise(problem, shell.design(), evaluations=22, keep=kept.append)
     phases = [each.numbers["phase"] for each in kept]
     assert set(phases) == {"climb", "descend", "thin"}
     wary = next(k for k, each in enumerate(kept) if phases[k] == "descend" and each.arrays["excess"].any())
     for place in (phases.index("climb"), wary, phases.index("thin")):
-        again = mma.optimize(problem, shell.design(), evaluations=22, resume=kept[place])
+        again = mma.optimise(problem, shell.design(), evaluations=22, resume=kept[place])
         np.testing.assert_array_equal(again.design.rest_length, whole.design.rest_length)
         np.testing.assert_array_equal(again.design.present, whole.design.present)
         assert told(again.history) == told(whole.history)

@@ -99,7 +99,7 @@ def test_no_candidate_cable_ends_at_a_support_or_rises_above_the_surface(shell, 
 
 
 def test_a_short_optimisation_improves_the_fit_and_keeps_every_limit(shell, wet):
-    best = mma.optimize(problem(shell, wet), shell.design(), evaluations=6, thin=False)
+    best = mma.optimise(problem(shell, wet), shell.design(), evaluations=6, thin=False)
     assert best.objective < 0.5
     assert max(best.constraints.values()) <= mma.FEASIBLE
     assert all(each.on_branch and each.equilibrium.stable for each in best.loaded.values())
@@ -165,7 +165,7 @@ def test_a_start_outside_the_bounds_is_refused():
 
 def test_a_start_that_does_not_carry_the_design_load_is_told_the_paper_s_advice(shell, wet):
     with pytest.raises(NotConverged, match="denser grid"):
-        mma.optimize(problem(shell, 3.0 * wet), shell.design(), evaluations=3)
+        mma.optimise(problem(shell, 3.0 * wet), shell.design(), evaluations=3)
 
 
 def test_bad_rods_joints_cables_and_loads_are_refused(shell, net, vault):

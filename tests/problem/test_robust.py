@@ -90,7 +90,7 @@ def test_the_mean_s_second_order_terms_are_the_misfit_s_second_derivatives(shell
         monkeypatch.setattr(
             robust,
             "groups_of",
-            lambda *given: [replace(each, freedoms=each.freedoms[30:32]) for each in groups_of(*given)],
+            lambda *given: [replace(each, dofs=each.dofs[30:32]) for each in groups_of(*given)],
         )
     scatter = Scatter(**{cause: 0.1 * getattr(ALL, cause)})
     state = solved(shell, design, state, load)

@@ -23,8 +23,8 @@ vectors = st.tuples(*[st.floats(-2.0, 2.0)] * 3).map(np.array)
 
 @st.composite
 def networks(draw):
-    """Beams along a chain and across it, cables taut and slack, bent and turned: beams, cables, all freedoms
-    free, a state.
+    """Beams along a chain and across it, cables taut and slack, bent and turned: beams, cables, all degrees
+    of freedom free, a state.
     """
     chance, count, bend = np.random.default_rng(draw(seeds)), draw(st.integers(3, 9)), draw(sizes)
     nodes = np.column_stack([np.arange(count), np.zeros((count, 2))]) + 0.3 * chance.uniform(

@@ -165,7 +165,7 @@ def measured(network, state, section):
 
 
 def rows(assembly, network, state):
-    """The partial derivatives of `measured` by the free freedoms."""
+    """The partial derivatives of `measured` by the free degrees of freedom."""
     picked = np.zeros((6, len(assembly.free)))
     for k, (node, axis) in enumerate([(n, a) for n in (3, 8) for a in range(3)]):
         picked[k, np.flatnonzero(assembly.free == 6 * node + axis)] = 1.0
@@ -316,7 +316,7 @@ def test_tensions_by_rest_lengths_through_the_freedoms_they_touch_are_those_of_t
     response = respond(assembly, state, by_rest_length(assembly, state, network.cables))
     picked = tension_rows(assembly, state, network.cables)
     whole = picked @ state_by_design(response)
-    for _ in range(2):  # the second time with the same freedoms
+    for _ in range(2):  # the second time with the same degrees of freedom
         np.testing.assert_allclose(
             direct(response, picked), whole, rtol=1e-9, atol=1e-10 * np.abs(whole).max()
         )

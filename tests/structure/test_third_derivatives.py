@@ -37,7 +37,7 @@ def test_rates_of_stiffness_are_those_of_the_elements_tangents(shell, kind):
         tangent = full(part.evaluate(moved(state, h * motion), tangent=True).tangent, size)
         expected.append(np.einsum("eij,eij->e", tangent, weights))
     slope = (expected[0] - expected[1]) / 2e-5
-    along = np.einsum("ec,ec->e", found, motion.ravel()[part.freedoms()])
+    along = np.einsum("ec,ec->e", found, motion.ravel()[part.dofs()])
     np.testing.assert_allclose(along, slope, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
 
 

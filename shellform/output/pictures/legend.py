@@ -9,6 +9,7 @@ dark on a line through CIELAB.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,8 +145,8 @@ def key_height(size: tuple[int, int]) -> int:
 
 
 def _bar(
-    quantity: str, name: str, limit: float, last: str, colours, ends, width: int, line: int
-) -> tuple[list[Word], Ramp]:  # type: ignore[no-untyped-def]
+    quantity: str, name: str, limit: float, last: str, colours: Any, ends: Any, width: int, line: int
+) -> tuple[list[Word], Ramp]:
     left, right = round(ends[0] * width), round(ends[1] * width)
     steps = _STEPS if right - left > 20 * line else 2
     ticks = limit * np.arange(steps + 1) / steps

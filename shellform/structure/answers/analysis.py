@@ -41,9 +41,9 @@ Progress = Callable[[float, int], None]
 class Analysis:
     """The last state reached and why it ended there.
 
-    `load` (n, 6) at that state; `reactions` (n, 6), what held freedoms bear there, N and N·m; `converged`;
-    `increments` as the contract has them, each with the `steps` it took; `modes` and `critical` where they
-    were asked for; `warnings`, a sentence each.
+    `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
+    `converged`; `increments` as the contract has them, each with the `steps` it took; `modes` and `critical`
+    where they were asked for; `warnings`, a sentence each.
     """
 
     model: Model
@@ -381,7 +381,7 @@ def _check(
 
 
 def _imposed(network: Network, state: State) -> State:
-    """The state with held freedoms where the supports want them at load factor 1."""
+    """The state with held degrees of freedom where the supports want them at load factor 1."""
     positions, quaternions = state.positions.copy(), state.quaternions.copy()
     held = network.fixed[:, :3]
     positions[held] = (network.nodes + network.imposed[:, :3])[held]

@@ -9,9 +9,9 @@ with the design s by
 so that the stiffness of the softest mode is a measure like any other (sensitivity.py): where it comes to 0,
 stability ends. t holds third derivatives of the energy. For beams they come from the compiled tangent itself,
 evaluated at complex positions x + i h e_j: the imaginary part over h is the derivative to the last digit,
-since nothing is subtracted (Squire and Trapp 1998). The freedoms of an element are taken one after the other,
-all elements at once, so that it costs twelve assemblies. A cable with its ends' relative motion d, a = e·d,
-has
+since nothing is subtracted (Squire and Trapp 1998). The degrees of freedom of an element are taken one after
+the other, all elements at once, so that it costs twelve assemblies. A cable with its ends' relative motion d,
+a = e·d, has
 
     v'Kv = EA/l0 (d·d - (l0/l) (d·d - a²)).
 """
@@ -31,7 +31,7 @@ from shellform.structure.solve.assembly import Assembly
 _STEP = 1e-30  # of the complex shift: its square vanishes beside 1
 
 
-def stiffness_by_freedom(assembly: Assembly, state: State, mode: Reals) -> Reals:
+def stiffness_by_dof(assembly: Assembly, state: State, mode: Reals) -> Reals:
     """t (6 n,), N/m² and N/m a radian, of a mode (n, 6) at the state: the derivative of v'Kv by every node's
     translations and spins.
     """
@@ -60,23 +60,23 @@ def quadratic(part: Beams, state: State, mode: Reals) -> float:
     """
     tangent = part.evaluate(state, tangent=True).tangent
     assert tangent is not None
-    own = mode.ravel()[part.freedoms()]
+    own = mode.ravel()[part.dofs()]
     return float((tangent * _weights(own)).sum())
 
 
 def _add_beams(beams: Beams, state: State, flat: Reals, total: Reals) -> None:
-    """One complex pass for each of the twelve freedoms, every element with ends of its own."""
+    """One complex pass for each of the twelve degrees of freedom, every element with ends of its own."""
     count = len(beams.ends)
-    freedoms = beams.freedoms()
-    weights = _weights(flat[freedoms])
+    dofs = beams.dofs()
+    weights = _weights(flat[dofs])
     ends = np.arange(2 * count).reshape(-1, 2)
     place = state.positions[beams.ends].reshape(-1, 3)
     turn = state.quaternions[beams.ends].reshape(-1, 4)
     stiffness = np.column_stack([beams.axial, beams.torsion, beams.bending_y, beams.bending_z])
     energy, force = np.empty(count, complex), np.empty((count, 12), complex)
     blocks, none = np.empty((count, 78), complex), np.empty((0, 7), complex)
-    for freedom in range(12):
-        node, axis = divmod(freedom, 6)
+    for dof in range(12):
+        node, axis = divmod(dof, 6)
         positions, quaternions = place.astype(complex), turn.astype(complex)
         if axis < 3:
             positions[node::2, axis] += 1j * _STEP
@@ -97,7 +97,7 @@ def _add_beams(beams: Beams, state: State, flat: Reals, total: Reals) -> None:
             none,
             none,
         )
-        np.add.at(total, freedoms[:, freedom], (blocks.imag * weights).sum(axis=1) / _STEP)
+        np.add.at(total, dofs[:, dof], (blocks.imag * weights).sum(axis=1) / _STEP)
 
 
 def _add_cables(cables: Cables, state: State, flat: Reals, total: Reals) -> None:
@@ -110,7 +110,7 @@ def _add_cables(cables: Cables, state: State, flat: Reals, total: Reals) -> None
     slope = (stiffness * share_left / length)[:, None] * (
         (whole - along**2)[:, None] * unit + 2.0 * along[:, None] * (motion - along[:, None] * unit)
     )
-    np.add.at(total, cables.freedoms(), np.hstack([-slope, slope]))
+    np.add.at(total, cables.dofs(), np.hstack([-slope, slope]))
 
 
 def _relative(cables: Cables, state: State, mode: Reals) -> tuple[Reals, Reals]:

@@ -13,7 +13,7 @@ variable, or adjoint,
 solving once for every measure. Both are exact, K being symmetric in an equilibrium without applied moments;
 `gradients` counts the solves and takes the cheaper way. The right-hand sides go to the solver as one block,
 with one factor for all. Where the measures are as local as the variables (tensions by rest lengths), `direct`
-condenses K to the few freedoms that they touch.
+condenses K to the few degrees of freedom that they touch.
 
 A design variable is a column of df/ds: `by_rest_length` for cables, `by_stiffness` for whatever the beams'
 stiffness depends on (a rod's radius or another size, a connector's EA, GJ or EI), `by_load` for the load
@@ -37,17 +37,17 @@ from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import Factor, Symmetric
 
-_MOST = 4000  # freedoms to which K is condensed: a dense matrix of 128 MB
-# freedoms that a design variable and the measures touch, for each variable: two nodes' translations shared by
-# several cables
+_MOST = 4000  # degrees of freedom to which K is condensed: a dense matrix of 128 MB
+# degrees of freedom that a design variable and the measures touch, for each variable: two nodes' translations
+# shared by several cables
 _FEW = 3
 
 
 @dataclass(frozen=True)
 class Response:
     """An equilibrium ready for sensitivities: `factor` of the tangent at `state`, and `force_by_design` (f,
-    s), the derivative of the unbalanced internal forces on the free freedoms by the design variables;
-    `family` and `tangent` (nnz,) are what was factorised."""
+    s), the derivative of the unbalanced internal forces on the free degrees of freedom by the design
+    variables; `family` and `tangent` (nnz,) are what was factorised."""
 
     state: State
     factor: Factor
@@ -69,14 +69,14 @@ def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Respons
 
 def by_rest_length(assembly: Assembly, state: State, cables: Cables) -> sp.csc_array:
     """Derivative (f, c), N/m, of the internal forces by the cables' rest lengths (A.23)."""
-    return element_columns(assembly, cables.freedoms(), cables.force_by_rest_length(state))
+    return element_columns(assembly, cables.dofs(), cables.force_by_rest_length(state))
 
 
-def element_columns(assembly: Assembly, freedoms: Indices, values: Reals) -> sp.csc_array:
-    """A column (f, m) on the free freedoms for each element, from its `values` (m, k) at its `freedoms` (m,
-    k).
+def element_columns(assembly: Assembly, dofs: Indices, values: Reals) -> sp.csc_array:
+    """A column (f, m) on the free degrees of freedom for each element, from its `values` (m, k) at its `dofs`
+    (m, k).
     """
-    rows = assembly.number[freedoms]
+    rows = assembly.number[dofs]
     taken = rows >= 0
     columns = np.broadcast_to(np.arange(len(rows))[:, None], rows.shape)
     return sp.csc_array((values[taken], (rows[taken], columns[taken])), shape=(len(assembly.free), len(rows)))
@@ -88,7 +88,7 @@ def by_stiffness(assembly: Assembly, state: State, *rates: Beams) -> sp.csc_arra
     have the derivative for end forces (A.27 to A.29)."""
     change = np.zeros((6 * assembly.count, len(rates)))
     for column, rate in zip(change.T, rates, strict=True):
-        np.add.at(column, rate.freedoms(), rate.evaluate(state, tangent=False).force)
+        np.add.at(column, rate.dofs(), rate.evaluate(state, tangent=False).force)
     return sp.csc_array(change[assembly.free])
 
 
@@ -111,40 +111,40 @@ def by_load(assembly: Assembly, load: Reals) -> sp.csc_array:
 
 
 def tension_rows(assembly: Assembly, state: State, cables: Cables) -> sp.csr_array:
-    """Derivative (c, f), N/m, of the tensions by the free freedoms at fixed rest lengths; they add -EA l/l0²
-    by their own.
+    """Derivative (c, f), N/m, of the tensions by the free degrees of freedom at fixed rest lengths; they add
+    -EA l/l0² by their own.
     """
-    return _rows(assembly, cables.freedoms()[:, None, :], cables.tension_by_position(state)[:, None, :])
+    return _rows(assembly, cables.dofs()[:, None, :], cables.tension_by_position(state)[:, None, :])
 
 
 def end_force_rows(assembly: Assembly, state: State, beams: Beams) -> sp.csr_array:
-    """Derivative (7 m, f) of N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam by the free freedoms at fixed
-    stiffness.
+    """Derivative (7 m, f) of N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam by the free degrees of
+    freedom at fixed stiffness.
     """
-    rates = beams.local_forces_by_freedom(state)
-    return _rows(assembly, beams.freedoms()[:, None, :], rates)
+    rates = beams.local_forces_by_dof(state)
+    return _rows(assembly, beams.dofs()[:, None, :], rates)
 
 
 def stress_rows(
     assembly: Assembly, state: State, beams: Beams, sections: Mapping[str, Section]
 ) -> sp.csr_array:
     """Derivative (2 m, f), Pa/m and Pa/rad, of the largest fibre stresses at both ends of each beam by the
-    free freedoms.
+    free degrees of freedom.
     """
     by_force = end_stress_by_force(beams, beams.local_forces(state), sections)
-    return _rows(assembly, beams.freedoms()[:, None, :], by_force @ beams.local_forces_by_freedom(state))
+    return _rows(assembly, beams.dofs()[:, None, :], by_force @ beams.local_forces_by_dof(state))
 
 
-def reaction_rows(assembly: Assembly, state: State, freedoms: Indices) -> sp.csr_array:
-    """Derivative (k, f), N/m and N/rad, of the internal forces at held `freedoms` (k,) by the free ones: of
+def reaction_rows(assembly: Assembly, state: State, dofs: Indices) -> sp.csr_array:
+    """Derivative (k, f), N/m and N/rad, of the internal forces at held `dofs` (k,) by the free ones: of
     the reactions, the load given.
     """
     wanted = np.full(6 * assembly.count, -1)
-    wanted[freedoms] = np.arange(len(freedoms))
+    wanted[dofs] = np.arange(len(dofs))
     number = assembly.number
-    result = sp.csr_array((len(freedoms), len(assembly.free)))
+    result = sp.csr_array((len(dofs), len(assembly.free)))
     for part in assembly.parts:
-        own = part.freedoms()
+        own = part.dofs()
         size = own.shape[1] if own.ndim == 2 else 0
         touched = np.flatnonzero((wanted[own] >= 0).any(axis=1)) if size else np.zeros(0, dtype=np.int64)
         if not len(touched):
@@ -162,8 +162,8 @@ def reaction_rows(assembly: Assembly, state: State, freedoms: Indices) -> sp.csr
 
 
 def gradients(response: Response, by_state: Reals, by_design: Reals) -> Reals:
-    """Total derivatives (g, s) of g measures, from their partial ones by the free freedoms (g, f) and by the
-    design (g, s).
+    """Total derivatives (g, s) of g measures, from their partial ones by the free degrees of freedom (g, f)
+    and by the design (g, s).
     """
     if by_state.shape[0] == 0:
         return by_design
@@ -179,7 +179,9 @@ def adjoint(response: Response, by_state: Reals | sp.csr_array) -> Reals:
 
 
 def direct(response: Response, by_state: Reals | sp.csr_array) -> Reals:
-    """∂g/∂x dx/ds (g, s), one solve for each design variable, or through the few freedoms that both touch."""
+    """∂g/∂x dx/ds (g, s), one solve for each design variable, or through the few degrees of freedom that both
+    touch.
+    """
     if sp.issparse(by_state):
         kept = _touched(response, sp.csr_array(by_state))
         if len(kept) <= min(_FEW * response.force_by_design.shape[1], _MOST):
@@ -192,7 +194,7 @@ def direct(response: Response, by_state: Reals | sp.csr_array) -> Reals:
 
 
 def _touched(response: Response, by_state: sp.csr_array) -> np.ndarray:
-    """The freedoms, ascending, that the design's forces act on or that the measures read.
+    """The degrees of freedom, ascending, that the design's forces act on or that the measures read.
 
     dx/ds is wanted there only, and K condensed to them says as much of it as K: the solves are dense ones of
     their number.
@@ -204,7 +206,7 @@ def _touched(response: Response, by_state: sp.csr_array) -> np.ndarray:
 
 
 def state_by_design(response: Response) -> Reals:
-    """dx/ds (f, s) of the free freedoms (A.16)."""
+    """dx/ds (f, s) of the free degrees of freedom (A.16)."""
     return -response.factor.solve(_dense(response.force_by_design))
 
 
@@ -217,9 +219,9 @@ def predicted(assembly: Assembly, response: Response, change: Reals) -> State:
     return moved(response.state, assembly.chords.corrected(response.state, step.reshape(-1, 6)))
 
 
-def _rows(assembly: Assembly, freedoms: np.ndarray, values: Reals) -> sp.csr_array:
-    """Rows (m q, f) from values (m, q, k) at freedoms (m, 1, k)."""
-    columns = np.broadcast_to(assembly.number[freedoms], values.shape)
+def _rows(assembly: Assembly, dofs: np.ndarray, values: Reals) -> sp.csr_array:
+    """Rows (m q, f) from values (m, q, k) at degrees of freedom (m, 1, k)."""
+    columns = np.broadcast_to(assembly.number[dofs], values.shape)
     taken = columns >= 0
     rows = np.broadcast_to(
         np.arange(values.shape[0] * values.shape[1]).reshape(values.shape[:2])[:, :, None], values.shape

@@ -38,7 +38,7 @@ from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import Measure, held
 
 _LANCZOS = 200  # restarts; an eigenvalue that stands out takes a few
-_DENSE = 12  # freedoms up to which Lanczos vectors don't fit
+_DENSE = 12  # degrees of freedom up to which Lanczos vectors don't fit
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,9 @@ with the state at fixed M.
 K being the Hessian of the energy U along spins, v'Kv is the second derivative of U(t) where an element moves
 by t v (nodes shifted, triads turned by exp(t S(v))). With M = sum of w v v' (its eigenvectors) the trace is
 the sum of w v'Kv. U(t) is carried as a polynomial up to t² in arithmetic that cuts off the rest, exact to
-rounding; the derivative by each freedom of the state follows from an imaginary step of that freedom, whose
-square is below the last digit: no differences are taken. The energies are those of beam.py (18) with its
-triads, and of cable.py.
+rounding; the derivative by each degree of freedom of the state follows from an imaginary step of that degree
+of freedom, whose square is below the last digit: no differences are taken. The energies are those of beam.py
+(18) with its triads, and of cable.py.
 """
 
 from __future__ import annotations
@@ -71,7 +71,9 @@ _Vector = list[_Poly]
 
 
 def beam_rates(beams: Beams, state: State, weights: Reals) -> Reals:
-    """Derivatives (m, 12) of tr(K M) by each beam's own freedoms, for symmetric M `weights` (m, 12, 12)."""
+    """Derivatives (m, 12) of tr(K M) by each beam's own degrees of freedom, for symmetric M `weights` (m, 12,
+    12).
+    """
     result = np.empty((len(beams.ends), 12))
     for first in range(0, len(result), _CHUNK):
         part = slice(first, first + _CHUNK)
@@ -80,8 +82,8 @@ def beam_rates(beams: Beams, state: State, weights: Reals) -> Reals:
 
 
 def cable_rates(cables: Cables, state: State, weights: Reals) -> Reals:
-    """Derivatives (c, 6) of tr(K M) by each cable's own freedoms, for symmetric M `weights` (c, 6, 6); 0 for
-    slack ones.
+    """Derivatives (c, 6) of tr(K M) by each cable's own degrees of freedom, for symmetric M `weights` (c, 6,
+    6); 0 for slack ones.
     """
     values, vectors = np.linalg.eigh(weights)
     shift = vectors.transpose(0, 2, 1)[:, :, None, :]
@@ -97,7 +99,7 @@ def cable_rates(cables: Cables, state: State, weights: Reals) -> Reals:
 
 def _beam_chunk(beams: Beams, state: State, weights: Reals, chosen: Array) -> Array:
     values, vectors = np.linalg.eigh(weights)
-    motion = vectors.transpose(0, 2, 1)[:, :, None, :]  # element, direction, step, freedom
+    motion = vectors.transpose(0, 2, 1)[:, :, None, :]  # element, direction, step, degree of freedom
     ends = beams.ends[chosen]
     frames = beams.frames[chosen]
     x = state.positions[ends]
@@ -140,7 +142,7 @@ def _contracted(scale: Reals, energy: _Poly, values: Reals) -> Array:
 
 def _moving(place: Reals, shift: Array, at: int, size: int) -> _Vector:
     """Coordinates of a node (m, 3) that moves along `shift` (m, r, 1, 3), each also with the imaginary steps
-    of its three freedoms from `at` on.
+    of its three degrees of freedom from `at` on.
     """
     result = []
     for axis in range(3):

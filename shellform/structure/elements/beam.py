@@ -33,7 +33,7 @@ from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, indices, reals
 from shellform.errors import InputError
-from shellform.structure.elements.beam_kernels import evaluate, local_by_freedom
+from shellform.structure.elements.beam_kernels import evaluate, local_by_dof
 from shellform.structure.elements.parts import Evaluation
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
@@ -71,8 +71,8 @@ class Beams:
         put(self, "frames", reals("beams.frames", self.frames, (count, 3, 3)))
         put(self, "kind", indices("beams.kind", self.kind, (count,), below=len(self.kinds)))
 
-    def freedoms(self) -> Indices:
-        """Freedoms (m, 12) of each element in the order of x^e below equation (20)."""
+    def dofs(self) -> Indices:
+        """Degrees of freedom (m, 12) of each element in the order of x^e below equation (20)."""
         return (6 * self.ends[:, :, None] + np.arange(6)).reshape(-1, 12)
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
@@ -93,11 +93,13 @@ class Beams:
         """Equation (17): l - l0, m, and the six local rotations, rad, of each beam, (m, 7)."""
         return self._local(state)[1]
 
-    def local_forces_by_freedom(self, state: State) -> Reals:
-        """Derivatives (m, 7, 12) of equation (16) by the freedoms of both ends, translations and spins."""
+    def local_forces_by_dof(self, state: State) -> Reals:
+        """Derivatives (m, 7, 12) of equation (16) by the degrees of freedom of both ends, translations and
+        spins.
+        """
         count = len(self.ends)
         result = np.empty((count, 7, 12))
-        share(local_by_freedom, count, *self._kernel_input(state), result)
+        share(local_by_dof, count, *self._kernel_input(state), result)
         return result
 
     def _local(self, state: State) -> tuple[Reals, Reals]:

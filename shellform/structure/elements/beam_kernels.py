@@ -246,7 +246,7 @@ def evaluate(  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})
 def _pack(E, K, out):  # type: ignore[no-untyped-def]
     """The symmetric matrix with lower triangle K (9, 9), element axes, as packed lower triangle (78,) of 12
-    freedoms, global axes.
+    degrees of freedom, global axes.
 
     The six blocks of three rows and columns are written out, so that the compiler knows every place.
     """
@@ -307,7 +307,7 @@ def _row(r):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def local_by_freedom(start, stop, positions, quaternions, ends, frames, rest_length, stiffness, result):  # type: ignore[no-untyped-def]
+def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length, stiffness, result):  # type: ignore[no-untyped-def]
     """The gradients of (12), h_k on the own spin less G' h_k, times the local stiffness (18), in global
     axes.
     """

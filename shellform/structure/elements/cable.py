@@ -48,7 +48,7 @@ class Cables:
                 "the cable joins a node to itself", where=f"cables[{cable}]", value=int(self.ends[cable, 0])
             )
 
-    def freedoms(self) -> Indices:
+    def dofs(self) -> Indices:
         """Translations (c, 6) of the two ends."""
         return (6 * self.ends[:, :, None] + np.arange(3)).reshape(-1, 6)
 

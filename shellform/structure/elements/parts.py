@@ -1,5 +1,5 @@
-"""What the assembler asks of a part (beams, cables, springs): its freedoms, and its forces and stiffness at a
-state.
+"""What the assembler asks of a part (beams, cables, springs): its degrees of freedom, and its forces and
+stiffness at a state.
 
 Freedom 6 i + k of a network is translation (k = 0, 1, 2) or rotation (k = 3, 4, 5) of node i along global
 axes.
@@ -31,8 +31,8 @@ class Evaluation:
 class Part(Protocol):
     """Elements of one kind."""
 
-    def freedoms(self) -> Indices:
-        """Freedoms (m, k) of each element, in the order of the columns of `force`."""
+    def dofs(self) -> Indices:
+        """Degrees of freedom (m, k) of each element, in the order of the columns of `force`."""
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy, forces and, if asked for, tangents of all elements, written `into` an array of their shape

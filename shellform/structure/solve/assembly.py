@@ -1,8 +1,8 @@
 """From the elements of several parts to one force vector and one sparse tangent.
 
 The pattern of the tangent is built once: each packed entry of each element has a fixed slot among the values
-of the lower triangle, so that an assembly is one pass of additions. Held freedoms never enter; a node that no
-beam touches has no rotations.
+of the lower triangle, so that an assembly is one pass of additions. Held degrees of freedom never enter; a
+node that no beam touches has no rotations.
 """
 
 from __future__ import annotations
@@ -41,32 +41,32 @@ class Balance:
 
 
 class Assembly:
-    """Parts on `count` nodes with held freedoms `fixed` (count, 6). `free` (f,) lists the free freedoms in
-    order, `number` (6 count,) the place of each freedom among them, -1 where it is held or has no stiffness;
-    `arms` (count,), m: the mean rest length of each node's beams; `clock` adds up the seconds spent on
-    assembly, factorisation and solve."""
+    """Parts on `count` nodes with held degrees of freedom `fixed` (count, 6). `free` (f,) lists the free
+    degrees of freedom in order, `number` (6 count,) the place of each degree of freedom among them, -1 where
+    it is held or has no stiffness; `arms` (count,), m: the mean rest length of each node's beams; `clock`
+    adds up the seconds spent on assembly, factorisation and solve."""
 
     def __init__(self, count: int, parts: Sequence[Part], fixed: Flags) -> None:
         self.count = count
         self.parts = tuple(parts)
-        freedoms = [part.freedoms() for part in self.parts]
+        dofs = [part.dofs() for part in self.parts]
         active = np.zeros(6 * count, dtype=bool)
-        for each in freedoms:
+        for each in dofs:
             active[each.ravel()] = True
         active &= ~fixed.ravel()
         self.free: Indices = np.flatnonzero(active)
         self.number: Indices = np.full(6 * count, -1, dtype=np.int64)
         self.number[self.free] = np.arange(len(self.free))
         self.clock: dict[str, float] = {"assembly": 0.0, "factorisation": 0.0, "solve": 0.0}
-        self._freedoms = freedoms
+        self._dofs = dofs
         self.arms = _arms(count, self.beams)
         # What turns a force or a moment into a force: 1 for translations, 1 over the node's arm for
         # rotations.
         self.reach: Reals = np.repeat(1.0 / self.arms[:, None], 6, axis=1)
         self.reach[:, :3] = 1.0
         self.reach = self.reach.ravel()
-        self.matrix, self._sources = _pattern(self.number, freedoms)
-        ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms])
+        self.matrix, self._sources = _pattern(self.number, dofs)
+        ends = np.cumsum([0] + [len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in dofs])
         self._shares = list(zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True))
         self._entries = np.empty(int(ends[-1]))
 
@@ -97,13 +97,13 @@ class Assembly:
         began = time.perf_counter()
         energy, largest = 0.0, 0.0
         force = np.zeros(6 * self.count)
-        for part, freedoms, (first, last) in zip(self.parts, self._freedoms, self._shares, strict=True):
-            if not len(freedoms):
+        for part, dofs, (first, last) in zip(self.parts, self._dofs, self._shares, strict=True):
+            if not len(dofs):
                 continue
-            block = self._entries[first:last].reshape(len(freedoms), -1) if tangent else None
+            block = self._entries[first:last].reshape(len(dofs), -1) if tangent else None
             result = part.evaluate(state, tangent=tangent, into=block)
             energy += float(result.energy.sum())
-            largest = max(largest, _add_forces(freedoms, self.reach, result.force, force))
+            largest = max(largest, _add_forces(dofs, self.reach, result.force, force))
         values = None
         if tangent:
             values = np.empty(len(self.matrix.indices))
@@ -113,14 +113,14 @@ class Assembly:
 
     def force_along(self, state: State, motion: Reals) -> Reals:
         """How the internal forces (n, 6) begin to change, N and N·m, as the nodes move by `motion` (n, 6),
-        held freedoms too.
+        held degrees of freedom too.
         """
         change = np.zeros(6 * self.count)
-        for part, freedoms in zip(self.parts, self._freedoms, strict=True):
-            if len(freedoms):
+        for part, dofs in zip(self.parts, self._dofs, strict=True):
+            if len(dofs):
                 tangent = part.evaluate(state, tangent=True).tangent
                 assert tangent is not None
-                _multiply(freedoms, tangent, motion.ravel(), change)
+                _multiply(dofs, tangent, motion.ravel(), change)
         return change.reshape(-1, 6)
 
     def factor(self, state: State) -> Factor:
@@ -146,18 +146,18 @@ def _arms(count: int, beams: Sequence[Beams]) -> Reals:
 
 
 def _pattern(
-    number: Indices, freedoms: Sequence[Indices]
+    number: Indices, dofs: Sequence[Indices]
 ) -> tuple[Symmetric, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """The common lower pattern, and which packed entries of all elements, one after the other, add up to each
     of its values: `first` has one for each value, and `sources` what else adds to the values at `places`,
     which ascend."""
     size = int(number.max(initial=-1)) + 1
-    count = sum(len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in freedoms)
+    count = sum(len(each) * each.shape[1] * (each.shape[1] + 1) // 2 for each in dofs)
     # Half the width is half the memory that an assembly has to read.
     width = np.int32 if count < np.iinfo(np.int32).max else np.int64
     row, column = np.empty(count, dtype=width), np.empty(count, dtype=width)
     begin = 0
-    for each in freedoms:
+    for each in dofs:
         begin = _entries(number, each, begin, row, column)
     order = np.flatnonzero(column >= 0).astype(width)
     order = _counted(column, _counted(row, order, size), size)
@@ -166,15 +166,15 @@ def _pattern(
 
 
 @njit(cache=True)
-def _entries(number, freedoms, begin, row, column):  # type: ignore[no-untyped-def]
-    """Fills rows and columns of the packed entries of all elements from place `begin` on; where a freedom is
-    held the column is -1.
+def _entries(number, dofs, begin, row, column):  # type: ignore[no-untyped-def]
+    """Fills rows and columns of the packed entries of all elements from place `begin` on; where a degree of
+    freedom is held the column is -1.
     """
     at = begin
-    for e in range(freedoms.shape[0]):
-        for i in range(freedoms.shape[1]):
+    for e in range(dofs.shape[0]):
+        for i in range(dofs.shape[1]):
             for j in range(i + 1):
-                a, b = number[freedoms[e, i]], number[freedoms[e, j]]
+                a, b = number[dofs[e, i]], number[dofs[e, j]]
                 row[at], column[at] = max(a, b), min(a, b)
                 at += 1
     return at
@@ -242,27 +242,27 @@ def _gather(start, stop, first, places, sources, entries, values):  # type: igno
 
 
 @njit(cache=True)
-def _add_forces(freedoms, reach, element, total):  # type: ignore[no-untyped-def]
+def _add_forces(dofs, reach, element, total):  # type: ignore[no-untyped-def]
     """Adds the elements' end forces to the nodes' and returns the largest component, moments over the node's
     arm.
     """
     largest = 0.0
-    for e in range(freedoms.shape[0]):
-        for k in range(freedoms.shape[1]):
-            freedom = freedoms[e, k]
-            total[freedom] += element[e, k]
-            largest = max(largest, abs(element[e, k]) * reach[freedom])
+    for e in range(dofs.shape[0]):
+        for k in range(dofs.shape[1]):
+            dof = dofs[e, k]
+            total[dof] += element[e, k]
+            largest = max(largest, abs(element[e, k]) * reach[dof])
     return largest
 
 
 @njit(cache=True)
-def _multiply(freedoms, tangent, motion, total):  # type: ignore[no-untyped-def]
+def _multiply(dofs, tangent, motion, total):  # type: ignore[no-untyped-def]
     """Adds each element's packed symmetric tangent times its motion."""
-    for e in range(freedoms.shape[0]):
+    for e in range(dofs.shape[0]):
         at = 0
-        for i in range(freedoms.shape[1]):
+        for i in range(dofs.shape[1]):
             for j in range(i + 1):
-                total[freedoms[e, i]] += tangent[e, at] * motion[freedoms[e, j]]
+                total[dofs[e, i]] += tangent[e, at] * motion[dofs[e, j]]
                 if j < i:
-                    total[freedoms[e, j]] += tangent[e, at] * motion[freedoms[e, i]]
+                    total[dofs[e, j]] += tangent[e, at] * motion[dofs[e, i]]
                 at += 1

@@ -28,7 +28,7 @@ _ANCHOR = 1e-9  # of the largest weight, holds what no support holds
 
 
 class ChordKeeper:
-    """The correction for the beams among the parts of a model, for its free freedoms `free`."""
+    """The correction for the beams among the parts of a model, for its free degrees of freedom `free`."""
 
     def __init__(self, count: int, beams: list[Beams], free: Indices) -> None:
         self.ends = np.vstack([part.ends for part in beams]) if beams else np.zeros((0, 2), dtype=np.int64)

@@ -50,7 +50,7 @@ _PATIENCE = 3  # steps with mass between two looks for a symmetric path
 _STAGNANT = 0.1
 _HEAVY = 1e6  # times the largest stiffness
 _FAR = 1e6  # m or rad, a step of Newton's iteration that leads nowhere
-_SYMMETRIC_UP_TO = 20_000  # freedoms
+_SYMMETRIC_UP_TO = 20_000  # degrees of freedom
 _HALVINGS = 4  # of one step before the mass is raised instead
 
 
@@ -59,9 +59,9 @@ class Equilibrium:
     """A state in which the forces balance.
 
     `residual`: largest unbalanced force (moments over an element length) over the largest applied or internal
-    force; `factorisations` spent; `energy` strain energy, J; `stable`: the tangent on the free freedoms is
-    positive definite (a rod's spin about its own axis disregarded); `negative`: how many of its eigenvalues
-    are negative.
+    force; `factorisations` spent; `energy` strain energy, J; `stable`: the tangent on the free degrees of
+    freedom is positive definite (a rod's spin about its own axis disregarded); `negative`: how many of its
+    eigenvalues are negative.
     """
 
     state: State
@@ -93,9 +93,9 @@ def find_equilibrium(
     """The equilibrium that implicit dynamic relaxation reaches from `start` under the dead `load` (n, 6), N
     and N·m.
 
-    Held freedoms stay where `start` has them. `limit` bounds the factorisations; `progress(factorisations,
-    residual)` is called at every step. Raises NotConverged with the last state, LostBranch where `on_branch`
-    is set and definiteness is lost.
+    Held degrees of freedom stay where `start` has them. `limit` bounds the factorisations;
+    `progress(factorisations, residual)` is called at every step. Raises NotConverged with the last state,
+    LostBranch where `on_branch` is set and definiteness is lost.
     """
     walk = _Walk(assembly, start, load, reach)
     while walk.residual > tolerance and walk.residual > walk.rounding():

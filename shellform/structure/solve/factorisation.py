@@ -133,8 +133,8 @@ class Symmetric:
         return _Pardiso(self, self._pardiso, self._generation)
 
     def solve_kept(self, values: Reals, kept: Indices, right: Reals) -> Reals | None:
-        """The solution (k, s) on the freedoms `kept` (k,), ascending, for right-hand sides (k, s) on them
-        that are zero elsewhere.
+        """The solution (k, s) on the degrees of freedom `kept` (k,), ascending, for right-hand sides (k, s)
+        on them that are zero elsewhere.
 
         All others are eliminated, which costs as much as a factorisation. Earlier factors go on serving. None
         where the solver can't do it. Raises NotPositiveDefinite.

@@ -36,7 +36,7 @@ Report = Callable[[float, Equilibrium], None]
 @dataclass(frozen=True)
 class Drive:
     """What grows with the load factor: dead `load` (n, 6), N and N·m, and the motion `imposed` (n, 6) of held
-    freedoms, m and rad (turns about fixed axes); `base` (n, 6) is there all the time."""
+    degrees of freedom, m and rad (turns about fixed axes); `base` (n, 6) is there all the time."""
 
     load: Reals
     imposed: Reals
@@ -48,7 +48,7 @@ class Drive:
 
     @property
     def moves_supports(self) -> bool:
-        """Whether held freedoms move."""
+        """Whether held degrees of freedom move."""
         return bool(self.imposed.any())
 
 

@@ -1,14 +1,14 @@
 """Door to MKL PARDISO's sparse Cholesky, from the library that `pip install mkl` brings (x86 Linux and
 Windows).
 
-On one thread it is as fast as CHOLMOD from the `cvxopt` wheel for 8,000 freedoms of a gridshell, and two to
-three times as fast from 30,000 on. One thread is what it gets up to 200,000 freedoms: two halve the time of
-an idle machine, but PARDISO's threads wait for each other without sleeping, and where another process holds
-one of two cores a factorisation of 2 ms was seen to take 139. Larger systems get two threads, told to add up
-in the same order however many there are (conditional numerical reproducibility, iparm 34), so that the same
-case gives the same bytes. Minimum degree beats nested dissection up to some 300,000 freedoms. Reference:
-Intel oneAPI Math Kernel Library, Developer Reference, "oneMKL PARDISO", parameters as numbered there (from
-1).
+On one thread it is as fast as CHOLMOD from the `cvxopt` wheel for 8,000 degrees of freedom of a gridshell,
+and two to three times as fast from 30,000 on. One thread is what it gets up to 200,000 degrees of freedom:
+two halve the time of an idle machine, but PARDISO's threads wait for each other without sleeping, and where
+another process holds one of two cores a factorisation of 2 ms was seen to take 139. Larger systems get two
+threads, told to add up in the same order however many there are (conditional numerical reproducibility, iparm
+34), so that the same case gives the same bytes. Minimum degree beats nested dissection up to some 300,000
+degrees of freedom. Reference: Intel oneAPI Math Kernel Library, Developer Reference, "oneMKL PARDISO",
+parameters as numbered there (from 1).
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ from shellform.structure.elements.threads import cores
 _POSITIVE_DEFINITE, _INDEFINITE = 2, -2
 _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
 _NOT_DEFINITE, _FULL = -4, -2
-_DISSECTION_FROM = 300_000  # freedoms
-_TWO_THREADS_FROM = 200_000  # freedoms
+_DISSECTION_FROM = 300_000  # degrees of freedom
+_TWO_THREADS_FROM = 200_000  # degrees of freedom
 _STRICT = 0x10002  # MKL_CBWR_AUTO | MKL_CBWR_STRICT; kept as it is where the processor has no such mode
 _ANALYSIS = 96  # bytes an entry: 51 to 62 were measured for cubes of rods of 50,000 to 3,300,000 entries
 _BESIDE = 64_000_000  # bytes that a phase takes beside what it tells of; 31e6 were measured
@@ -74,7 +74,7 @@ class Factoriser:
 
     `indptr` (n + 1,), `indices` (nnz,): the lower triangle by columns, the diagonal first in each. Cholesky
     factors, or with `definite` false Bunch and Kaufman's L D L' with pivots of one and two rows, or with
-    freedoms `kept` (k,), ascending, the elimination of all others.
+    degrees of freedom `kept` (k,), ascending, the elimination of all others.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Factoriser:
         self._kept = np.zeros(1, dtype=np.int32)
         self._complement = np.zeros((0, 0))
         if kept is not None:
-            put[35] = 1  # iparm(36): the Schur complement of what the list of freedoms marks
+            put[35] = 1  # iparm(36): the Schur complement of what the list of degrees of freedom marks
             self._kept = np.zeros(self.size, dtype=np.int32)
             self._kept[kept] = 1
             self._complement = np.zeros((len(kept), len(kept)))
@@ -116,9 +116,9 @@ class Factoriser:
         self._call(_FACTOR, 1, self._none, self._none)
 
     def solve_kept(self, values: Reals, right: Reals) -> Reals:
-        """The solution (k, s) on the kept freedoms for the matrix with lower `values` (nnz,) and `right` (k,
-        s) on them, zero elsewhere: a dense Cholesky solution with the Schur complement. Raises NotDefinite,
-        MemoryError."""
+        """The solution (k, s) on the kept degrees of freedom for the matrix with lower `values` (nnz,) and
+        `right` (k, s) on them, zero elsewhere: a dense Cholesky solution with the Schur complement. Raises
+        NotDefinite, MemoryError."""
         self._values = np.ascontiguousarray(values)
         self._analyse(self._complement)
         self._call(_FACTOR, 1, self._none, self._complement)

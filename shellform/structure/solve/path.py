@@ -1,8 +1,9 @@
 """Path following through limit points (Riks 1979; Crisfield 1981; Ramm 1981), with forces and with imposed
 displacements.
 
-All that grows does so with one load factor f: p(f) = base + f·load on the free freedoms, and the held ones
-move by f·imposed. Along the path the unknowns are the free freedoms x and f. A step of Newton's kind solves
+All that grows does so with one load factor f: p(f) = base + f·load on the free degrees of freedom, and the
+held ones move by f·imposed. Along the path the unknowns are the free degrees of freedom x and f. A step of
+Newton's kind solves
 
     K dx = r + q df,   r = p - internal forces,   q = load - K_held·imposed,
     a·dx = g,
@@ -11,7 +12,7 @@ by two solves with one factor of K, dx = u_r + df u_q, and df = (g - a·u_r) / (
 holds the step to its size s:
 
     arc length              a = 2 D,  g = s² - D·D     D the translations since the last point (spherical, translations only)
-    displacement control    a = e_c,  g = s - D_c      freedom c is led
+    displacement control    a = e_c,  g = s - D_c      degree of freedom c is led
     load control            df = s - (f - f_last)      only to end at a given factor
 
 Near a limit point K is nearly singular, but dx is not. K needn't be positive definite: its factor is L D L',
@@ -73,10 +74,10 @@ def follow(
     """The points of the path from the equilibrium `start` at factor 0, one by one.
 
     It ends when the factor comes to `goal` for the first time. With `lead` (node, axis 0 to 2, displacement
-    in m) that freedom is led instead, up to its displacement. `first`: the first step, as a share of the goal
-    or of the led displacement; `most` points. With `events` limit points and bifurcations are located and
-    given as points of their own. Raises NotConverged with the last state where no step succeeds or the points
-    run out, InputError for a held freedom as lead.
+    in m) that degree of freedom is led instead, up to its displacement. `first`: the first step, as a share
+    of the goal or of the led displacement; `most` points. With `events` limit points and bifurcations are
+    located and given as points of their own. Raises NotConverged with the last state where no step succeeds
+    or the points run out, InputError for a held degree of freedom as lead.
     """
     walk = _Path(assembly, start, drive, tolerance)
     led = None if lead is None else walk.number(lead)
@@ -131,8 +132,8 @@ class _Missed(Exception):
 
 @dataclass(frozen=True)
 class _Here:
-    """A point with what the next step needs: `tangent` (f,), the change of the free freedoms with the
-    factor.
+    """A point with what the next step needs: `tangent` (f,), the change of the free degrees of freedom with
+    the factor.
     """
 
     state: State
@@ -159,7 +160,7 @@ class _Path:
         self.spent = 0
 
     def number(self, lead: tuple[int, int, float]) -> int:
-        """Place among the free freedoms of the one that leads."""
+        """Place among the free degrees of freedom of the one that leads."""
         found = np.flatnonzero(self.assembly.free == 6 * lead[0] + lead[1])
         if not len(found):
             raise InputError(
@@ -171,7 +172,7 @@ class _Path:
         return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
 
     def between(self, before: State, after: State) -> Reals:
-        """Translations (t,) of the free freedoms from one state to the other."""
+        """Translations (t,) of the free degrees of freedom from one state to the other."""
         return (after.positions - before.positions).ravel()[self._flat()]
 
     def point(self, state: State, factor: float, iterations: int) -> _Here:

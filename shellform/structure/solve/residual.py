@@ -77,12 +77,12 @@ def _stiffened(values, places, share):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _largest_difference(load, force, free, reach):  # type: ignore[no-untyped-def]
-    """The largest |load - force| on the free freedoms, each times its reach; infinite where one isn't
-    finite.
+    """The largest |load - force| on the free degrees of freedom, each times its reach; infinite where one
+    isn't finite.
     """
     largest = 0.0
-    for freedom in free:
-        size = abs(load[freedom] - force[freedom]) * reach[freedom]
+    for dof in free:
+        size = abs(load[dof] - force[dof]) * reach[dof]
         if not np.isfinite(size):
             return np.inf
         largest = max(largest, size)
@@ -93,8 +93,8 @@ def _largest_difference(load, force, free, reach):  # type: ignore[no-untyped-de
 def _largest(load, reach):  # type: ignore[no-untyped-def]
     """The largest |load|, each times its reach."""
     largest = 0.0
-    for freedom in range(len(load)):
-        largest = max(largest, abs(load[freedom]) * reach[freedom])
+    for dof in range(len(load)):
+        largest = max(largest, abs(load[dof]) * reach[dof])
     return largest
 
 
