@@ -191,7 +191,7 @@ _ACCIDENTS: list[Callable[[bytes, random.Random], bytes]] = [
 def sound(folder: Path) -> dict[str, list[Path]]:
     """Good files of each kind; made in `folder`."""
     import pyvista
-    from tests.study.stubs import study_file
+    from tests.stubs import study_file
 
     from shellform.case.case import load_case
     from shellform.run.run import run_case

@@ -47,7 +47,7 @@ def main() -> int:
     parser.add_argument("--until", default="optimise", help="last stage of each design")
     asked = parser.parse_args()
     sys.path.insert(0, str(ROOT))
-    from tests.study.stubs import study_file
+    from tests.stubs import study_file
 
     place = asked.folder or Path(tempfile.mkdtemp(prefix="study_faults"))
     file = study_file(place, STUDY.replace('case = "dome.toml"', f'until = "{asked.until}"'))

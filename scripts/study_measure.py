@@ -60,7 +60,7 @@ async def asleep(job: Job, before: Outcome | None = None) -> Outcome:
 
 def soak(count: int) -> None:
     """Throughput of two workers over one, processor time a design, and the workers' memory."""
-    from tests.study.stubs import study_file
+    from tests.stubs import study_file
 
     place = Path(tempfile.mkdtemp(prefix="study_soak"))
     case = load_case(study_file(place, "").with_name("dome.toml"), ["optimise.evaluations=3"])
@@ -116,7 +116,7 @@ def soak(count: int) -> None:
 
 def thousand(count: int) -> None:
     """A study by its command's function, from the study file to the page."""
-    from tests.study.stubs import study_file
+    from tests.stubs import study_file
 
     from shellform.study.store import read_table
     from shellform.study.studies import run_study
@@ -151,7 +151,7 @@ optimise.cable_force = "1 - optimise.misfit"
 
 def overhead() -> None:
     """Milliseconds a design that does nothing, through the engine alone and through a whole study."""
-    from tests.study.stubs import study_file
+    from tests.stubs import study_file
 
     from shellform.study.studies import run_study
 
@@ -237,7 +237,7 @@ def many(workers: int, seconds: float) -> None:
     """
     import dask
     import distributed  # noqa: F401 (it adds its own settings, before ours)
-    from tests.study.stubs import study_file
+    from tests.stubs import study_file
 
     from shellform.study.store import Log, flat
 

@@ -304,7 +304,8 @@ def test_where_vtk_s_library_is_missing_states_and_lines_are_still_written(tmp_p
         "import sys; sys.modules['vtkmodules.vtkRenderingOpenGL2'] = None  # as an import that fails\n"
         "import numpy as np\n"
         "from shellform.errors import InputError\n"
-        "from shellform.output import render, vtp\n"
+        "from shellform.output.exchange import vtp\n"
+        "from shellform.output.pictures import render\n"
         "from shellform.output.pictures.panel import Panel\n"
         "panel = Panel('a', np.eye(3), [[0, 1], [1, 2]], np.zeros(3), [[0, 2]], [1.0], [0], [], 0.01)\n"
         "vtp.write_vtp('a.vtp', panel); render.picture('a.svg', panel)\n"
@@ -330,7 +331,7 @@ def test_a_window_without_a_context_is_found_out_before_vtk_crashes():
     # OSMesa is asked for where it isn't installed, which leaves VTK with what it has on a machine without GL
     # libraries
     code = (
-        "import ctypes.util, sys; from shellform.output import scene\n"
+        "import ctypes.util, sys; from shellform.output.pictures import scene\n"
         "sys.exit(0 if scene._window_works() is bool(ctypes.util.find_library('OSMesa')) else 1)"
     )
     asked = {**os.environ, "VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
@@ -341,7 +342,7 @@ def test_a_window_without_a_context_is_found_out_before_vtk_crashes():
 
 
 def test_drawing_without_a_display_says_nothing_on_standard_error():
-    code = "from shellform.output import scene; assert scene._window_works()"
+    code = "from shellform.output.pictures import scene; assert scene._window_works()"
     shell = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
     done = subprocess.run([sys.executable, "-c", code], env=shell, capture_output=True, text=True, check=True)
     assert done.stderr == ""

@@ -266,7 +266,7 @@ def test_no_density_falls_below_the_least_where_the_shape_asks_for_tension():
 
 
 def test_densities_that_do_not_settle_are_not_given_out(monkeypatch):
-    monkeypatch.setattr(thrust_shell, "_ROUNDS", 2)
+    monkeypatch.setattr(funicular, "_ROUNDS", 2)
     plan, triangles, fixed = disc(4)
     shape = np.column_stack([plan, 1 - (plan**2).sum(axis=1)])
     loads = np.column_stack([np.zeros((len(plan), 2)), -np.ones(len(plan))])
