@@ -1,9 +1,12 @@
 """Rotations, factorisation, equilibrium and loading."""
 
+import threading
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shellform.errors import InputError, NotConverged
@@ -20,6 +23,7 @@ from shellform.verification import chain
 small = st.floats(-3.0, 3.0)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.tuples(small, small, small).filter(lambda v: 1e-9 < np.linalg.norm(v) < 3.1))
 def test_rotation_vectors_come_back_from_quaternions_and_matrices(vector):
     quaternion = rotation.from_vectors(np.array([vector]))
@@ -65,6 +69,53 @@ def test_every_solver_solves_and_counts_negative_eigenvalues(backend, monkeypatc
         == symmetric.negative_eigenvalues(values)
         == (np.linalg.eigvalsh(indefinite) < 0).sum()
     )
+
+
+def overtaken(monkeypatch, first, second):
+    """What `first` returns where a second thread runs `second` between the setting of CHOLMOD's option and its
+    use, unless a lock keeps it out.
+    """
+    real, inside, done = factorisation.cholmod, threading.Event(), threading.Event()
+    other = threading.Thread(target=second)
+
+    def symbolic(matrix):
+        if threading.current_thread() is other:
+            inside.set()  # the second has set the option to its own liking, and keeps it so
+            done.wait(10.0)
+        else:
+            other.start()
+            inside.wait(0.5)  # as long as a thread that is kept out is waited for
+        return real.symbolic(matrix)
+
+    stand_in = SimpleNamespace(**{**vars(real), "symbolic": symbolic})
+    monkeypatch.setattr(factorisation, "cholmod", stand_in)
+    try:
+        return first()
+    finally:
+        done.set()
+        other.join(10.0)
+
+
+@pytest.mark.skipif("cholmod" not in factorisation.installed(), reason="CHOLMOD isn't installed")
+def test_an_indefinite_matrix_is_refused_though_another_thread_asks_for_pivots_meanwhile(monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", "cholmod")
+    (one, values), (two, others) = family(random_matrix(0.0)), family(random_matrix(30.0))
+    with pytest.raises(factorisation.NotPositiveDefinite):
+        overtaken(monkeypatch, lambda: one.factor(values), lambda: two.negative_eigenvalues(others))
+
+
+@pytest.mark.skipif("cholmod" not in factorisation.installed(), reason="CHOLMOD isn't installed")
+def test_pivots_are_counted_and_thin_factors_solve_though_another_thread_wants_blocks_meanwhile(monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", "cholmod")
+    whole = random_matrix(30.0)
+    (one, values), (two, others) = family(whole), family(random_matrix(40.0))
+    with monkeypatch.context() as patch:
+        factor = overtaken(patch, lambda: one.factor_thin(values), lambda: two.factor(others))
+    right = np.arange(30.0)
+    np.testing.assert_allclose(factor.solve(right), np.linalg.solve(whole, right), atol=1e-10)
+    one, values = family(random_matrix(0.0))
+    _, untouched = overtaken(monkeypatch, lambda: one.newton(values, right), lambda: two.factor(others))
+    assert not untouched
 
 
 def test_a_factor_that_was_replaced_refuses_to_solve():

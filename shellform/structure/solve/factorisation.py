@@ -4,11 +4,16 @@ MKL's PARDISO is the fastest Cholesky that pip installs; CHOLMOD's supernodal on
 takes its place where there is no MKL, and SciPy's SuperLU in symmetric mode without pivoting where there is
 neither. SHELLFORM_SOLVER=mkl, cholmod or superlu asks for one of them. A Cholesky factorisation that fails is
 information (the state is no stable equilibrium), so it is an exception of its own.
+
+Whether CHOLMOD makes a supernodal L L', which fails where the matrix isn't positive definite, or a simplicial
+L D L', which doesn't, hangs on an option of the whole process. Load cases are followed in threads, so one lock
+is held from setting that option until the factor that it is meant for is there.
 """
 
 from __future__ import annotations
 
 import os
+import threading
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -25,6 +30,9 @@ try:
     from cvxopt import cholmod, matrix, spmatrix
 except ImportError:  # no wheel for this platform: SuperLU serves
     cholmod = None
+
+_SUPERNODAL, _SIMPLICIAL = 2, 0  # values of CHOLMOD's option: L L' by blocks, L D L' column by column
+_CHOLMOD = threading.Lock()  # held while the option must stay as it was set
 
 _NAMES = {"mkl": "PARDISO (MKL)", "cholmod": "CHOLMOD (cvxopt)", "superlu": "SuperLU (SciPy)"}
 
@@ -105,19 +113,15 @@ class Symmetric:
             return self._factor_with_pardiso(values)
         if self._backend == "superlu":
             return _SuperLU(self.full(values))
-        if self._symbolic is None:
-            self._matrix = spmatrix(
-                matrix(values),
-                matrix(self.indices.astype(np.int64)),
-                matrix(self.columns),
-                (self.size, self.size),
-            )
-            cholmod.options["supernodal"] = 2
-            self._symbolic = cholmod.symbolic(self._matrix)
-        self._matrix.V = matrix(values)
         self._generation += 1
         try:
-            cholmod.numeric(self._matrix, self._symbolic)
+            with _CHOLMOD:
+                if self._symbolic is None:
+                    cholmod.options["supernodal"] = _SUPERNODAL
+                    self._matrix = self._lower(values)
+                    self._symbolic = cholmod.symbolic(self._matrix)
+                self._matrix.V = matrix(values)
+                cholmod.numeric(self._matrix, self._symbolic)
         except ArithmeticError as error:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
         return _Cholmod(self, self._symbolic, self._generation)
@@ -208,21 +212,22 @@ class Symmetric:
 
     def _indefinite(self, values: Reals) -> tuple[Any, Reals]:
         """CHOLMOD's simplicial LDLᵀ and the pivots D (n,)."""
-        cholmod.options["supernodal"] = 0
-        try:
-            lower = spmatrix(
-                matrix(values),
-                matrix(self.indices.astype(np.int64)),
-                matrix(self.columns),
-                (self.size, self.size),
-            )
-            symbolic = cholmod.symbolic(lower)
-            cholmod.numeric(lower, symbolic)
-            inverse = matrix(1.0, (self.size, 1))
-            cholmod.solve(symbolic, inverse, sys=6)
-        finally:
-            cholmod.options["supernodal"] = 2
+        lower = self._lower(values)
+        with _CHOLMOD:
+            cholmod.options["supernodal"] = _SIMPLICIAL
+            try:
+                symbolic = cholmod.symbolic(lower)
+                cholmod.numeric(lower, symbolic)
+            finally:  # the convex solvers of the same library take it as it stands
+                cholmod.options["supernodal"] = _SUPERNODAL
+        inverse = matrix(1.0, (self.size, 1))
+        cholmod.solve(symbolic, inverse, sys=6)
         return symbolic, 1.0 / np.array(inverse)[:, 0]
+
+    def _lower(self, values: Reals) -> Any:
+        """The lower triangle as CVXOPT holds it."""
+        rows, columns = matrix(self.indices.astype(np.int64)), matrix(self.columns)
+        return spmatrix(matrix(values), rows, columns, (self.size, self.size))
 
     def _check(self, generation: int) -> None:
         if generation != self._generation:
