@@ -27,11 +27,11 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged
 from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence
 from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
 from shellform.surface.units import turned_up, unit_factor
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
-    from shellform.surface.readers.rhino import Patch
     from shellform.surface.shape.target import Surface
 
 FORMATS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep"}

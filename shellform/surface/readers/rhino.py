@@ -23,6 +23,7 @@ import rhino3dm
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.readers.draft import Choice, Draft, Part, among, joined
+from shellform.surface.readers.nurbs import Curve, Patch
 
 _METRES = {
     "Microns": 1e-6, "Millimeters": 1e-3, "Centimeters": 1e-2, "Decimeters": 0.1, "Meters": 1.0, "Kilometers": 1e3,
@@ -32,29 +33,6 @@ _DEEPEST = 16  # blocks within blocks
 _SUBDIVISIONS = 3
 _ON_EDGE = 1e-4  # of the size: a trim nearer to the patch's own edge than that doesn't cut it
 _SAMPLES = 161  # along each side, whose chords are then nearer to it than that
-
-
-@dataclass(frozen=True)
-class Curve:
-    """A NURBS curve: `control` (n, 3), m, `weights` (n,), `knots` (n + degree + 1,)."""
-
-    control: Reals
-    weights: Reals
-    knots: Reals
-    degree: int
-
-
-@dataclass(frozen=True)
-class Patch:
-    """A NURBS surface: `control` (m, n, 3), m, `weights` (m, n), `knots` along u and v, `degree` along u and
-    v; it is trimmed by `loops` of curves, the outer one first, or whole where there are none.
-    """
-
-    control: Reals
-    weights: Reals
-    knots: tuple[Reals, Reals]
-    degree: tuple[int, int]
-    loops: tuple[tuple[Curve, ...], ...] = ()
 
 
 @dataclass(frozen=True)
