@@ -155,7 +155,7 @@ def tributary(net: Net, triangles: Reals) -> Reals:
     """
     nodes = np.concatenate([net.grid.crossing_nodes[:, 1], net.supports])
     place = np.vstack([net.crossings, net.target.positions[net.supports]])
-    result = np.zeros(len(net.grid.flat))
+    result = np.zeros(net.node_count)
     result[nodes] = _nearest(triangles, place, _COARSE * net.grid.scale)
     return result
 

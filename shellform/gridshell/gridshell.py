@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike
 from shellform.arrays import Flags, Indices, Reals, reals
 from shellform.errors import InputError
 from shellform.gridshell.loads import points
-from shellform.net.grid import cells, grid_beams
+from shellform.net.grid import ROD, cells, grid_beams
 from shellform.net.net import Net
+from shellform.structure.answers.results import bending_utilisation, utilisation
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.sections import Round, Section, isotropic, stiffness, stiffness_by_size
@@ -168,6 +169,11 @@ class Gridshell:
         """The bent state on the target surface, (n,) nodes."""
         return self.net.target
 
+    @property
+    def node_count(self) -> int:
+        """How many nodes there are, those of both layers of rods."""
+        return self.net.node_count
+
     def design(self, *, rest_ratio: float = 0.99) -> Design:
         """The initial design: every candidate cable at `rest_ratio` of its length in the target."""
         if not 0.0 < rest_ratio < 1.0:
@@ -187,6 +193,10 @@ class Gridshell:
         """
         return points(self.net, force, every=every, openings=openings)
 
+    def sections(self, radius: float) -> dict[str, Section]:
+        """The sections by kind of beam, rods of the radius, m; connectors have none."""
+        return {ROD: self.rod.resized(radius).section}
+
     def beams(self, radius: float) -> Beams:
         """Rods of the radius, m, and connectors."""
         return grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
@@ -197,7 +207,7 @@ class Gridshell:
         """
         beams = self.beams(radius)
         rate = self.rod.resized(radius).stiffness_by_radius
-        rods = beams.kind == 0
+        rods = beams.of_kind(ROD)
         axial, torsion, bending_y, bending_z = (np.where(rods, value, 0.0) for value in rate)
         return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
 
@@ -218,6 +228,23 @@ class Gridshell:
         imposed = np.zeros((len(flat), 6))
         imposed[self.net.supports, :3] = (self.target.positions - flat)[self.net.supports]
         return Network(flat, self.beams(design.radius), self.cables(design), fixed, imposed)
+
+    def rod_forces(self, design: Design, state: State) -> Reals:
+        """Section forces (16) (r, 7), N and N·m, of the rods' elements, rod after rod."""
+        beams = self.beams(design.radius)
+        return beams.local_forces(state)[beams.of_kind(ROD)]
+
+    def utilisation(self, design: Design, state: State) -> Reals:
+        """Largest fibre stress (r,) of the rods' elements over their strength; 0 where it isn't known."""
+        beams = self.beams(design.radius)
+        used = utilisation(beams, beams.local_forces(state), self.sections(design.radius))
+        return used[beams.of_kind(ROD)]
+
+    def bending_utilisation(self, design: Design, state: State) -> Reals:
+        """Bending stress (r, 2) at both ends of the rods' elements over their flexural strength, M r / (I f_f)
+        for round ones (1); 0 where it isn't known.
+        """
+        return bending_utilisation(self.sections(design.radius)[ROD], self.rod_forces(design, state))
 
 
 def erection_stress(net: Net, section: Section) -> float:

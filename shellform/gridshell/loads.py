@@ -134,14 +134,14 @@ def rods(net: Net, section: Section) -> Reals:
     if not section.material.density > 0.0:
         raise InputError("the rods' density isn't known", where="rod.density", remedy="Give it in kg/m³.")
     half = 0.5 * GRAVITY * mass_per_length(section) * net.grid.rod_rest_lengths
-    weight = np.zeros(len(net.grid.flat))
+    weight = np.zeros(net.node_count)
     np.add.at(weight, net.grid.rod_ends, half[:, None])
     return _down(weight)
 
 
 def joints(net: Net, mass: float) -> Reals:
     """Load (n, 6) of joints of `mass`, kg, each, half on either rod."""
-    weight = np.zeros(len(net.grid.flat))
+    weight = np.zeros(net.node_count)
     weight[net.grid.crossing_nodes] = 0.5 * GRAVITY * _positive("load.mass", mass)
     return _down(weight)
 
@@ -158,7 +158,7 @@ def points(
     in section 4.1), on its upper rod, outside the plan polygons `openings` and, if any are given, inside one
     of `inside`."""
     loaded = crossings_to_load(net, every, openings, inside)
-    weight = np.zeros(len(net.grid.flat))
+    weight = np.zeros(net.node_count)
     if not math.isfinite(force):
         raise InputError("must be finite", where="load.force", value=force)
     weight[net.grid.crossing_nodes[loaded, 1]] = force

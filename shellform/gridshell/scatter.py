@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import CONNECTOR
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
@@ -321,7 +322,7 @@ def groups_of(shell: Gridshell, design: Design, load: Reals, scatter: Scatter) -
     if scatter.supports:
         supports = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
         result.append(Supports("supports", supports, scatter.supports))
-    connectors = np.flatnonzero(beams.kind == beams.kinds.index("connector"))
+    connectors = np.flatnonzero(beams.of_kind(CONNECTOR))
     for name, deviation, together in (
         ("joints", scatter.joints, False),
         ("joints_all", scatter.joints_all, True),

@@ -17,7 +17,7 @@ from shellform.arrays import Indices, Reals, indices, reals
 from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.state import State
 
-KINDS = ("rod", "connector")
+ROD, CONNECTOR = "rod", "connector"  # kinds of beams
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,11 @@ class Grid:
         )
 
     @property
+    def node_count(self) -> int:
+        """How many nodes there are, those of both layers."""
+        return len(self.flat)
+
+    @property
     def scale(self) -> float:
         """The mean spacing, m, by which lengths are measured."""
         return math.sqrt(self.spacing * self.spacing_v)
@@ -93,7 +98,7 @@ class Grid:
         """Signed distance (n,), m, of each node from the middle between the layers: -gap/2 for u rods, gap/2
         for v rods.
         """
-        level = np.empty(len(self.flat))
+        level = np.empty(self.node_count)
         for rod in self.rods:
             level[rod.nodes] = -0.5 * self.gap if rod.direction == "u" else 0.5 * self.gap
         return level
@@ -118,7 +123,7 @@ def grid_beams(
         bending_z=stiffness[:, 3],
         rest_length=rest,
         kind=kind,
-        kinds=KINDS,
+        kinds=(ROD, CONNECTOR),
     )
 
 

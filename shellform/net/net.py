@@ -25,8 +25,13 @@ class Net:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        count = len(self.grid.flat)
+        count = self.node_count
         object.__setattr__(self, "supports", indices("supports", self.supports, (None,), below=count))
+
+    @property
+    def node_count(self) -> int:
+        """How many nodes there are, those of both layers of rods."""
+        return self.grid.node_count
 
     @property
     def curvature(self) -> Reals:

@@ -29,6 +29,7 @@ from scipy.optimize import least_squares
 from shellform.arrays import Indices, Reals, indices
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
+from shellform.net.grid import CONNECTOR
 from shellform.problem.problem import follow
 from shellform.site.identifiability import Identifiability, told
 from shellform.site.scans import Match, Motion, Scan, match, rigid_fit
@@ -249,7 +250,7 @@ class _Model:
 
     def __init__(self, shell: Gridshell, design: Design, loads: Sequence[Reals]) -> None:
         self.shell, self.design, self.loads = shell, design, list(loads)
-        nodes = len(shell.net.grid.flat)
+        nodes = shell.node_count
         for number, load in enumerate(self.loads):
             if np.shape(load) != (nodes, 6):
                 raise InputError("must be a load (nodes, 6)", where=f"loads[{number}]", value=np.shape(load))
@@ -293,7 +294,7 @@ class _Model:
         beams = assembly.beams[0]
         stiffness = {"axial": (joint.axial, 0.0, 0.0, 0.0), "torsion": (0.0, joint.torsion, 0.0, 0.0)}
         stiffness["bending"] = (0.0, 0.0, joint.bending, joint.bending)
-        rates = [stiffness_rate(beams, "connector", stiffness[name]) for name in names]
+        rates = [stiffness_rate(beams, CONNECTOR, stiffness[name]) for name in names]
         result = np.zeros((len(states), 6 * assembly.count, len(names)))
         for each, state in zip(result, states, strict=True):
             each[assembly.free] = state_by_design(
@@ -456,7 +457,7 @@ def _apart(one: Motion, other: Motion, place: Reals) -> float:
 
 
 def _checked(shell: Gridshell, nodes: Indices) -> Indices:
-    markers = indices("nodes", nodes, (None,), below=len(shell.net.grid.flat))
+    markers = indices("nodes", nodes, (None,), below=shell.node_count)
     if len(np.unique(markers)) < len(markers):
         raise InputError("a node is marked twice", where="nodes")
     return markers

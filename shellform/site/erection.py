@@ -104,7 +104,7 @@ def erect(
     """
     if not 0.0 < step <= 1.0:
         raise InputError("must lie between 0 and 1", where="erect.step", value=step)
-    nodes = len(shell.net.grid.flat)
+    nodes = shell.node_count
     none = np.zeros((nodes, 6))
     own, carried, last = (
         none if each is None else reals(name, each, (nodes, 6))
@@ -166,7 +166,7 @@ class _Site:
     def __init__(self, shell: Gridshell, design: Design, assembly: Assembly | None = None) -> None:
         self.shell, self.design = shell, design
         self.assembly = assemble(shell.network(design)) if assembly is None else assembly
-        self.sections = {"rod": shell.rod.resized(design.radius).section}
+        self.sections = shell.sections(design.radius)
 
     def step(self, stage: str, share: float, state: State, load: Reals) -> Step:
         """The state as a step."""

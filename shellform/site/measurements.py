@@ -95,7 +95,7 @@ def nodes_of(path: str | Path, rows: list[Row], shell: Gridshell) -> Indices:
     crossings = shell.net.grid.crossing_nodes[:, 1]
     found: list[int] = []
     for row in rows:
-        for name, count in (("node", len(shell.net.grid.flat)), ("crossing", len(crossings))):
+        for name, count in (("node", shell.node_count), ("crossing", len(crossings))):
             if name in row.values:
                 where = f"{path}, line {row.line}: {name}"
                 at = _index(row.values[name], where, count)
@@ -136,7 +136,7 @@ def read_loads(path: str | Path, shell: Gridshell) -> Reals:
             where=str(path),
             remedy="Forces are in N, fz upwards.",
         )
-    load = np.zeros((len(shell.net.grid.flat), 6))
+    load = np.zeros((shell.node_count, 6))
     for node, row in zip(nodes_of(path, rows, shell), rows, strict=True):
         load[node, :3] = [row.values.get(name, 0.0) for name in axes]
     return load
@@ -169,7 +169,7 @@ def read_way(path: str | Path, shell: Gridshell) -> list[Reals]:
     stops: dict[float, dict[int, list[float]]] = {}
     for row in read_table(path, ("stop", "node", "x", "y", "z")):
         where = f"{path}, line {row.line}: node"
-        node = _index(row.values["node"], where, len(shell.net.grid.flat))
+        node = _index(row.values["node"], where, shell.node_count)
         if node not in supports:
             raise InputError(
                 "is no support",

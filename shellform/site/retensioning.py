@@ -144,7 +144,7 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
     Raises InputError where nothing was seen, NotConverged where no equilibrium explains it even to a
     thirtieth.
     """
-    marked = indices("nodes", nodes, (None,), below=len(shell.net.grid.flat))
+    marked = indices("nodes", nodes, (None,), below=shell.node_count)
     measured = np.asarray(survey, dtype=float)
     if measured.shape != (len(marked), 3):
         raise InputError("must be a point for each node", where="survey", value=measured.shape)
@@ -175,7 +175,7 @@ def adjust(shell: Gridshell, belief: Belief, goal: Reals, crew: Crew, *, noise: 
     """The next turns towards the `goal` (n, 3), m, as far as the crew can; see the head. Raises
     NotConverged.
     """
-    wanted = reals("goal", goal, (len(shell.net.grid.flat), 3))
+    wanted = reals("goal", goal, (shell.node_count, 3))
     assembly = assemble(shell.network(belief.design))
     rates = _rates(shell, assembly, belief.design, belief.state)
     jacobian = rates.reshape(-1, rates.shape[2])
@@ -263,7 +263,7 @@ def replay(
     (one standard deviation). It ends after `rounds`, or where no turn is worth taking. Raises NotConverged.
     """
     rng = np.random.default_rng(seed)
-    wanted = reals("goal", goal, (len(shell.net.grid.flat), 3))
+    wanted = reals("goal", goal, (shell.node_count, 3))
     wrong = reals("errors", errors, (len(belief.design.present),))
     assembly = assemble(shell.network(belief.design))
     present = belief.design.present

@@ -33,7 +33,7 @@ def test_a_flat_net_on_a_plane_is_perfect(plane, grid):
         grid,
         at_rest(grid.flat),
         np.zeros((len(grid.rod_ends), 2, 2)),
-        np.zeros(len(grid.flat)),
+        np.zeros(grid.node_count),
         0,
     )
     assert found.distance_max < 1e-15
@@ -82,7 +82,7 @@ def test_a_net_off_its_surface_is_refused(plane, grid):
         grid,
         at_rest(raised),
         np.zeros((len(grid.rod_ends), 2, 2)),
-        np.zeros(len(grid.flat)),
+        np.zeros(grid.node_count),
         0,
     )
     with pytest.raises(InputError, match=r"0\.2 m off the surface at \["):

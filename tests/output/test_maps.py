@@ -35,7 +35,7 @@ def test_each_map_shows_the_number_of_the_summary(shell, braced):
 
 
 def test_the_curvature_without_load_and_cables_is_about_the_net_s(shell):
-    state = sf.follow(shell, shell.unbraced(), {"none": np.zeros((len(shell.net.grid.flat), 6))})[
+    state = sf.follow(shell, shell.unbraced(), {"none": np.zeros((shell.node_count, 6))})[
         "none"
     ].equilibrium.state
     panel = maps.panel_of(shell, None, state, quantity="curvature")

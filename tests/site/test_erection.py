@@ -25,7 +25,7 @@ def test_erection_begins_flat_and_free_of_stress_and_ends_in_the_design_s_equili
     # The supports lie on the target, whose edge isn't exactly level; laid out they are.
     np.testing.assert_allclose(first.state.positions, laid_out(shell).positions, atol=1e-9)
     assert first.stress < 1.0
-    none = np.zeros((len(shell.net.grid.flat), 6))
+    none = np.zeros((shell.node_count, 6))
     expected = find_equilibrium(assemble(shell.network(shell.design())), shell.target, none).state
     np.testing.assert_allclose(last.state.positions, expected.positions, atol=1e-8)
     assert last.tension == pytest.approx(shell.cables(shell.design()).tension(expected).max(), rel=1e-5)
@@ -45,7 +45,7 @@ def test_the_way_up_passes_the_states_found_on_the_way_down(shell, erection):
     moving = [each for each in erection.steps if each.stage == "moving supports"]
     low, high = moving[2], moving[-1]
     assembly = assemble(shell.network(shell.unbraced()))
-    imposed = np.zeros((len(shell.net.grid.flat), 6))
+    imposed = np.zeros((shell.node_count, 6))
     supports = shell.net.supports
     imposed[supports, :3] = (high.state.positions - low.state.positions)[supports]
     none = np.zeros_like(imposed)

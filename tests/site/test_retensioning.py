@@ -18,7 +18,7 @@ NOISE, ERROR = 0.15e-3, 1e-3
 @pytest.fixture(scope="module")
 def belief(shell):
     """The unloaded initial design as drawn."""
-    design, none = shell.design(), np.zeros((len(shell.net.grid.flat), 6))
+    design, none = shell.design(), np.zeros((shell.node_count, 6))
     state = find_equilibrium(assemble(shell.network(design)), shell.target, none).state
     return drawn(shell, design, state, none, length_error=ERROR)
 

@@ -63,7 +63,7 @@ def panel_of(
         raise InputError(
             "is nothing to draw", where="quantity", value=quantity, remedy=f"Known: {', '.join(QUANTITIES)}."
         )
-    if len(state.positions) != len(shell.net.grid.flat):
+    if len(state.positions) != shell.node_count:
         raise InputError("belongs to another shell", where="state", value=len(state.positions))
     chosen = shell.unbraced() if design is None else design
     seen = QUANTITIES[quantity](shell, chosen, state)
@@ -89,10 +89,7 @@ def _deviation(shell: Gridshell, design: Design, state: State) -> Map:
 
 
 def _utilisation(shell: Gridshell, design: Design, state: State) -> Map:
-    section = shell.rod.resized(design.radius).section
-    moments = _moments(shell, design, state)
-    stress = np.stack([section.bending(moments[:, end, 0], moments[:, end, 1]) for end in range(2)], axis=1)
-    values = worst_at_nodes(shell.net, stress / section.material.strength)
+    values = worst_at_nodes(shell.net, shell.bending_utilisation(design, state))
     return Map(values, "utilisation of the rods in bending", ("", 1.0), state.positions)
 
 
@@ -134,14 +131,13 @@ def _moments(shell: Gridshell, design: Design, state: State) -> Reals:
     """Bending moments (m, 2, 2), N·m, of the rod elements at their two ends about their local y and z
     axes.
     """
-    forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
-    return np.asarray(forces[:, [[2, 3], [5, 6]]])
+    return np.asarray(shell.rod_forces(design, state)[:, [[2, 3], [5, 6]]])
 
 
 def along_rods(net: Net, at_crossings: Reals) -> Reals:
     """Values (n,) at all nodes from those at crossings (c,), linear along each rod."""
-    result = np.zeros(len(net.grid.flat))
-    known = np.full(len(net.grid.flat), np.nan)
+    result = np.zeros(net.node_count)
+    known = np.full(net.node_count, np.nan)
     for side in range(2):
         known[net.grid.crossing_nodes[:, side]] = at_crossings
     for rod in net.grid.rods:
@@ -153,6 +149,6 @@ def along_rods(net: Net, at_crossings: Reals) -> Reals:
 
 def worst_at_nodes(net: Net, at_ends: Reals) -> Reals:
     """The largest of the rod elements' values at their two ends (m, 2) at each node (n,)."""
-    result = np.zeros(len(net.grid.flat))
+    result = np.zeros(net.node_count)
     np.maximum.at(result, net.grid.rod_ends, at_ends)
     return result

@@ -219,7 +219,7 @@ def tension_order(shell: Gridshell, design: Design) -> Indices:
 
 def cable_crossings(shell: Gridshell, design: Design) -> Indices:
     """The crossings (c, 2) that the design's cables join."""
-    number = np.full(len(shell.net.grid.flat), -1)
+    number = np.full(shell.node_count, -1)
     for side in range(2):
         nodes = shell.net.grid.crossing_nodes[:, side]
         number[nodes] = np.arange(len(nodes))

@@ -40,12 +40,12 @@ def end_stress(beams: Beams, forces: Reals, sections: Mapping[str, Section]) -> 
     kinds without a section.
     """
     result = np.full((len(beams.ends), 2), np.nan)
-    for index, kind in enumerate(beams.kinds):
-        if kind in sections:
-            own = beams.kind == index
+    for kind, section in sections.items():
+        own = beams.of_kind(kind)
+        if own.any():
             for end in range(2):
                 axial, about_y, about_z = forces[own, 0], forces[own, 2 + 3 * end], forces[own, 3 + 3 * end]
-                result[own, end] = stress(sections[kind], axial, about_y, about_z)
+                result[own, end] = stress(section, axial, about_y, about_z)
     return result
 
 
@@ -54,12 +54,12 @@ def end_stress_by_force(beams: Beams, forces: Reals, sections: Mapping[str, Sect
     without a section.
     """
     result = np.zeros((len(beams.ends), 2, 7))
-    for index, kind in enumerate(beams.kinds):
-        if kind in sections:
-            own = beams.kind == index
+    for kind, section in sections.items():
+        own = beams.of_kind(kind)
+        if own.any():
             for end in range(2):
                 y, z = 2 + 3 * end, 3 + 3 * end
-                rates = stress_by_force(sections[kind], forces[own, 0], forces[own, y], forces[own, z])
+                rates = stress_by_force(section, forces[own, 0], forces[own, y], forces[own, z])
                 result[own, end, 0], result[own, end, y], result[own, end, z] = rates
     return result
 
@@ -72,6 +72,13 @@ def utilisation(beams: Beams, forces: Reals, sections: Mapping[str, Section]) ->
         [sections[kind].material.strength if kind in sections else np.nan for kind in beams.kinds]
     )
     return np.asarray(end_stress(beams, forces, sections).max(axis=1) / strength[beams.kind])
+
+
+def bending_utilisation(section: Section, forces: Reals) -> Reals:
+    """Bending stress over strength (m, 2) at both ends of beams of one section, without their axial force; 0
+    without a known strength.
+    """
+    return np.asarray(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]) / section.material.strength)
 
 
 def twist(deformations: Reals) -> Reals:
@@ -97,9 +104,9 @@ def energy_by_kind(network: Network, state: State) -> dict[str, dict[str, float]
         "bending": work[:, [2, 3, 5, 6]].sum(axis=1),
     }
     result = {
-        kind: {name: float(values[beams.kind == index].sum()) for name, values in parts.items()}
-        for index, kind in enumerate(beams.kinds)
-        if (beams.kind == index).any()
+        kind: {name: float(values[own].sum()) for name, values in parts.items()}
+        for kind in beams.kinds
+        if (own := beams.of_kind(kind)).any()
     }
     if len(network.cables.ends):
         result["cable"] = {"axial": float(network.cables.evaluate(state, tangent=False).energy.sum())}

@@ -96,11 +96,7 @@ def stiffness_rate(beams: Beams, kind: str, rate: tuple[float, float, float, flo
     """The beams with the derivatives of EA, GJ, EI_y, EI_z by one variable for the stiffness of one kind, and
     none for the rest.
     """
-    chosen = (
-        beams.kind == beams.kinds.index(kind)
-        if kind in beams.kinds
-        else np.zeros(len(beams.ends), dtype=bool)
-    )
+    chosen = beams.of_kind(kind)
     axial, torsion, bending_y, bending_z = (np.where(chosen, value, 0.0) for value in rate)
     return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
 

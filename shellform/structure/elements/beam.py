@@ -75,6 +75,12 @@ class Beams:
         """Degrees of freedom (m, 12) of each element in the order of x^e below equation (20)."""
         return (6 * self.ends[:, :, None] + np.arange(6)).reshape(-1, 12)
 
+    def of_kind(self, kind: str) -> Flags:
+        """Which beams (m,) are of a kind; none where there is no such kind."""
+        if kind not in self.kinds:
+            return np.zeros(len(self.ends), dtype=bool)
+        return np.asarray(self.kind == self.kinds.index(kind))
+
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy (m,) J, end forces (m, 12) N and N·m, packed lower tangents (m, 78) if asked for (19, 21),
         filled `into`.
