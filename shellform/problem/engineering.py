@@ -21,14 +21,10 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.problem.terms import Measure
-from shellform.structure.answers.mode_stiffness import (
-    quadratic,
-    stiffness_by_dof,
-    stiffness_by_rest_length,
-)
 from shellform.structure.answers.results import end_stress, end_stress_by_force, twist
 from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.answers.stability import modes
+from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.sections import stress_by_size
 from shellform.structure.elements.state import State
@@ -166,9 +162,10 @@ class Softness:
         rows, by_radius, by_rest = [], [], []
         for shape in found.shapes:
             unit = shape / np.sqrt(float(mass @ shape.ravel()[assembly.free] ** 2))
-            rows.append(stiffness_by_dof(assembly, state, unit))
-            by_radius.append(quadratic(rate, state, unit))
-            by_rest.append(stiffness_by_rest_length(cables, state, unit))
+            mode = unit.reshape(-1, 1)
+            rows.append(bilinear_by_dof(assembly, state, mode, mode))
+            by_radius.append(bilinear(rate, state, mode, mode))
+            by_rest.append(bilinear_by_rest_length(cables, state, mode, mode))
         ratio = found.stiffness / self.least
         weight, value = _smooth(2.0 - ratio * np.abs(ratio), SHARPNESS)
         weight = 2.0 * np.abs(ratio) * weight

@@ -7,7 +7,7 @@ K X = -F, the misfit q = |d + X z + ...|² has, to second order,
     E q = d'd + tr(X'X) + sum of d'x_kk,                             var q = 4 |X'd|² + 2 |X'X|² (Frobenius).
 
 The third term of the mean is the curvature of the equilibria; with y = K⁻¹ d it is -(sum of T(y, x_k, x_k) +
-2 y' dF_k/dx x_k + y'F_kk), T being the third derivative of the energy (third.py). The variance is the one of
+2 y' dF_k/dx x_k + y'F_kk), T being the third derivative of the energy (third_derivatives.py). The variance is the one of
 linear equilibria: that is a Gauss-Newton approximation. `Spread.mean` has all three terms. On the vault at 3
 N a crossing, supports 0.075 mm off and all else in proportion, 150 samples gave a deviation of 8.4e-5 m²
 where 8.4e-5 were predicted; with twice that scatter 2.7e-4 instead of 1.9e-4: a stiff grid on supports that
@@ -35,7 +35,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Built, Group, Scatter, groups_of, unpacked
 from shellform.problem.terms import Measure
 from shellform.structure.answers.sensitivity import by_rest_length
-from shellform.structure.answers.third_derivatives import beam_rates, cable_rates
+from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State, moved
 from shellform.structure.network import assemble
@@ -48,7 +48,6 @@ _TOLERANCE = (
     1e-11  # tighter than usual: the linear answer is a start so good that it would pass for a solution
 )
 _SHARES = ((1.0,), (0.5, 1.0), (0.25, 0.5, 0.75, 1.0))  # of a sample's variation, tried one after the other
-_CHUNK = 200  # elements whose products of multipliers and motions are summed at a time
 
 
 @dataclass(frozen=True)
@@ -267,11 +266,7 @@ class _Line:
 
     def curvature(self, adjoint: Reals, along: Reals) -> float:
         """Sum of d'x_kk by the adjoint (6 n,) of the distances."""
-        total = 0.0
-        for part, rates in ((self.built.beams, self._beam_rates), (self.built.cables, self._cable_rates)):
-            dofs = part.dofs()
-            weights = _weights(dofs, self.motion, self.motion)
-            total += float((rates(weights) * adjoint[dofs]).sum())
+        total = float(bilinear_by_dof(self.assembly, self.state, self.motion, self.motion) @ adjoint)
         for each, columns in self._columns():
             # Twice y'(dF/dx)x for what is symmetric. Spins don't commute: with w = x × y the third derivative
             # taken along y instead of x differs by 3/2 w'K x = -3/2 w'F, which with the skew part of dF/dx,
@@ -283,25 +278,14 @@ class _Line:
 
     def by_state(self, multipliers: Reals) -> Reals:
         """Derivative (6 n,) by the state of the sum of L_k'(K X_k + F_k) at fixed L, X."""
-        result = np.zeros(len(multipliers))
-        for part, rates in ((self.built.beams, self._beam_rates), (self.built.cables, self._cable_rates)):
-            dofs = part.dofs()
-            np.add.at(result, dofs, rates(_weights(dofs, multipliers, self.motion)))
+        result = bilinear_by_dof(self.assembly, self.state, multipliers, self.motion)
         for each, columns in self._columns():
             result += each.by_state(self.state, multipliers[:, columns]).sum(axis=1)
         return result
 
     def by_rest_length(self, multipliers: Reals) -> Reals:
-        """The same by the rest lengths (p,): a taut cable's stiffness falls by EA/l0² times the unit
-        matrix.
-        """
-        cables = self.built.cables
-        dofs = cables.dofs()
-        weights = _weights(dofs, multipliers, self.motion)
-        signs = np.vstack([-np.eye(3), np.eye(3)])
-        trace = np.einsum("ij,eik,kj->e", signs, weights, signs)
-        taut = cables.lengths(self.state) > cables.rest_length
-        result = np.where(taut, -cables.stiffness / cables.rest_length**2, 0.0) * trace
+        """The same by the rest lengths (p,)."""
+        result = bilinear_by_rest_length(self.built.cables, self.state, multipliers, self.motion)
         for each, columns in self._columns():
             result = result + each.by_rest_length(self.state, multipliers[:, columns])
         return result
@@ -309,10 +293,7 @@ class _Line:
     def by_radius(self, multipliers: Reals) -> float:
         """The same by the rods' radius, on which beams' stiffness depends; no cause of scatter does."""
         rate = self.shell.beams_by_radius(self.radius)
-        packed = rate.evaluate(self.state, tangent=True).tangent
-        assert packed is not None
-        weights = _weights(rate.dofs(), multipliers, self.motion)
-        return float((unpacked(packed, weights.shape[1]) * weights).sum())
+        return bilinear(rate, self.state, multipliers, self.motion)
 
     def drawn(self, z: Reals, shares: Sequence[float]) -> State | None:
         """The equilibrium of the structure at z, on the stable branch; None where it can't be followed in
@@ -346,27 +327,10 @@ class _Line:
             for each, end in zip(self.groups, ends, strict=True)
         ]
 
-    def _beam_rates(self, weights: Reals) -> Reals:
-        return beam_rates(self.built.beams, self.state, weights)
-
-    def _cable_rates(self, weights: Reals) -> Reals:
-        return cable_rates(self.built.cables, self.state, weights)
-
 
 def _places(motion: Reals) -> Reals:
     """The nodes' translations (3 n, k) among all degrees of freedom (6 n, k)."""
     return np.ascontiguousarray(motion.reshape(-1, 6, motion.shape[1])[:, :3]).reshape(-1, motion.shape[1])
-
-
-def _weights(dofs: Indices, left: Reals, right: Reals) -> Reals:
-    """Symmetric sums over k of left_k right_k' (m, d, d) on each element's degrees of freedom."""
-    size = dofs.shape[1]
-    result = np.empty((len(dofs), size, size))
-    for first in range(0, len(dofs), _CHUNK):
-        part = dofs[first : first + _CHUNK]
-        whole = left[part] @ right[part].transpose(0, 2, 1)
-        result[first : first + _CHUNK] = 0.5 * (whole + whole.transpose(0, 2, 1))
-    return result
 
 
 def _add_products(part: Part, state: State, motion: Reals, forces: Reals, columns: Indices) -> None:

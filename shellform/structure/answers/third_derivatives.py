@@ -1,193 +1,145 @@
-"""Third derivatives of the elements' energies, exact, for the derivatives of stiffness: how tr(K M) changes
-with the state at fixed M.
+"""How the stiffness along given motions changes as the nodes move and cables are let out: third derivatives of
+the elements' energies, exact.
 
-K being the Hessian of the energy U along spins, v'Kv is the second derivative of U(t) where an element moves
-by t v (nodes shifted, triads turned by exp(t S(v))). With M = sum of w v v' (its eigenvectors) the trace is
-the sum of w v'Kv. U(t) is carried as a polynomial up to t² in arithmetic that cuts off the rest, exact to
-rounding; the derivative by each degree of freedom of the state follows from an imaginary step of that degree
-of freedom, whose square is below the last digit: no differences are taken. The energies are those of beam.py
-(18) with its triads, and of cable.py.
+For motions l_k, r_k of the nodes at fixed l, r the tangent K gives B = sum of l_k'K r_k; l = r = a mode is that
+mode's stiffness, l the multipliers of linear answers r what a robust design derives. For beams the derivative
+of B by the state comes from the compiled tangent itself, evaluated at complex positions x + i h e_j: the
+imaginary part over h is the derivative to the last digit, since nothing is subtracted (Squire and Trapp 1998).
+The degrees of freedom of an element are taken one after the other, all elements at once, so that it costs
+twelve assemblies. A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q, has
+
+    B = EA/l0 (p·q - (l0/l) (p·q - a b)),   dB/d(x_b - x_a) = EA/l² ((p·q - a b) e + a (q - b e) + b (p - a e)).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 
-from shellform.arrays import Reals
-from shellform.structure.elements import rotation
+from shellform.arrays import Indices, Reals
 from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.beam_kernels import evaluate
 from shellform.structure.elements.cable import Cables
+from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State
+from shellform.structure.elements.threads import share
+from shellform.structure.solve.assembly import Assembly
 
-_STEP = 1e-30  # imaginary
-_CHUNK = 256  # elements at a time, each with 144 polynomials
-
-Array = np.ndarray[Any, Any]
-
-
-@dataclass(frozen=True)
-class _Poly:
-    """a + b t + c t², with arrays that broadcast."""
-
-    a: Array
-    b: Array
-    c: Array
-
-    def __add__(self, other: _Poly) -> _Poly:
-        return _Poly(self.a + other.a, self.b + other.b, self.c + other.c)
-
-    def __sub__(self, other: _Poly) -> _Poly:
-        return _Poly(self.a - other.a, self.b - other.b, self.c - other.c)
-
-    def __mul__(self, other: _Poly) -> _Poly:
-        return _Poly(
-            self.a * other.a,
-            self.a * other.b + self.b * other.a,
-            self.a * other.c + self.b * other.b + self.c * other.a,
-        )
-
-    def of(self, value: Array, first: Array, second: Array) -> _Poly:
-        """A function of this polynomial with its value and derivatives at a."""
-        return _Poly(value, first * self.b, first * self.c + 0.5 * second * self.b * self.b)
-
-    def root(self) -> _Poly:
-        root = np.sqrt(self.a)
-        return self.of(root, 0.5 / root, -0.25 / (root * self.a))
-
-    def inverse(self) -> _Poly:
-        inverse = 1.0 / self.a
-        return self.of(inverse, -(inverse**2), 2.0 * inverse**3)
-
-    def arcsine(self) -> _Poly:
-        rest = 1.0 - self.a * self.a
-        first = 1.0 / np.sqrt(rest)
-        return self.of(np.arcsin(self.a), first, self.a * first / rest)
+_STEP = 1e-30  # of the complex shift: its square vanishes beside 1
+_CHUNK = 200  # elements whose products of motions are summed at a time
 
 
-_Vector = list[_Poly]
+def bilinear(part: Part, state: State, left: Reals, right: Reals) -> float:
+    """Sum of l_k'K r_k over the motions `left`, `right` (6 n, k), m and rad, with the tangent K of one part.
 
-
-def beam_rates(beams: Beams, state: State, weights: Reals) -> Reals:
-    """Derivatives (m, 12) of tr(K M) by each beam's own degrees of freedom, for symmetric M `weights` (m, 12,
-    12).
+    With a rate of the part's stiffness in its place it is the derivative by what the stiffness depends on.
     """
-    result = np.empty((len(beams.ends), 12))
-    for first in range(0, len(result), _CHUNK):
-        part = slice(first, first + _CHUNK)
-        result[part] = _beam_chunk(beams, state, weights[part], np.arange(len(result))[part])
-    return result
+    tangent = part.evaluate(state, tangent=True).tangent
+    assert tangent is not None
+    return float((tangent * _packed_products(part.dofs(), left, right)).sum())
 
 
-def cable_rates(cables: Cables, state: State, weights: Reals) -> Reals:
-    """Derivatives (c, 6) of tr(K M) by each cable's own degrees of freedom, for symmetric M `weights` (c, 6,
-    6); 0 for slack ones.
+def bilinear_by_dof(assembly: Assembly, state: State, left: Reals, right: Reals) -> Reals:
+    """Derivative (6 n,), N and N·m, of the sum of l_k'K r_k by every node's translations and rotation
+    increments, for beams and cables.
     """
-    values, vectors = np.linalg.eigh(weights)
-    shift = vectors.transpose(0, 2, 1)[:, :, None, :]
-    place = state.positions[cables.ends].reshape(-1, 6)
-    a, b = _moving(place[:, :3], shift[..., :3], 0, 6), _moving(place[:, 3:], shift[..., 3:], 3, 6)
-    away = [q - p for p, q in zip(a, b, strict=True)]
-    stretch = _dot(away, away).root() - _constant(cables.rest_length)
-    taut = cables.lengths(state) > cables.rest_length
-    scale = np.where(taut, cables.stiffness / cables.rest_length, 0.0)
-    energy = stretch * stretch
-    return _contracted(0.5 * scale, energy, values)
-
-
-def _beam_chunk(beams: Beams, state: State, weights: Reals, chosen: Array) -> Array:
-    values, vectors = np.linalg.eigh(weights)
-    motion = vectors.transpose(0, 2, 1)[:, :, None, :]  # element, direction, step, degree of freedom
-    ends = beams.ends[chosen]
-    frames = beams.frames[chosen]
-    x = state.positions[ends]
-    triads = [rotation.matrices(state.quaternions[ends[:, end]]) @ frames for end in range(2)]
-    a, b = _moving(x[:, 0], motion[..., :3], 0, 12), _moving(x[:, 1], motion[..., 6:9], 6, 12)
-    A, B = _turning(triads[0], motion[..., 3:6], 3), _turning(triads[1], motion[..., 9:12], 9)
-    d = [q - p for p, q in zip(a, b, strict=True)]
-    length = _dot(d, d).root()
-    ex = _scaled(d, length.inverse())
-    v = [p + q for p, q in zip(A[1], B[1], strict=True)]
-    z = _cross(ex, v)
-    ez = _scaled(z, _dot(z, z).root().inverse())
-    ey = _cross(ez, ex)
-    half = 0.5
-    theta = []
-    for T in (A, B):
-        for one, other in (
-            (_dot(ez, T[1]), _dot(ey, T[2])),
-            (_dot(ez, T[0]), _dot(ex, T[2])),
-            (_dot(ey, T[0]), _dot(ex, T[1])),
-        ):
-            twice = one - other
-            theta.append(_Poly(half * twice.a, half * twice.b, half * twice.c).arcsine())
-    l0 = beams.rest_length[chosen]
-    stretch = length - _constant(l0)
-    twist = theta[0] - theta[3]
-    total = _contracted(0.5 * beams.axial[chosen] / l0, stretch * stretch, values)
-    total += _contracted(0.5 * beams.torsion[chosen] / l0, twist * twist, values)
-    for k, bending in ((1, beams.bending_y), (2, beams.bending_z)):
-        one, other = theta[k], theta[k + 3]
-        total += _contracted(2.0 * bending[chosen] / l0, one * one + one * other + other * other, values)
+    total = np.zeros(6 * assembly.count)
+    for part in assembly.parts:
+        if isinstance(part, Beams) and len(part.ends):
+            _add_beams(part, state, left, right, total)
+        elif isinstance(part, Cables) and len(part.ends):
+            _add_cables(part, state, left, right, total)
     return total
 
 
-def _contracted(scale: Reals, energy: _Poly, values: Reals) -> Array:
-    """Sum over the directions of weight times second derivative, its rate by each step, (m, k)."""
-    rates = 2.0 * np.imag(energy.c) / _STEP
-    return np.asarray(scale[:, None] * np.einsum("er,erc->ec", values, rates))
-
-
-def _moving(place: Reals, shift: Array, at: int, size: int) -> _Vector:
-    """Coordinates of a node (m, 3) that moves along `shift` (m, r, 1, 3), each also with the imaginary steps
-    of its three degrees of freedom from `at` on.
+def bilinear_by_rest_length(cables: Cables, state: State, left: Reals, right: Reals) -> Reals:
+    """Derivative (c,), N, of the sum of l_k'K r_k by each cable's rest length at the state: -EA p·q / l0², 0 in
+    slack cables.
     """
-    result = []
-    for axis in range(3):
-        step = np.zeros(size, dtype=complex)
-        step[at + axis] = 1j * _STEP
-        start = place[:, None, None, axis] + step
-        result.append(_Poly(start, shift[..., axis], np.zeros(1)))
+    taut = cables.lengths(state) > cables.rest_length
+    whole = np.empty(len(cables.ends))
+    for first in range(0, len(whole), _CHUNK):
+        chosen = slice(first, first + _CHUNK)
+        p, q = (_relative(cables.ends[chosen], each) for each in (left, right))
+        whole[chosen] = (p * q).sum(axis=2).sum(axis=1)
+    return np.where(taut, -cables.stiffness * whole / cables.rest_length**2, 0.0)
+
+
+def _add_beams(beams: Beams, state: State, left: Reals, right: Reals, total: Reals) -> None:
+    """One complex pass for each of the twelve degrees of freedom, every element with ends of its own."""
+    count = len(beams.ends)
+    dofs = beams.dofs()
+    weights = _packed_products(dofs, left, right)
+    ends = np.arange(2 * count).reshape(-1, 2)
+    place = state.positions[beams.ends].reshape(-1, 3)
+    turn = state.quaternions[beams.ends].reshape(-1, 4)
+    stiffness = np.column_stack([beams.axial, beams.torsion, beams.bending_y, beams.bending_z])
+    energy, force = np.empty(count, complex), np.empty((count, 12), complex)
+    blocks, none = np.empty((count, 78), complex), np.empty((0, 7), complex)
+    for dof in range(12):
+        node, axis = divmod(dof, 6)
+        positions, quaternions = place.astype(complex), turn.astype(complex)
+        if axis < 3:
+            positions[node::2, axis] += 1j * _STEP
+        else:
+            quaternions[node::2] += 0.5j * _STEP * _turned_about(axis - 3, turn[node::2])
+        share(
+            evaluate,
+            count,
+            positions,
+            quaternions,
+            ends,
+            beams.frames,
+            beams.rest_length,
+            stiffness,
+            energy,
+            force,
+            blocks,
+            none,
+            none,
+        )
+        np.add.at(total, dofs[:, dof], (blocks.imag * weights).sum(axis=1) / _STEP)
+
+
+def _add_cables(cables: Cables, state: State, left: Reals, right: Reals, total: Reals) -> None:
+    dofs = cables.dofs()
+    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    unit = chord / length[:, None]
+    taut = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
+    scale = taut * (cables.rest_length / length) / length
+    for first in range(0, len(length), _CHUNK):
+        chosen = slice(first, first + _CHUNK)
+        p, q = (_relative(cables.ends[chosen], each) for each in (left, right))
+        e = unit[chosen, None]
+        a, b = (e * p).sum(axis=2), (e * q).sum(axis=2)
+        across = ((p * q).sum(axis=2) - a * b).sum(axis=1)
+        swung = (a[..., None] * (q - b[..., None] * e) + b[..., None] * (p - a[..., None] * e)).sum(axis=1)
+        slope = scale[chosen, None] * (across[:, None] * unit[chosen] + swung)
+        np.add.at(total, dofs[chosen], np.hstack([-slope, slope]))
+
+
+def _relative(ends: Indices, motions: Reals) -> Reals:
+    """How second ends move against first ones (c, k, 3), by motions (6 n, k)."""
+    place = motions.reshape(-1, 6, motions.shape[1])[:, :3]
+    return np.ascontiguousarray((place[ends[:, 1]] - place[ends[:, 0]]).transpose(0, 2, 1))
+
+
+def _packed_products(dofs: Indices, left: Reals, right: Reals) -> Reals:
+    """What packed lower entries (m, d (d + 1) / 2) of symmetric blocks on `dofs` (m, d) count in the sum over
+    k of l_k'K r_k.
+    """
+    row, column = np.tril_indices(dofs.shape[1])
+    times = np.where(row == column, 1.0, 2.0)
+    result = np.empty((len(dofs), len(row)), order="F")
+    for first in range(0, len(dofs), _CHUNK):
+        own = dofs[first : first + _CHUNK]
+        whole = left[own] @ right[own].transpose(0, 2, 1)
+        result[first : first + _CHUNK] = 0.5 * (whole + whole.transpose(0, 2, 1))[:, row, column] * times
     return result
 
 
-def _turning(triad: Reals, spin: Array, at: int) -> list[_Vector]:
-    """The three axes, each a vector, of the triads (m, 3, 3) that turn by `spin` (m, r, 1, 3): exp(t S(v))
-    exp(i S(step)) up to t².
-    """
-    axes = []
-    w = [spin[..., k] for k in range(3)]
-    for column in range(3):
-        own = triad[:, None, None, :, column]
-        start = [np.broadcast_to(own[..., k], (len(triad), 1, 12)).astype(complex) for k in range(3)]
-        for axis in range(3):
-            # An imaginary spin about one axis turns the two others into each other.
-            i, j = (axis + 1) % 3, (axis + 2) % 3
-            start[i][..., at + axis] -= 1j * _STEP * own[..., 0, j]
-            start[j][..., at + axis] += 1j * _STEP * own[..., 0, i]
-        first = _product(w, start)
-        second = _product(w, first)
-        axes.append([_Poly(p, q, 0.5 * r) for p, q, r in zip(start, first, second, strict=True)])
-    return axes
-
-
-def _product(u: list[Array], v: list[Array]) -> list[Array]:
-    return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-
-
-def _constant(value: Reals) -> _Poly:
-    return _Poly(value[:, None, None], np.zeros(1), np.zeros(1))
-
-
-def _dot(u: _Vector, v: _Vector) -> _Poly:
-    return u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-
-
-def _cross(u: _Vector, v: _Vector) -> _Vector:
-    return [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-
-
-def _scaled(u: _Vector, s: _Poly) -> _Vector:
-    return [each * s for each in u]
+def _turned_about(axis: int, quaternions: Reals) -> Reals:
+    """The product of the unit imaginary quaternion about an axis and each quaternion (k, 4)."""
+    w, x, y, z = quaternions.T
+    rows = {0: (-x, w, -z, y), 1: (-y, z, w, -x), 2: (-z, -y, x, w)}
+    return np.column_stack(rows[axis])

@@ -40,7 +40,7 @@ def evaluate(  # type: ignore[no-untyped-def]
     """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled
     where they have rows.
 
-    Positions and quaternions may be complex, for derivatives by complex steps (softening.py).
+    Positions and quaternions may be complex, for derivatives by complex steps (third_derivatives.py).
     """
     dtype = positions.dtype
     E = np.empty((3, 3), dtype)
