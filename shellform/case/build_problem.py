@@ -23,6 +23,7 @@ from shellform.case.entries import RobustEntry
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Scatter
+from shellform.net.grid import CONNECTOR
 from shellform.problem.engineering import (
     ConnectorTurn,
     LargestCableForce,
@@ -70,7 +71,7 @@ def case_problem(
         limits.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
     limits += _engineers(case, shell, loads)
     if case.robust is not None and case.robust.limit is not None and robust is not None:
-        limits.append(AtMost(case.robust.limit**2 * len(shell.net.grid.flat), robust))
+        limits.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
     used = dict(loads)
     factor, critical = case.limits.critical_factor, []
     if factor is not None:
@@ -156,13 +157,11 @@ def shown(shell: Gridshell, design: Design, state: State, load: Reals) -> dict[s
     """
     beams, cables = shell.beams(design.radius), shell.cables(design)
     pull = cables.tension(state)
-    section = shell.rod.resized(design.radius).section
-    used = results.utilisation(beams, beams.local_forces(state), {beams.kinds[0]: section})
-    turn = results.twist(beams.local_deformations(state))[beams.kind == 1]
+    turn = results.twist(beams.local_deformations(state))[beams.of_kind(CONNECTOR)]
     held = shell.net.supports
     inner = assemble(shell.network(design)).evaluate(state, tangent=False).force
     return {
-        "stress_utilisation_max": float(np.nanmax(used)),
+        "stress_utilisation_max": float(shell.utilisation(design, state).max()),
         "connector_turn_max": float(np.abs(turn).max(initial=0.0)),
         "uplift_max": max(0.0, -float((inner - load)[held, 2].min())),
         "cable_force_max": float(pull.max(initial=0.0)),

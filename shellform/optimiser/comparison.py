@@ -173,7 +173,7 @@ def compare(
         status = "the number of evaluations was reached"
     shell, best, evaluator = problem.shell, plain.best, plain.evaluator
     design = without_slack(shell, best.design, best.states[next(iter(problem.loads))])
-    none = np.zeros((len(shell.net.grid.flat), 6))
+    none = np.zeros((shell.node_count, 6))
     return Compared(
         method,
         design,

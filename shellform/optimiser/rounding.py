@@ -14,19 +14,15 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.catalogue import Catalogue, label, neighbours, rounded_up
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import ROD
 from shellform.optimiser import solver
 from shellform.optimiser.optimum import Optimum
 from shellform.problem.problem import Problem, deviations, follow
-from shellform.structure.answers import results
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.sections import mass_per_length
-from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 
 
@@ -130,7 +126,7 @@ def table(trials: Sequence[Trial]) -> str:
 def rods_mass(shell: Gridshell) -> float:
     """Of all rods, kg."""
     beams = shell.beams(shell.rod.radius)
-    return float(beams.rest_length[beams.kind == 0].sum() * mass_per_length(shell.rod.section))
+    return float(beams.rest_length[beams.of_kind(ROD)].sum() * mass_per_length(shell.rod.section))
 
 
 def _whole(start: Design, design: Design) -> Design:
@@ -201,7 +197,7 @@ def _trial(
         weight * float(part.term.measure(shell, optimum.design, state).value[0])
         for weight, part in zip(weights, problem.minimise, strict=True)
     )
-    used = _used(shell, optimum.design, state)
+    used = float(shell.utilisation(optimum.design, state).max())
     if used > 1.0:
         why = "; ".join(
             [
@@ -222,9 +218,3 @@ def _trial(
         why,
         up,
     )
-
-
-def _used(shell: Gridshell, design: Design, state: State) -> float:
-    beams = shell.beams(design.radius)
-    values: Reals = results.utilisation(beams, beams.local_forces(state), {beams.kinds[0]: shell.rod.section})
-    return float(np.nanmax(values))

@@ -388,7 +388,7 @@ class Search:
     def finish(self) -> Optimum:
         """The last accepted design that bears all loads on the documented path."""
         shell, problem = self.problem.shell, self.problem
-        none = np.zeros((len(shell.net.grid.flat), 6))
+        none = np.zeros((shell.node_count, 6))
         if not self.accepted:
             raise NotConverged(
                 "No design was found that carries all loads",

@@ -20,6 +20,7 @@ import scipy.sparse as sp
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import CONNECTOR, ROD
 from shellform.problem.terms import Measure
 from shellform.structure.answers.results import end_stress, end_stress_by_force, twist
 from shellform.structure.answers.sensitivity import reaction_rows
@@ -55,9 +56,9 @@ class RodUtilisation:
             raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
         section = rod.resized(design.radius).section
         beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
-        chosen = {beams.kinds[0]: section}
+        chosen = shell.sections(design.radius)
         forces = beams.local_forces(state)
-        own = beams.kind == 0
+        own = beams.of_kind(ROD)
         values = end_stress(beams, forces, chosen)[own].ravel() / rod.strength
         by_force = end_stress_by_force(beams, forces, chosen)[own] / rod.strength
         rows = (by_force @ beams.local_forces_by_dof(state)[own]).reshape(len(values), 12)
@@ -81,7 +82,7 @@ class ConnectorTurn:
     def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
         """One value, rad."""
         beams = shell.beams(design.radius)
-        own = beams.kind == 1
+        own = beams.of_kind(CONNECTOR)
         turn = twist(beams.local_deformations(state))[own]
         # Mx_a = GJ (theta_a - theta_b) / l0, so that its derivative is that of the twist but for a factor.
         scale = (-beams.rest_length / beams.torsion)[own]
@@ -212,7 +213,7 @@ def _of_tensions(
     """KS of offset + factor EA (l / l0 - 1) of the `chosen` candidate cables; 0 where there are none."""
     if not len(chosen):
         zero = sp.csr_array((1, len(shell.cable_ends)))
-        return Measure(np.zeros(1), sp.csr_array((1, 6 * len(shell.net.grid.flat))), zero, np.zeros(1))
+        return Measure(np.zeros(1), sp.csr_array((1, 6 * shell.node_count)), zero, np.zeros(1))
     cables = make_cables(
         shell.cable_ends[chosen], rest_length=design.rest_length[chosen], stiffness=shell.cable.stiffness
     )
@@ -248,7 +249,7 @@ def _largest(
     each by its own cable's rest length.
     """
     weight, value = _smooth(values, SHARPNESS / unit)
-    slope = np.zeros(6 * len(shell.net.grid.flat))
+    slope = np.zeros(6 * shell.node_count)
     np.add.at(slope, dofs, weight[:, None] * rows)
     by_rest = np.zeros(len(shell.cable_ends))
     if cables is not None and by_rest_length is not None:

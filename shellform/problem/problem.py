@@ -374,7 +374,7 @@ def follow(
     The cases are solved side by side on the cores. With `stay` snap-through isn't followed. Raises
     NotConverged where no equilibrium is found.
     """
-    none = np.zeros((len(shell.net.grid.flat), 6))
+    none = np.zeros((shell.node_count, 6))
     network = shell.network(design)
     idle = [
         assemble(network)

@@ -154,7 +154,7 @@ class AtMost:
 def _measure(
     shell: Gridshell, value: object, *, by_dof: sp.csr_array | None = None, by_radius: object = (0.0,)
 ) -> Measure:
-    nodes, cables = len(shell.net.grid.flat), len(shell.cable_ends)
+    nodes, cables = shell.node_count, len(shell.cable_ends)
     return Measure(
         np.asarray(value, dtype=float),
         sp.csr_array((1, 6 * nodes)) if by_dof is None else by_dof,
@@ -166,7 +166,7 @@ def _measure(
 def _tensions(shell: Gridshell, design: Design, state: State) -> Measure:
     cables = shell.cables(design)
     present = np.flatnonzero(design.present)
-    count, nodes = len(shell.cable_ends), len(shell.net.grid.flat)
+    count, nodes = len(shell.cable_ends), shell.node_count
     value = np.zeros(count)
     value[present] = cables.tension(state)
     rows = np.repeat(present, 6)

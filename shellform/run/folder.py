@@ -227,7 +227,7 @@ def keep_design(
                 "stable": loaded[each].equilibrium.stable,
                 "on_branch": loaded[each].on_branch,
                 "residual": loaded[each].equilibrium.residual,
-                "rod_utilisation_max": utilisation(shell, design, states[each]),
+                "rod_utilisation_max": float(shell.bending_utilisation(design, states[each]).max()),
                 **shown(shell, design, states[each], loads[each]),
             }
             for each in loads
@@ -265,15 +265,6 @@ def _deviation(shell: Gridshell, state: State) -> dict[str, float]:
         "deviation_mean": float(away.mean()),
         "deviation_rms": float(np.sqrt((away**2).mean())),
     }
-
-
-def utilisation(shell: Gridshell, design: Design, state: State) -> float:
-    """The largest bending stress of the rods over their flexural strength: M r / I over f_f for round ones
-    (1).
-    """
-    section = shell.rod.resized(design.radius).section
-    forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
-    return float(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]).max()) / section.material.strength
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -96,4 +96,4 @@ def robustness(entry: RobustEntry, shell: Gridshell, design: Design, state: Stat
         if entry.samples
         else None
     )
-    return Robustness(told, drawn, len(shell.net.grid.flat))
+    return Robustness(told, drawn, shell.node_count)

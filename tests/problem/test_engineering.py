@@ -61,7 +61,7 @@ def test_the_smooth_maximum_is_never_below_the_largest_and_little_above(shell, w
     design = shell.design()
     told = RodUtilisation("wet").measure(shell, design, state).value[0]
     beams = shell.beams(design.radius)
-    forces = beams.local_forces(state)[beams.kind == 0]
+    forces = beams.local_forces(state)[beams.of_kind("rod")]
     inertia = 0.25 * np.pi * design.radius**4
     stress = [
         np.abs(forces[:, 0]) / (np.pi * design.radius**2)

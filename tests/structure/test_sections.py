@@ -242,7 +242,7 @@ def test_stresses_answer_to_the_radius_and_the_load_as_solved_neighbours_do():
     partial[:, 0] = (own @ by_radius.local_forces(state)[:, :, None]).ravel()
     for end in range(2):
         rates = stress_by_size(section, forces[:, 0], forces[:, 2 + 3 * end], forces[:, 3 + 3 * end])[0]
-        partial[end::2, 0] += np.where(network.beams.kind == 0, rates, 0.0)
+        partial[end::2, 0] += np.where(network.beams.of_kind("rod"), rates, 0.0)
     total = gradients(
         response, stress_rows(assembly, state, network.beams, {"rod": section}).toarray(), partial
     )
@@ -250,7 +250,7 @@ def test_stresses_answer_to_the_radius_and_the_load_as_solved_neighbours_do():
     def stresses(model, shape, under):
         return end_stress(model.beams, model.beams.local_forces(solved(model, under)), {"rod": shape}).ravel()
 
-    rods = np.repeat(network.beams.kind == 0, 2)
+    rods = np.repeat(network.beams.of_kind("rod"), 2)
     step = 1e-4 * 0.012
     ahead, behind = frame(radius=0.012 + step), frame(radius=0.012 - step)
     slope = (stresses(ahead[0], ahead[2], load) - stresses(behind[0], behind[2], load)) / (2 * step)

@@ -32,7 +32,7 @@ def nets(draw):
         gap=draw(st.floats(1e-9, 1.0)),
         elements=draw(st.integers(1, 3)),
     )
-    count = len(grid.flat)
+    count = grid.node_count
     target = from_vectors(chance.normal(size=(count, 3)), chance.normal(size=(count, 3)))
     scalars = dict(
         zip(

@@ -293,12 +293,8 @@ def _utilisation(shell: Gridshell, design: Design, state: State) -> Reals:
     """Bending stress over strength (n,) at each node, the larger of its elements' ends; 0 where the strength
     isn't known.
     """
-    section, ends = shell.rod.resized(design.radius).section, shell.net.grid.rod_ends
-    forces = shell.beams(design.radius).local_forces(state)[: len(ends)]
-    use = np.zeros(len(state.positions))
-    np.maximum.at(
-        use, ends, section.bending(forces[:, [2, 5]], forces[:, [3, 6]]) / section.material.strength
-    )
+    use = np.zeros(shell.node_count)
+    np.maximum.at(use, shell.net.grid.rod_ends, shell.bending_utilisation(design, state))
     return use
 
 
