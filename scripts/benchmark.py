@@ -39,7 +39,7 @@ from shellform.structure.network import assemble  # noqa: E402
 from shellform.structure.solve import factorisation, pardiso  # noqa: E402
 from shellform.structure.solve.assembly import Assembly  # noqa: E402
 from shellform.structure.solve.equilibrium import _Walk, find_equilibrium  # noqa: E402
-from shellform.structure.solve.residual import Measure, held  # noqa: E402
+from shellform.structure.solve.residual import ResidualNorm, held  # noqa: E402
 
 HERE = Path(__file__).parent
 SIZES = (12, 25, 51)  # rods in each direction: 7,488, 31,200 and 127,296 degrees of freedom
@@ -175,7 +175,7 @@ def beside_peers(rods: int, python: str, missing: dict[str, str]) -> list[Row]:
     total.clear()
     step.clear()
     assembly = assemble(model.network)
-    scale = Measure(assembly).scale(assembly.evaluate(at_rest(model.network.nodes + own)), load)
+    scale = ResidualNorm(assembly).scale(assembly.evaluate(at_rest(model.network.nodes + own)), load)
     unit = float(np.median(assembly.arms))
     told: dict[str, list[dict[str, float]]] = {}
     differences: dict[str, float] = {}

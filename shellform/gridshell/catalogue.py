@@ -51,7 +51,7 @@ class _Sizes(msgspec.Struct, forbid_unknown_fields=True):
     rectangle: list[tuple[float, float]] = []
 
 
-class _Document(msgspec.Struct, forbid_unknown_fields=True):
+class _CatalogueFile(msgspec.Struct, forbid_unknown_fields=True):
     material: _Material
     sizes: _Sizes
     title: str = ""
@@ -85,7 +85,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
     """
     path = _SHIPPED / f"{source}.toml" if str(source) in shipped_catalogues() else Path(source)
     try:
-        document = msgspec.toml.decode(path.read_bytes(), type=_Document)
+        document = msgspec.toml.decode(path.read_bytes(), type=_CatalogueFile)
     except OSError as error:
         remedy = f"Shipped are {', '.join(shipped_catalogues())}."
         raise InputError(f"can't be read: {error}", where=f"catalogue {path}", remedy=remedy) from error

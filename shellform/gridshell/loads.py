@@ -79,7 +79,7 @@ def lying(surface: Surface, region: Region) -> Reals:
         raise InputError(
             "no part of the surface is loaded",
             where="load",
-            remedy=f"The surface reaches from {_told(surface.vertices.min(axis=0))} to {_told(surface.vertices.max(axis=0))} m.",
+            remedy=f"The surface reaches from {_coordinates(surface.vertices.min(axis=0))} to {_coordinates(surface.vertices.max(axis=0))} m.",
         )
     return triangles
 
@@ -95,7 +95,7 @@ def _parted(triangles: Reals, polygon: ArrayLike, where: str) -> tuple[Reals, Re
         raise InputError(error.what, where=where, value=error.value, remedy=error.remedy) from error
 
 
-def _told(point: Reals) -> str:
+def _coordinates(point: Reals) -> str:
     return "(" + ", ".join(f"{x:.3g}" for x in point) + ")"
 
 

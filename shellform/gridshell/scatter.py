@@ -54,7 +54,7 @@ class Scatter:
 
 
 @dataclass(frozen=True)
-class Built:
+class Realisation:
     """The structure as built: `beams`, `cables`, the dead `load` (n, 6), and how far held degrees of freedom
     are off, `offset` (n, 6), m.
     """
@@ -91,7 +91,7 @@ class Group(Protocol):
     def by_rest_length(self, state: State, multipliers: Reals) -> Reals:
         """Derivative (c,) by the present cables' rest lengths of the sum of y_k'F_k."""
 
-    def varied(self, built: Built, z: Reals) -> Built:
+    def varied(self, built: Realisation, z: Reals) -> Realisation:
         """The structure with the variables at z (k,)."""
 
 
@@ -138,8 +138,8 @@ class Stiffness:
         result = np.zeros_like(multipliers)
         change = np.einsum("eij,ej->ei", unpacked(found.tangent, dofs.shape[1]), own)
         if isinstance(self.part, Beams):
-            for spins in (slice(3, 6), slice(9, 12)):
-                change[:, spins] -= 0.5 * np.cross(own[:, spins], found.force[:, spins])
+            for turns in (slice(3, 6), slice(9, 12)):
+                change[:, turns] -= 0.5 * np.cross(own[:, turns], found.force[:, turns])
         change *= self.deviation
         np.add.at(result, (dofs, self._column[:, None]), change)
         return result
@@ -151,7 +151,7 @@ class Stiffness:
         own = multipliers[self.part.dofs(), self._column[:, None]]
         return self.deviation * np.asarray((own * self.part.force_by_rest_length(state)).sum(axis=1))
 
-    def varied(self, built: Built, z: Reals) -> Built:
+    def varied(self, built: Realisation, z: Reals) -> Realisation:
         """Stiffnesses times exp(s z)."""
         factor = np.exp(self.deviation * z)
         if isinstance(self.part, Cables):
@@ -213,7 +213,7 @@ class Lengths:
         own = multipliers[self.cables.dofs(), np.arange(self.count)[:, None]]
         return self.deviation * np.asarray((own * self._twice(state)).sum(axis=1))
 
-    def varied(self, built: Built, z: Reals) -> Built:
+    def varied(self, built: Realisation, z: Reals) -> Realisation:
         """Rest lengths plus s z."""
         return replace(
             built, cables=replace(built.cables, rest_length=built.cables.rest_length + self.deviation * z)
@@ -260,7 +260,7 @@ class Supports:
         """None."""
         return np.zeros(1)
 
-    def varied(self, built: Built, z: Reals) -> Built:
+    def varied(self, built: Realisation, z: Reals) -> Realisation:
         """Offsets of s z."""
         offset = built.offset.copy()
         offset.reshape(-1)[self.dofs] += self.deviation * z
@@ -300,7 +300,7 @@ class Loads:
         """None."""
         return np.zeros(1)
 
-    def varied(self, built: Built, z: Reals) -> Built:
+    def varied(self, built: Realisation, z: Reals) -> Realisation:
         """Loads times 1 + s z."""
         return replace(built, load=built.load + self.deviation * np.asarray(self.parts @ z).reshape(-1, 6))
 

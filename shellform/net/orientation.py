@@ -35,7 +35,7 @@ Job = tuple[float, tuple[float, float], Method]
 
 
 @dataclass(frozen=True)
-class Trial:
+class TriedNet:
     """One net of the search: `angle`, rad, `offset` in spacings, its `cost`, infinite where there is none,
     and why.
     """
@@ -80,7 +80,7 @@ def best_orientation(
     *,
     workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
-) -> tuple[Trial, list[Trial]]:
+) -> tuple[TriedNet, list[TriedNet]]:
     """The best trial and all of them; `settings` are those of pull_net but for angle and offset.
 
     Raises InputError where no orientation gives a net.
@@ -89,10 +89,10 @@ def best_orientation(
     if settings.get("spacing_v") not in (None, settings["spacing"]):
         quarter = math.pi  # u and v differ
     angles = [quarter * k / _ANGLES for k in range(_ANGLES)]
-    tried: list[Trial] = []
+    tried: list[TriedNet] = []
     with _runner(surface, settings, workers) as run:
 
-        def stage(name: str, jobs: list[Job]) -> list[Trial]:
+        def stage(name: str, jobs: list[Job]) -> list[TriedNet]:
             found = []
             for k, trial in enumerate(run(jobs), start=1):
                 found.append(trial)
@@ -136,7 +136,7 @@ def best_orientation(
 @contextmanager
 def _runner(
     surface: Surface, settings: dict[str, Any], workers: int
-) -> Iterator[Callable[[list[Job]], Iterator[Trial]]]:
+) -> Iterator[Callable[[list[Job]], Iterator[TriedNet]]]:
     """Runs trials one by one, or in processes that each know the surface; gives them back in their order."""
     if workers == 1:
         yield lambda jobs: (_try(surface, settings, job) for job in jobs)
@@ -159,14 +159,14 @@ def _begin(surface: Surface, settings: dict[str, Any]) -> None:
     _work.update(surface=surface, settings=settings)
 
 
-def _run(job: Job) -> Trial:
+def _run(job: Job) -> TriedNet:
     return _try(_work["surface"], _work["settings"], job)
 
 
-def _try(surface: Surface, settings: dict[str, Any], job: Job) -> Trial:
+def _try(surface: Surface, settings: dict[str, Any], job: Job) -> TriedNet:
     angle, offset, method = job
     try:
         net = pull_net(surface, **{**settings, "angle": angle, "offset": offset, "method": method})
     except ShellformError as error:
-        return Trial(angle, offset, math.inf, str(error))
-    return Trial(angle, offset, float(np.round(cost(net), 12)))
+        return TriedNet(angle, offset, math.inf, str(error))
+    return TriedNet(angle, offset, float(np.round(cost(net), 12)))

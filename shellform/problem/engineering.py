@@ -158,7 +158,7 @@ class Softness:
         """One value."""
         assembly = assemble(shell.network(design))
         found = modes(assembly, state, _MODES)
-        mass = residual.Measure(assembly).mass_shape
+        mass = residual.ResidualNorm(assembly).mass_shape
         rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
         rows, by_radius, by_rest = [], [], []
         for shape in found.shapes:

@@ -32,7 +32,7 @@ import scipy.sparse as sp
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.scatter import Built, Group, Scatter, groups_of, unpacked
+from shellform.gridshell.scatter import Group, Realisation, Scatter, groups_of, unpacked
 from shellform.problem.terms import Measure
 from shellform.structure.answers.sensitivity import by_rest_length
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
@@ -212,7 +212,7 @@ class _Line:
 
     def __init__(self, shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter) -> None:
         self.shell, self.state, self.radius = shell, state, design.radius
-        self.built = Built(
+        self.built = Realisation(
             shell.beams(design.radius), shell.cables(design), np.asarray(load), np.zeros_like(load)
         )
         self.groups: list[Group] = groups_of(shell, design, load, scatter)

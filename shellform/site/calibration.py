@@ -31,7 +31,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
 from shellform.problem.problem import follow
-from shellform.site.identifiability import Identifiability, told
+from shellform.site.identifiability import Identifiability, identifiability
 from shellform.site.scans import Match, Motion, Scan, match, rigid_fit
 from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate
 from shellform.structure.elements.state import State
@@ -129,7 +129,7 @@ def foresee(
     basis = _nuisance(
         states, markers, [frame] * len(loads), np.ones((len(loads), len(markers)), dtype=bool), offsets
     )
-    return told(PARAMETERS, jacobian - basis @ (basis.T @ jacobian), jacobian, noise)
+    return identifiability(PARAMETERS, jacobian - basis @ (basis.T @ jacobian), jacobian, noise)
 
 
 def calibrate(
@@ -193,7 +193,7 @@ def calibrate(
         joint,
         fitted,
         tuple(name for name in first if name not in fitted),
-        fit.told(first, max(noise, deviation)),
+        fit.identifiability(first, max(noise, deviation)),
         markers,
         tuple(matches),
         before,
@@ -220,7 +220,7 @@ def _rounds(
     matches = _laid(scans, states, markers, reach)
     for _ in range(_ROUNDS):
         fit = _Fit(model, joint, states, scans, matches, markers, offsets)
-        known = fit.told(free, noise)
+        known = fit.identifiability(free, noise)
         if not known.tellable:
             raise NotConverged(
                 "The data tell none of the connectors' stiffnesses: " + " ".join(known.sentences()),
@@ -334,9 +334,9 @@ class _Fit:
         )
         return self._projected(raw), raw
 
-    def told(self, names: Sequence[str], noise: float) -> Identifiability:
+    def identifiability(self, names: Sequence[str], noise: float) -> Identifiability:
         """What the data tell about the names."""
-        return told(names, *self.jacobian(self.joint, self.states, names), noise)
+        return identifiability(names, *self.jacobian(self.joint, self.states, names), noise)
 
     def solve(self, names: Sequence[str]) -> tuple[Joint, list[State]]:
         """The best joint and its equilibria."""

@@ -39,7 +39,7 @@ _TRIAL = 25  # factorisations of one step of tightening
 
 
 @dataclass(frozen=True)
-class Step:
+class ErectionStep:
     """One state on the way: the `stage` it belongs to and the `share` of it that is done; `height`, m, of the
     highest node over the lowest support; the largest rod `stress`, Pa, and the `element` that bears it; the
     largest cable `tension`, N; the largest `reaction`, N, of a support; `state`."""
@@ -58,11 +58,11 @@ class Step:
 class Erection:
     """All `steps` in the order of building; `strength`, Pa, of the rods (inf: not known)."""
 
-    steps: tuple[Step, ...]
+    steps: tuple[ErectionStep, ...]
     strength: float
 
     @property
-    def worst(self) -> Step:
+    def worst(self) -> ErectionStep:
         """The step in which a rod bears the largest stress."""
         return max(self.steps, key=lambda step: step.stress)
 
@@ -168,7 +168,7 @@ class _Site:
         self.assembly = assemble(shell.network(design)) if assembly is None else assembly
         self.sections = shell.sections(design.radius)
 
-    def step(self, stage: str, share: float, state: State, load: Reals) -> Step:
+    def step(self, stage: str, share: float, state: State, load: Reals) -> ErectionStep:
         """The state as a step."""
         beams, cables = self.assembly.beams[0], self.shell.cables(self.design)
         stress = end_stress(beams, beams.local_forces(state), self.sections).max(axis=1)
@@ -177,7 +177,7 @@ class _Site:
         supports = self.shell.net.supports
         forces = (self.assembly.evaluate(state, tangent=False).force - load)[supports, :3]
         height = float(state.positions[:, 2].max() - state.positions[supports, 2].min())
-        return Step(
+        return ErectionStep(
             stage,
             float(share),
             height,
@@ -191,14 +191,14 @@ class _Site:
 
 def _taken_down(
     site: _Site, erected: State, way: Sequence[ArrayLike], lift: Reals, weight: Reals, step: float
-) -> list[Step]:
+) -> list[ErectionStep]:
     """Steps from the flat grid to the erected one, found the other way round."""
     shell = site.shell
     supports, none = shell.net.supports, np.zeros_like(weight)
     flat = laid_out(shell)
     stops = [reals(f"way[{k}]", each, (len(supports), 3)) for k, each in enumerate(way)]
     places = [flat.positions[supports], *stops, shell.target.positions[supports]]
-    steps: list[Step] = []
+    steps: list[ErectionStep] = []
     state, total = erected, len(places) - 1
 
     def passed(stage: str, drive: Drive, share_of: tuple[float, float]) -> State:
@@ -239,7 +239,7 @@ def _tightened(
     load: Reals,
     stage: str,
     widest: float,
-) -> tuple[Design, State, list[Step]]:
+) -> tuple[Design, State, list[ErectionStep]]:
     """The team's cables brought to their rest lengths from where they just hang straight, in steps that are
     halved where they leave the branch.
     """

@@ -15,7 +15,7 @@ import numpy as np
 from shellform.arrays import Reals
 
 TELLABLE = 0.5  # relative deviation of a parameter beyond which the data don't tell it
-_APART = 0.95  # correlation of two parameters from which they aren't told apart
+_APART = 0.95  # correlation of two parameters from which they can't be told apart
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Identifiability:
         return result
 
 
-def told(names: Sequence[str], jacobian: Reals, raw: Reals, noise: float) -> Identifiability:
+def identifiability(names: Sequence[str], jacobian: Reals, raw: Reals, noise: float) -> Identifiability:
     """From derivatives (r, p), m, by the logarithms, projected and as they are.
 
     The parameter that is told worst is taken for known as long as it isn't told at all: it mustn't blur the

@@ -17,7 +17,7 @@ from shellform.gridshell.gridshell import Gridshell
 
 
 @dataclass(frozen=True)
-class Row:
+class MeasuredRow:
     """A `line` of a file with its `values` by column, NaN where a cell is empty."""
 
     line: int
@@ -26,7 +26,7 @@ class Row:
 
 def read_table(
     path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = (), *, empty: tuple[str, ...] = ()
-) -> list[Row]:
+) -> list[MeasuredRow]:
     """The rows of a CSV file with the columns `needed` and perhaps some `optional` ones; only those in
     `empty` may have empty cells.
 
@@ -70,7 +70,7 @@ def read_table(
             place = names.index(name)
             cell = cells[place].strip() if place < len(cells) else ""
             values[name] = _number(cell, f"{file}, line {number}: {name}", name in empty)
-        rows.append(Row(number, values))
+        rows.append(MeasuredRow(number, values))
     if not rows:
         raise InputError("has no rows below its first line", where=str(file), remedy=columns)
     return rows
@@ -88,7 +88,7 @@ def has_column(path: str | Path, name: str) -> bool:
     return name in [each.strip().lower() for each in first.replace(";", ",").replace("\t", ",").split(",")]
 
 
-def nodes_of(path: str | Path, rows: list[Row], shell: Gridshell) -> Indices:
+def nodes_of(path: str | Path, rows: list[MeasuredRow], shell: Gridshell) -> Indices:
     """The nodes (k,) that rows name by a `node` of the model or by a `crossing` of the net (its upper rod's
     node); none twice.
     """

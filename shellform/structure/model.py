@@ -64,7 +64,7 @@ class _Start(msgspec.Struct, forbid_unknown_fields=True):
     rotations: list[_Three]
 
 
-class _Document(msgspec.Struct, forbid_unknown_fields=True):
+class _ModelFile(msgspec.Struct, forbid_unknown_fields=True):
     format: str
     version: int
     nodes: list[_Three]
@@ -76,7 +76,7 @@ class _Document(msgspec.Struct, forbid_unknown_fields=True):
 
 
 _PARTS = {
-    "": _Document,
+    "": _ModelFile,
     "beams": _Beam,
     "cables": _Cable,
     "supports": _Support,
@@ -106,7 +106,7 @@ def read_model(path: str | Path) -> Model:
         raise InputError(f"can't be read: {error}", where=str(file)) from error
     try:
         try:
-            document = msgspec.json.decode(content, type=_Document)
+            document = msgspec.json.decode(content, type=_ModelFile)
         except msgspec.ValidationError as error:
             _refuse(error)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
@@ -121,7 +121,7 @@ def read_model(path: str | Path) -> Model:
 def parse_model(data: object) -> Model:
     """The model in a parsed JSON document. Raises InputError naming the field and the element."""
     try:
-        return _model(msgspec.convert(data, _Document))
+        return _model(msgspec.convert(data, _ModelFile))
     except msgspec.ValidationError as error:
         _refuse(error)
 
@@ -193,7 +193,7 @@ def _document(model: Model) -> dict[str, Any]:
     return document
 
 
-def _model(document: _Document) -> Model:
+def _model(document: _ModelFile) -> Model:
     if document.format != "shellform-model":
         raise InputError("must be 'shellform-model'", where="format", value=document.format)
     if document.version != 1:

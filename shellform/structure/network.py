@@ -95,7 +95,7 @@ def doubts(network: Network) -> list[str]:
     """What is allowed but rarely meant, a sentence each: nodes in one place, stiffnesses too far apart, rest
     lengths far from the distance of their nodes, and straight rods that nothing keeps from spinning about
     their own axis (that spin is held in the solution)."""
-    return [*_coincident(network), *_far_apart(network), *_misfitting(network), *_spinning(network)]
+    return [*_coincident(network), *_far_apart(network), *_misfitting(network), *_free_to_spin(network)]
 
 
 def _coincident(network: Network) -> list[str]:
@@ -147,7 +147,7 @@ def _misfitting(network: Network) -> list[str]:
     ]
 
 
-def _spinning(network: Network) -> list[str]:
+def _free_to_spin(network: Network) -> list[str]:
     ends = network.beams.ends
     if not len(ends):
         return []

@@ -11,13 +11,13 @@ from collections.abc import Callable, Iterator
 
 from shellform.verification import beams, bent, buckling, cables, invariances, limit_points
 from shellform.verification.cables import slack_pair
-from shellform.verification.compared import Row
+from shellform.verification.compared import Comparison
 from shellform.verification.invariances import turned_forces
 from shellform.verification.models import chain
 
-__all__ = ["CASES", "Row", "chain", "slack_pair", "turned_forces", "verify"]
+__all__ = ["CASES", "Comparison", "chain", "slack_pair", "turned_forces", "verify"]
 
-CASES: tuple[Callable[[], Iterator[Row]], ...] = (
+CASES: tuple[Callable[[], Iterator[Comparison]], ...] = (
     beams.cantilevers,
     beams.cantilever_order,
     beams.diamonds,
@@ -66,7 +66,7 @@ CASES: tuple[Callable[[], Iterator[Row]], ...] = (
 )
 
 
-def verify() -> Iterator[Row]:
+def verify() -> Iterator[Comparison]:
     """All cases, one row a compared number."""
     for case in CASES:
         yield from case()

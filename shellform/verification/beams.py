@@ -12,7 +12,7 @@ from shellform.structure.network import assemble
 from shellform.structure.solve.loading import apply_load, forces
 from shellform.structure.solve.path import follow
 from shellform.verification import exact
-from shellform.verification.compared import Row, rows
+from shellform.verification.compared import Comparison, rows
 from shellform.verification.models import (
     CLAMP,
     PIN,
@@ -35,7 +35,7 @@ def elastica(elements: int, load: float) -> tuple[float, float]:
     return float(1.0 - tip[0]), float(tip[2])
 
 
-def cantilevers() -> Iterator[Row]:
+def cantilevers() -> Iterator[Comparison]:
     """Mattiasson, Int. J. Num. Meth. Eng. 17 (1981) 145: dead transverse tip load, against elliptic
     integrals.
 
@@ -49,14 +49,14 @@ def cantilevers() -> Iterator[Row]:
         )
 
 
-def cantilever_order() -> Iterator[Row]:
+def cantilever_order() -> Iterator[Comparison]:
     """The tip of the cantilever at PL²/EI = 10 on 10, 20 and 40 elements: straight two-node elements are
     O(h²).
 
     EA = 1e7 leaves 1e-6, 1/70 of the last error; the order of finite meshes is within 0.05 of its limit.
     """
     errors = [elastica(n, 10.0)[1] - exact.cantilever(10.0)[1] for n in (10, 20, 40)]
-    yield Row("cantilever, 10, 20, 40 elements", "order of w", order(errors), 2.0, 0.05, "O(h²)")
+    yield Comparison("cantilever, 10, 20, 40 elements", "order of w", order(errors), 2.0, 0.05, "O(h²)")
 
 
 def roll_up(elements: int, turns: float = 1.0) -> Reals:
@@ -69,7 +69,7 @@ def roll_up(elements: int, turns: float = 1.0) -> Reals:
     )
 
 
-def roll_ups() -> Iterator[Row]:
+def roll_ups() -> Iterator[Comparison]:
     """Closed form: an end moment M bends to a circle of radius EI/M. L = 1, EI = GJ = 1, EA = 1e6, 10
     elements, one step.
 
@@ -78,14 +78,14 @@ def roll_ups() -> Iterator[Row]:
     20 elements is stated too.
     """
     source = "closed form"
-    yield Row(
+    yield Comparison(
         "roll-up in one step", "tip from the clamp", float(np.linalg.norm(roll_up(10))), 0.0, 1e-6, source
     )
     half = [roll_up(n, 0.5) for n in (10, 20)]
     # π/20 over its sine is 1.0041, and half that error enters once the elements halve: 5e-3 covers the first
     # mesh.
-    yield Row("half a roll-up", "height y/L", float(half[0][1]), 2.0 / np.pi, 5e-3, source)
-    yield Row(
+    yield Comparison("half a roll-up", "height y/L", float(half[0][1]), 2.0 / np.pi, 5e-3, source)
+    yield Comparison(
         "half a roll-up", "order of y", order([tip[1] - 2.0 / np.pi for tip in half]), 2.0, 0.02, "O(h²)"
     )
 
@@ -109,7 +109,7 @@ BENDS = {
 """Tip of the 45° bend by (GJ, load), recomputed as a Kirchhoff rod (tests/literature/test_references.py)."""
 
 
-def bends() -> Iterator[Row]:
+def bends() -> Iterator[Comparison]:
     """Bathe and Bolourchi, Int. J. Num. Meth. Eng. 14 (1979) 961, print displacements of (-13.4, -23.5, 53.4)
     at P = 600.
 
@@ -127,12 +127,12 @@ def bends() -> Iterator[Row]:
         )
 
 
-def bend_order() -> Iterator[Row]:
+def bend_order() -> Iterator[Comparison]:
     """The 45° bend's height on 8, 16 and 32 elements, GJ = 8.333e5, P = 600; the last digit quoted is 1/500
     of the last error.
     """
     errors = [bend_45(n, 8.333e5, 600.0)[2] - BENDS[8.333e5, 600.0][2] for n in (8, 16, 32)]
-    yield Row("45° bend, 8, 16, 32 elements", "order of z", order(errors), 2.0, 0.05, "O(h²)")
+    yield Comparison("45° bend, 8, 16, 32 elements", "order of z", order(errors), 2.0, 0.05, "O(h²)")
 
 
 LEE = {0.5: (3.7915, 0.3096), 1.0: (10.7069, 1.9143), 1.5: (25.8410, 8.0096)}
@@ -155,7 +155,7 @@ def lee_frame(elements: int, load: float) -> tuple[float, float]:
     return float(120.0 - place[2]), float(place[0] - 24.0)
 
 
-def lee_frames() -> Iterator[Row]:
+def lee_frames() -> Iterator[Comparison]:
     """Lee, Manuel and Rossow, J. Eng. Mech. ASCE 94 (1968) 521: legs of 120, E = 720, A = 6, I = 2, load at
     24 from the corner.
 
@@ -186,7 +186,7 @@ def diamond(load: float) -> tuple[float, float]:
     return float(place[-1, 2]), float(place[0, 0])
 
 
-def diamonds() -> Iterator[Row]:
+def diamonds() -> Iterator[Comparison]:
     """Mattiasson, Int. J. Num. Meth. Eng. 17 (1981) 145: square frame, hinged where it is loaded, rigid at
     the other corners.
 
@@ -229,7 +229,7 @@ def helix(elements: int, share: float) -> Reals:
     return np.asarray(last.equilibrium.state.positions[-1])
 
 
-def helices() -> Iterator[Row]:
+def helices() -> Iterator[Comparison]:
     """Ibrahimbegovic, Comp. Meth. Appl. Mech. Eng. 149 (1997) 49: roll-up by an end moment with a force out
     of its plane.
 
@@ -246,7 +246,7 @@ def helices() -> Iterator[Row]:
     )
 
 
-def quarter_ring() -> Iterator[Row]:
+def quarter_ring() -> Iterator[Comparison]:
     """A quarter ring clamped at one end and loaded across its plane at the other, so little that it stays
     linear.
 
@@ -258,12 +258,12 @@ def quarter_ring() -> Iterator[Row]:
     network = chain(points, (1e6, 0.7, 1.0, 1.0), {0: CLAMP})
     height = solved(network, load_at(network, 32, [0.0, 0.0, 1e-6])).positions[-1, 2] / 1e-6
     wanted = 0.25 * np.pi + (0.75 * np.pi - 2.0) / 0.7
-    yield Row(
+    yield Comparison(
         "quarter ring, load across its plane", "w EI/(P R³)", float(height), wanted, 5e-4, "Castigliano"
     )
 
 
-def twisted_rod() -> Iterator[Row]:
+def twisted_rod() -> Iterator[Comparison]:
     """A straight rod twisted by nearly three turns, by a moment about its axis, 10 elements: ML/GJ, exact.
 
     Stout in bending (EI = 100 GJ), for it would buckle at M = 1.43 · 2π EI/L.
@@ -273,10 +273,10 @@ def twisted_rod() -> Iterator[Row]:
     # Quaternions tell turns apart only element by element: the sum of the differences.
     w, x = state.quaternions[:, 0], state.quaternions[:, 1]
     twist = np.unwrap(2.0 * np.arctan2(x, w), period=2.0 * np.pi)[-1]
-    yield Row("rod twisted by 2.7 turns", "twist, rad", float(twist), 17.0, 1e-8, "closed form")
+    yield Comparison("rod twisted by 2.7 turns", "twist, rad", float(twist), 17.0, 1e-8, "closed form")
 
 
-def beam_columns() -> Iterator[Row]:
+def beam_columns() -> Iterator[Comparison]:
     """A pinned beam with a small load in the middle and a large axial force, in compression and in tension.
 
     Timoshenko and Gere 1961, chapter 1: the deflection PL³/48EI times 3 (tan u - u)/u³, or 3 (u - tanh u)/u³,
@@ -293,7 +293,7 @@ def beam_columns() -> Iterator[Row]:
         load = load_at(network, 40, [force, 0.0, 0.0]) + load_at(network, 20, [0.0, 0.0, -0.01])
         found = -48.0 * solved(network, load).positions[20, 2] / 0.01
         kind = "tension" if force > 0.0 else "compression"
-        yield Row(
+        yield Comparison(
             f"beam in {kind}, S L²/EI = 5",
             "deflection over PL³/48EI",
             float(found),
@@ -303,7 +303,7 @@ def beam_columns() -> Iterator[Row]:
         )
 
 
-def helical_spring() -> Iterator[Row]:
+def helical_spring() -> Iterator[Comparison]:
     """A helical spring of three open coils pulled along its axis: extension P R² L (cos² a/GJ + sin² a/EI)
     (Love 1927, spiral springs).
 
@@ -326,6 +326,6 @@ def helical_spring() -> Iterator[Row]:
     found = (heights[0] - heights[1]) / 4e-4
     length = 6.0 * np.pi / np.cos(angle)
     wanted = length * (np.cos(angle) ** 2 / 0.8 + np.sin(angle) ** 2)
-    yield Row(
+    yield Comparison(
         "helical spring, 3 coils at 20°", "extension EI/(P R³)", float(found), wanted, 2e-3, "Love 1927"
     )

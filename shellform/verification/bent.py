@@ -17,7 +17,7 @@ from shellform.structure.elements.state import State, from_vectors
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.verification import exact
-from shellform.verification.compared import Row, rows
+from shellform.verification.compared import Comparison, rows
 from shellform.verification.models import CLAMP, PIN, chain, in_plane, line
 
 _ELEMENTS = 80
@@ -52,7 +52,7 @@ def strip(chord: float, *, clamped: bool) -> tuple[float, float]:
     return float(force[0, 0]), float(found.state.positions[:, 2].max())
 
 
-def strips() -> Iterator[Row]:
+def strips() -> Iterator[Comparison]:
     """Timoshenko and Gere, Theory of Elastic Stability (1961), art. 2.7 tabulate the pinned elastica by its
     end slope alpha.
 
@@ -92,7 +92,7 @@ def bow(rest: float, stiffness: float) -> tuple[float, float, float]:
     )
 
 
-def bows() -> Iterator[Row]:
+def bows() -> Iterator[Comparison]:
     """A bow: a pinned rod tied by one cable of rest length 0.8 of it, stiff (EA = 1e4) and soft (EA = 50
     EI/L²).
 
@@ -107,7 +107,7 @@ def bows() -> Iterator[Row]:
         )
 
 
-def bow_in_space() -> Iterator[Row]:
+def bow_in_space() -> Iterator[Comparison]:
     """The stiff-stringed bow free in space, of a strip twice as stiff the other way, let go bent about its
     stiff axis.
 
@@ -168,7 +168,7 @@ def ring_state(elements: int, twist: float) -> tuple[Network, State]:
     return network, State(place, quaternion)
 
 
-def rings() -> Iterator[Row]:
+def rings() -> Iterator[Comparison]:
     """A straight strip closed to a ring, relaxed from an oval: moment 2π EI/L and energy 2π² EI/L everywhere.
 
     Bent about its weak axis (EI 1 and 3), 40 elements, EA = 1e6. Chords in place of arcs leave nothing here,
@@ -189,7 +189,7 @@ def rings() -> Iterator[Row]:
     yield from rows("straight strip closed to a ring", "closed form", 1e-6, numbers)
 
 
-def torsion_constants() -> Iterator[Row]:
+def torsion_constants() -> Iterator[Comparison]:
     """St Venant's torsion constant of rectangles, J/(a b³), against the table of Timoshenko and Goodier,
     Theory of Elasticity.
 
@@ -199,7 +199,7 @@ def torsion_constants() -> Iterator[Row]:
     material = isotropic(young=1.0)
     for ratio, reference in table.items():
         found = Rectangle(ratio, 1.0, material).constants[1] / ratio
-        yield Row(
+        yield Comparison(
             "torsion of a rectangle",
             f"J/(ab³), a/b = {ratio:g}",
             found,
@@ -209,7 +209,7 @@ def torsion_constants() -> Iterator[Row]:
         )
 
 
-def laths() -> Iterator[Row]:
+def laths() -> Iterator[Comparison]:
     """A lath of 3 x 20 mm, 3 m long, E = 10 GPa, sprung to a ring: stress E t/(2 R) of 31.4 MPa in every
     fibre that is furthest out.
 

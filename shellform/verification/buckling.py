@@ -15,7 +15,7 @@ from shellform.structure.network import Network, assemble
 from shellform.structure.solve.equilibrium import LostBranch, find_equilibrium
 from shellform.verification import exact
 from shellform.verification.bent import ring_state
-from shellform.verification.compared import Row, rows
+from shellform.verification.compared import Comparison, rows
 from shellform.verification.models import (
     CLAMP,
     FORK,
@@ -52,19 +52,19 @@ def column(kind: str, elements: int) -> float:
     return critical(network, load, _BEYOND * reference)
 
 
-def columns() -> Iterator[Row]:
+def columns() -> Iterator[Comparison]:
     """Euler's columns, L = EI = 1, EA = 1e6, 48 elements: a straight chain buckles O(h²) late, (kL)² h²/12 =
     1e-3 at most.
     """
     numbers = [(kind, column(kind, 48), _COLUMNS[kind][2]) for kind in _COLUMNS]
     yield from rows("Euler column, PL²/EI", "Euler 1744; Timoshenko and Gere 1961", 2e-3, numbers)
     errors = [column("clamped-clamped", n) - 4.0 * np.pi**2 for n in (12, 24)]
-    yield Row(
+    yield Comparison(
         "clamped column, 12, 24 elements", "order of the buckling load", order(errors), 2.0, 0.05, "O(h²)"
     )
 
 
-def braced() -> Iterator[Row]:
+def braced() -> Iterator[Comparison]:
     """A pinned column held at its middle by two prestressed cables across it: rods and cables together.
 
     L = EI = 1, EA = 1e6, 48 elements (O(h²) late). Cables of length 1 and EA = 25: as long as both are taut
@@ -82,10 +82,10 @@ def braced() -> Iterator[Row]:
         network = Network(points, beams, cables, fixed, np.zeros((51, 6)))
         reference = exact.braced_column(spring) if spring else np.pi**2
         found = critical(network, load_at(network, 48, [-1.0, 0.0, 0.0]), _BEYOND * reference)
-        yield Row("column braced by two cables", f"{name}, PL²/EI", found, reference, 2e-3, source)
+        yield Comparison("column braced by two cables", f"{name}, PL²/EI", found, reference, 2e-3, source)
 
 
-def lateral() -> Iterator[Row]:
+def lateral() -> Iterator[Comparison]:
     """Lateral-torsional buckling of strips on edge (Prandtl 1899, Michell 1899; Timoshenko and Gere 1961,
     chapter 6).
 
@@ -114,7 +114,7 @@ FRAME_TIP = (1.08752, -0.68043)
 """Critical tip loads of the clamped frame, recomputed (tests/literature/test_references.py)."""
 
 
-def right_angle() -> Iterator[Row]:
+def right_angle() -> Iterator[Comparison]:
     """Argyris et al., Comp. Meth. Appl. Mech. Eng. 17/18 (1979) 1: right-angle frames that buckle out of
     their plane.
 
@@ -132,7 +132,7 @@ def right_angle() -> Iterator[Row]:
     for name, sign in [("closing", 1.0), ("opening", -1.0)]:
         load = load_at(network, 0, [0, 0, 0, 0, sign, 0]) + load_at(network, 80, [0, 0, 0, 0, -sign, 0])
         found = critical(network, load, _BEYOND * reference)
-        yield Row(
+        yield Comparison(
             "right-angle frame, end moments",
             f"{name} M, N mm",
             found,
@@ -145,7 +145,7 @@ def right_angle() -> Iterator[Row]:
     for reference in FRAME_TIP:
         found = critical(network, load_at(network, 80, [1.0, 0.0, 0.0]), _BEYOND * reference)
         source = "Kirchhoff rod, recomputed; Argyris et al. 1979"
-        yield Row(
+        yield Comparison(
             "right-angle frame, tip load",
             f"{'pull' if reference > 0.0 else 'push'}, N",
             found,
@@ -155,7 +155,7 @@ def right_angle() -> Iterator[Row]:
         )
 
 
-def ring_pressure() -> Iterator[Row]:
+def ring_pressure() -> Iterator[Comparison]:
     """A ring under radial loads that keep their directions buckles at q = 4 EI/R³ (3 for hydrostatic
     pressure; Bodner 1958).
 
@@ -171,7 +171,7 @@ def ring_pressure() -> Iterator[Row]:
     load[:, :3] = -0.5 * np.pi / count * points
     load[[0, -1]] *= 0.5
     found = critical(network, load, _BEYOND * 4.0)
-    yield Row("ring under dead pressure", "q R³/EI", found, 4.0, 1e-3, "Bodner 1958")
+    yield Comparison("ring under dead pressure", "q R³/EI", found, 4.0, 1e-3, "Bodner 1958")
 
 
 def critical_twist(network: Network, start: State, reference: float) -> float:
@@ -187,10 +187,10 @@ def critical_twist(network: Network, start: State, reference: float) -> float:
     share = np.linspace(0.0, 1.0, count)[:, None]
     angle, state, step = 0.0, start, 0.1 * reference
     while step > 1e-6 * reference and angle < 2.0 * reference:
-        spin = np.zeros((count, 6))
-        spin[:, 3:] = share * step * rotation.matrices(state.quaternions)[:, :, 0]
+        turn = np.zeros((count, 6))
+        turn[:, 3:] = share * step * rotation.matrices(state.quaternions)[:, :, 0]
         try:
-            found = find_equilibrium(assembly, moved(state, spin), none, on_branch=True)
+            found = find_equilibrium(assembly, moved(state, turn), none, on_branch=True)
         except LostBranch:
             step *= 0.5
             continue
@@ -201,7 +201,7 @@ def critical_twist(network: Network, start: State, reference: float) -> float:
     return angle
 
 
-def greenhill() -> Iterator[Row]:
+def greenhill() -> Iterator[Comparison]:
     """A straight rod twisted between clamps, one free to slide, buckles at ML/EI = 8.9868: tan(x/2) = x/2
     (Greenhill 1883).
 
@@ -215,11 +215,11 @@ def greenhill() -> Iterator[Row]:
         )
         found.append(critical_twist(network, at_rest(network.nodes), reference))
     case = "rod twisted between clamps"
-    yield Row(case, "ML/EI", found[1], reference, 5e-3, "Greenhill 1883, closed form")
-    yield Row(case, "order", order(np.array(found) - reference), 2.0, 0.1, "O(h²)")
+    yield Comparison(case, "ML/EI", found[1], reference, 5e-3, "Greenhill 1883, closed form")
+    yield Comparison(case, "order", order(np.array(found) - reference), 2.0, 0.1, "O(h²)")
 
 
-def michell() -> Iterator[Row]:
+def michell() -> Iterator[Comparison]:
     """A straight rod closed to a ring leaves its plane at a twist of 2π √3 EI/GJ (Michell 1889; Zajac 1962).
 
     L = EI = GJ = 1. The ring may turn about its tangent at the clamp without a force: the opposite node's
@@ -232,5 +232,5 @@ def michell() -> Iterator[Row]:
         fixed = network.fixed.copy()
         fixed[count // 2, 2] = True
         found.append(critical_twist(replace(network, fixed=fixed), circle, reference))
-    yield Row("twisted ring", "twist GJ/EI", found[1], reference, 5e-3, "Michell 1889, Zajac 1962")
-    yield Row("twisted ring", "order", order(np.array(found) - reference), 2.0, 0.1, "O(h²)")
+    yield Comparison("twisted ring", "twist GJ/EI", found[1], reference, 5e-3, "Michell 1889, Zajac 1962")
+    yield Comparison("twisted ring", "order", order(np.array(found) - reference), 2.0, 0.1, "O(h²)")

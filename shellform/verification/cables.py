@@ -12,7 +12,7 @@ from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import Network
 from shellform.verification import exact
-from shellform.verification.compared import Row, rows
+from shellform.verification.compared import Comparison, rows
 from shellform.verification.models import line, load_at, order, polyline, ropes, solved
 
 
@@ -28,16 +28,16 @@ def slack_pair() -> tuple[float, float]:
     return float(first), float(second)
 
 
-def slack() -> Iterator[Row]:
+def slack() -> Iterator[Comparison]:
     """Statics: of two collinear unstressed cables loaded in the middle one carries all, the other exactly
     nothing.
     """
     first, second = slack_pair()
-    yield Row("collinear pair", "tension of the loaded cable", first, 1.0, 1e-8, "statics")
-    yield Row("collinear pair", "tension of the slack cable", second, 0.0, 0.0, "statics")
+    yield Comparison("collinear pair", "tension of the loaded cable", first, 1.0, 1e-8, "statics")
+    yield Comparison("collinear pair", "tension of the slack cable", second, 0.0, 0.0, "statics")
 
 
-def tripod() -> Iterator[Row]:
+def tripod() -> Iterator[Comparison]:
     """A node hung between three anchors and pushed sideways away from two of them: the third cable goes
     slack.
 
@@ -60,7 +60,7 @@ def tripod() -> Iterator[Row]:
     yield from rows("three cables, one slack", "Hooke, closed form", 1e-8, numbers)
 
 
-def two_links() -> Iterator[Row]:
+def two_links() -> Iterator[Comparison]:
     """Two links in a line, prestressed, loaded across: Kwan, Computers and Structures 67 (1998) explains nets
     by it.
 
@@ -73,7 +73,7 @@ def two_links() -> Iterator[Row]:
         sag = -solved(network, load_at(network, 1, [0.0, 0.0, -load])).positions[1, 2]
         wanted = exact.two_links(1.0, 1e4, pretension, load)
         quantity = f"sag, prestress {pretension:g}, load {load:g}"
-        yield Row("two links", quantity, float(sag), wanted, 1e-7, "closed form; Kwan 1998")
+        yield Comparison("two links", quantity, float(sag), wanted, 1e-7, "closed form; Kwan 1998")
 
 
 def hanging(elements: int, force: float) -> tuple[float, float, float]:
@@ -99,7 +99,7 @@ def hanging(elements: int, force: float) -> tuple[float, float, float]:
     return tension, float(x), float(z)
 
 
-def catenaries() -> Iterator[Row]:
+def catenaries() -> Iterator[Comparison]:
     """The elastic catenary (Irvine 1981, section 1.3), alone and with a load at 3/5 as in Jayaraman and
     Knudsen 1981.
 
@@ -113,10 +113,10 @@ def catenaries() -> Iterator[Row]:
         )
         yield from rows(f"heavy cable, load {force:g}", "elastic catenary, Irvine 1981", 5e-4, numbers)
     errors = [hanging(n, 2.0)[0] - exact.catenary(1.0, 0.0, 1.2, 1.0, 60.0, 0.72, 2.0)[0] for n in (20, 40)]
-    yield Row("heavy cable, 20, 40 cables", "order of the tension", order(errors), 2.0, 0.1, "O(h²)")
+    yield Comparison("heavy cable, 20, 40 cables", "order of the tension", order(errors), 2.0, 0.1, "O(h²)")
 
 
-def force_densities() -> Iterator[Row]:
+def force_densities() -> Iterator[Comparison]:
     """A line of n = 8 cables of equal force density q under node loads p: z = p i (n - i)/(2q) (Schek 1974),
     exact at the nodes.
 
@@ -136,7 +136,9 @@ def force_densities() -> Iterator[Row]:
     load[:, 2] = -p
     found = solved(network, load).positions
     miss = float(np.abs(found[:, 2] + depth).max())
-    yield Row("line of equal force density", "largest miss of z", miss, 0.0, 1e-7, "Schek 1974, closed form")
+    yield Comparison(
+        "line of equal force density", "largest miss of z", miss, 0.0, 1e-7, "Schek 1974, closed form"
+    )
 
 
 SIDE = 6
@@ -163,7 +165,7 @@ def hypar() -> tuple[Network, Reals]:
     return ropes(shape, cables, number[edge]), shape
 
 
-def nets() -> Iterator[Row]:
+def nets() -> Iterator[Comparison]:
     """A prestressed saddle net: found back from half as deep again, then loaded with 200 N a node on one
     half; four cables go slack.
 
@@ -174,7 +176,7 @@ def nets() -> Iterator[Row]:
     deep = np.where(network.fixed[:, :3], shape, shape * [1.0, 1.0, 1.5])
     found = solved(network, start=at_rest(deep))
     miss = float(np.abs(found.positions - shape).max())
-    yield Row("saddle net", "miss of its shape, m", miss, 0.0, 1e-7, "force densities, closed form")
+    yield Comparison("saddle net", "miss of its shape, m", miss, 0.0, 1e-7, "force densities, closed form")
     loaded = solved(network, hypar_load(shape), found)
     tension = network.cables.tension(loaded)
     centre, sunk = (loaded.positions[node, 2] - shape[node, 2] for node in HYPAR_NODES)
@@ -216,7 +218,7 @@ def two_catenaries(elements: int) -> tuple[float, float]:
     return float(place[0]), float(place[2])
 
 
-def opensees() -> Iterator[Row]:
+def opensees() -> Iterator[Comparison]:
     """Two catenary cables with a node that slides in the plane y = 0 between them: the example of OpenSees'
     CatenaryCable.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Row:
+class Comparison:
     """One compared number of a `case`; `tolerance` on the difference, relative to the reference where that
     isn't 0.
     """
@@ -38,7 +38,7 @@ class Row:
 
 def rows(
     case: str, source: str, tolerance: float, numbers: Iterable[tuple[str, float, float]]
-) -> Iterator[Row]:
+) -> Iterator[Comparison]:
     """Rows of one case from (quantity, value, reference)."""
     for quantity, value, reference in numbers:
-        yield Row(case, quantity, float(value), float(reference), tolerance, source)
+        yield Comparison(case, quantity, float(value), float(reference), tolerance, source)

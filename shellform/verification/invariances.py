@@ -25,7 +25,7 @@ from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import State, at_rest, from_vectors, moved
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.verification.compared import Row, rows
+from shellform.verification.compared import Comparison, rows
 from shellform.verification.models import CLAMP, load_at, order, pushed
 
 _AXIS = np.array([1.0, -2.0, 0.5]) / np.linalg.norm([1.0, -2.0, 0.5])
@@ -36,18 +36,18 @@ def turned_forces(angle: float) -> float:
     axis.
     """
     beams, state = _bent_beam()
-    spin = np.zeros((2, 6))
-    spin[:, 3:] = angle * _AXIS
+    increment = np.zeros((2, 6))
+    increment[:, 3:] = angle * _AXIS
     turn = rotation.matrices(rotation.from_vectors(angle * _AXIS[None, :]))[0]
     first = beams.local_forces(state)
-    second = beams.local_forces(State(state.positions @ turn.T, moved(state, spin).quaternions))
+    second = beams.local_forces(State(state.positions @ turn.T, moved(state, increment).quaternions))
     return float(np.abs(second - first).max() / np.abs(first).max())
 
 
-def turns() -> Iterator[Row]:
+def turns() -> Iterator[Comparison]:
     """The internal forces of a beam bent at random don't change when everything turns: to rounding."""
     for angle in (0.1, 1.0, 3.0):
-        yield Row(
+        yield Comparison(
             "objectivity",
             f"change of forces after a turn by {angle} rad",
             turned_forces(angle),
@@ -106,7 +106,7 @@ def _shape(network: Network, load: Reals) -> tuple[Reals, float]:
     return found.state.positions, found.energy
 
 
-def invariances() -> Iterator[Row]:
+def invariances() -> Iterator[Comparison]:
     """Two tied arches in space under a skew load, solved again turned, moved, renumbered and in millimetres:
     the same shape.
 
@@ -117,7 +117,7 @@ def invariances() -> Iterator[Row]:
     place, energy = _shape(network, load)
     turn = rotation.matrices(rotation.from_vectors(2.0 * _AXIS[None, :]))[0]
     turned = _shape(*basket(turn=turn))[0] @ turn
-    yield Row(
+    yield Comparison(
         "tied arches",
         "change when turned by 2 rad",
         float(np.abs(turned - place).max()),
@@ -127,16 +127,16 @@ def invariances() -> Iterator[Row]:
     )
     shift = np.array([1e4, -2e4, 5e3])
     far = _shape(replace(network, nodes=network.nodes + shift), load)[0] - shift
-    yield Row(
+    yield Comparison(
         "tied arches", "change when moved by 2e4 m", float(np.abs(far - place).max()), 0.0, 1e-6, "invariance"
     )
     number = np.random.default_rng(1).permutation(17)
     renamed = _shape(*basket(number=number))[0][number]
-    yield Row(
+    yield Comparison(
         "tied arches", "change when renumbered", float(np.abs(renamed - place).max()), 0.0, 1e-8, "invariance"
     )
     large, work = _shape(*basket(scale=1000.0))
-    yield Row(
+    yield Comparison(
         "tied arches",
         "change in millimetres",
         float(np.abs(large / 1000.0 - place).max()),
@@ -144,10 +144,10 @@ def invariances() -> Iterator[Row]:
         1e-8,
         "invariance",
     )
-    yield Row("tied arches", "energy in N mm", work / 1000.0, energy, 1e-8, "invariance")
+    yield Comparison("tied arches", "energy in N mm", work / 1000.0, energy, 1e-8, "invariance")
 
 
-def statics() -> Iterator[Row]:
+def statics() -> Iterator[Comparison]:
     """Loads and reactions of the tied arches balance, forces and moments about the origin, in the bent
     shape.
     """
@@ -166,7 +166,7 @@ def statics() -> Iterator[Row]:
     yield from rows("tied arches, reactions", "statics", 1e-8, numbers)
 
 
-def work() -> Iterator[Row]:
+def work() -> Iterator[Comparison]:
     """The work done on a crown that is pushed down by 0.3 is the energy stored: Gauss' rule over the holding
     force.
 
@@ -180,12 +180,12 @@ def work() -> Iterator[Row]:
     path = pushed(network, start.state, (4, 2), [*places, top - 0.3])
     done = -0.15 * sum(w * force for w, (_, force) in zip(weights, path[:-1], strict=True))
     stored = assemble(network).evaluate(path[-1][0], tangent=False).energy - start.energy
-    yield Row(
+    yield Comparison(
         "tied arches, crown pushed down", "energy stored by work done", stored / done, 1.0, 1e-6, "energy"
     )
 
 
-def betti() -> Iterator[Row]:
+def betti() -> Iterator[Comparison]:
     """Betti: about a loaded state, node 5 moves under a small extra force at node 12 as node 12 does under
     one at node 5.
 
@@ -204,7 +204,9 @@ def betti() -> Iterator[Row]:
         return float(sides[0].positions[to] - sides[1].positions[to])
 
     ratio = answer((5, 2), (12, 0)) / answer((12, 0), (5, 2))
-    yield Row("tied arches, two small forces", "ratio of displacements", ratio, 1.0, 1e-5, "Betti 1872")
+    yield Comparison(
+        "tied arches, two small forces", "ratio of displacements", ratio, 1.0, 1e-5, "Betti 1872"
+    )
 
 
 def _bent_beam() -> tuple[Beams, State]:
@@ -215,7 +217,7 @@ def _bent_beam() -> tuple[Beams, State]:
     )
 
 
-def gradients() -> Iterator[Row]:
+def gradients() -> Iterator[Comparison]:
     """Taylor's test of a beam bent at random by half a radian: what the energy's expansions to the first and
     second order leave.
 
@@ -247,7 +249,7 @@ def gradients() -> Iterator[Row]:
         s: beams.evaluate(moved(state, s * h * direction), tangent=False).energy[0] for s in (-2, -1, 1, 2)
     }
     slope = (8.0 * (sides[1] - sides[-1]) - (sides[2] - sides[-2])) / (12.0 * h)
-    yield Row(
+    yield Comparison(
         "beam, Taylor's test",
         "energy's slope over f·d",
         float(slope / (result.force[0] @ d)),
@@ -257,7 +259,7 @@ def gradients() -> Iterator[Row]:
     )
 
 
-def assembled() -> Iterator[Row]:
+def assembled() -> Iterator[Comparison]:
     """Taylor's test of the tied arches' whole tangent, cables and all, away from equilibrium: a remainder of
     O(t³).
 
@@ -281,10 +283,12 @@ def assembled() -> Iterator[Row]:
     for t in (4e-3, 2e-3):
         energy = assembly.evaluate(moved(state, t * direction), tangent=False).energy - here.energy
         rests.append(energy - t * slope - 0.5 * t * t * curvature)
-    yield Row("tied arches, Taylor's test", "order left by the tangent", order(rests), 3.0, 0.05, "Taylor")
+    yield Comparison(
+        "tied arches, Taylor's test", "order left by the tangent", order(rests), 3.0, 0.05, "Taylor"
+    )
 
 
-def sensitivities() -> Iterator[Row]:
+def sensitivities() -> Iterator[Comparison]:
     """Adjoint and direct sensitivities of the loaded tied arches against re-solved equilibria.
 
     How the height of node 5 and the tension of the first cable change with the three rest lengths, with the
@@ -333,7 +337,7 @@ def sensitivities() -> Iterator[Row]:
     for way, found in [("adjoint", adjoint(response, by_state)), ("direct", direct(response, by_state))]:
         miss = np.abs(found + partial - wanted) / scale
         for name, columns in zip(names, (slice(0, 3), slice(3, 4), slice(4, 5)), strict=True):
-            yield Row(
+            yield Comparison(
                 "tied arches, sensitivities",
                 f"{way}, by {name}",
                 float(miss[:, columns].max()),

@@ -16,7 +16,7 @@ from shellform.structure.network import Network, assemble
 from shellform.structure.solve.loading import forces
 from shellform.verification import exact
 from shellform.verification.beams import lee_frame
-from shellform.verification.compared import Row, rows
+from shellform.verification.compared import Comparison, rows
 from shellform.verification.models import (
     CLAMP,
     PIN,
@@ -31,7 +31,7 @@ from shellform.verification.models import (
 )
 
 
-def mises_truss() -> Iterator[Row]:
+def mises_truss() -> Iterator[Comparison]:
     """Two hinged bars, half span 1, rise 0.1, EA = 1e4, pushed down at the crown: the closed form of von
     Mises (1923).
 
@@ -62,7 +62,7 @@ def toggle(elements: int) -> list[tuple[float, float]]:
     return turning_points(network, load_at(network, elements, [0.0, 0.0, -1.0]), elements, 60.0)
 
 
-def toggles() -> Iterator[Row]:
+def toggles() -> Iterator[Comparison]:
     """Williams, Quart. J. Mech. Appl. Math. 17 (1964) 451: clamped shallow toggle; against the exact
     extensible elastica.
 
@@ -76,7 +76,7 @@ LEE_LIMITS = ((1.85567, 48.735), (-0.94144, 58.217))
 """Load and drop at the two limit points of Lee's frame (tests/literature/test_references.py)."""
 
 
-def lee_limits() -> Iterator[Row]:
+def lee_limits() -> Iterator[Comparison]:
     """The limit points of Lee's frame (see beams.py), 70 elements a leg, by arc length: between them the path
     snaps back at 61.
 
@@ -99,9 +99,9 @@ def turns(
     tolerance: float,
     found: Sequence[tuple[float, float]],
     wanted: Sequence[tuple[float, float]],
-) -> Iterator[Row]:
+) -> Iterator[Comparison]:
     """Rows that compare turning points, load and drop; a wrong number of them is a row that fails."""
-    yield Row(case, "turning points", len(found), len(wanted), 0.0, source)
+    yield Comparison(case, "turning points", len(found), len(wanted), 0.0, source)
     for number, (here, there) in enumerate(zip(found, wanted, strict=False), 1):
         yield from rows(
             case, source, tolerance, zip((f"load {number}", f"drop {number}"), here, there, strict=True)
@@ -125,7 +125,7 @@ def arch(elements: int) -> tuple[float, float]:
     return limit.factor, 100.0 - float(limit.equilibrium.state.positions[elements, 2])
 
 
-def arches() -> Iterator[Row]:
+def arches() -> Iterator[Comparison]:
     """DaDeppo and Schmidt, J. Appl. Mech. 42 (1975) 894: arch of 215°, clamped left, hinged right, dead crown
     load: 897.
 
@@ -136,7 +136,7 @@ def arches() -> Iterator[Row]:
     source = "extensible elastica, recomputed; DaDeppo and Schmidt 1975"
     case = "clamped-hinged arch of 215°"
     yield from rows(case, source, 1e-3, zip(("limit load", "drop there"), found[1], ARCH, strict=True))
-    yield Row(
+    yield Comparison(
         case, "order of the limit load", order([load - ARCH[0] for load, _ in found]), 2.0, 0.1, "O(h²)"
     )
 
@@ -164,7 +164,7 @@ def star_dome() -> tuple[Reals, Indices]:
     return points, np.vstack([spokes, rim, legs])
 
 
-def domes() -> Iterator[Row]:
+def domes() -> Iterator[Comparison]:
     """Star dome of 24 hinged bars, EA = 3.03e5 · 3.17 N, loaded at its apex: limit load and valley by arc
     length.
 

@@ -20,12 +20,12 @@ def test_each_case_says_where_its_reference_comes_from(case):
 
 
 def test_a_row_fails_beyond_its_tolerance_relative_to_its_reference():
-    row = verification.Row("case", "quantity", 2.02, 2.0, 0.0099, "nowhere")
+    row = verification.Comparison("case", "quantity", 2.02, 2.0, 0.0099, "nowhere")
     assert row.difference == pytest.approx(0.01)
     assert not row.passed
-    assert verification.Row("case", "quantity", 2.02, 2.0, 0.0101, "nowhere").passed
-    assert verification.Row("case", "quantity", float("nan"), 2.0, 0.1, "nowhere").passed is False
-    assert verification.Row("case", "quantity", 1e-9, 0.0, 1e-8, "nowhere").difference == 1e-9
+    assert verification.Comparison("case", "quantity", 2.02, 2.0, 0.0101, "nowhere").passed
+    assert verification.Comparison("case", "quantity", float("nan"), 2.0, 0.1, "nowhere").passed is False
+    assert verification.Comparison("case", "quantity", 1e-9, 0.0, 1e-8, "nowhere").difference == 1e-9
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def test_the_command_prints_each_row_and_its_status_says_whether_all_hold(
     value, status, words, monkeypatch, capsys
 ):
     def case():
-        yield verification.Row("a case", "a quantity", value, 1.0, 0.1, "a source")
+        yield verification.Comparison("a case", "a quantity", value, 1.0, 0.1, "a source")
 
     monkeypatch.setattr(verification, "CASES", (case,))
     monkeypatch.setattr(sys, "argv", ["shellform", "verify"])

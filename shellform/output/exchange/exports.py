@@ -101,7 +101,7 @@ def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "d
             f"rods {rod.direction}",
             name,
             state.positions[rod.nodes],
-            told={"length [m]": f"{rod.length:.6f}"},
+            strings={"length [m]": f"{rod.length:.6f}"},
         )
         for name, rod in zip(rod_names(grid), grid.rods, strict=True)
     ]
@@ -109,12 +109,12 @@ def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "d
         ties.ends, ties.rest_length, ties.tension(state), cable_crossings(shell, built.design), strict=True
     )
     for number, (ends, rest, force, pair) in enumerate(rows):
-        told = {
+        strings = {
             "crossings": f"{pair[0]} {pair[1]}",
             "rest length [m]": f"{rest:.6f}",
             f"force under {load} [N]": f"{force:.6f}",
         }
-        items.append(Item("cables", f"C{number}", state.positions[ends], told=told))
+        items.append(Item("cables", f"C{number}", state.positions[ends], strings=strings))
     items += [Item("supports", f"S{k}", state.positions[[node]]) for k, node in enumerate(shell.net.supports)]
     items += [Item("crossings", str(k), point[None]) for k, point in enumerate(crossing_points(grid, state))]
     items.append(Item("target", "target", target.vertices, target.triangles))

@@ -3,7 +3,7 @@
 The nodes stand where they are free of stress (a gridshell's flat grid), and so do the co-rotational elements on them. The displacements and
 rotations of the unloaded, bent state are given to them in one step: from zero, a node's rotation vector is its total rotation, which is what
 OpenSees' co-rotational transformation takes from its first increment. Elements notice what their nodes were given only after a solution: a
-first analysis, with all nodes held but for one freedom, does that (without it the first iteration begins with the cables' prestress alone
+first analysis, with all nodes held but for one dof, does that (without it the first iteration begins with the cables' prestress alone
 and is lost). Then everything but the supports is let go, equilibrium without load is found from there, and the load is
 applied in increments by full Newton-Raphson, with a line search where that fails.
 
@@ -65,8 +65,8 @@ def build():
         ops.uniaxialMaterial("InitStrainMaterial", 2 * k + 2, 2 * k + 1, 1.0 - rest / apart)
         ops.element("corotTruss", tag, a + 1, b + 1, 1.0, 2 * k + 2)
     for tag, displacement in enumerate(START, 1):
-        for freedom, value in enumerate(displacement, 1):
-            ops.setNodeDisp(tag, freedom, value, "-commit")
+        for dof, value in enumerate(displacement, 1):
+            ops.setNodeDisp(tag, dof, value, "-commit")
     ops.timeSeries("Linear", 1)
     ops.pattern("Plain", 1, 1)
     for node, *force in LOAD:
@@ -81,9 +81,9 @@ def settle():
         ops.fix(node + 1, *([1, 1, 1, 1, 1, 0] if node == loose else [1] * 6))
     advance(0.0, 1)
     for node in range(len(NODES)):
-        for freedom, fixed in enumerate(held.get(node, [0] * 6), 1):
-            if not fixed and (node, freedom) != (loose, 6):
-                ops.remove("sp", node + 1, freedom)
+        for dof, fixed in enumerate(held.get(node, [0] * 6), 1):
+            if not fixed and (node, dof) != (loose, 6):
+                ops.remove("sp", node + 1, dof)
     return advance(0.0, 1)
 
 
@@ -175,12 +175,12 @@ def opensees_script(
         ],
         "MOVED": (loaded.positions - bent.positions).tolist(),
     }
-    told = {
+    meaning = {
         "NODES": "places without stress",
         "SECTIONS": "EA, GJ, EIy, EIz",
         "BEAMS": "ends, section, a vector in the local x-z plane",
         "CABLES": "ends, EA, rest length",
-        "SUPPORTS": "node, which of its freedoms are held",
+        "SUPPORTS": "node, which of its degrees of freedom are held",
         "START": "displacements and rotation vectors of the bent grid without load",
         "LOAD": "node, force, moment",
         "MOVED": "displacements by shellform from there to the loaded state",
@@ -188,7 +188,7 @@ def opensees_script(
     scale = float(np.abs(forces).max(initial=0.0)) or float(np.abs(beams.axial).max()) * 1e-9
     head = _HEAD.format(title=title.replace('"', "'").replace("\\", "/"), name=name, load=case)
     lists = "\n".join(
-        f"{key} = [  # {told[key]}\n" + "".join(f"    {row},\n" for row in rows) + "]\n"
+        f"{key} = [  # {meaning[key]}\n" + "".join(f"    {row},\n" for row in rows) + "]\n"
         for key, rows in data.items()
     )
     return head + lists + _BODY.format(tolerance=1e-6 * scale)

@@ -81,14 +81,14 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
     if largest < _NOTHING * scale.limit / unit:
         largest = mean = 0.0
     digits = ".1f" if largest >= 1.0 and name else ".2g"
-    told = (
+    caption = (
         f"{panel.quantity.split()[0]}: maximum {largest:{digits}} {name}".rstrip()
         + f", mean {mean:{digits}} {name}".rstrip()
     )
     taut = panel.cable_forces > 0.0
     if taut.any():
         label, size_of = _newtons(scale.force)
-        told += f"; {int(taut.sum())} cables, {panel.cable_forces.max() / size_of:.3g} {label} at most"
+        caption += f"; {int(taut.sum())} cables, {panel.cable_forces.max() / size_of:.3g} {label} at most"
     line = scale.letters
     return (
         Word(
@@ -98,9 +98,9 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
             bold=True,
         ),
         Word(
-            told,
+            caption,
             (0.8 * line, size[1] - 3.1 * line),
-            _fitting(told, round(0.9 * line), size[0] - 1.6 * line),
+            _fitting(caption, round(0.9 * line), size[0] - 1.6 * line),
             QUIET,
         ),
     )
@@ -132,9 +132,9 @@ def key(scale: Scale, width: int) -> tuple[tuple[Word, ...], tuple[Ramp, ...]]:
     )
     ramps = [ramp]
     if scale.force > 0.0:
-        told = "cable force (pale: slack)" if scale.slack else "cable force"
+        caption = "cable force (pale: slack)" if scale.slack else "cable force"
         label, size_of = _newtons(scale.force)
-        more, ramp = _bar(told, label, scale.force / size_of, "", cable_colours, ends[1], width, line)
+        more, ramp = _bar(caption, label, scale.force / size_of, "", cable_colours, ends[1], width, line)
         words, ramps = words + more, [*ramps, ramp]
     return tuple(words), tuple(ramps)
 

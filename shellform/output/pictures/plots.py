@@ -164,7 +164,7 @@ def constraint_history(
 
 
 @dataclass(frozen=True)
-class Line:
+class PaperLine:
     """A line through `points` (x, y), mm from the page's lower left corner, `width` mm wide."""
 
     points: Sequence[tuple[float, float]]
@@ -190,16 +190,16 @@ class Label:
 
 
 @dataclass(frozen=True)
-class Page:
+class PaperPage:
     """A page of `width` and `height`, mm, with its lines and labels."""
 
     width: float
     height: float
-    lines: tuple[Line, ...]
+    lines: tuple[PaperLine, ...]
     labels: tuple[Label, ...]
 
 
-def write_pages(path: str | Path, pages: Sequence[Page], title: str = "") -> None:
+def write_pages(path: str | Path, pages: Sequence[PaperPage], title: str = "") -> None:
     """Writes the pages, to scale and with their words as text, to a PDF; a single page may also go to a PNG
     or SVG.
 
@@ -222,7 +222,7 @@ def write_pages(path: str | Path, pages: Sequence[Page], title: str = "") -> Non
                 book.savefig(_page(page))
 
 
-def _page(page: Page) -> Figure:
+def _page(page: PaperPage) -> Figure:
     figure = Figure(figsize=(page.width / _INCH, page.height / _INCH))
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))

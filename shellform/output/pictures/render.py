@@ -21,7 +21,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.output.pictures import maps
 from shellform.output.pictures.images import FILMS, write_film, write_png
 from shellform.output.pictures.panel import LIMIT, Look, Panel
-from shellform.output.pictures.sheets import Page, single, table
+from shellform.output.pictures.sheets import Canvas, single, table
 from shellform.structure.elements.state import State
 from shellform.written import door
 
@@ -105,7 +105,7 @@ def film(
         write_film(path, frames, rate=rate)
 
 
-def _written(path: str | Path | None, page: Page) -> Image:
+def _written(path: str | Path | None, page: Canvas) -> Image:
     """The page as an array, and in its file; a page of lines is never drawn by VTK."""
     target = None if path is None else door(path, *FORMATS)
     if target is not None and target.suffix.lower() != ".png":

@@ -33,7 +33,7 @@ from shellform.output.pictures.panel import (
     drawn_radius,
     long_enough,
 )
-from shellform.output.pictures.sheets import Drawing, Page
+from shellform.output.pictures.sheets import Canvas, Drawing
 from shellform.output.pictures.view import Camera
 
 _LIBRARIES = "On Debian and Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri libxrender1; pictures as .svg and .pdf need none of them"
@@ -56,7 +56,7 @@ _MATT = {
 }  # colours stay those of the bar
 
 
-def drawn(pages: Iterable[Page]) -> Iterator[Image]:
+def drawn(pages: Iterable[Canvas]) -> Iterator[Image]:
     """The pages as arrays (height, width, 3), or 4 without a background; all are drawn in one window.
 
     Keys and headings that don't change from page to page are drawn once. Raises InputError where VTK can't
@@ -111,7 +111,7 @@ def _window(size: tuple[int, int]) -> pv.Plotter:
     return plotter
 
 
-def _one(plotter: pv.Plotter, drawing: Drawing, page: Page) -> Image:
+def _one(plotter: pv.Plotter, drawing: Drawing, page: Canvas) -> Image:
     """One drawing, (height, width, 3 or 4)."""
     with _quiet():
         plotter.clear_actors()
@@ -131,7 +131,7 @@ def _one(plotter: pv.Plotter, drawing: Drawing, page: Page) -> Image:
     return _without_ground(*shots) if page.look.transparent else shots[0]
 
 
-def _add(plotter: pv.Plotter, panel: Panel, page: Page) -> None:
+def _add(plotter: pv.Plotter, panel: Panel, page: Canvas) -> None:
     """A panel's actors."""
     scale, camera, look = page.scale, page.camera, page.look
     radius = drawn_radius(panel, look, camera.width)

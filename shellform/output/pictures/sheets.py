@@ -28,8 +28,8 @@ class Drawing:
 
 
 @dataclass(frozen=True)
-class Page:
-    """`drawings` on a page of a `size` in pixels, all with one `scale`, `camera` and `look`."""
+class Canvas:
+    """`drawings` on a canvas of a `size` in pixels, all with one `scale`, `camera` and `look`."""
 
     size: tuple[int, int]
     drawings: Sequence[Drawing]
@@ -38,7 +38,7 @@ class Page:
     look: Look
 
 
-def single(panels: Sequence[Panel], look: Look) -> list[Page]:
+def single(panels: Sequence[Panel], look: Look) -> list[Canvas]:
     """A page of the look's size for each panel, all with one scale and camera: one picture, or the frames of
     a film.
     """
@@ -52,7 +52,7 @@ def single(panels: Sequence[Panel], look: Look) -> list[Page]:
     words, ramps = legend.key(scale, width)
     foot = Drawing((width, strip), (0, height - strip), words, ramps)
     return [
-        Page(
+        Canvas(
             look.size,
             [Drawing(room, (0, 0), legend.title(panel, scale, room), (), panel), foot],
             scale,
@@ -63,7 +63,7 @@ def single(panels: Sequence[Panel], look: Look) -> list[Page]:
     ]
 
 
-def table(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> Page:
+def table(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> Canvas:
     """All panels on one page, each of the look's size; rows may differ in length."""
     panels = [panel for row in rows for panel in row]
     if not panels:
@@ -88,4 +88,4 @@ def table(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> Pag
     words, ramps = legend.key(scale, min(across, 2 * width))
     wide = min(across, 2 * width)
     drawings.append(Drawing((wide, strip), ((across - wide) // 2, top + height * len(rows)), words, ramps))
-    return Page((across, top + height * len(rows) + strip), drawings, scale, camera, look)
+    return Canvas((across, top + height * len(rows) + strip), drawings, scale, camera, look)

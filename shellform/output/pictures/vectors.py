@@ -17,25 +17,25 @@ from shellform.arrays import Reals
 from shellform.output.pictures import plots
 from shellform.output.pictures.legend import LOAD, SLACK, SUPPORT, SURFACE, cable_colours, rod_colours
 from shellform.output.pictures.panel import Panel, Skin, arrow_length, cable_thickness, drawn_radius
-from shellform.output.pictures.sheets import Drawing, Page
+from shellform.output.pictures.sheets import Canvas, Drawing
 from shellform.output.pictures.view import Camera
 
 _BANDS = 12  # of depth, between which arrows stand
 _OUTLINE = 1.2  # pixels
 
 
-def write(path: str | Path, page: Page) -> None:
+def write(path: str | Path, page: Canvas) -> None:
     """Writes the page; the ending of `path` chooses .svg or .pdf."""
     plots.save(_drawn(page), path)
 
 
-def rasterised(page: Page) -> NDArray[np.uint8]:
+def rasterised(page: Canvas) -> NDArray[np.uint8]:
     """The page of lines as an array (height, width, 3), or 4 without a background."""
     image = plots.pixels(_drawn(page))
     return image if page.look.transparent else image[..., :3]
 
 
-def _drawn(page: Page) -> Any:
+def _drawn(page: Canvas) -> Any:
     axes = plots.blank(page.size, transparent=page.look.transparent)
     for each in page.drawings:
         corner = (float(each.corner[0]), float(page.size[1] - each.corner[1] - each.size[1]))
@@ -48,7 +48,7 @@ def _drawn(page: Page) -> Any:
     return axes
 
 
-def _add(axes: Any, drawing: Drawing, panel: Panel, page: Page, corner: Reals) -> None:
+def _add(axes: Any, drawing: Drawing, panel: Panel, page: Canvas, corner: Reals) -> None:
     scale, camera, look = page.scale, page.camera, page.look
     pixel = camera.height / drawing.size[1]
     middle = corner + 0.5 * np.array(drawing.size)

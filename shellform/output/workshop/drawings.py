@@ -20,7 +20,7 @@ from ezdxf.enums import TextEntityAlignment
 from ezdxf.layouts import Modelspace
 
 import shellform
-from shellform.output.pictures.plots import Label, Line, Page, write_pages
+from shellform.output.pictures.plots import Label, PaperLine, PaperPage, write_pages
 from shellform.output.workshop import layout
 from shellform.output.workshop.marks import PENS, WIDE, Mark, Ring, Sheet, Span, Stroke, Words
 from shellform.output.workshop.nesting import Cutting
@@ -148,7 +148,7 @@ def fitted(sheet: Sheet) -> tuple[str, float]:
     return found
 
 
-def paper_page(sheet: Sheet, built: Built, number: str) -> Page:
+def paper_page(sheet: Sheet, built: Built, number: str) -> PaperPage:
     """The page: the drawing to scale, notes and list in a column on the right, the title block below them."""
     paper, scale = fitted(sheet)
     width, height = PAPERS[paper]
@@ -167,11 +167,11 @@ def paper_page(sheet: Sheet, built: Built, number: str) -> Page:
     if sheet.rows:
         column.table(sheet.heads, sheet.rows, down_to=_EDGE + _BLOCK + 6.0)
     block = _title_block(right, width - _EDGE, built, sheet, paper, scale, number)
-    return Page(width, height, (*lines, *block[0]), (*labels, *column.labels, *block[1]))
+    return PaperPage(width, height, (*lines, *block[0]), (*labels, *column.labels, *block[1]))
 
 
-def _to_scale(sheet: Sheet, scale: float, shift: tuple[float, float]) -> tuple[list[Line], list[Label]]:
-    lines: list[Line] = []
+def _to_scale(sheet: Sheet, scale: float, shift: tuple[float, float]) -> tuple[list[PaperLine], list[Label]]:
+    lines: list[PaperLine] = []
     labels: list[Label] = []
 
     def at(point: tuple[float, float]) -> tuple[float, float]:
@@ -179,7 +179,7 @@ def _to_scale(sheet: Sheet, scale: float, shift: tuple[float, float]) -> tuple[l
 
     for mark in sheet.marks:
         pen = PENS[mark.layer]
-        line = Line((), pen.colour, pen.width, pen.dashed)
+        line = PaperLine((), pen.colour, pen.width, pen.dashed)
         if isinstance(mark, Stroke):
             lines.append(replace(line, points=[at(p) for p in mark.points]))
         elif isinstance(mark, Ring):
@@ -295,13 +295,13 @@ class _Column:
 
 def _title_block(
     left: float, right: float, built: Built, sheet: Sheet, paper: str, scale: float, number: str
-) -> tuple[list[Line], list[Label]]:
+) -> tuple[list[PaperLine], list[Label]]:
     bottom, top = _EDGE, _EDGE + _BLOCK
     middle = 0.5 * (left + right)
     rows = [top - 16.0, top - 26.0, top - 36.0, bottom + 14.0]
-    lines = [Line([(left, top), (right, top)], width=0.35)]
-    lines += [Line([(left, y), (right, y)], width=0.18) for y in rows]
-    lines.append(Line([(middle, rows[-1]), (middle, rows[0])], width=0.18))
+    lines = [PaperLine([(left, top), (right, top)], width=0.35)]
+    lines += [PaperLine([(left, y), (right, y)], width=0.18) for y in rows]
+    lines.append(PaperLine([(middle, rows[-1]), (middle, rows[0])], width=0.18))
     fields = [
         ("job", built.title or "gridshell", left, top, 3.5),
         ("drawing", sheet.title, left, rows[0], 3.0),
@@ -322,13 +322,13 @@ def _title_block(
     # A bar to check the print by.
     bar = 50.0
     x0, y0 = left + 6.0, bottom + 6.0
-    lines += [Line([(x0, y0), (x0 + bar, y0)], width=0.5)]
-    lines += [Line([(x, y0 - 1.5), (x, y0 + 1.5)], width=0.35) for x in (x0, x0 + 0.5 * bar, x0 + bar)]
+    lines += [PaperLine([(x0, y0), (x0 + bar, y0)], width=0.5)]
+    lines += [PaperLine([(x, y0 - 1.5), (x, y0 + 1.5)], width=0.35) for x in (x0, x0 + 0.5 * bar, x0 + bar)]
     labels.append(
         Label((x0 + bar + 3.0, y0), 2.0, f"{bar:g} mm on paper = {bar * scale:g} mm", foot="middle")
     )
     return lines, labels
 
 
-def _frame(x0: float, y0: float, x1: float, y1: float, width: float) -> Line:
-    return Line([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], width=width)
+def _frame(x0: float, y0: float, x1: float, y1: float, width: float) -> PaperLine:
+    return PaperLine([(x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)], width=width)

@@ -108,9 +108,9 @@ def rods(built: Built, cutting: Cutting) -> Table:
 def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
     """What the buyer and the carpenter must know, a sentence each."""
     count = len(cutting.bars)
-    told = "fewer" if count == cutting.least else f"fewer than {cutting.least}"
+    fewer = "fewer" if count == cutting.least else f"fewer than {cutting.least}"
     said = [
-        f"{count} bars of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, {100 * cutting.waste:.0f} % waste; {told} can't do."
+        f"{count} bars of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, {100 * cutting.waste:.0f} % waste; {fewer} can't do."
     ]
     if cutting.spliced:
         which = ", ".join(names[rod] for rod in cutting.spliced)
@@ -143,8 +143,8 @@ def splices(built: Built, cutting: Cutting) -> Table:
             int(rod.crossings[before]),
             int(rod.crossings[before + 1]),
         ]
-        for told in forces.values():
-            axial, _, y_a, z_a, _, y_b, z_b = told[first[number] + inside]
+        for own in forces.values():
+            axial, _, y_a, z_a, _, y_b, z_b = own[first[number] + inside]
             # Both ends' moments are counted as they turn the ends, so that a constant bending moment has
             # opposite signs there.
             bent = (1.0 - share) * np.array([y_a, z_a]) - share * np.array([y_b, z_b])

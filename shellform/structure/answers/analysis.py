@@ -87,7 +87,7 @@ def analyse(
     chosen = _chosen(model, load)
     _check(factor, increments, tolerance, method, lead, limit, len(model.network.nodes))
     assembly = assemble(model.network)
-    walk = _Walk(model, assembly, chosen, factor, tolerance, limit, progress)
+    walk = _Analysis(model, assembly, chosen, factor, tolerance, limit, progress)
     message, converged = "", True
     critical, softest = None, None
     try:
@@ -114,7 +114,7 @@ def analyse(
         assembly.evaluate(found.state, tangent=False).force - loaded,
         replace(found, factorisations=walk.spent),
         converged,
-        tuple(walk.told),
+        tuple(walk.documented),
         _seconds(assembly, time.perf_counter() - began),
         message,
         tuple(doubts(model.network)),
@@ -125,7 +125,7 @@ def analyse(
 
 
 @dataclass
-class _Walk:
+class _Analysis:
     """An analysis under way."""
 
     model: Model
@@ -137,7 +137,7 @@ class _Walk:
     progress: Progress | None
     spent: int = 0
     reached: float = 0.0
-    told: list[dict[str, Any]] = field(default_factory=list)
+    documented: list[dict[str, Any]] = field(default_factory=list)
     found: Equilibrium | None = None
 
     def __post_init__(self) -> None:
@@ -194,7 +194,7 @@ class _Walk:
                 )
                 found, spent = arrived.equilibrium, arrived.factorisations
             self.accept(found, after, spent)
-            self.told.append(self._increment(after, spent) | {"steps": steps})
+            self.documented.append(self._increment(after, spent) | {"steps": steps})
 
     def path(self, lead: tuple[int, int, float] | None, parts: int) -> None:
         """Along the path to the factor or to the led displacement, the first step a `parts`-th of it, or a
@@ -213,10 +213,10 @@ class _Walk:
         )
         for point in points:
             spent = point.equilibrium.factorisations
-            if point.factor == 0.0 and not self.told:
+            if point.factor == 0.0 and not self.documented:
                 continue
             self.accept(point.equilibrium, point.factor, spent - before)
-            self.told.append(
+            self.documented.append(
                 self._increment(point.factor, spent - before) | {"rate": point.rate, "event": point.event}
             )
             before = spent

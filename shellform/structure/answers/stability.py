@@ -35,7 +35,7 @@ from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.loading import Drive
 from shellform.structure.solve.path import follow
-from shellform.structure.solve.residual import Measure, held
+from shellform.structure.solve.residual import ResidualNorm, held
 
 _LANCZOS = 200  # restarts; an eigenvalue that stands out takes a few
 _DENSE = 12  # degrees of freedom up to which Lanczos vectors don't fit
@@ -78,7 +78,7 @@ def modes(assembly: Assembly, state: State, count: int) -> Modes:
         solve = assembly.matrix.factor(values).solve
     except NotPositiveDefinite:
         solve = assembly.matrix.factor_indefinite(values).solve
-    mass = Measure(assembly).mass_shape
+    mass = ResidualNorm(assembly).mass_shape
     stiffness, vectors = _lowest(assembly.matrix.full(values), solve, sp.diags_array(mass).tocsc(), count)
     order = np.argsort(stiffness)
     flat = np.zeros((count, 6 * assembly.count))

@@ -2,8 +2,8 @@
 
 Letters, all of one element: a, b the two ends; a_x, a_y, a_z and b_x, b_y, b_z the nodal triads (columns of
 `A`, `B` in the kernel, in element axes); e_x, e_y, e_z the element triad (`E`); d = x_b - x_a, l = |d|, l0
-the rest length; theta the six local rotations (12), M their moments, N the axial force (15, 18); phi the spin
-of the element triad.
+the rest length; theta the six local rotations (12), M their moments, N the axial force (15, 18); phi the
+rotation increment of the element triad.
 
 The element triad has e_x along the chord and e_z along e_x × (a_y + b_y). Crisfield's mean triad has the same
 limit for small local rotations but is not exactly conservative (findings: 8e-3 relative at 0.5 rad); with
@@ -13,7 +13,7 @@ this one the local deformations (12) are smooth functions of the ends' positions
     f = dU/dx                                                                       end forces (19, 20)
 
 hold exactly. With c_k = M_k / (2 cos theta_k) the moments on the triads are g = sum c_k h_k, where 2 sin
-theta_k = s_k and h_k is the gradient of s_k with respect to the spin of its end at fixed E. The triad turns
+theta_k = s_k and h_k is the gradient of s_k with respect to the rotation increment of its end at fixed E. The triad turns
 by phi = G (dd, w_a, w_b), and since U doesn't change when everything turns together,
 
     f = (N e_x on d, g_a on w_a, g_b on w_b) - G' (g_a + g_b).
@@ -101,7 +101,7 @@ class Beams:
 
     def local_forces_by_dof(self, state: State) -> Reals:
         """Derivatives (m, 7, 12) of equation (16) by the degrees of freedom of both ends, translations and
-        spins.
+        rotation increments.
         """
         count = len(self.ends)
         result = np.empty((count, 7, 12))

@@ -1,7 +1,7 @@
 """The compiled loops over co-rotational beams; the letters and equations are those at the head of beam.py.
 
-The tangent, term by term. Let w stand for the spins of both ends and phi = G y for that of the element triad,
-y = (dd, w). The second variation of the energy at given triads is a quadratic form in the ends' spins
+The tangent, term by term. Let w stand for the rotation increments of both ends and phi = G y for that of the element triad,
+y = (dd, w). The second variation of the energy at given triads is a quadratic form in the ends' rotation increments
 relative to the element, w - phi, to which the turning of the triads' moments themselves adds M = Q - tr(Q) I
 at each end, with Q the sum of c_k (triad vector)(element axis)'. Altogether
 
@@ -47,7 +47,7 @@ def evaluate(  # type: ignore[no-untyped-def]
     A = np.empty((3, 3), dtype)
     B = np.empty((3, 3), dtype)
     Q = np.empty((3, 3), dtype)  # of a node, then of a quaternion's matrix
-    h = np.empty((6, 3), dtype)  # gradients of s_k by the spin of their end, E fixed
+    h = np.empty((6, 3), dtype)  # gradients of s_k by the rotation increment of their end, E fixed
     c = np.empty(6, dtype)
     theta = np.empty(6, dtype)
     sine, cosine = np.empty(6, dtype), np.empty(6, dtype)
@@ -126,7 +126,7 @@ def evaluate(  # type: ignore[no-untyped-def]
         # G's first row is (0, 0, -eta / l, alpha), its others turn d2 and d1 over l.
         alpha[0], alpha[1], alpha[3], alpha[4] = nu * A[1, 1], -nu * A[0, 1], nu * B[1, 1], -nu * B[0, 1]
 
-        # End forces in element axes: on d, then on the two ends' spins.
+        # End forces in element axes: on d, then on the two ends' rotation increments.
         fd1 = -(gz / l)
         fd2 = (gy + eta * gx) / l
         ma0, ma1, ma2 = g[0, 0] - alpha[0] * gx, g[0, 1] - alpha[1] * gx, g[0, 2]
@@ -140,7 +140,7 @@ def evaluate(  # type: ignore[no-untyped-def]
         if blocks.shape[0] == 0:
             continue
 
-        # h_k / (2 cos theta_k): gradients of the local rotations by the spin of their end.
+        # h_k / (2 cos theta_k): gradients of the local rotations by the rotation increment of their end.
         for end in range(2):
             T = A if end == 0 else B
             k = 3 * end
@@ -157,7 +157,7 @@ def evaluate(  # type: ignore[no-untyped-def]
             near_b[k] = near_a[k] + moment[k + 3] * sine[k + 3] / cosine[k + 3]
             near_a[k] += moment[k] * sine[k] / cosine[k]
 
-        # P: the quadratic form of the two ends' spins with the element triad at rest, from the derivatives of
+        # P: the quadratic form of the two ends' rotation increments with the element triad at rest, from the derivatives of
         # the moments by the local rotations, the arcsine's own curvature with them, and from the triads'
         # moments' own turning M.
         for i in range(3):
@@ -170,7 +170,7 @@ def evaluate(  # type: ignore[no-untyped-def]
                 ab = f0 * h[3, j] + f1 * h[4, j] + f2 * h[5, j]
                 P[i, 3 + j] = ab
                 P[3 + j, i] = ab
-        # R, S: how spins of the element triad (phi, the same at both ends) couple with the ends' spins and
+        # R, S: how rotation increments of the element triad (phi, the same at both ends) couple with the ends' rotation increments and
         # with themselves.
         for r in range(3):
             for i in range(3):
@@ -217,20 +217,20 @@ def evaluate(  # type: ignore[no-untyped-def]
             a0, a1, a2 = T[0, 1], T[1, 1], T[2, 1]  # the end's y axis
             o = 3 + 3 * end
             m0, m1 = alpha[o - 3], alpha[o - 2]
-            # d1 and d2 against this end's spins; each term and its transpose have a half.
+            # d1 and d2 against this end's rotation increments; each term and its transpose have a half.
             K[o, 1] -= 0.5 * (a1 * nu * s + eta * gx * m0) * il
             K[o + 1, 1] -= 0.5 * (-a0 * nu * s + eta * gx * m1) * il
             K[o, 2] -= 0.5 * (a1 * nu * gz - n * eta * a2 - eta * nu * gx * a2) * il
             K[o + 1, 2] -= 0.5 * (-a0 * nu * gz - n * a2 - nu * gx * a2) * il
             K[o + 2, 2] -= 0.5 * (n * (a0 * eta + a1) + nu * gx * (a1 + eta * a0)) * il
-            # This end's spins against themselves.
+            # This end's rotation increments against themselves.
             nn = nu * n
             K[o, o] -= nn * a2 * a1 + n * a2 * (m0 - 1.0)
             K[o + 1, o] -= 0.5 * (-nn * a2 * a0 + n * m1 * a2)
             K[o + 2, o] -= 0.5 * (n * a0 - nn * a0 * a1 - n * a0 * m0)
             K[o + 1, o + 1] += n * a2
             K[o + 2, o + 1] -= 0.5 * (n * a1 + nn * a0 * a0 - n * a0 * m1)
-        # The two ends' spins against each other.
+        # The two ends' rotation increments against each other.
         a0, a1, a2, b0, b1, b2 = A[0, 1], A[1, 1], A[2, 1], B[0, 1], B[1, 1], B[2, 1]
         nn = nu * n
         K[6, 3] -= 0.5 * (nn * a2 * b1 + n * alpha[0] * b2 + nn * b2 * a1 + n * alpha[3] * a2)
@@ -308,7 +308,7 @@ def _row(r):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length, stiffness, result):  # type: ignore[no-untyped-def]
-    """The gradients of (12), h_k on the own spin less G' h_k, times the local stiffness (18), in global
+    """The gradients of (12), h_k on the own rotation increment less G' h_k, times the local stiffness (18), in global
     axes.
     """
     dtype = positions.dtype

@@ -32,11 +32,11 @@ from shellform.errors import NotConverged
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
-from shellform.structure.solve.residual import Measure, Turning, held
+from shellform.structure.solve.residual import ResidualNorm, Turning, held
 
 # unbalanced over largest force; rounding leaves about 1e-10 for rods of EA/l = 1e7 N/m and 10 N loads
 TOLERANCE = 1e-8
-TURN = 0.5  # rad, the largest spin of a node in one step: the updates are first order in the spin
+TURN = 0.5  # rad, the largest rotation increment of a node in one step, in which the updates are first order
 _GROWTH, _DECAY = 10.0, 0.2  # of the mass after a failed and a good step
 _SUFFICIENT = 1e-4  # share of the predicted decrease of the potential that a step must bring (Armijo)
 _CLOSE, _CONTRACTION = (
@@ -60,7 +60,7 @@ class Equilibrium:
 
     `residual`: largest unbalanced force (moments over an element length) over the largest applied or internal
     force; `factorisations` spent; `energy` strain energy, J; `stable`: the tangent on the free degrees of
-    freedom is positive definite (a rod's spin about its own axis disregarded); `negative`: how many of its
+    freedom is positive definite (a rod's rotation about its own axis disregarded); `negative`: how many of its
     eigenvalues are negative.
     """
 
@@ -97,7 +97,7 @@ def find_equilibrium(
     `progress(factorisations, residual)` is called at every step. Raises NotConverged with the last state,
     LostBranch where `on_branch` is set and definiteness is lost.
     """
-    walk = _Walk(assembly, start, load, reach)
+    walk = _Relaxation(assembly, start, load, reach)
     while walk.residual > tolerance and walk.residual > walk.rounding():
         if progress is not None:
             progress(walk.factorisations, walk.residual)
@@ -129,7 +129,7 @@ def newton(
     It may end on an unstable equilibrium, which implicit dynamic relaxation never does. Raises NotConverged
     with the state of the smallest residual after `limit` factorisations, or where a step isn't finite.
     """
-    measure, turning = Measure(assembly), Turning(assembly, load)
+    measure, turning = ResidualNorm(assembly), Turning(assembly, load)
     state, best, least, before = start, start, np.inf, np.inf
     for spent in range(limit + 1):
         now = assembly.evaluate(state)
@@ -163,7 +163,7 @@ def newton(
 
 
 def stability(assembly: Assembly, balance: Balance) -> tuple[bool, int]:
-    """Whether the tangent is positive definite, and its number of negative eigenvalues; spins about rod axes
+    """Whether the tangent is positive definite, and its number of negative eigenvalues; turns about rod axes
     are held.
     """
     values = held(assembly, balance)
@@ -174,13 +174,13 @@ def stability(assembly: Assembly, balance: Balance) -> tuple[bool, int]:
     return True, 0
 
 
-class _Walk:
+class _Relaxation:
     """The moving state of one relaxation."""
 
     def __init__(self, assembly: Assembly, start: State, load: Reals, reach: float) -> None:
         self.assembly, self.load, self.state, self.reach = assembly, load, start, reach
         self.now = assembly.evaluate(start)
-        self.measure = Measure(assembly)
+        self.measure = ResidualNorm(assembly)
         self.mass_shape = self.measure.mass_shape
         self.mass = 0.0
         self.factorisations = 0
@@ -280,8 +280,8 @@ class _Walk:
         whole = np.zeros(6 * self.assembly.count)
         whole[self.assembly.free] = direction
         step = whole.reshape(-1, 6)
-        spin, shift = float(np.abs(step[:, 3:]).max()), float(np.abs(step[:, :3]).max())
-        share = min(1.0, TURN / max(spin, TURN), self.reach / max(shift, 1e-300))
+        turn, shift = float(np.abs(step[:, 3:]).max()), float(np.abs(step[:, :3]).max())
+        share = min(1.0, TURN / max(turn, TURN), self.reach / max(shift, 1e-300))
         if share < _SHORTEST:
             return False
         full = share == 1.0

@@ -36,7 +36,7 @@ from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
 from shellform.structure.solve.factorisation import Indefinite
 from shellform.structure.solve.loading import Drive
-from shellform.structure.solve.residual import Measure, Turning, held
+from shellform.structure.solve.residual import ResidualNorm, Turning, held
 
 FIRST = 0.1  # of the goal, the first step's change of the factor
 MOST = 500  # points
@@ -49,7 +49,7 @@ _LOCATED = 1e-7  # of the factor, as near as an event is located
 
 
 @dataclass(frozen=True)
-class Point:
+class PathPoint:
     """A converged point of the path: load `factor`; `equilibrium`; `rate`, the change of the factor with the
     path's length (1/m, negative where the load falls); `event`: "", "limit point" or "bifurcation"."""
 
@@ -70,7 +70,7 @@ def follow(
     most: int = MOST,
     tolerance: float = TOLERANCE,
     events: bool = True,
-) -> Iterator[Point]:
+) -> Iterator[PathPoint]:
     """The points of the path from the equilibrium `start` at factor 0, one by one.
 
     It ends when the factor comes to `goal` for the first time. With `lead` (node, axis 0 to 2, displacement
@@ -92,7 +92,7 @@ def follow(
         raise InputError(
             "the goal of a path must not be zero", where="path", value=goal if lead is None else lead
         )
-    yield here.told()
+    yield here.point()
     smallest = _SMALLEST * abs(size)
     last: Reals | None = None
     for _ in range(most):
@@ -111,7 +111,7 @@ def follow(
             event = walk.located(here, size, led, last, direction, there)
             if event is not None:
                 yield event
-        yield there.told()
+        yield there.point()
         if lead is None:
             if there.factor == goal:
                 return
@@ -147,14 +147,14 @@ class _Here:
     def negative(self) -> int:
         return self.equilibrium.negative
 
-    def told(self) -> Point:
-        return Point(self.factor, self.equilibrium, self.rate)
+    def point(self) -> PathPoint:
+        return PathPoint(self.factor, self.equilibrium, self.rate)
 
 
 class _Path:
     def __init__(self, assembly: Assembly, start: State, drive: Drive, tolerance: float) -> None:
         self.assembly, self.drive, self.tolerance, self.start = assembly, drive, tolerance, start
-        self.measure = Measure(assembly)
+        self.measure = ResidualNorm(assembly)
         self.turning = Turning(assembly, drive.load + drive.base)
         self.moving = assembly.free % 6 < 3
         self.spent = 0
@@ -248,7 +248,7 @@ class _Path:
 
     def located(
         self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float, there: _Here
-    ) -> Point | None:
+    ) -> PathPoint | None:
         """The point between two where the number of negative eigenvalues changes."""
         low, high, near = 0.0, 1.0, there
         total = size if led is not None else float(np.linalg.norm(self.between(here.state, there.state)))
@@ -268,7 +268,7 @@ class _Path:
             ):
                 break
         kind = "limit point" if here.rate * there.rate < 0.0 else "bifurcation"
-        return replace(near.told(), event=kind)
+        return replace(near.point(), event=kind)
 
     def gave_up(self, here: _Here, what: str) -> NotConverged:
         return NotConverged(
@@ -299,8 +299,8 @@ class _Path:
         whole = factor * self.drive.imposed.ravel()
         whole[self.assembly.free] = change
         step = whole.reshape(-1, 6)
-        spin = float(np.abs(step[:, 3:]).max(initial=0.0))
-        if not spin <= 2.0 * TURN:  # also where it isn't a number
+        turn = float(np.abs(step[:, 3:]).max(initial=0.0))
+        if not turn <= 2.0 * TURN:  # also where it isn't a number
             raise _Missed
         return moved(state, self.assembly.chords.corrected(state, step))
 

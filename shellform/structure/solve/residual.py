@@ -13,11 +13,11 @@ from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.factorisation import Factor
 
-_SPIN = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
+_HELD = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
 
 
-class Measure:
-    """Measures unbalanced forces, moments divided by a length, against the largest applied or internal force.
+class ResidualNorm:
+    """Unbalanced forces, moments divided by a length, measured against the largest applied or internal force.
 
     `arms` (n,), m: that length for each node; `mass_shape` (f,): 1 for free translations
     and the arm's square for free rotations, so that both weigh alike.
@@ -63,7 +63,7 @@ def held(assembly: Assembly, balance: Balance) -> Reals:
     regular and is far below what rounding leaves of the softest mode that matters.
     """
     assert balance.tangent is not None
-    return np.asarray(_stiffened(balance.tangent, assembly.turns, _SPIN))
+    return np.asarray(_stiffened(balance.tangent, assembly.turns, _HELD))
 
 
 @njit(cache=True)
@@ -120,10 +120,10 @@ class Turning:
         moments = balance.force[self.nodes, 3:]
 
         def turned(step: Reals) -> Reals:
-            spins = np.where(self.rows >= 0, step[self.rows], 0.0)
+            increments = np.where(self.rows >= 0, step[self.rows], 0.0)
             change = np.zeros_like(step)
             kept = self.rows >= 0
-            change[self.rows[kept]] = (-0.5 * np.cross(moments, spins))[kept]
+            change[self.rows[kept]] = (-0.5 * np.cross(moments, increments))[kept]
             return step + factor.solve(change)
 
         size = len(right)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, Part, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 
 _SHELL = "ThrustDiagram"
 
@@ -76,7 +76,7 @@ def _meshes(data: Any, name: str) -> Iterator[tuple[str, dict[str, Any]]]:
                 yield from _meshes(each, called)
 
 
-def _part(name: str, table: dict[str, Any]) -> tuple[Part, int]:
+def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
     """The mesh, and how many of its faces are openings."""
     default = {"x": 0.0, "y": 0.0, "z": 0.0} | dict(
         table.get("default_vertex_attributes") or table.get("dva") or {}
@@ -100,4 +100,4 @@ def _part(name: str, table: dict[str, Any]) -> tuple[Part, int]:
             corners.pop()
         blocks.setdefault(len(corners), []).append(corners)
     faces = tuple(np.array(each, dtype=np.int64) for size, each in blocks.items() if size > 2)
-    return Part(name, "", points.reshape(-1, 3), faces), openings
+    return MeshObject(name, "", points.reshape(-1, 3), faces), openings

@@ -33,7 +33,7 @@ class Draft:
 
 
 @dataclass(frozen=True)
-class Part:
+class MeshObject:
     """One object of a file: `points` (v, 3) and its `faces`, arrays (f, k) of polygons with k corners
     each.
     """
@@ -63,7 +63,7 @@ def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flag
         kept &= [_is_called(label[column], wanted) for label in labels]
         if not kept.any():
             known = Counter(label[column] for label in labels if label[column])
-            told = ", ".join(
+            listed = ", ".join(
                 f"{name!r}" + (f" ({n})" if n > 1 else "") for name, n in known.most_common(_NAMES_TOLD)
             )
             more = f" and {len(known) - _NAMES_TOLD} more" if len(known) > _NAMES_TOLD else ""
@@ -71,7 +71,7 @@ def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flag
                 f"{where} has no such surface",
                 where=entry,
                 value=wanted,
-                remedy=f"There are {told}{more}." if told else "None has a name.",
+                remedy=f"There are {listed}{more}." if listed else "None has a name.",
             )
     return kept
 
@@ -81,7 +81,7 @@ def _is_called(name: str, wanted: str) -> bool:
     return wanted.casefold() in (name.casefold(), name.rsplit("::", 1)[-1].casefold())
 
 
-def joined(parts: Sequence[Part], choice: Choice, where: str) -> Draft:
+def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
     """All chosen parts as one mesh of triangles. Raises InputError where there is no face."""
     if not any(len(block) for part in parts for block in part.faces):
         raise InputError(

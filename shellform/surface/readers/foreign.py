@@ -68,12 +68,17 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
             said = (child.stderr.strip().splitlines() or ["without a word"])[-1]
             raise InputError(f"{_LIBRARIES[kind]} failed on it: {said}", where=str(file), remedy=_ANEW)
         with np.load(answer, allow_pickle=False) as data:
-            told = json.loads(str(data["told"]))
-            if "refused" in told:
-                raise InputError(**told["refused"])
+            answer = json.loads(str(data["answer"]))
+            if "refused" in answer:
+                raise InputError(**answer["refused"])
             normals = data.get("normals")
             return Draft(
-                data["points"], data["triangles"], normals, told["metres"], told["up"], tuple(told["notes"])
+                data["points"],
+                data["triangles"],
+                normals,
+                answer["metres"],
+                answer["up"],
+                tuple(answer["notes"]),
             )
 
 
@@ -84,7 +89,7 @@ def _serve() -> None:
     arrays: dict[str, Any] = {}
     try:
         draft = _read(Path(request["file"]), request["kind"], request["settings"])
-        told: dict[str, Any] = {"metres": draft.metres, "up": draft.up, "notes": list(draft.notes)}
+        answer: dict[str, Any] = {"metres": draft.metres, "up": draft.up, "notes": list(draft.notes)}
         arrays = {"points": draft.points, "triangles": draft.triangles}
         if draft.normals is not None:
             arrays["normals"] = draft.normals
@@ -96,11 +101,13 @@ def _serve() -> None:
             if error.value is None
             else repr(error.value)
         )
-        told = {"refused": {"what": error.what, "where": error.where, "value": value, "remedy": error.remedy}}
+        answer = {
+            "refused": {"what": error.what, "where": error.where, "value": value, "remedy": error.remedy}
+        }
     except MemoryError:
         what = "needs more memory to read than this machine has"
-        told = {"refused": {"what": what, "where": request["file"], "remedy": "Export a coarser mesh."}}
-    np.savez(request["answer"], told=np.array(json.dumps(told)), **arrays)
+        answer = {"refused": {"what": what, "where": request["file"], "remedy": "Export a coarser mesh."}}
+    np.savez(request["answer"], answer=np.array(json.dumps(answer)), **arrays)
 
 
 def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, Part, check_points, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, check_points, joined
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -168,7 +168,7 @@ class _Scene:
                     f"is compressed ({name})", where=str(file), remedy="Export it without compression."
                 )
 
-    def parts(self, node: int, above: Reals, depth: int) -> list[Part]:
+    def parts(self, node: int, above: Reals, depth: int) -> list[MeshObject]:
         """The meshes of a node and of those below it, placed by the transformation (4, 4) from `above`."""
         if depth > _DEEPEST:
             raise InputError(
@@ -186,7 +186,7 @@ class _Scene:
             found += self.parts(child, here, depth + 1)
         return found
 
-    def _part(self, primitive: dict[str, Any], name: str, layer: str, place: Reals) -> list[Part]:
+    def _part(self, primitive: dict[str, Any], name: str, layer: str, place: Reals) -> list[MeshObject]:
         mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_TRIANGLES, _STRIP, _FAN) or "POSITION" not in primitive["attributes"]:
             return []
@@ -198,7 +198,7 @@ class _Scene:
             else np.arange(len(points))
         )
         placed = points @ place[:3, :3].T + place[:3, 3]
-        return [Part(name, layer, placed, (_faces(order, mode),))]
+        return [MeshObject(name, layer, placed, (_faces(order, mode),))]
 
     def _accessor(self, index: int) -> NDArray[Any]:
         entry = self._tree["accessors"][index]

@@ -182,11 +182,11 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
     )
     order = np.argsort(-area, kind="stable")
     if piece is None:
-        told = ", ".join(f"{area[k]:.3g}" for k in order[:_PIECES_TOLD]) + (
+        listed = ", ".join(f"{area[k]:.3g}" for k in order[:_PIECES_TOLD]) + (
             " …" if count > _PIECES_TOLD else ""
         )
         raise InputError(
-            f"has {count} separate pieces, of {told} m²",
+            f"has {count} separate pieces, of {listed} m²",
             where=where,
             remedy="Choose one (surface.piece, --piece, 1 is the largest; or by object or layer), or join their edges.",
         )

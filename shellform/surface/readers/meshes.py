@@ -11,7 +11,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, Part, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 
 if TYPE_CHECKING:  # which loads numba, and the reader's process does without
     from shellform.surface.shape.target import Surface
@@ -51,7 +51,7 @@ def read_meshio(file: Path, choice: Choice, kind: str) -> Draft:
         for block in mesh.cells
         if block.type.startswith(("triangle", "quad", "polygon"))
     )
-    return joined([Part("", "", points, faces)], choice, str(file))
+    return joined([MeshObject("", "", points, faces)], choice, str(file))
 
 
 def write_mesh(path: str | Path, surface: Surface) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, Part, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 
 _ANEW = "Export it anew."
 _STL_HEAD, _STL_FACET = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
@@ -40,7 +40,9 @@ def read_obj(file: Path, choice: Choice) -> Draft:
         except (ValueError, IndexError) as error:
             raise _bad_line(file, number, line) from error
     place = np.array(points, dtype=float).reshape(-1, 3)
-    parts = [Part(called, layer, place, _blocks(blocks, file)) for (layer, called), blocks in groups.items()]
+    parts = [
+        MeshObject(called, layer, place, _blocks(blocks, file)) for (layer, called), blocks in groups.items()
+    ]
     return joined(parts, choice, str(file))
 
 
@@ -72,7 +74,7 @@ def read_off(file: Path, choice: Choice) -> Draft:
             else:
                 size = int(row[0])
                 blocks.setdefault(size, []).append([int(row[1 + k]) for k in range(size)])
-        part = Part("", "", np.array(place, dtype=float).reshape(-1, 3), _blocks(blocks, file))
+        part = MeshObject("", "", np.array(place, dtype=float).reshape(-1, 3), _blocks(blocks, file))
     except (ValueError, IndexError) as error:
         raise _bad_line(file, last, "") from error
     return joined([part], choice, str(file))
@@ -110,7 +112,7 @@ def read_stl(file: Path, choice: Choice) -> Draft:
     return joined(parts, choice, str(file))
 
 
-def _text_facets(name: str, corners: list[list[float]], file: Path) -> Part:
+def _text_facets(name: str, corners: list[list[float]], file: Path) -> MeshObject:
     if len(corners) % 3:
         raise InputError(
             f"its solid {name!r} has {len(corners)} vertices, not three a facet",
@@ -120,8 +122,8 @@ def _text_facets(name: str, corners: list[list[float]], file: Path) -> Part:
     return _facets(name, np.array(corners, dtype=float).reshape(-1, 3, 3))
 
 
-def _facets(name: str, corners: Reals) -> Part:
-    return Part(name, "", corners.reshape(-1, 3), (np.arange(3 * len(corners)).reshape(-1, 3),))
+def _facets(name: str, corners: Reals) -> MeshObject:
+    return MeshObject(name, "", corners.reshape(-1, 3), (np.arange(3 * len(corners)).reshape(-1, 3),))
 
 
 def _blocks(blocks: dict[int, list[list[int]]], file: Path) -> tuple[Indices, ...]:

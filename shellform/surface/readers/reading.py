@@ -124,7 +124,7 @@ def kind_of(file: Path) -> str:
             where=str(file),
             remedy="Export a coarser mesh, or the surface alone.",
         )
-    told = ENDINGS.get(file.suffix.lower())
+    stated = ENDINGS.get(file.suffix.lower())
     try:
         with file.open("rb") as opened:
             head = opened.read(_HEAD)
@@ -138,21 +138,21 @@ def kind_of(file: Path) -> str:
                 f"is {what}, which isn't read here", where=str(file), remedy=f"Known: {', '.join(ENDINGS)}."
             )
     found = _content(head, file)
-    if told is None and found is None:
+    if stated is None and found is None:
         raise InputError(
             "is in no format that is read here",
             where=str(file),
             value=file.suffix,
             remedy=f"Known: {', '.join(ENDINGS)}.",
         )
-    if told is not None and found is not None and told != found:
+    if stated is not None and found is not None and stated != found:
         ending = next(each for each, kind in ENDINGS.items() if kind == found)
         raise InputError(
             f"is {FORMATS[found]} by its content, though its ending is {file.suffix}",
             where=str(file),
             remedy=f"Rename it to {file.stem}{ending}, or export it anew.",
         )
-    return told or found or ""
+    return stated or found or ""
 
 
 def _content(head: bytes, file: Path) -> str | None:

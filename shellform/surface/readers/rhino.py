@@ -22,7 +22,7 @@ import rhino3dm
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, Part, among, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, joined
 from shellform.surface.readers.nurbs import Curve, Patch
 
 _METRES = {
@@ -38,13 +38,13 @@ _SAMPLES = 161  # along each side, whose chords are then nearer to it than that
 @dataclass(frozen=True)
 class Item:
     """What is written: on `layer`, under a `name`, a polyline through `points` (n, 3), m, a point where there
-    is one, or where `triangles` are given their mesh; `told` are its user strings."""
+    is one, or where `triangles` are given their mesh; `strings` are its user strings."""
 
     layer: str
     name: str
     points: Reals
     triangles: Indices | None = None
-    told: Mapping[str, str] = field(default_factory=dict)
+    strings: Mapping[str, str] = field(default_factory=dict)
 
 
 def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -> None:
@@ -62,7 +62,7 @@ def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -
     for item in items:
         own = rhino3dm.ObjectAttributes()
         own.Name, own.LayerIndex = item.name, layers[item.layer]
-        for key, value in item.told.items():
+        for key, value in item.strings.items():
             own.SetUserString(key, value)
         if item.triangles is not None:
             mesh = rhino3dm.Mesh()
@@ -117,9 +117,9 @@ def read_rhino(
         else:
             patches += list(_patches(shape, factor, file))
     if parts and patches:
-        told = ", ".join(f"{name!r} on layer {layer!r}" for layer, name, _ in chosen[:6])
+        listed = ", ".join(f"{name!r} on layer {layer!r}" for layer, name, _ in chosen[:6])
         raise InputError(
-            f"holds both meshes and surfaces: {told}",
+            f"holds both meshes and surfaces: {listed}",
             where=str(file),
             remedy="Choose by surface.object or surface.layer (--object, --layer).",
         )
@@ -192,7 +192,7 @@ def _is_surface(shape: Any) -> bool:
     return isinstance(shape, rhino3dm.Mesh | rhino3dm.SubD | rhino3dm.Brep | rhino3dm.Surface)
 
 
-def _mesh(shape: Any, layer: str, name: str, factor: float) -> Part:
+def _mesh(shape: Any, layer: str, name: str, factor: float) -> MeshObject:
     if isinstance(shape, rhino3dm.SubD):
         shape = shape.Duplicate()
         shape.Subdivide(_SUBDIVISIONS)
@@ -203,7 +203,7 @@ def _mesh(shape: Any, layer: str, name: str, factor: float) -> Part:
     )
     faces = np.array([shape.Faces[k] for k in range(shape.Faces.Count)], dtype=np.int64).reshape(-1, 4)
     triangle = faces[:, 2] == faces[:, 3]
-    return Part(name, layer, factor * points.reshape(-1, 3), (faces[triangle, :3], faces[~triangle]))
+    return MeshObject(name, layer, factor * points.reshape(-1, 3), (faces[triangle, :3], faces[~triangle]))
 
 
 def _patches(shape: Any, factor: float, file: Path) -> Iterator[Patch]:

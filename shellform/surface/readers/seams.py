@@ -140,8 +140,8 @@ def without_slivers(draft: Draft) -> Draft:
         if not any(counts):
             break
     done = [(collapsed, "collapsed"), (flipped, "flipped"), (dropped, "dropped at the edge")]
-    told = [f"{count} {what}" for count, what in done if count]
-    return replace(draft, notes=(*draft.notes, f"slivers: {', '.join(told)}")) if told else draft
+    sentences = [f"{count} {what}" for count, what in done if count]
+    return replace(draft, notes=(*draft.notes, f"slivers: {', '.join(sentences)}")) if sentences else draft
 
 
 def _fewer_slivers(draft: Draft) -> tuple[Draft, tuple[int, int, int]]:

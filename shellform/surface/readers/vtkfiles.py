@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, Part, joined
+from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 
 _POLYGONS = (5, 7, 9)  # VTK_TRIANGLE, VTK_POLYGON, VTK_QUAD
 _CURVED = {22: 3, 34: 3, 23: 4, 28: 4}  # quadratic triangles and quadrilaterals: their corners come first
@@ -59,7 +59,7 @@ def read_vtk(file: Path, choice: Choice, kind: str) -> Draft:
                 corners = corners[: _CURVED.get(cell, len(corners))]
                 blocks.setdefault(len(corners), []).append(corners)
     faces = tuple(np.array(each, dtype=np.int64) for each in blocks.values())
-    return joined([Part("", "", points, faces)], choice, str(file))
+    return joined([MeshObject("", "", points, faces)], choice, str(file))
 
 
 def _reader(kind: str) -> Any:
