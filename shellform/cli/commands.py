@@ -273,7 +273,7 @@ def analyse(
 ) -> None:
     """Solve a structural model."""
     from shellform.structure.answers.analysis import analyse as solve
-    from shellform.structure.answers.analysis import result
+    from shellform.structure.answers.result_document import result
     from shellform.structure.answers.results import read_sections
     from shellform.structure.model import read_model
     from shellform.structure.solve.memory import limit_to_free_memory

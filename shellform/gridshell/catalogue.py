@@ -22,13 +22,15 @@ from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell, Rod, erection_stress
 from shellform.net.net import Net
 from shellform.structure.elements.sections import (
+    SHAPES,
     Material,
-    Rectangle,
     Round,
     Section,
     Tube,
     isotropic,
+    make_section,
     mass_per_length,
+    sizes_of,
     stiffness,
 )
 
@@ -97,15 +99,10 @@ def read_catalogue(source: str | Path) -> Catalogue:
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"isn't valid TOML: {error}", where=f"catalogue {path}") from error
     material = _checked(f"catalogue {path}", lambda: _material(document.material))
-    kinds: list[tuple[str, Sequence[Any], Callable[[Any], Section]]] = [
-        ("round", document.sizes.round, lambda size: Round(0.5 * size, material)),
-        ("tube", document.sizes.tube, lambda size: Tube(0.5 * size[0], size[1], material)),
-        ("rectangle", document.sizes.rectangle, lambda size: Rectangle(size[0], size[1], material)),
-    ]
     sections = [
-        _checked(f"catalogue {path}: sizes.{kind}[{k}]", partial(make, size))
-        for kind, sizes, make in kinds
-        for k, size in enumerate(sizes)
+        _checked(f"catalogue {path}: sizes.{shape}[{k}]", partial(_bought, shape, size, material))
+        for shape in SHAPES
+        for k, size in enumerate(getattr(document.sizes, shape))
     ]
     if not sections:
         raise InputError(
@@ -128,6 +125,14 @@ def _material(given: _Material) -> Material:
             young=given.young, poisson=given.poisson or 0.0, density=given.density, strength=strength
         )
     return Material(given.young, given.shear, given.density, strength)
+
+
+def _bought(shape: str, size: float | tuple[float, float], material: Material) -> Section:
+    """A section from the size by which it is sold: of what has a radius, the diameter comes first."""
+    sizes = [size] if isinstance(size, float) else list(size)
+    if "radius" in sizes_of(shape):
+        sizes[0] *= 0.5
+    return make_section(shape, sizes, material)
 
 
 def _checked(where: str, make: Callable[[], Any]) -> Any:

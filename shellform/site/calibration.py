@@ -31,8 +31,8 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
 from shellform.problem.problem import follow
-from shellform.site.identifiability import Identifiability, identifiability
-from shellform.site.scans import Match, Motion, Scan, match, rigid_fit
+from shellform.site.identifiability import Identifiability, identifiability, nuisance
+from shellform.site.scans import Match, Scan, apart, distances, laid
 from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -126,7 +126,7 @@ def foresee(
         _refuse(begun)
     states = [each.equilibrium.state for each in begun]
     jacobian = model.jacobian(shell.joint, states, PARAMETERS)[:, markers, :3].reshape(-1, len(PARAMETERS))
-    basis = _nuisance(
+    basis = nuisance(
         states, markers, [frame] * len(loads), np.ones((len(loads), len(markers)), dtype=bool), offsets
     )
     return identifiability(PARAMETERS, jacobian - basis @ (basis.T @ jacobian), jacobian, noise)
@@ -169,7 +169,7 @@ def calibrate(
     carried = [k for k, each in enumerate(begun) if each.on_branch]
     own = [scans[k] for k in carried]
     near = [begun[k].equilibrium.state for k in carried]
-    before[:, carried] = _distances(own, _laid(own, near, markers, beside), near, markers)
+    before[:, carried] = distances(own, laid(own, near, markers, beside), near, markers)
     while len(carried) < len(scans):
         # The start is too soft for some load states: what the others tell comes first.
         if carried:
@@ -197,7 +197,7 @@ def calibrate(
         markers,
         tuple(matches),
         before,
-        _distances(scans, matches, states, markers),
+        distances(scans, matches, states, markers),
         deviation,
         tuple(states),
         model.evaluations,
@@ -217,7 +217,7 @@ def _rounds(
     reach: float,
 ) -> tuple[Joint, list[State], list[Match], tuple[str, ...]]:
     """Fits, lays and names the points anew until nothing changes; the names of what was fitted come last."""
-    matches = _laid(scans, states, markers, reach)
+    matches = laid(scans, states, markers, reach)
     for _ in range(_ROUNDS):
         fit = _Fit(model, joint, states, scans, matches, markers, offsets)
         known = fit.identifiability(free, noise)
@@ -228,9 +228,9 @@ def _rounds(
                 remedy="Choose load states that move the markers more (see `foresee`).",
             )
         joint, states = fit.solve(known.tellable)
-        before, matches = matches, _laid(scans, states, markers, reach)
+        before, matches = matches, laid(scans, states, markers, reach)
         pairs = list(zip(before, matches, strict=True))
-        moved = max(_apart(a.motion, b.motion, model.shell.target.positions) for a, b in pairs)
+        moved = max(apart(a.motion, b.motion, model.shell.target.positions) for a, b in pairs)
         if moved < 0.1 * noise and all(np.array_equal(a.point, b.point) for a, b in pairs):
             break
     return joint, states, matches, known.tellable
@@ -319,7 +319,7 @@ class _Fit:
         self.model, self.joint, self.states, self.markers = model, joint, states, markers
         self.goal = np.stack([each.places(scan.points) for each, scan in zip(matches, scans, strict=True)])
         self.seen = np.isfinite(self.goal[:, :, 0])
-        self.basis = _nuisance(states, markers, [scan.frame for scan in scans], self.seen, offsets)
+        self.basis = nuisance(states, markers, [scan.frame for scan in scans], self.seen, offsets)
         self.dof = 3 * int(self.seen.sum()) - self.basis.shape[1]
 
     def residuals(self, states: Sequence[State]) -> Reals:
@@ -388,72 +388,6 @@ class _Fit:
 
     def _projected(self, columns: Reals) -> Reals:
         return np.asarray(columns - self.basis @ (self.basis.T @ columns))
-
-
-def _nuisance(
-    states: Sequence[State], markers: Indices, frames: Sequence[int | None], seen: np.ndarray, offsets: bool
-) -> Reals:
-    """An orthonormal basis (r, k) of what rigid motions of the frames and offsets of the markers do to the
-    seen coordinates.
-    """
-    place = np.stack([state.positions[markers] for state in states])
-    middle = place.reshape(-1, 3).mean(axis=0)
-    size = float(np.abs(place - middle).max())
-    columns = []
-    for frame in sorted({each for each in frames if each is not None}):
-        own = np.array([each == frame for each in frames])[:, None, None]
-        for axis in np.eye(3):
-            columns.append(own * np.broadcast_to(axis, place.shape))
-            columns.append(own * np.cross(axis, (place - middle) / size))
-    if offsets:
-        for marker in range(len(markers)):
-            for k in range(3):
-                each = np.zeros(place.shape)
-                each[:, marker, k] = 1.0
-                columns.append(each)
-    rows = 3 * int(seen.sum())
-    if not columns:
-        return np.zeros((rows, 0))
-    matrix = np.stack([each[seen].ravel() for each in columns], axis=1)
-    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
-    return np.asarray(left[:, singular > 1e-10 * singular[0]])
-
-
-def _laid(scans: Sequence[Scan], states: Sequence[State], markers: Indices, reach: float) -> list[Match]:
-    """The scans' points named and laid onto the states; scans of one frame by one motion."""
-    found = [
-        match(scan.points, state.positions[markers], reach=reach, placed=scan.frame is None)
-        for scan, state in zip(scans, states, strict=True)
-    ]
-    for frame in sorted({scan.frame for scan in scans if scan.frame is not None}):
-        own = [k for k, scan in enumerate(scans) if scan.frame == frame]
-        points = np.vstack([scans[k].points[found[k].point[found[k].point >= 0]] for k in own])
-        places = np.vstack([states[k].positions[markers][found[k].point >= 0] for k in own])
-        motion = rigid_fit(points, places)
-        for k in own:
-            distance = np.linalg.norm(
-                replace(found[k], motion=motion).places(scans[k].points) - states[k].positions[markers],
-                axis=1,
-            )
-            found[k] = replace(found[k], motion=motion, distance=distance)
-    return found
-
-
-def _distances(
-    scans: Sequence[Scan], matches: Sequence[Match], states: Sequence[State], markers: Indices
-) -> Reals:
-    """Distances (m, s), m, of each scan's points from the states."""
-    away = [
-        each.places(scan.points) - state.positions[markers]
-        for each, scan, state in zip(matches, scans, states, strict=True)
-    ]
-    return np.linalg.norm(np.stack(away, axis=1), axis=2)
-
-
-def _apart(one: Motion, other: Motion, place: Reals) -> float:
-    """How far two motions lay the same points apart, m, at most, over the size of `place`."""
-    back = (place - one.shift) @ one.turn
-    return float(np.linalg.norm(other(back) - place, axis=1).max())
 
 
 def _checked(shell: Gridshell, nodes: Indices) -> Indices:

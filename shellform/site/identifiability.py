@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Flags, Indices, Reals
+from shellform.structure.elements.state import State
 
 TELLABLE = 0.5  # relative deviation of a parameter beyond which the data don't tell it
 _APART = 0.95  # correlation of two parameters from which they can't be told apart
@@ -90,3 +91,32 @@ def identifiability(names: Sequence[str], jacobian: Reals, raw: Reals, noise: fl
             break
         kept.pop(worst)
     return Identifiability(tuple(names), deviation, correlation, singular, directions, reach)
+
+
+def nuisance(
+    states: Sequence[State], markers: Indices, frames: Sequence[int | None], seen: Flags, offsets: bool
+) -> Reals:
+    """An orthonormal basis (r, k) of what rigid motions of the frames and offsets of the markers do to the
+    seen coordinates.
+    """
+    place = np.stack([state.positions[markers] for state in states])
+    middle = place.reshape(-1, 3).mean(axis=0)
+    size = float(np.abs(place - middle).max())
+    columns = []
+    for frame in sorted({each for each in frames if each is not None}):
+        own = np.array([each == frame for each in frames])[:, None, None]
+        for axis in np.eye(3):
+            columns.append(own * np.broadcast_to(axis, place.shape))
+            columns.append(own * np.cross(axis, (place - middle) / size))
+    if offsets:
+        for marker in range(len(markers)):
+            for k in range(3):
+                each = np.zeros(place.shape)
+                each[:, marker, k] = 1.0
+                columns.append(each)
+    rows = 3 * int(seen.sum())
+    if not columns:
+        return np.zeros((rows, 0))
+    matrix = np.stack([each[seen].ravel() for each in columns], axis=1)
+    left, singular, _ = np.linalg.svd(matrix, full_matrices=False)
+    return np.asarray(left[:, singular > 1e-10 * singular[0]])

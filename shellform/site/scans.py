@@ -12,7 +12,8 @@ that fits nearly as well makes the match doubtful, which is said and not guessed
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
+from shellform.structure.elements.state import State
 from shellform.surface.units import METRES
 
 _TURNS = 24  # starts about the common normal, each also flipped
@@ -243,3 +245,40 @@ def _axes(points: Reals) -> tuple[Reals, Reals]:
     middle = near.mean(axis=0)
     axes = np.linalg.svd(near - middle)[2].T
     return middle, axes * np.array([1.0, 1.0, np.sign(np.linalg.det(axes))])
+
+
+def laid(scans: Sequence[Scan], states: Sequence[State], markers: Indices, reach: float) -> list[Match]:
+    """The scans' points named and laid onto the states; scans of one frame by one motion."""
+    found = [
+        match(scan.points, state.positions[markers], reach=reach, placed=scan.frame is None)
+        for scan, state in zip(scans, states, strict=True)
+    ]
+    for frame in sorted({scan.frame for scan in scans if scan.frame is not None}):
+        own = [k for k, scan in enumerate(scans) if scan.frame == frame]
+        points = np.vstack([scans[k].points[found[k].point[found[k].point >= 0]] for k in own])
+        places = np.vstack([states[k].positions[markers][found[k].point >= 0] for k in own])
+        motion = rigid_fit(points, places)
+        for k in own:
+            distance = np.linalg.norm(
+                replace(found[k], motion=motion).places(scans[k].points) - states[k].positions[markers],
+                axis=1,
+            )
+            found[k] = replace(found[k], motion=motion, distance=distance)
+    return found
+
+
+def distances(
+    scans: Sequence[Scan], matches: Sequence[Match], states: Sequence[State], markers: Indices
+) -> Reals:
+    """Distances (m, s), m, of each scan's points from the states."""
+    away = [
+        each.places(scan.points) - state.positions[markers]
+        for each, scan, state in zip(matches, scans, states, strict=True)
+    ]
+    return np.linalg.norm(np.stack(away, axis=1), axis=2)
+
+
+def apart(one: Motion, other: Motion, place: Reals) -> float:
+    """How far two motions lay the same points apart, m, at most, over the size of `place`."""
+    back = (place - one.shift) @ one.turn
+    return float(np.linalg.norm(other(back) - place, axis=1).max())

@@ -23,14 +23,13 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
 from shellform.errors import InputError, NotConverged
+from shellform.surface.bounded import bounded_minimum
 
 if TYPE_CHECKING:  # which load gmsh and numba
     from shellform.surface.shape.target import Surface
 
 _ROUNDS = 200
 _SETTLED = 1e-10  # change of the heights in a round, of the rise
-_CENTRING = 0.1  # of the present complementarity that the next step aims at
-_TO_EDGE = 0.99  # of the way to a bound that a step goes at the most
 _NEAREST = 1e-9  # weight of being uniform in a fit, of the mean diagonal
 _SINGULAR = 1e-12  # of the diagonal: a pivot below that is rounding
 
@@ -254,39 +253,7 @@ def fitted_densities(
     normal = push.T @ push
     nearest = _NEAREST * float(normal.diagonal().mean())
     matrix = sp.csc_array(normal + nearest * sp.eye_array(len(ends)))
-    return -_bounded(matrix, push.T @ right + nearest * uniform, least * uniform)
-
-
-def _bounded(matrix: sp.csc_array, right: Reals, least: float) -> Reals:
-    """The minimum of x'Ax/2 - b'x with all x at least `least`, by a primal-dual interior-point method (Wright
-    1997).
-    """
-    target = right - matrix @ np.full(len(right), least)
-    x = np.full(len(right), least)
-    push = np.full(len(right), np.abs(target).max())  # multipliers of x >= 0
-    scale = float(x @ push)
-    for _ in range(_ROUNDS):
-        centre = _CENTRING * float(x @ push) / len(x)
-        residual = matrix @ x - target - push
-        step = splu(sp.csc_array(matrix + sp.diags_array(push / x))).solve(-residual - push + centre / x)
-        turn = centre / x - push - push / x * step
-        x = x + _share(x, step) * step
-        push = push + _share(push, turn) * turn
-        if float(x @ push) < _SETTLED * scale and np.abs(residual).max() < _SETTLED * np.abs(target).max():
-            return x + least
-    raise NotConverged(
-        "the force densities don't settle",
-        state=x + least,
-        residual=float(x @ push),
-        iterations=_ROUNDS,
-        remedy="Raise least.",
-    )
-
-
-def _share(value: Reals, step: Reals) -> float:
-    """How much of a step keeps values positive."""
-    down = step < 0.0
-    return min(1.0, _TO_EDGE * float((-value[down] / step[down]).min())) if down.any() else 1.0
+    return -bounded_minimum(matrix, push.T @ right + nearest * uniform, least * uniform)
 
 
 def _turning(polygon: Reals) -> float:

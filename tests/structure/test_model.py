@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.structure.answers.analysis import analyse, result
+from shellform.structure.answers.analysis import analyse
+from shellform.structure.answers.result_document import result
 from shellform.structure.model import parse_model, read_model, write_model
 from shellform.structure.network import doubts
 

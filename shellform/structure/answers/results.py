@@ -15,23 +15,18 @@ from shellform.errors import InputError
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.sections import (
+    SHAPES,
     Material,
-    Rectangle,
-    Round,
     Section,
-    Tube,
     isotropic,
+    make_section,
+    sizes_of,
     stress,
     stress_by_force,
 )
 from shellform.structure.elements.state import State
 from shellform.structure.network import Network
 
-_SHAPES = {
-    "round": (Round, ("radius",)),
-    "tube": (Tube, ("radius", "thickness")),
-    "rectangle": (Rectangle, ("width", "height")),
-}
 _MATERIAL = ("young", "shear", "poisson", "density", "strength")
 
 
@@ -129,9 +124,9 @@ def _section(table: object, where: str) -> Section:
     if not isinstance(table, dict):
         raise InputError("must be a table", where=where, value=table)
     shape = table.get("shape")
-    if shape not in _SHAPES:
-        raise InputError("unknown shape", where=where, value=shape, remedy=f"Known: {', '.join(_SHAPES)}.")
-    make, sizes = _SHAPES[shape]
+    if shape not in SHAPES:
+        raise InputError("unknown shape", where=where, value=shape, remedy=f"Known: {', '.join(SHAPES)}.")
+    sizes = sizes_of(shape)
     for name in table:
         if name not in ("shape", *sizes, *_MATERIAL):
             raise InputError(
@@ -150,5 +145,4 @@ def _section(table: object, where: str) -> Section:
         material = Material(float(table["young"]), float(table["shear"]), **known)
     else:
         material = isotropic(young=float(table["young"]), poisson=float(table["poisson"]), **known)
-    section: Section = make(*(float(table[name]) for name in sizes), material)  # type: ignore[operator]
-    return section
+    return make_section(shape, (float(table[name]) for name in sizes), material)

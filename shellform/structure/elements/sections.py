@@ -14,6 +14,7 @@ rectangle's is in a corner.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from typing import Protocol
 
@@ -293,6 +294,25 @@ class Rectangle:
             6.0 * np.abs(about_z) / (self.height * self.width**2),
         )
         return [np.asarray(-(by_y + 2.0 * by_z) / self.width), np.asarray(-(2.0 * by_y + by_z) / self.height)]
+
+
+SHAPES: dict[str, type[Round] | type[Tube] | type[Rectangle]] = {
+    "round": Round,
+    "tube": Tube,
+    "rectangle": Rectangle,
+}
+"""The sections by the name of their shape."""
+
+
+def sizes_of(shape: str) -> tuple[str, ...]:
+    """The names of a shape's sizes in the order in which it is made of them."""
+    return tuple(each.name for each in fields(SHAPES[shape]) if each.name != "material")
+
+
+def make_section(shape: str, sizes: Iterable[float], material: Material) -> Section:
+    """The section of that shape and its sizes, m, in their order. Raises InputError."""
+    make: Callable[..., Section] = SHAPES[shape]
+    return make(*sizes, material)
 
 
 def _along(about_y: Reals, about_z: Reals, scale: float) -> tuple[Reals, Reals]:

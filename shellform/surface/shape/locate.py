@@ -7,8 +7,7 @@ surface has a continuous normal n, so that the signed distance d = (x - p)·n ha
 continuously, and with the principal curvatures k (positive towards n) and directions e of the surface at p
 the Hessian - sum k / (1 - d k) e e'.
 
-Past the edge the surface goes on as extend.py makes it, as far as was asked for; beyond that, in the tangent
-plane at the closest point of the outermost edge.
+Past the edge it goes on as extension.py makes it, beyond that in the tangent plane at the closest edge point.
 """
 
 from __future__ import annotations
