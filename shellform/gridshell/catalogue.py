@@ -181,8 +181,10 @@ def allowed(catalogue: Catalogue, net: Net) -> tuple[Section, ...]:
     if not found:
         least = min(catalogue.sections, key=lambda section: erection_stress(net, section))
         raise InputError(
-            f"none of the sections of the catalogue {catalogue.title!r} bears the net's curvature of {net.quality.curvature_max:.3g} 1/m: "
-            f"{label(least)} would be stressed to {erection_stress(net, least) / 1e6:.3g} of {least.material.strength / 1e6:.3g} MPa",
+            f"none of the sections of the catalogue {catalogue.title!r} bears the net's curvature of "
+            f"{net.quality.curvature_max:.3g} 1/m: "
+            f"{label(least)} would be stressed to {erection_stress(net, least) / 1e6:.3g} of "
+            f"{least.material.strength / 1e6:.3g} MPa",
             where="rod.catalogue",
             remedy="Choose thinner or stronger rods, another angle of the net, or a flatter surface.",
         )
@@ -226,7 +228,8 @@ def rounded_up(shell: Gridshell, design: Design, catalogue: Catalogue) -> tuple[
 
 def _too_stiff(radius: float, catalogue: Catalogue, sections: Sequence[Section]) -> InputError:
     return InputError(
-        f"no section of the catalogue {catalogue.title!r} that bears the net's curvature is as stiff as the design's",
+        f"no section of the catalogue {catalogue.title!r} that bears the net's curvature is as stiff as the "
+        "design's",
         where="rod.catalogue",
         value=radius,
         remedy=f"The stiffest is {label(sections[-1])}: bound the radius by it.",

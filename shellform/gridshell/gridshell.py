@@ -241,8 +241,8 @@ class Gridshell:
         return used[beams.of_kind(ROD)]
 
     def bending_utilisation(self, design: Design, state: State) -> Reals:
-        """Bending stress (r, 2) at both ends of the rods' elements over their flexural strength, M r / (I f_f)
-        for round ones (1); 0 where it isn't known.
+        """Bending stress (r, 2) at both ends of the rods' elements over their flexural strength, M r / (I
+        f_f) for round ones (1); 0 where it isn't known.
         """
         return bending_utilisation(self.sections(design.radius)[ROD], self.rod_forces(design, state))
 
@@ -284,11 +284,13 @@ def brace(net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface) -> 
     bearable = max_radius(net, rod)
     if rod.radius > bearable * (1.0 + 1e-9):
         raise InputError(
-            f"the net bends rods to {net.quality.curvature_max:.3g} 1/m; with the outermost fibre more than {bearable:.4g} m from the "
+            f"the net bends rods to {net.quality.curvature_max:.3g} 1/m; with the outermost fibre more than "
+            f"{bearable:.4g} m from the "
             "axis they break (equation 1)",
             where="rod.radius",
             value=rod.radius,
-            remedy="Choose a thinner rod, a stronger material, another angle of the net, or a flatter surface.",
+            remedy="Choose a thinner rod, a stronger material, another angle of the net, or a flatter "
+            "surface.",
         )
     corners = cells(net.grid)
     ends = net.grid.crossing_nodes[:, 0][np.vstack([corners[:, [0, 2]], corners[:, [1, 3]]])]

@@ -43,7 +43,8 @@ def symmetric_groups(shell: Gridshell) -> Indices:
             f"has no mirror or half turn that maps all cables onto each other within {1e3 * reach:.2g} mm",
             where="optimise.symmetric",
             value=True,
-            remedy="Turn the net (net.angle) or shift it (net.offset) along the surface's symmetry, or leave symmetric out.",
+            remedy="Turn the net (net.angle) or shift it (net.offset) along the surface's symmetry, or leave "
+            "symmetric out.",
         )
     pairs = np.vstack(joined)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))

@@ -79,7 +79,8 @@ def lying(surface: Surface, region: Region) -> Reals:
         raise InputError(
             "no part of the surface is loaded",
             where="load",
-            remedy=f"The surface reaches from {_coordinates(surface.vertices.min(axis=0))} to {_coordinates(surface.vertices.max(axis=0))} m.",
+            remedy=f"The surface reaches from {_coordinates(surface.vertices.min(axis=0))} to "
+            f"{_coordinates(surface.vertices.max(axis=0))} m.",
         )
     return triangles
 

@@ -251,8 +251,10 @@ def _broken(
     ]
     total = float(gaussian(finder, np.array(cells)).sum()) if cells else 0.0
     return InputError(
-        f"the surface is curved too much for one net: its rods come to run in one direction at {at.round(3).tolist()}; from the net's "
-        f"origin to there its Gaussian curvature adds up to {total:.2f} (no patch of a net holds 2π = {2 * math.pi:.2f})",
+        "the surface is curved too much for one net: its rods come to run in one direction at "
+        f"{at.round(3).tolist()}; from the net's "
+        f"origin to there its Gaussian curvature adds up to {total:.2f} (no patch of a net holds 2π = "
+        f"{2 * math.pi:.2f})",
         where="net.spacing",
         value=spacing[0],
         remedy="Choose another net.angle or net.offset, or cover the surface by several nets.",

@@ -156,8 +156,10 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
     if folded.any():
         middle = corner[np.argmax(folded)].mean(axis=0).round(3).tolist()
         raise InputError(
-            f"the net folds over itself in {int(folded.sum())} cells, first at {middle}: the surface, whose Gaussian curvature adds up "
-            f"to {float(gaussian(finder, corner).sum()):.2f} there, is curved more than rods at this spacing can follow",
+            f"the net folds over itself in {int(folded.sum())} cells, first at {middle}: the surface, whose "
+            "Gaussian curvature adds up "
+            f"to {float(gaussian(finder, corner).sum()):.2f} there, is curved more than rods at this spacing "
+            "can follow",
             where="net.spacing",
             value=float(grid.spacing),
             remedy="Choose a smaller spacing, another angle, or a flatter surface.",

@@ -74,7 +74,8 @@ class Erection:
     def table(self) -> str:
         """Step after step as CSV."""
         lines = [
-            "stage,share,height [mm],largest stress [MPa],stress/strength,rod element,largest tension [N],largest reaction [N]"
+            "stage,share,height [mm],largest stress [MPa],stress/strength,rod element,largest tension "
+            "[N],largest reaction [N]"
         ]
         for each in self.steps:
             lines.append(
@@ -212,7 +213,8 @@ def _taken_down(
         reached = advance(site.assembly, state, drive, step=step, smallest=_SMALLEST, stay=True, report=note)
         if not reached.on_branch:
             raise NotConverged(
-                f"No stable path leads from the flat grid to the erected one: taken down, it snaps at {first + reached.share * (last - first):.2f} "
+                "No stable path leads from the flat grid to the erected one: taken down, it snaps at "
+                f"{first + reached.share * (last - first):.2f} "
                 f"of the stage {stage!r}",
                 state=reached.equilibrium.state,
                 remedy="Give the supports other way points, or lift the grid.",

@@ -57,8 +57,10 @@ class Identifiability:
                         ("quotient", "product") if self.correlation[i, j] > 0.0 else ("product", "quotient")
                     )
                     result.append(
-                        f"The data can't tell {self.names[j]} and {self.names[i]} apart (correlation {self.correlation[i, j]:.3f}): they fix "
-                        f"their {kept} far better than their {lost}; add a load state that bends the grid in another way."
+                        f"The data can't tell {self.names[j]} and {self.names[i]} apart (correlation "
+                        f"{self.correlation[i, j]:.3f}): they fix "
+                        f"their {kept} far better than their {lost}; add a load state that bends the grid in "
+                        "another way."
                     )
         return result
 

@@ -170,7 +170,8 @@ def match(points: Reals, markers: Reals, *, reach: float, placed: bool = False) 
             np.arccos(np.clip(0.5 * (np.trace(other[2].turn @ motion.turn.T) - 1.0), -1.0, 1.0))
         )
         doubts = (
-            f"Turned by {swing:.0f}° the points fit nearly as well ({rivals[0] / cost:.2f} times the cost): mark the grid less symmetrically, "
+            f"Turned by {swing:.0f}° the points fit nearly as well ({rivals[0] / cost:.2f} times the cost): "
+            "mark the grid less symmetrically, "
             "or give the points in the model's axes.",
         )
     return _named(cloud, markers, pairs, motion, doubts)
@@ -183,7 +184,8 @@ def _named(cloud: Reals, markers: Reals, pairs: Indices, motion: Motion, doubts:
         raise InputError(
             f"only {len(taken)} of {len(markers)} markers are found among {len(cloud)} points",
             where="scan",
-            remedy="Check the unit and the handedness of the axes, and that the load case and the markers are the right ones.",
+            remedy="Check the unit and the handedness of the axes, and that the load case and the markers "
+            "are the right ones.",
         )
     point = np.full(len(markers), -1)
     point[pairs[taken]] = taken

@@ -106,7 +106,8 @@ def _coincident(network: Network) -> list[str]:
     k = int(np.argmax(same))
     pair = sorted((int(order[k]), int(order[k + 1])))
     return [
-        f"{int(same.sum())} nodes lie where another one does, nodes[{pair[0]}] and nodes[{pair[1]}] the first; they don't touch."
+        f"{int(same.sum())} nodes lie where another one does, nodes[{pair[0]}] and nodes[{pair[1]}] the "
+        "first; they don't touch."
     ]
 
 
@@ -130,7 +131,8 @@ def _far_apart(network: Network) -> list[str]:
 
     stiff, soft = int(values.argmax()), int(values.argmin())
     return [
-        f"{named(stiff)} ({values[stiff]:.1e} N/m) is {values[stiff] / values[soft]:.1e} times as stiff as {named(soft)}; digits are lost."
+        f"{named(stiff)} ({values[stiff]:.1e} N/m) is {values[stiff] / values[soft]:.1e} times as stiff as "
+        f"{named(soft)}; digits are lost."
     ]
 
 
@@ -142,7 +144,8 @@ def _misfitting(network: Network) -> list[str]:
         return []
     k = int(np.argmax(off))
     return [
-        f"{int(off.sum())} beams have rest lengths far from the distance of their nodes, beams[{k}] the first "
+        f"{int(off.sum())} beams have rest lengths far from the distance of their nodes, beams[{k}] the "
+        "first "
         f"({beams.rest_length[k]:.4g} m over {length[k]:.4g} m)."
     ]
 
@@ -178,5 +181,6 @@ def _free_to_spin(network: Network) -> list[str]:
         return []
     first = int(anchor[free[0]])
     return [
-        f"{len(free)} straight rods are free to spin about their own axis, the one at nodes[{first}] the first; the spin is held."
+        f"{len(free)} straight rods are free to spin about their own axis, the one at nodes[{first}] the "
+        "first; the spin is held."
     ]

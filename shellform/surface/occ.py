@@ -27,7 +27,8 @@ try:
 except (ImportError, OSError) as error:  # a shared library that gmsh's wheel needs isn't there
     raise InputError(
         f"gmsh can't be loaded: {error}",
-        remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 libxinerama1",
+        remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 "
+        "libxinerama1",
     ) from error
 
 _AGREES = (
@@ -143,7 +144,8 @@ def mesh_faces(
     spans = np.sort(extent())
     if 2.5 * spans[2] * spans[1] / size**2 > MOST_TRIANGLES:
         raise InputError(
-            f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × {spans[1]:.3g} m",
+            f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × "
+            f"{spans[1]:.3g} m",
             where="surface.size",
             value=size,
             remedy="Choose a larger mesh size, or check the surface's unit.",

@@ -136,7 +136,8 @@ def bend_order() -> Iterator[Comparison]:
 
 
 LEE = {0.5: (3.7915, 0.3096), 1.0: (10.7069, 1.9143), 1.5: (25.8410, 8.0096)}
-"""Lee's frame, displacements down and along under the load (tests/literature/test_references.py)."""
+"""Lee's frame, displacements down and along under the load
+(tests/literature/test_references.py)."""
 
 
 def lee_frame(elements: int, load: float) -> tuple[float, float]:
@@ -211,7 +212,8 @@ def diamonds() -> Iterator[Comparison]:
 
 
 HELIX = (7.41252, 5.06259, 2.65499)
-"""Tip of the roll-up with a force across its plane at 2 % of the load (tests/literature/test_references.py)."""
+"""Tip of the roll-up with a force across its plane at 2 % of the load
+(tests/literature/test_references.py)."""
 ONE_TURN = (0.41042, 0.05383, -1.09651)
 """The same at 10 %."""
 

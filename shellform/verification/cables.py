@@ -191,7 +191,8 @@ def nets() -> Iterator[Comparison]:
 
 HYPAR_NODES = (24, 17)
 HYPAR = (0.00980161, -0.17225218, 672.82097, 4.0)
-"""Displacements, largest tension and number of slack cables of the loaded net (tests/literature/test_references.py)."""
+"""Displacements, largest tension and number of slack cables of the loaded net
+(tests/literature/test_references.py)."""
 
 
 def hypar_load(shape: Reals) -> Reals:

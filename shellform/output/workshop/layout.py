@@ -52,10 +52,13 @@ def flat_grid(built: Built) -> Sheet:
         marks += _lanes(built, direction, names, low, high, s)
     marks += _spans(built, low, high, s)
     notes = (
-        "Rods are drawn by their axes. Their first end is the left one of U rods and the lower one of V rods.",
-        "Violet: distance of the first and of the last crossing from the rod's end. All other marks: schedules/marks.csv.",
+        "Rods are drawn by their axes. Their first end is the left one of U rods and the lower one of V "
+        "rods.",
+        "Violet: distance of the first and of the last crossing from the rod's end. All other marks: "
+        "schedules/marks.csv.",
         f"U rods lie below, V rods above; {MM * grid.gap:g} mm between their axes at the connectors.",
-        f"{len(grid.rods)} rods, {sum(rod.length for rod in grid.rods):.2f} m in all, {label(built.shell.rod.resized(built.design.radius).section)}; "
+        f"{len(grid.rods)} rods, {sum(rod.length for rod in grid.rods):.2f} m in all, "
+        f"{label(built.shell.rod.resized(built.design.radius).section)}; "
         f"{len(grid.lattice)} connectors.",
         *(
             [
@@ -241,8 +244,10 @@ def cable_plan(built: Built) -> Sheet:
     notes = (
         "Drawn on the flat grid; the erected grid's cells are skewed. C12·3: cable 12, tightened in round 3.",
         "Where a cell has two cables, the upper name is that of the rising one.",
-        "Rounds go from the supports to the crown; within a round tighten on opposite sides at a time (schedules/cables.csv).",
-        f"{len(pairs)} cables, joined to the lower rods; lengths and forces at each stage: schedules/cables.csv.",
+        "Rounds go from the supports to the crown; within a round tighten on opposite sides at a time "
+        "(schedules/cables.csv).",
+        f"{len(pairs)} cables, joined to the lower rods; lengths and forces at each stage: "
+        "schedules/cables.csv.",
     )
     return Sheet("Cables", tuple(marks), height, notes)
 
@@ -287,7 +292,8 @@ def support_plan(built: Built) -> Sheet:
         ]
     notes = (
         "Supports are where the rods' axes meet the ground; rods stand as on the target.",
-        "Directions of the rods at the supports: schedules/supports.csv. Survey targets: schedules/survey.csv.",
+        "Directions of the rods at the supports: schedules/supports.csv. Survey targets: "
+        "schedules/survey.csv.",
     )
     return Sheet(
         "Setting-out of the supports",

@@ -110,12 +110,14 @@ def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
     count = len(cutting.bars)
     fewer = "fewer" if count == cutting.least else f"fewer than {cutting.least}"
     said = [
-        f"{count} bars of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, {100 * cutting.waste:.0f} % waste; {fewer} can't do."
+        f"{count} bars of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, "
+        f"{100 * cutting.waste:.0f} % waste; {fewer} can't do."
     ]
     if cutting.spliced:
         which = ", ".join(names[rod] for rod in cutting.spliced)
         said.append(
-            f"{len(cutting.spliced)} rods are longer than the stock and must be SPLICED; the analysis takes a splice for as stiff and as "
+            f"{len(cutting.spliced)} rods are longer than the stock and must be SPLICED; the analysis takes "
+            "a splice for as stiff and as "
             f"strong as the rod: {which}."
         )
     return tuple(said)
@@ -259,7 +261,8 @@ def cables(built: Built) -> Table:
         columns[f"{_stage(name)}: force [N]"] = ties.tension(state)
     rows = tuple((f"C{k}", *(values[k].item() for values in columns.values())) for k in range(len(pairs)))
     notes = (
-        f"Lengths between the pins' axes. {len(pairs)} cables, EA = {shell.cable.stiffness:g} N. A force of 0: slack at that stage.",
+        f"Lengths between the pins' axes. {len(pairs)} cables, EA = {shell.cable.stiffness:g} N. A force of "
+        "0: slack at that stage.",
         *cutting_of_cables(built),
     )
     return Table("cables", ("cable", *columns), rows, notes)
@@ -282,7 +285,8 @@ def cutting_of_cables(built: Built) -> tuple[str, ...]:
     if built.adjustment is None or "cut_lengths" not in counts:
         return ()
     return (
-        f"Cut to {counts['cut_lengths']} different lengths, the fewest for {counts['rest_lengths']} different rest lengths and turnbuckles that "
+        f"Cut to {counts['cut_lengths']} different lengths, the fewest for {counts['rest_lengths']} "
+        "different rest lengths and turnbuckles that "
         f"let a cable out by {1e3 * built.adjustment:g} mm from its cut length.",
     )
 
@@ -320,7 +324,8 @@ def supports(built: Built) -> Table:
     ]
     heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
     notes = (
-        "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them.",
+        "Supports stand where they are: before, during and after the pour. Forces are those of the rods' "
+        "ends on them.",
     )
     return Table("supports", tuple(heads), tuple(rows), notes)
 

@@ -12,8 +12,7 @@ to K1; carried on at the same rate it becomes singular where
     (K1 + (f - f1) (K1 - K0) / (f1 - f0)) v = 0,
 
 the eigenvalue of which nearest above f1 is the estimate. It assumes that the tangent goes on changing as it
-begins to: where cables go slack or tighten on the way it may be far off, to either side (the paper-scale
-vault: 0.43 told, 1.31 found).
+begins to: where cables go slack or tighten on the way it may be far off, to either side.
 
 True critical factor. The path is followed (path.py) until the number of negative eigenvalues changes, which
 is located by bisection.

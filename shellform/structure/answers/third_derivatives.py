@@ -1,14 +1,16 @@
-"""How the stiffness along given motions changes as the nodes move and cables are let out: third derivatives of
-the elements' energies, exact.
+"""How the stiffness along given motions changes as the nodes move and cables are let out: third derivatives
+of the elements' energies, exact.
 
-For motions l_k, r_k of the nodes at fixed l, r the tangent K gives B = sum of l_k'K r_k; l = r = a mode is that
-mode's stiffness, l the multipliers of linear answers r what a robust design derives. For beams the derivative
-of B by the state comes from the compiled tangent itself, evaluated at complex positions x + i h e_j: the
-imaginary part over h is the derivative to the last digit, since nothing is subtracted (Squire and Trapp 1998).
-The degrees of freedom of an element are taken one after the other, all elements at once, so that it costs
-twelve assemblies. A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q, has
+For motions l_k, r_k of the nodes at fixed l, r the tangent K gives B = sum of l_k'K r_k; l = r = a mode is
+that mode's stiffness, l the multipliers of linear answers r what a robust design derives. For beams the
+derivative of B by the state comes from the compiled tangent itself, evaluated at complex positions x + i h
+e_j: the imaginary part over h is the derivative to the last digit, since nothing is subtracted (Squire and
+Trapp 1998). The degrees of freedom of an element are taken one after the other, all elements at once, so that
+it costs twelve assemblies. A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q,
+has
 
-    B = EA/l0 (p·q - (l0/l) (p·q - a b)),   dB/d(x_b - x_a) = EA/l² ((p·q - a b) e + a (q - b e) + b (p - a e)).
+    B = EA/l0 (p·q - (l0/l) (p·q - a b)),
+    dB/d(x_b - x_a) = EA/l² ((p·q - a b) e + a (q - b e) + b (p - a e)).
 """
 
 from __future__ import annotations
@@ -52,8 +54,8 @@ def bilinear_by_dof(assembly: Assembly, state: State, left: Reals, right: Reals)
 
 
 def bilinear_by_rest_length(cables: Cables, state: State, left: Reals, right: Reals) -> Reals:
-    """Derivative (c,), N, of the sum of l_k'K r_k by each cable's rest length at the state: -EA p·q / l0², 0 in
-    slack cables.
+    """Derivative (c,), N, of the sum of l_k'K r_k by each cable's rest length at the state: -EA p·q / l0², 0
+    in slack cables.
     """
     taut = cables.lengths(state) > cables.rest_length
     whole = np.empty(len(cables.ends))

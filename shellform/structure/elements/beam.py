@@ -6,15 +6,15 @@ the rest length; theta the six local rotations (12), M their moments, N the axia
 rotation increment of the element triad.
 
 The element triad has e_x along the chord and e_z along e_x × (a_y + b_y). Crisfield's mean triad has the same
-limit for small local rotations but is not exactly conservative (findings: 8e-3 relative at 0.5 rad); with
+limit for small local rotations but is not exactly conservative; with
 this one the local deformations (12) are smooth functions of the ends' positions and rotations, so that
 
     U = 1/2 u' K u,   u = (l - l0, theta)                                          energy (18)
     f = dU/dx                                                                       end forces (19, 20)
 
 hold exactly. With c_k = M_k / (2 cos theta_k) the moments on the triads are g = sum c_k h_k, where 2 sin
-theta_k = s_k and h_k is the gradient of s_k with respect to the rotation increment of its end at fixed E. The triad turns
-by phi = G (dd, w_a, w_b), and since U doesn't change when everything turns together,
+theta_k = s_k and h_k is the gradient of s_k with respect to the rotation increment of its end at fixed E. The
+triad turns by phi = G (dd, w_a, w_b), and since U doesn't change when everything turns together,
 
     f = (N e_x on d, g_a on w_a, g_b on w_b) - G' (g_a + g_b).
 

@@ -1,9 +1,9 @@
 """The compiled loops over co-rotational beams; the letters and equations are those at the head of beam.py.
 
-The tangent, term by term. Let w stand for the rotation increments of both ends and phi = G y for that of the element triad,
-y = (dd, w). The second variation of the energy at given triads is a quadratic form in the ends' rotation increments
-relative to the element, w - phi, to which the turning of the triads' moments themselves adds M = Q - tr(Q) I
-at each end, with Q the sum of c_k (triad vector)(element axis)'. Altogether
+The tangent, term by term. Let w stand for the rotation increments of both ends and phi = G y for that of the
+element triad, y = (dd, w). The second variation of the energy at given triads is a quadratic form in the
+ends' rotation increments relative to the element, w - phi, to which the turning of the triads' moments
+themselves adds M = Q - tr(Q) I at each end, with Q the sum of c_k (triad vector)(element axis)'. Altogether
 
     P w·w - 2 R w·phi + S phi·phi - y·(dG)' g,
 
@@ -157,9 +157,9 @@ def evaluate(  # type: ignore[no-untyped-def]
             near_b[k] = near_a[k] + moment[k + 3] * sine[k + 3] / cosine[k + 3]
             near_a[k] += moment[k] * sine[k] / cosine[k]
 
-        # P: the quadratic form of the two ends' rotation increments with the element triad at rest, from the derivatives of
-        # the moments by the local rotations, the arcsine's own curvature with them, and from the triads'
-        # moments' own turning M.
+        # P: the quadratic form of the two ends' rotation increments with the element triad at rest, from the
+        # derivatives of the moments by the local rotations, the arcsine's own curvature with them, and from
+        # the triads' moments' own turning M.
         for i in range(3):
             a0, a1, a2 = near_a[0] * h[0, i], near_a[1] * h[1, i], near_a[2] * h[2, i]
             b0, b1, b2 = near_b[0] * h[3, i], near_b[1] * h[4, i], near_b[2] * h[5, i]
@@ -170,8 +170,8 @@ def evaluate(  # type: ignore[no-untyped-def]
                 ab = f0 * h[3, j] + f1 * h[4, j] + f2 * h[5, j]
                 P[i, 3 + j] = ab
                 P[3 + j, i] = ab
-        # R, S: how rotation increments of the element triad (phi, the same at both ends) couple with the ends' rotation increments and
-        # with themselves.
+        # R, S: how rotation increments of the element triad (phi, the same at both ends) couple with the
+        # ends' rotation increments and with themselves.
         for r in range(3):
             for i in range(3):
                 R[r, i] = P[i, r] + P[i, 3 + r] + Ma[r, i]
@@ -308,8 +308,8 @@ def _row(r):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length, stiffness, result):  # type: ignore[no-untyped-def]
-    """The gradients of (12), h_k on the own rotation increment less G' h_k, times the local stiffness (18), in global
-    axes.
+    """The gradients of (12), h_k on the own rotation increment less G' h_k, times the local stiffness (18),
+    in global axes.
     """
     dtype = positions.dtype
     E, A, B, Q = (

@@ -1,10 +1,10 @@
 """Finite rotations of the nodes as unit quaternions (equations 9 to 11).
 
 A node's orientation is the quaternion q = (w, v) of its total rotation from the stress-free state, w =
-cos(a/2), v = sin(a/2) times the axis. A rotation increment d (a rotation vector in global axes, rad) is applied from the
-left, R <- R(d) R as in equation (9). Quaternions keep small angles to full relative precision and zero
-exactly zero, need no special case at any angle, and are made unit again after every product, so errors don't
-build up.
+cos(a/2), v = sin(a/2) times the axis. A rotation increment d (a rotation vector in global axes, rad) is
+applied from the left, R <- R(d) R as in equation (9). Quaternions keep small angles to full relative
+precision and zero exactly zero, need no special case at any angle, and are made unit again after every
+product, so errors don't build up.
 """
 
 from __future__ import annotations

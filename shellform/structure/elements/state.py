@@ -44,5 +44,7 @@ def from_vectors(positions: ArrayLike, rotations: ArrayLike) -> State:
 
 
 def moved(state: State, step: Reals) -> State:
-    """The state after `step` (n, 6): translations, m, and rotation increments about global axes, rad (equation 9)."""
+    """The state after `step` (n, 6): translations, m, and rotation increments about global axes, rad
+    (equation 9).
+    """
     return State(state.positions + step[:, :3], rotation.turned(step[:, 3:], state.quaternions))

@@ -60,8 +60,8 @@ class Equilibrium:
 
     `residual`: largest unbalanced force (moments over an element length) over the largest applied or internal
     force; `factorisations` spent; `energy` strain energy, J; `stable`: the tangent on the free degrees of
-    freedom is positive definite (a rod's rotation about its own axis disregarded); `negative`: how many of its
-    eigenvalues are negative.
+    freedom is positive definite (a rod's rotation about its own axis disregarded); `negative`: how many of
+    its eigenvalues are negative.
     """
 
     state: State
@@ -158,7 +158,8 @@ def newton(
         state=best,
         residual=least,
         iterations=spent,
-        remedy="Apply the load in more increments, or use the relaxation, which finds stable states from afar.",
+        remedy="Apply the load in more increments, or use the relaxation, which finds stable states from "
+        "afar.",
     )
 
 

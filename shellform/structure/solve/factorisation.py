@@ -6,8 +6,8 @@ neither. SHELLFORM_SOLVER=mkl, cholmod or superlu asks for one of them. A Choles
 information (the state is no stable equilibrium), so it is an exception of its own.
 
 Whether CHOLMOD makes a supernodal L L', which fails where the matrix isn't positive definite, or a simplicial
-L D L', which doesn't, hangs on an option of the whole process. Load cases are followed in threads, so one lock
-is held from setting that option until the factor that it is meant for is there.
+L D L', which doesn't, hangs on an option of the whole process. Load cases are followed in threads, so one
+lock is held from setting that option until the factor that it is meant for is there.
 """
 
 from __future__ import annotations

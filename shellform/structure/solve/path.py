@@ -11,7 +11,7 @@ Newton's kind solves
 by two solves with one factor of K, dx = u_r + df u_q, and df = (g - a·u_r) / (a·u_q). The last line is what
 holds the step to its size s:
 
-    arc length              a = 2 D,  g = s² - D·D     D the translations since the last point (spherical, translations only)
+    arc length              a = 2 D,  g = s² - D·D     D the translations since the last point (spherical)
     displacement control    a = e_c,  g = s - D_c      degree of freedom c is led
     load control            df = s - (f - f_last)      only to end at a given factor
 

@@ -98,7 +98,8 @@ def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
         for block in part.faces:
             if len(block) and not (block.min() >= 0 and block.max() < len(part.points)):
                 raise InputError(
-                    f"a face names vertex {1 + int(block.max() if block.min() >= 0 else block.min())}, of {len(part.points)}",
+                    f"a face names vertex {1 + int(block.max() if block.min() >= 0 else block.min())}, of "
+                    f"{len(part.points)}",
                     where=where,
                     remedy="Export the mesh anew.",
                 )

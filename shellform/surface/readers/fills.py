@@ -114,9 +114,11 @@ def _arches(outer: Indices, low: Flags, where: str) -> list[_Arch]:
     grounded = low[outer]
     if grounded.sum() < 2:
         raise InputError(
-            "its edge touches the ground at fewer than two places, so that it can't be brought down between them",
+            "its edge touches the ground at fewer than two places, so that it can't be brought down between "
+            "them",
             where=where,
-            remedy="State the ground's height (surface.ground), or close the shell's edge in its own program.",
+            remedy="State the ground's height (surface.ground), or close the shell's edge in its own "
+            "program.",
         )
     turned = np.roll(outer, -int(np.argmax(grounded)))
     feet = np.flatnonzero(low[turned])

@@ -150,7 +150,8 @@ def _refuse_branches(draft: Draft, where: str) -> None:
     if (counts > 2).any():
         place = draft.points[pairs[np.argmax(counts > 2), 0]]
         raise InputError(
-            f"{int((counts > 2).sum())} edges belong to more than two faces, the first at {place.round(4).tolist()} m",
+            f"{int((counts > 2).sum())} edges belong to more than two faces, the first at "
+            f"{place.round(4).tolist()} m",
             where=where,
             remedy="Remove the faces inside or behind the surface and export it again.",
         )
@@ -188,7 +189,8 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         raise InputError(
             f"has {count} separate pieces, of {listed} m²",
             where=where,
-            remedy="Choose one (surface.piece, --piece, 1 is the largest; or by object or layer), or join their edges.",
+            remedy="Choose one (surface.piece, --piece, 1 is the largest; or by object or layer), or join "
+            "their edges.",
         )
     kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
     return noted(

@@ -106,7 +106,8 @@ def surface_of(
         share = f"{100.0 * plan / surface.area:.0f} %"
         notes = (
             *notes,
-            f"it stands upright, with a plan of {share} of its area: check the vertical axis (surface.up, --up)",
+            f"it stands upright, with a plan of {share} of its area: check the vertical axis (surface.up, "
+            "--up)",
         )
     return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
 

@@ -169,7 +169,8 @@ def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
     if (counts > 2).any():
         a = keys[np.argmax(counts > 2)] // len(points)
         raise InputError(
-            f"{int((counts > 2).sum())} edges belong to more than two triangles, the first at {points[a].round(4).tolist()}",
+            f"{int((counts > 2).sum())} edges belong to more than two triangles, the first at "
+            f"{points[a].round(4).tolist()}",
             where=where,
             remedy="Remove the faces inside or behind the surface and export it again.",
         )
