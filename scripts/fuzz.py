@@ -191,12 +191,12 @@ _ACCIDENTS: list[Callable[[bytes, random.Random], bytes]] = [
 def sound(folder: Path) -> dict[str, list[Path]]:
     """Good files of each kind; made in `folder`."""
     import pyvista
-    from tests.stubs import study_file
 
     from shellform.case.case import load_case
     from shellform.run.run import run_case
     from shellform.study.store import Log
     from tests.cli.test_commands import MODEL
+    from tests.stubs import study_file
     from tests.surface.shells import cap
     from tests.surface.test_bad_files import every_format
 

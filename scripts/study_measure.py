@@ -116,10 +116,9 @@ def soak(count: int) -> None:
 
 def thousand(count: int) -> None:
     """A study by its command's function, from the study file to the page."""
-    from tests.stubs import study_file
-
     from shellform.study.store import read_table
     from shellform.study.studies import run_study
+    from tests.stubs import study_file
 
     place = Path(tempfile.mkdtemp(prefix="study_thousand"))
     text = f"""
@@ -151,9 +150,8 @@ optimise.cable_force = "1 - optimise.misfit"
 
 def overhead() -> None:
     """Milliseconds a design that does nothing, through the engine alone and through a whole study."""
-    from tests.stubs import study_file
-
     from shellform.study.studies import run_study
+    from tests.stubs import study_file
 
     place = Path(tempfile.mkdtemp(prefix="study_overhead"))
     file = study_file(
@@ -237,9 +235,9 @@ def many(workers: int, seconds: float) -> None:
     """
     import dask
     import distributed  # noqa: F401 (it adds its own settings, before ours)
-    from tests.stubs import study_file
 
     from shellform.study.store import Log, flat
+    from tests.stubs import study_file
 
     place = Path(tempfile.mkdtemp(prefix="study_many"))
     case = load_case(study_file(place, "").with_name("dome.toml"))

@@ -39,6 +39,7 @@ from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.loading import Loaded
+from shellform.tables import Table, Value, table_text
 
 PARAMETERS = ("axial", "torsion", "bending")
 NOISE = 0.15e-3  # m, the average error that section 4.2 reports for its motion capture
@@ -94,16 +95,16 @@ class Calibration:
         maxima, as CSV.
         """
         scans = self.after.shape[1]
-        lines = ["pos.,node," + ",".join(f"{k} start,{k}" for k in range(1, scans + 1))]
+        heads = [name for k in range(1, scans + 1) for name in (f"{k} start", str(k))]
         both = 1e3 * np.stack([self.before, self.after], axis=2).reshape(len(self.nodes), -1)
-        for number, (node, row) in enumerate(zip(self.nodes, both, strict=True), 1):
-            lines.append(
-                f"{number},{node}," + ",".join("" if np.isnan(each) else f"{each:.3f}" for each in row)
-            )
+        rows: list[tuple[Value, ...]] = [
+            (number, int(node), *("" if np.isnan(each) else f"{each:.3f}" for each in row))
+            for number, (node, row) in enumerate(zip(self.nodes, both, strict=True), 1)
+        ]
         for name, measure in (("mean", np.mean), ("max", np.max)):
             seen = [column[np.isfinite(column)] for column in both.T]
-            lines.append(f"{name},," + ",".join(f"{measure(each):.3f}" if len(each) else "" for each in seen))
-        return "\n".join(lines) + "\n"
+            rows.append((name, "", *(f"{measure(each):.3f}" if len(each) else "" for each in seen)))
+        return table_text(Table("calibration", ("pos.", "node", *heads), tuple(rows)))
 
 
 def foresee(

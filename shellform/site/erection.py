@@ -31,11 +31,23 @@ from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
 from shellform.structure.solve.loading import Drive, advance
+from shellform.tables import Table, table_text
 
 STEP = 0.1  # of a stage
 _SMALLEST = 1.0 / 256.0
 _SLACK = 1.5  # times its length in the target: a cable that isn't tightened yet
 _TRIAL = 25  # factorisations of one step of tightening
+
+_COLUMNS = (
+    "stage",
+    "share",
+    "height [mm]",
+    "largest stress [MPa]",
+    "stress/strength",
+    "rod element",
+    "largest tension [N]",
+    "largest reaction [N]",
+)
 
 
 @dataclass(frozen=True)
@@ -73,16 +85,20 @@ class Erection:
 
     def table(self) -> str:
         """Step after step as CSV."""
-        lines = [
-            "stage,share,height [mm],largest stress [MPa],stress/strength,rod element,largest tension "
-            "[N],largest reaction [N]"
-        ]
-        for each in self.steps:
-            lines.append(
-                f"{each.stage},{each.share:.3f},{1e3 * each.height:.2f},{1e-6 * each.stress:.2f},{each.stress / self.strength:.3f},"
-                f"{each.element},{each.tension:.3f},{each.reaction:.3f}"
+        rows = tuple(
+            (
+                each.stage,
+                f"{each.share:.3f}",
+                f"{1e3 * each.height:.2f}",
+                f"{1e-6 * each.stress:.2f}",
+                f"{each.stress / self.strength:.3f}",
+                each.element,
+                f"{each.tension:.3f}",
+                f"{each.reaction:.3f}",
             )
-        return "\n".join(lines) + "\n"
+            for each in self.steps
+        )
+        return table_text(Table("erection", _COLUMNS, rows))
 
 
 def erect(

@@ -36,6 +36,7 @@ from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
+from shellform.tables import Table, table_text
 
 _LEARNING = 4  # linearisations of one survey; the error is of second order after each
 _SETTLED = 0.02  # of a cable's usual error: smaller changes of the estimate end the learning
@@ -100,13 +101,13 @@ class Adjustment:
         design = self.belief.design
         tension = np.zeros(len(self.turns))
         tension[design.present] = shell.cables(design).tension(self.belief.state)
-        lines = ["cable,node a,node b,turns,change [mm],tension after [N]"]
+        rows = []
         for cable in np.flatnonzero(self.turns):
-            a, b = shell.cable_ends[cable]
-            lines.append(
-                f"{cable},{a},{b},{self.turns[cable]:+d},{1e3 * self.change[cable]:+.2f},{tension[cable]:.2f}"
-            )
-        return "\n".join(lines) + "\n"
+            a, b = shell.cable_ends[cable].tolist()
+            turn, change = f"{self.turns[cable]:+d}", f"{1e3 * self.change[cable]:+.2f}"
+            rows.append((int(cable), a, b, turn, change, f"{tension[cable]:.2f}"))
+        heads = ("cable", "node a", "node b", "turns", "change [mm]", "tension after [N]")
+        return table_text(Table("turns", heads, tuple(rows)))
 
 
 @dataclass(frozen=True)
