@@ -17,6 +17,7 @@ from shellform.surface import cad
 from shellform.surface.readers import rhino
 from shellform.surface.readers.meshes import write_mesh
 from shellform.surface.readers.reading import read_surface
+from tests.surface.brought import rhino_mesh
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
 
 ROOT = Path(__file__).parent.parent.parent
@@ -187,15 +188,6 @@ def rhino_file(file, shapes, unit="Millimeters"):
         model.Objects.Add(shape, attributes)
     model.Write(str(file), 7)
     return file
-
-
-def rhino_mesh(points, quads):
-    mesh = rhino3dm.Mesh()
-    for x, y, z in points.tolist():
-        mesh.Vertices.Add(x, y, z)
-    for face in quads.tolist():
-        mesh.Faces.AddFace(*face)
-    return mesh
 
 
 def sphere(radius):

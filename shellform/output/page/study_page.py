@@ -18,21 +18,12 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.gridshell.gridshell import Gridshell
 from shellform.output.page.template import filled, part
+from shellform.output.pictures.colours import VIRIDIS
 from shellform.problem.problem import deviations
 from shellform.structure.elements.state import State
 
 MOST_ROWS = 4000  # that are drawn; the front is always among them
-_COLOURS = (
-    "#440154",
-    "#472d7b",
-    "#3b528b",
-    "#2c728e",
-    "#21918c",
-    "#28ae80",
-    "#5ec962",
-    "#addc30",
-    "#fde725",
-)  # viridis
+_COLOURS = tuple("#{:02x}{:02x}{:02x}".format(*colour) for colour in VIRIDIS[::2])
 _SEGMENTS = 1500  # of a thumbnail
 
 
