@@ -7,19 +7,6 @@ table = study.read_table(found.table.parent, ["cables"])
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
+from shellform import lazy
 
-_HOMES = {
-    "load_case": "shellform.case.case",
-    "run_case": "shellform.run.run",
-    "run_study": "shellform.study.studies",
-    "read_study": "shellform.study.plan",
-    "read_table": "shellform.study.store",
-}
-
-
-def __getattr__(name: str) -> Any:
-    if name in _HOMES:
-        return getattr(importlib.import_module(_HOMES[name]), name)
-    raise AttributeError(f"module 'shellform.study' has no attribute {name!r}")
+__getattr__, __dir__ = lazy.public(__name__)

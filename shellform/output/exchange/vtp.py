@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -57,8 +58,8 @@ def _write(
     nodes: Reals,
     pairs: NDArray[np.int64],
     points: Mapping[str, Reals],
-    cells: Mapping[str, NDArray],
-) -> None:  # type: ignore[type-arg]
+    cells: Mapping[str, NDArray[Any]],
+) -> None:
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
