@@ -249,6 +249,6 @@ def test_the_stress_of_any_section_follows_its_radius(shell, section):
     )
     assert measured.by_radius[0] == pytest.approx((up - down) / (2.0 * step), rel=1e-6)
     bending = erection_stress(shell.net, section) / section.material.strength
-    assert measured.value[0] == pytest.approx(
-        bending, rel=0.15
-    )  # axial stress and the smooth maximum come on top
+    # The target bends the straight elements a little less than their net's circles, and axial stress and the
+    # smooth maximum come on top: 0.2 to 0.6 % less in all.
+    assert measured.value[0] == pytest.approx(bending, rel=0.01)

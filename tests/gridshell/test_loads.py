@@ -170,7 +170,7 @@ def test_two_half_pours_sum_to_the_whole(net, vault, angle):
     ]
     whole = loads.concrete(net, vault, thickness=0.0025)
     np.testing.assert_allclose(halves[0] + halves[1], whole, atol=1e-9 * np.abs(whole).max())
-    assert halves[0][:, 2].sum() == pytest.approx(0.5 * whole[:, 2].sum(), rel=0.05)
+    assert halves[0][:, 2].sum() == pytest.approx(0.5 * whole[:, 2].sum(), rel=0.01)  # openings aside: 0.8 %
 
 
 def test_strips_rings_and_openings_with_their_complements_sum_to_the_whole(net, vault):

@@ -12,11 +12,7 @@ from shellform.cli import program
 def test_published_values_hold(case):
     for row in case():
         assert row.passed, f"{row.name}: {row.value} instead of {row.reference} ({row.source})"
-
-
-@pytest.mark.parametrize("case", verification.CASES, ids=lambda case: case.__name__)
-def test_each_case_says_where_its_reference_comes_from(case):
-    assert len(case.__doc__) > 80
+        assert row.source
 
 
 def test_a_row_fails_beyond_its_tolerance_relative_to_its_reference():

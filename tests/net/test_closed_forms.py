@@ -204,17 +204,18 @@ def test_the_compass_net_of_a_cylinder_is_the_flat_grid_rolled_up(angle):
         assert np.median(bent[..., 0]) == pytest.approx(wanted, abs=0.01)
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.5, np.pi / 4])
-def test_a_net_pulled_onto_a_cylinder_bends_no_more_than_the_surface_and_hardly_in_it(angle):
+@pytest.mark.parametrize(
+    ("angle", "sideways", "rolled"),
+    [(0.0, 1e-3, 2e-3), (0.5, 0.05, 0.15), (np.pi / 4, 0.05, 0.15)],  # askew it shears a little to bend less
+)
+def test_a_net_pulled_onto_a_cylinder_bends_no_more_than_the_surface_and_hardly_in_it(
+    angle, sideways, rolled
+):
     net = sf.pull_net(roof(1.0, 0.8, 2.0), spacing=0.12, gap=1e-4, angle=angle)
     bent = net.quality.curvature
     assert bent[..., 0].max() < 1.03
-    assert np.abs(bent[..., 1]).max() < 0.05
-    if angle == 0.0:
-        assert unrolling_error(net) < 2e-3 * 0.12
-        assert np.abs(bent[..., 1]).max() < 1e-3
-    else:  # askew, the grid gives way a little in shear to bend less
-        assert unrolling_error(net) < 0.15 * 0.12
+    assert np.abs(bent[..., 1]).max() < sideways
+    assert unrolling_error(net) < rolled * 0.12
 
 
 def test_the_gaussian_curvature_of_cells_adds_up_to_the_solid_angle_of_a_cap():

@@ -19,9 +19,8 @@ def test_on_a_cylinder_rods_bend_least_at_45_degrees(cylinder):
     """At the angle a the mean of the squared curvatures is (cos⁴ a + sin⁴ a) / 2, smallest at 45°."""
     said = []
     best, tried = best_orientation(cylinder, {"spacing": 0.25, "gap": 0.005}, progress=said.append)
-    assert math.degrees(best.angle) == pytest.approx(
-        45.0, abs=8.0
-    )  # a cut-out of so few rods isn't quite even
+    # A cut-out of so few rods isn't quite even: one step of the search, 7.5°, is allowed.
+    assert math.degrees(best.angle) == pytest.approx(45.0, abs=7.501)
     assert best.cost == min(trial.cost for trial in tried)
     rolled = 0.5 * 0.25 * 0.25**2  # κ² = 1/4, of the flat grid rolled up; at 0° it would be twice as much
     assert 0.7 * rolled < best.cost < rolled  # pulled, it gives way in shear to bend still less

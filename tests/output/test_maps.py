@@ -39,7 +39,9 @@ def test_the_curvature_without_load_and_cables_is_about_the_net_s(shell):
         "none"
     ].equilibrium.state
     panel = maps.panel_of(shell, None, state, quantity="curvature")
-    assert panel.deviation.max() == pytest.approx(shell.net.quality.curvature_max, rel=0.2)
+    assert panel.deviation.max() == pytest.approx(
+        shell.net.quality.curvature_max, rel=0.08
+    )  # the joints bend the rods: 6 %
     assert len(panel.cables) == 0
 
 

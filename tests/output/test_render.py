@@ -78,6 +78,7 @@ def test_the_same_panel_gives_the_same_picture():
     second = render.image(panel(), SMALL)
     assert first.shape == (300, 400, 3)
     assert first.dtype == np.uint8
+    assert ink(above(first)) > 500
     assert np.abs(first.astype(int) - second).max() <= 1
 
 
@@ -102,7 +103,7 @@ def test_slack_cables_are_fainter_than_taut_ones():
     taut = above(render.image(replace(panel(), **only, cable_forces=np.full(64, 5.0)), SMALL))
     slack = above(render.image(replace(panel(), **only, cable_forces=np.zeros(64)), SMALL))
     assert (255 - slack).sum() < 0.5 * (255 - taut).sum()
-    assert (255 - slack).sum() > 0
+    assert ink(slack) > 500
 
 
 def test_a_cable_is_as_thick_as_its_force():
@@ -110,7 +111,7 @@ def test_a_cable_is_as_thick_as_its_force():
     half = np.arange(64) < 32
     uneven = above(render.image(replace(panel(), **only, cable_forces=np.where(half, 12.0, 0.1)), SMALL))
     even = above(render.image(replace(panel(), **only, cable_forces=np.full(64, 12.0)), SMALL))
-    assert (255 - uneven).sum() < 0.85 * (255 - even).sum()
+    assert 0.4 * (255 - even).sum() < (255 - uneven).sum() < 0.85 * (255 - even).sum()
 
 
 def test_a_gridshell_without_cables_loads_or_supports_is_drawn():
@@ -161,6 +162,7 @@ def test_a_target_surface_shows_through():
     )
     assert (np.abs(plain - covered).max(axis=2) > 5).mean() > 0.2
     dark = plain.max(axis=2) < 120  # rods stand above it
+    assert dark.sum() > 500
     assert np.abs(plain - covered)[dark].mean() < 30
 
 
@@ -184,6 +186,7 @@ def test_a_sheet_has_the_size_of_its_panels_and_one_scale_and_camera(tmp_path):
     page = np.flipud(pv.read(tmp_path / "sheet.png").point_data.active_scalars.reshape(-1, 800, 3))
     assert page.shape == (600 + legend.key_height(SIZE), 800, 3)
     upper, lower = page[45:300, :400].astype(int), page[345:600, :400].astype(int)
+    assert ink(upper) > 500
     assert np.abs(upper - lower).max() <= 1
     np.testing.assert_array_equal(
         ink(page[45:300, :400], 0), ink(page[45:300, 400:], 0)
@@ -436,7 +439,8 @@ def test_the_best_view_has_the_long_axis_across_and_looks_at_what_opens_towards_
     turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     long = panel().positions * [2.0, 1.0, 1.0]
     along, across = (above(render.image(bare(positions=place), SMALL)) for place in (long, long @ turned.T))
-    np.testing.assert_allclose(ink(along), ink(across), rtol=0.05)
+    np.testing.assert_allclose(ink(along), ink(across), rtol=0.01)
+    assert ink(along) > 500
     leaning = panel().positions + np.outer(panel().positions[:, 1], [0.0, 0.0, -0.8])
     away = _fitted(leaning).away
     assert away[1] > 0.0  # it falls towards +y, and is seen from there
@@ -486,7 +490,7 @@ def test_pictures_drawn_one_after_the_other_are_those_drawn_alone(tmp_path):
             <= 1
         )
     render.pictures([tmp_path / "a.svg"], [panel()], SMALL)
-    assert (tmp_path / "a.svg").stat().st_size > 0
+    assert "<path" in (tmp_path / "a.svg").read_text(encoding="utf-8")
 
 
 def test_a_film_has_a_frame_for_each_panel_and_one_camera(tmp_path):

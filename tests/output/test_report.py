@@ -127,10 +127,8 @@ def test_an_engineer_s_limits_are_checked_where_they_are_asked_for(
     summary = told(designs, load, **changes)
     found = failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **bound)), "polished")
     assert [check.cells["polished"].told for check in found] == [words]
-    if "force" not in bound:
-        assert failed(checks(every(shell, designs), designs, summary, BOUNDS), "polished") == [], (
-            "nobody asked"
-        )
+    unasked = replace(BOUNDS, force=np.inf)
+    assert failed(checks(every(shell, designs), designs, summary, unasked), "polished") == []
     looser = {name: 0.5 * limit if name == "critical" else 2.0 * limit for name, limit in bound.items()}
     assert (
         failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **looser)), "polished") == []
@@ -246,7 +244,7 @@ def test_a_fine_surface_is_made_light_and_stays_where_it_is(vault, monkeypatch):
     assert triangles.max() < len(vertices)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
     area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum()
-    assert area == pytest.approx(vault.area, rel=0.05)
+    assert area == pytest.approx(vault.area, rel=0.035)  # the edge draws in by half a cell: 2.9 %
 
 
 def test_file_names_are_told_in_words():

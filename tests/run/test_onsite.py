@@ -193,8 +193,8 @@ def test_scans_become_connector_stiffness(folder, run, tmp_path):
     result = shellform("calibrate", folder, *scans, "--markers", markers, "--placed", "--output", tmp_path)
     assert result.returncode == 0, result.stderr
     joint = tomllib.loads((tmp_path / "calibration.toml").read_text(encoding="utf-8"))["joint"]
-    assert joint["torsion"] == pytest.approx(1.3 * shell.joint.torsion, rel=0.05)
-    assert joint["bending"] == pytest.approx(0.9 * shell.joint.bending, rel=0.10)
+    assert joint["torsion"] == pytest.approx(1.3 * shell.joint.torsion, rel=0.01)
+    assert joint["bending"] == pytest.approx(0.9 * shell.joint.bending, rel=0.03)
     assert joint["axial"] == shell.joint.axial
     assert "axial was held" in result.stdout
     assert (

@@ -79,7 +79,7 @@ def test_planted_connector_stiffness_is_recovered_within_2_percent_from_42_shuff
         error = getattr(found.joint, name) / getattr(shell.joint, name) - 1.0
         assert abs(error) < 0.02
         assert abs(error) < 4.0 * deviation
-    assert found.residual == pytest.approx(NOISE, rel=0.1)
+    assert found.residual == pytest.approx(NOISE, rel=0.01)  # of this seed: 0.3 %
     # A strut of 2 mm is rigid along its axis whatever its EA: that is said, and its EA stays what it was.
     assert found.held == ("axial",)
     assert found.joint.axial == shell.joint.axial

@@ -1,6 +1,5 @@
 """Work side by side on the cores."""
 
-import os
 import threading
 
 import pytest
@@ -33,14 +32,14 @@ def test_an_error_in_one_item_is_raised(asked):
 
 def test_dense_algebra_within_the_block_runs_on_one_thread():
     import numpy as np
-    from threadpoolctl import threadpool_info
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def counts():
+        return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
 
     np.ones((4, 4)) @ np.ones((4, 4))
-    with threads.dense_on_one():
-        assert {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"} == {1}
-    if (
-        (os.cpu_count() or 1) > 1
-        and "OMP_NUM_THREADS" not in os.environ
-        and "OPENBLAS_NUM_THREADS" not in os.environ
-    ):
-        assert max(each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas") > 1
+    with threadpool_limits(2):  # whatever the machine and its environment say
+        assert counts() == {2}
+        with threads.dense_on_one():
+            assert counts() == {1}
+        assert counts() == {2}

@@ -205,7 +205,9 @@ def test_an_opening_stays_open_on_its_ring():
     assert shell.holes == 1
     rim = shell.vertices[shell.boundary[1]]
     assert rim[:, 2].min() > 2.5
-    assert np.hypot(rim[:, 0], rim[:, 1]).mean() == pytest.approx(0.8, abs=0.25)
+    assert np.hypot(rim[:, 0], rim[:, 1]).mean() == pytest.approx(
+        0.73, abs=0.01
+    )  # in compression, so that it draws in
 
 
 def test_a_load_of_the_plan_needs_no_rounds_and_gives_a_flatter_foot():
@@ -283,7 +285,7 @@ def test_the_thrust_shell_nearest_to_one_is_itself_and_to_a_dome_is_near():
     same = thrust_heights(dome.vertices[:, :2], dome.triangles, edge, rise=0.2)
     assert away < 0.5 * np.abs(same - dome.vertices[:, 2]).max()
     again = nearest_thrust_shell(near)
-    np.testing.assert_allclose(again.vertices, near.vertices, atol=0.2 * away)
+    np.testing.assert_allclose(again.vertices, near.vertices, atol=1e-3 * away)
     with pytest.raises(InputError, match="stands on the ground"):
         nearest_thrust_shell(dome, ground=-5.0)
 
@@ -294,8 +296,8 @@ def test_a_thrust_shell_written_as_cad_comes_back_within_a_thousandth(tmp_path, 
     off = cad.write_fitted(tmp_path / f"shell.{ending}", shell)
     assert 0.0 < off < 1e-3 * 10
     back = read_surface(tmp_path / f"shell.{ending}")
-    np.testing.assert_allclose(back.size, shell.size, atol=0.02)
-    assert back.area == pytest.approx(shell.area, rel=3e-3)
+    np.testing.assert_allclose(back.size, shell.size, atol=4e-3)
+    assert back.area == pytest.approx(shell.area, rel=1e-4)
 
 
 def test_what_one_b_spline_can_not_be_is_not_written(tmp_path):
