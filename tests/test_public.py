@@ -13,6 +13,7 @@ import pytest
 
 import shellform as sf
 from shellform import lazy
+from tests.test_readme import EXAMPLE
 
 ROOT = Path(__file__).parent.parent
 NAMES = sorted(lazy.homes("shellform"))
@@ -92,10 +93,19 @@ def checked(tmp_path_factory) -> list[str]:
     shown = [f"reveal_type(sf.{name})" for name in NAMES]
     shown += [f"reveal_type(sf.study.{name})" for name in sorted(lazy.homes("shellform.study"))]
     (folder / "shown.py").write_text("\n".join(["import shellform as sf", *shown]))
+    (folder / "example.py").write_text(EXAMPLE, encoding="utf-8")
     (folder / "wrong.py").write_text("import shellform as sf\nsf.Problems\nsf.Rod.round(young='stiff')\n")
     strict = [sys.executable, "-m", "mypy", "--strict", "--no-color-output"]
     told = subprocess.run(
-        [*strict, "--python-executable", environment / "bin/python", "script.py", "shown.py", "wrong.py"],
+        [
+            *strict,
+            "--python-executable",
+            environment / "bin/python",
+            "script.py",
+            "example.py",
+            "shown.py",
+            "wrong.py",
+        ],
         cwd=folder,
         env={name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "MYPYPATH")},
         capture_output=True,
@@ -106,8 +116,9 @@ def checked(tmp_path_factory) -> list[str]:
     return told.stdout.splitlines()
 
 
-def test_a_users_script_is_clean_under_strict_types(checked):
-    assert [line for line in checked if line.startswith("script.py")] == []
+@pytest.mark.parametrize("file", ["script.py", "example.py"])
+def test_a_user_s_script_and_the_readme_s_example_are_clean_under_strict_types(checked, file):
+    assert [line for line in checked if line.startswith(file)] == []
 
 
 def test_type_checkers_see_a_type_behind_every_public_name(checked):

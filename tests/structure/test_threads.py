@@ -39,7 +39,8 @@ def test_dense_algebra_within_the_block_runs_on_one_thread():
 
     np.ones((4, 4)) @ np.ones((4, 4))
     with threadpool_limits(2):  # whatever the machine and its environment say
-        assert counts() == {2}
+        before = counts()
+        assert 2 in before  # of a library built for one thread it stays 1
         with threads.dense_on_one():
             assert counts() == {1}
-        assert counts() == {2}
+        assert counts() == before
