@@ -35,8 +35,8 @@ FLOORS = {
         ["cli"],
     ],
     "shellform.surface": [
-        ["units", "shape"],
-        ["readers.draft", "readers.script"],
+        ["units", "shape", "bounded"],
+        ["readers.draft", "readers.script", "readers.nurbs"],
         ["readers.seams", "readers.sides"],
         ["readers.mend"],
         ["occ"],
