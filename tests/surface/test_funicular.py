@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial import Delaunay
 
 from shellform.errors import InputError, NotConverged
-from shellform.surface import cad, funicular
+from shellform.surface import bounded, cad, funicular
 from shellform.surface.funicular import (
     fitted_densities,
     force_density,
@@ -268,7 +268,7 @@ def test_no_density_falls_below_the_least_where_the_shape_asks_for_tension():
 
 
 def test_densities_that_do_not_settle_are_not_given_out(monkeypatch):
-    monkeypatch.setattr(funicular, "_ROUNDS", 2)
+    monkeypatch.setattr(bounded, "_ROUNDS", 2)
     plan, triangles, fixed = disc(4)
     shape = np.column_stack([plan, 1 - (plan**2).sum(axis=1)])
     loads = np.column_stack([np.zeros((len(plan), 2)), -np.ones(len(plan))])
