@@ -3,7 +3,7 @@
 Every limit holds under every load case, and those that matter before concrete comes also without load. The
 critical load factor F is kept by a load case "critical NAME", F times the load case, that every accepted
 design bears on its stable branch, its softest mode keeping a share of the initial design's stiffness under
-the design load (checks.py: Softness). Load steps can pass a bifurcation that is followed by stable states
+the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is followed by stable states
 again: in the end the paths are followed closely (`critical_factors`), and a design whose path ends before F
 isn't feasible.
 """
@@ -24,17 +24,20 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Scatter
 from shellform.net.grid import CONNECTOR
+from shellform.problem.constraints import AtMost, Constraint
 from shellform.problem.engineering import (
     ConnectorTurn,
     LargestCableForce,
+    LeastTension,
+    ModalStiffness,
     RodUtilisation,
-    Slackness,
-    Softness,
     Uplift,
 )
-from shellform.problem.problem import Problem, follow
+from shellform.problem.paths import follow
+from shellform.problem.problem import LoadCase, Problem
 from shellform.problem.robust import RobustMisfit
-from shellform.problem.terms import AtMost, CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
+from shellform.problem.terms import CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
+from shellform.problem.variables import FreeRadius, RestLengths, Variable
 from shellform.structure.answers import results
 from shellform.structure.answers.stability import critical_load, modes
 from shellform.structure.elements.state import State
@@ -58,20 +61,21 @@ def case_problem(
         (entry.misfit, Misfit("design")),
         (entry.cable_force, CableForce("design")),
     ]
+    variables = varied(case, shell, frees_radius=frees_radius)
     if frees_radius:
         shares.append((entry.rod_radius, RodRadius()))
-    robust = robust_misfit(case, loads)
+    robust = robust_misfit(case)
     if robust is not None:
         shares.append((entry.robust, robust))
     total = sum(share for share, _ in shares)
     others = [name for name in loads if name not in ("none", "design")]
-    limits = [AtMost(case.cable.force_max, CableForces("design"))]
+    constraints: list[Constraint] = [AtMost(case.cable.force_max, CableForces("design"))]
     for name in others:
-        limits.append(AtMost(entry.misfit_rms_additional, RmsMisfit(name)))
-        limits.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
-    limits += _engineers(case, shell, loads)
+        constraints.append(AtMost(entry.misfit_rms_additional, RmsMisfit(name)))
+        constraints.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
+    constraints += _engineers(case, shell, loads)
     if case.robust is not None and case.robust.limit is not None and robust is not None:
-        limits.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
+        constraints.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
     used = dict(loads)
     factor, critical = case.limits.critical_factor, []
     if factor is not None:
@@ -81,19 +85,35 @@ def case_problem(
         ):
             critical.append(f"critical {each}")
             used[critical[-1]] = factor * loads[each]
-            limits.append(AtMost(1.0, Softness(critical[-1], least)))
-    # The design load leads; its own critical case comes last, where thinning looks at what cables do against
-    # buckling.
-    order = ["design", "none", *others, *sorted(critical, key="critical design".__eq__)]
+            constraints.append(AtMost(1.0, ModalStiffness(critical[-1], least)))
+    order = ["none", *others, *sorted(critical, key="critical design".__eq__)]
     return Problem(
         shell,
-        {name: used[name] for name in order if name in used},
+        LoadCase("design", used["design"]),
         [Share(share / total, term) for share, term in shares if share > 0.0],
-        limits,
-        entry.rest_length_min,
-        entry.rest_length_max,
-        rod_bounds(case, shell),
+        constraints,
+        [LoadCase(name, used[name]) for name in order if name in used],
+        variables,
+        decisive=_decisive(others, critical),
     )
+
+
+def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[Variable]:
+    """The variables of a case: the rest lengths, and the rods' radius where it has a share of the objective
+    and isn't fixed."""
+    entry, bounds = case.optimise, rod_bounds(case, shell)
+    blocks: list[Variable] = [RestLengths(entry.rest_length_min, entry.rest_length_max)]
+    if frees_radius and entry.rod_radius > 0.0:
+        blocks.append(FreeRadius(*bounds) if bounds else FreeRadius())
+    return blocks
+
+
+def _decisive(others: Sequence[str], critical: Sequence[str]) -> str:
+    """Where thinning looks at what cables do against buckling: the design load's critical case, else another
+    critical one, else the last additional load, which a case lists by rising severity."""
+    if "critical design" in critical:
+        return "critical design"
+    return critical[-1] if critical else (others[-1] if others else "design")
 
 
 def scatter_of(entry: RobustEntry) -> Scatter:
@@ -101,29 +121,30 @@ def scatter_of(entry: RobustEntry) -> Scatter:
     return Scatter(**{each.name: getattr(entry, each.name) for each in fields(Scatter)})
 
 
-def robust_misfit(case: Case, loads: Mapping[str, Reals]) -> RobustMisfit | None:
+def robust_misfit(case: Case) -> RobustMisfit | None:
     """The robust misfit of the case under the design load, if it has one."""
     if case.robust is None:
         return None
-    return RobustMisfit("design", loads["design"], scatter_of(case.robust), case.robust.deviations)
+    return RobustMisfit("design", scatter_of(case.robust), case.robust.deviations)
 
 
-def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[AtMost]:
+def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[Constraint]:
     """The limits on rods, connectors, supports and slack cables."""
-    entry, found = case.limits, []
-    for name, load in loads.items():
+    entry = case.limits
+    found: list[Constraint] = []
+    for name in loads:
         if entry.utilisation is not None:
             found.append(AtMost(entry.utilisation, RodUtilisation(name)))
         if entry.connector_turn is not None:
             found.append(AtMost(entry.connector_turn, ConnectorTurn(name)))
         if entry.uplift is not None:
             offset = max(entry.uplift, -float(loads["design"][:, 2].sum()) / len(shell.net.supports))
-            found.append(AtMost(offset + entry.uplift, Uplift(name, load, offset)))
+            found.append(AtMost(offset + entry.uplift, Uplift(name, offset)))
     if entry.slack_min is not None:
         longest = case.cable.rest_ratio * case.optimise.rest_length_max
         let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
         for name in _known("limits.slack_loads", entry.slack_loads, list(loads)):
-            found.append(AtMost(1.0, Slackness(name, entry.slack_min, let_out)))
+            found.append(AtMost(1.0, LeastTension(name, entry.slack_min, let_out)))
     return found
 
 

@@ -2,7 +2,7 @@
 
 A symmetry is a mirror or a half turn of the plan about the middle of the joints under which every candidate
 cable lies on another one. Cables that symmetries join are a group, of which every member gets the same rest
-length (`mma.polish` with `groups`).
+length (`sf.polish` with `groups`).
 
 Turnbuckles take up what lengths differ within a group. With a range of adjustment w, cables can be cut to the
 length L where all their rest lengths lie in [L, L + w]; walking up the sorted rest lengths and starting anew

@@ -1,7 +1,7 @@
 """The same design problem for other optimisers: plain functions of its variables, and SciPy's two for smooth
 constrained problems.
 
-What mma.py does with models in the cables' tensions, SciPy's methods do with values and gradients in the rest
+What step_model.py does with models in the cables' tensions, SciPy's methods do with values and gradients in the rest
 lengths alone, which tells what the models are worth. SLSQP (Kraft 1988) solves a sequence of quadratic
 problems, each with a line search; trust-constr is an interior point method in a trust region (Byrd, Hribar
 and Nocedal 1999). Both build their curvature from gradients.
@@ -14,7 +14,7 @@ accepted that one isn't told, but it is on the stable branch.
 SciPy can't be led to a load by stages: the start must bear all loads.
 
 Measured on a gridshell of 28 candidate cables and 714 degrees of freedom, misfit and cable forces with shares
-of 0.9 and 0.1 (evaluations to the end): mma.optimise 0.4361 (8), SLSQP 0.4360 (119), trust-constr 0.4360
+of 0.9 and 0.1 (evaluations to the end): optimise 0.4361 (8), SLSQP 0.4360 (119), trust-constr 0.4360
 (79); with cable forces limited and the limit active 0.4461 (7), 0.4588 (90), 0.4457 (26). Where a cable goes
 slack the objective has a kink in its rest length, at which SLSQP stops early.
 """
@@ -31,38 +31,30 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
-from shellform.problem.problem import (
-    FEASIBLE,
-    Evaluator,
-    OffBranch,
-    Point,
-    Problem,
-    follow,
-    not_carried,
-    without_slack,
-)
+from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch, not_carried
+from shellform.problem.paths import follow, without_slack
+from shellform.problem.problem import FEASIBLE, Problem
 from shellform.structure.solve.loading import Loaded
 
 METHODS = ("trust-constr", "SLSQP")
 _KEPT = 12  # points on the branch that are remembered as starts: the last ones and the best
-# SciPy's unit, in the variables: a fifth of the usual prestrain, as mma.py's first window is of the tension
+# SciPy's unit, in the variables: a fifth of the usual prestrain, as the first window of `optimise` is of the tension
 _STEP = 2e-3
 _INSIDE = 1e-6  # of the bounds' distance that an interior point starts away from them
 
 
 class Plain:
-    """A problem as plain functions of its variables (s,): rest lengths over lengths in the target, then the
-    rods' radius over the start's where it is free. `start` (s,); `points`, the designs on the stable branch
+    """A problem as plain functions of its variables (s,), values over their unit. `start` (s,); `points`, the designs on the stable branch
     evaluated last; `history`, all of them."""
 
     def __init__(self, problem: Problem, start: Design) -> None:
         """Loads the start; raises NotConverged where it doesn't bear all loads."""
         self.evaluator = Evaluator(problem, start)
         reached = self.evaluator.begin()
-        for name in self.evaluator.used():
+        for name in problem.used():
             if not reached[name].on_branch:
-                raise not_carried(name, reached[name], "Lead it there by stages: mma.optimise.")
-        states = {name: reached[name].equilibrium.state for name in self.evaluator.used()}
+                raise not_carried(name, reached[name], "Lead it there by stages: optimise.")
+        states = {name: reached[name].equilibrium.state for name in problem.used()}
         point = self.evaluator.seed(start, states, 1.0)
         self.start = point.variables
         self.points = [point]
@@ -72,7 +64,7 @@ class Plain:
 
     def bounds(self) -> tuple[Reals, Reals]:
         """Lower and upper bounds (s,) (3, 4)."""
-        return self.evaluator.bounds()
+        return self.evaluator.blocks.bounds()
 
     def value(self, variables: Reals) -> float:
         """The objective (2), 1 at the start; infinite off the stable branch."""
@@ -91,13 +83,14 @@ class Plain:
         """Derivatives (k, s) of the constraints."""
         return self._evaluated(variables)[0].constraints_by_variables
 
-    def _evaluated(self, variables: Reals) -> tuple[Point, bool]:
+    def _evaluated(self, variables: Reals) -> tuple[Linearisation, bool]:
         """The point at the variables and True, or the nearest one on the branch and False."""
         key = variables.tobytes()
         if self._at[0] != key:
             near = min(self.points, key=lambda point: float(np.linalg.norm(point.variables - variables)))
             try:
-                point, there = self.evaluator.evaluate(np.array(variables), near.states, 1.0, lead=True), True
+                design = self.evaluator.blocks.design(np.array(variables), near.design.present)
+                point, there = self.evaluator.evaluate(design, near.states, 1.0, lead=True), True
             except OffBranch:
                 point, there = near, False
             if there:
@@ -105,7 +98,7 @@ class Plain:
             self._at = (key, point, there)
         return self._at[1], self._at[2]
 
-    def _remember(self, point: Point) -> None:
+    def _remember(self, point: Linearisation) -> None:
         self.history.append((self.evaluator.evaluations, point.objective, violation(point)))
         if _rank(point) < _rank(self.best):
             self.best = point
@@ -149,8 +142,8 @@ def compare(
     """SciPy's optimum of the problem from the start, within a number of design `evaluations`.
 
     `tolerance`: of the objective for SLSQP; of the gradient, the trust region and the barrier for
-    trust-constr. For the same problem from mma.optimise give it `stiffness=0`, `thin=False`: both add to the
-    problem. Raises InputError for another method and NotConverged where the start doesn't bear all loads.
+    trust-constr. For the same problem from optimise give its solver `stiffness=0`, `thin=False`: both add to
+    the problem. Raises InputError for another method and NotConverged where the start doesn't bear all loads.
     """
     if method not in METHODS:
         raise InputError(
@@ -172,7 +165,7 @@ def compare(
     except _Enough:
         status = "the number of evaluations was reached"
     shell, best, evaluator = problem.shell, plain.best, plain.evaluator
-    design = without_slack(shell, best.design, best.states[next(iter(problem.loads))])
+    design = without_slack(shell, best.design, best.states[problem.design_load.name])
     none = np.zeros((shell.node_count, 6))
     return Compared(
         method,
@@ -188,12 +181,12 @@ def compare(
     )
 
 
-def violation(point: Point) -> float:
+def violation(point: Linearisation) -> float:
     """By how much the worst constraint is violated, over its limit; 0 where all are met."""
     return max(float(point.constraints.max(initial=0.0)), 0.0)
 
 
-def _rank(point: Point) -> tuple[float, float]:
+def _rank(point: Linearisation) -> tuple[float, float]:
     """Feasible designs by their objective, before the others by their violation."""
     beyond = violation(point)
     return (0.0, point.objective) if beyond <= FEASIBLE else (beyond, point.objective)

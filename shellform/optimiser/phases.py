@@ -1,7 +1,8 @@
-"""The phases of a search: rounds of proposal (proposal.py), trial and judgement (search.py).
+"""The phases of a search, each from an iterate to an iterate: rounds of proposal (proposal.py), trial
+(trials.py) and judgement (state.py).
 
-Climbing, where the start doesn't bear the additional loads; descending, by the objective; thinning, which
-takes cables away.
+Climbing, where the start doesn't bear the further loads; descending, by the objective; thinning, which takes
+cables away.
 """
 
 from __future__ import annotations
@@ -10,221 +11,214 @@ from dataclasses import replace
 
 import numpy as np
 
-from shellform.arrays import Flags, Indices
-from shellform.optimiser.optimum import Optimum
+from shellform.arrays import Indices
 from shellform.optimiser.proposal import propose
-from shellform.optimiser.search import Search, Track
-from shellform.optimiser.tensions import TensionModel
-from shellform.optimiser.thinning import kept_stiffness, spared
-from shellform.problem.problem import Point
+from shellform.optimiser.state import Iterate, Search, in_tension, merit, noted, tell, violation
+from shellform.optimiser.step_model import StepModel
+from shellform.optimiser.thinning import kept_stiffness, removable
+from shellform.optimiser.trials import accepted, attempt, attempt_without, reach, sound, staged, task
+from shellform.problem.evaluation import Linearisation
 
-_GROW, _SHRINK = 1.6, 0.4
-_GOOD, _POOR = 0.7, 0.3  # true over predicted improvement
-_SETTLED = 1e-3  # relative improvement predicted for the largest window that ends the optimisation
-_FAILURES = 6  # single cables in a row that can't be taken away, after which thinning ends
-_BATCHES = 8  # share of the taut cables that the first batch takes, one in so many
-_KEPT = 0.4  # of the stiffness in any direction, at the additional load, that must be left without a batch
-_THINNING = 1.5  # of the objective that cables with little use may cost
-_IDLE = 0.2  # of the cables in a search that may be slack under all loads before they are left out of it
-_REPAIRS = 2  # steps after each batch
+_TINY = -1e-300  # a predicted change that isn't one
 
 
-def run(search: Search, evaluations: int, *, thin: bool) -> Optimum:
-    """First the branch up to the additional loads, then the objective alone, then thinning."""
-    search.most = evaluations
-    if search.track.phase == "climb":
-        _climb(search)
-        search.track = replace(search.track, phase="descend")
-    if search.track.phase == "descend":
-        _descend(search)
-        while search.accepted:
-            sound = search.sound(search.accepted[-1])
-            if sound is not None:
-                search.accepted[-1] = search.point = sound
-                break
-            search.accepted.pop()
-        if search.accepted and thin:
-            _begin_thinning(search)
-    if search.track.phase == "thin":
-        _thin(search)
-    return search.finish()
+def run(search: Search, it: Iterate) -> Iterate:
+    """First the branch up to the further loads, then the objective alone, then thinning."""
+    if it.phase == "climb":
+        it = replace(_climb(search, it), phase="descend")
+    if it.phase == "descend":
+        it = _last_sound(search, _descend(search, it))
+        each_cable = any(block.of_each_cable for block in search.problem.variables)
+        if it.accepted and search.solver.thin and each_cable:
+            it = _ready_to_thin(search, it)
+    if it.phase == "thin":
+        it = _thin(search, it)
+    return it
 
 
-def _climb(search: Search) -> None:
+def _last_sound(search: Search, it: Iterate) -> Iterate:
+    """Back to the last accepted design that its documented path leads to."""
+    while it.accepted:
+        found = sound(search, it.accepted[-1])
+        if found is not None:
+            return replace(it, accepted=(*it.accepted[:-1], found), point=found)
+        it = replace(it, accepted=it.accepted[:-1])
+    return it
+
+
+def _climb(search: Search, it: Iterate) -> Iterate:
     """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the
-    additional loads are borne whole.
+    further loads are borne whole.
 
-    Each goes along the gradient of the limits on it, with all cables kept taut; it counts where the stable
+    Each goes along the gradient of the constraints on it, with all cables kept taut; it counts where the stable
     branch reaches farther.
     """
-    if search.stage == 1.0 or search.least == 0.0:
-        return
-    search.guarded = search.climbing = True
-    while search.stage < 1.0 and search.left() > 0 and search.window > search.smallest * search.tension:
-        search.tell()
-        model = search.model()
-        y, _ = propose(search.task(model))
-        trial = search.attempt(model, y)
-        stage = 0.0 if trial is None else search.reach(trial.design, trial.states[search.base], 0.0)
-        if trial is None or stage <= search.stage:
-            search.window *= _SHRINK
-            search.note(trial or search.point, False)
+    if it.stage == 1.0 or not any(part.term.stabilises for part in search.evaluator.problem.constraints):
+        return it
+    evaluator, base = search.evaluator, search.base
+    it = replace(it, guarded=True, climbing=True)
+    while it.stage < 1.0 and search.left() > 0 and it.window > search.solver.smallest * search.tension:
+        tell(search, it)
+        model = search.models.at(it.point)
+        y, _ = propose(task(search, it, model))
+        trial, it = attempt(search, it, model, y)
+        stage = 0.0 if trial is None else reach(evaluator, trial.design, trial.states[base], 0.0, it.margin)
+        if trial is None or stage <= it.stage:
+            it = replace(it, window=it.window * search.solver.shrink)
+            it = noted(search, it, trial or it.point, False)
             continue
-        search.stage = stage
-        search.point = search.evaluator.seed(
-            trial.design, search.staged(trial.design, trial.states[search.base], stage), stage
-        )
-        search.accepted.append(search.point)
-        search.note(search.point, True)
-    search.window, search.guarded, search.climbing = search.track.first, search.always_guarded, False
+        states = staged(evaluator, trial.design, trial.states[base], stage)
+        point = evaluator.seed(trial.design, states, stage)
+        it = replace(it, stage=stage, point=point, accepted=(*it.accepted, point))
+        it = noted(search, it, point, True)
+    return replace(it, window=search.first_window, guarded=search.always_guarded, climbing=False)
 
 
-def _descend(search: Search) -> None:
+def _descend(search: Search, it: Iterate) -> Iterate:
     """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none
     may; and so in turns as long as a turn improves the objective."""
-    track = search.track
+    solver = search.solver
     while search.left() > 0:
-        search.track = track
-        search.tell()
-        model = search.model()
-        y, predicted = propose(search.task(model))
-        settled = _settled(search, predicted)
-        if settled:
-            search.status = settled
-            turned = search.guarded and search.point.objective > (1.0 - _SETTLED) * track.before
-            if (
-                search.always_guarded or turned or len(search.evaluator.used()) == 1
-            ):  # without additional loads there are no guards
-                return
-            track = replace(track, before=search.point.objective if search.guarded else track.before)
-            search.guarded, search.window = not search.guarded, track.first
+        tell(search, it)
+        model = search.models.at(it.point)
+        y, predicted = propose(task(search, it, model))
+        status = _settled(search, it, predicted)
+        if status:
+            it = replace(it, status=status)
+            turned = it.guarded and it.point.objective > (1.0 - solver.settled) * it.before
+            # without further loads there are no guards
+            if search.always_guarded or turned or len(search.evaluator.problem.used()) == 1:
+                return it
+            before = it.point.objective if it.guarded else it.before
+            it = replace(it, before=before, guarded=not it.guarded, window=search.first_window)
             continue
-        trial = search.attempt(model, y)
-        if trial is None or search.merit(trial) >= search.merit(search.point):
-            search.window *= _SHRINK
-            track = replace(track, refused=True)
-            search.note(trial or search.point, False)
+        trial, it = attempt(search, it, model, y)
+        if trial is None or merit(search, trial) >= merit(search, it.point):
+            it = replace(it, window=it.window * solver.shrink, refused=True)
+            it = noted(search, it, trial or it.point, False)
             continue
-        ratio = (trial.objective - search.point.objective) / min(predicted, -1e-300)
-        grown = 1.0 if track.refused else _GROW  # a window that was just refused isn't tried again at once
-        search.window *= grown if ratio > _GOOD else (_SHRINK if ratio < _POOR else 1.0)
-        track = replace(track, refused=False)
-        search.accept(trial)
+        ratio = (trial.objective - it.point.objective) / min(predicted, _TINY)
+        grown = 1.0 if it.refused else solver.grow  # a window that was just refused isn't tried again at once
+        factor = grown if ratio > solver.good else (solver.shrink if ratio < solver.poor else 1.0)
+        it = accepted(search, replace(it, window=it.window * factor, refused=False), trial)
+    return it
 
 
-def _settled(search: Search, predicted: float) -> str:
+def _settled(search: Search, it: Iterate, predicted: float) -> str:
     """The criterion of convergence that the point meets, in words; empty where none is met."""
-    if search.stage < 1.0 or search.violation(search.point) > 0.0:
+    solver = search.solver
+    if it.stage < 1.0 or violation(search, it.point) > 0.0:
         return ""
-    if -predicted < _SETTLED * search.point.objective and search.window >= search.tension:
-        return f"the model predicts less than {_SETTLED:.1%} improvement"
-    if search.window < search.smallest * search.tension:
+    if -predicted < solver.settled * it.point.objective and it.window >= search.tension:
+        return f"the model predicts less than {solver.settled:.1%} improvement"
+    if it.window < solver.smallest * search.tension:
         return "the objective has no better design within the smallest window"
     return ""
 
 
-def _begin_thinning(search: Search) -> None:
-    search.window = max(search.window, 0.1 * search.tension)
-    search.guarded = True
-    search.track = replace(
-        search.track,
+def _ready_to_thin(search: Search, it: Iterate) -> Iterate:
+    solver = search.solver
+    return replace(
+        it,
+        window=max(it.window, 0.1 * search.tension),
+        guarded=True,
         phase="thin",
-        thrifty=_THINNING * search.point.objective,
-        batch=max(1, search.taut(search.point) // _BATCHES),
-        needed=np.zeros(len(search.braces), dtype=bool),
+        thrifty=solver.thrift * it.point.objective,
+        batch=max(1, in_tension(search, it.point) // solver.batch),
+        needed=np.zeros(len(it.tensioned), dtype=bool),
     )
 
 
-def _thin(search: Search) -> None:
-    """Takes away cables that the shell can spare (thinning.py), in batches, and lets the others make up for
-    them.
+def _thin(search: Search, it: Iterate) -> Iterate:
+    """Takes away cables that the shell can do without (thinning.py), in batches, and lets the others make up
+    for them.
 
     Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or
     that costs too much of the objective, is cut; a single cable that can't go is kept for good.
     """
-    track = search.track
-    while track.failures < _FAILURES and search.left() > 0:
-        search.track = _without_slack(search, track)
-        track = search.track
-        search.tell()
-        over = search.most_cables is not None and search.taut(search.point) > search.most_cables
-        budget = np.inf if over else track.thrifty
-        model = search.model()
-        leaving = _spared(search, model, track.needed, track.batch)
+    solver = search.solver
+    most = solver.most_cables
+    while it.failures < solver.failures and search.left() > 0:
+        it = _without_slack(search, it)
+        tell(search, it)
+        over = most is not None and in_tension(search, it.point) > most
+        budget = np.inf if over else it.thrifty
+        model = search.models.at(it.point)
+        leaving = _leaving(search, it, model)
         if not len(leaving):
-            search.status += ", and every cable that is left is needed for stability"
-            return
-        search.braces = model.origin[: len(search.braces)] > 0.0
-        search.braces[leaving] = False
-        trial = search.attempt_without(model, leaving)
-        if (
-            trial is not None and trial.objective < 2.0 * budget
-        ):  # limits that it breaks are the repair's business
-            trial = _repair(search, trial, budget)
-        fits = trial is not None and search.merit(trial) <= budget and search.violation(trial) <= 0.0
-        sound = search.sound(trial) if trial is not None and fits else None
-        if sound is None:
-            search.note(trial or search.point, False)
+            return replace(it, status=f"{it.status}, and every cable that is left is needed for stability")
+        tensioned = model.origin[: len(it.tensioned)] > 0.0
+        tensioned[leaving] = False
+        it = replace(it, tensioned=tensioned)
+        trial = attempt_without(search, it, model, leaving)
+        # constraints that it breaks are the repair's business
+        if trial is not None and trial.objective < 2.0 * budget:
+            trial, it = _repaired(search, it, trial)
+        fits = trial is not None and merit(search, trial) <= budget and violation(search, trial) <= 0.0
+        found = sound(search, trial) if trial is not None and fits else None
+        if found is None:
+            it = noted(search, it, trial or it.point, False)
             alone = len(leaving) == 1
-            needed = track.needed.copy()
+            needed = it.needed.copy()
             needed[leaving] = alone
-            track = replace(
-                track, needed=needed, failures=track.failures + alone, batch=max(1, len(leaving) // 3)
-            )
+            it = replace(it, needed=needed, failures=it.failures + alone, batch=max(1, len(leaving) // 3))
             continue
-        search.accept(sound)
-        track = replace(track, failures=0, batch=int(1.3 * track.batch) + 1)
-    done = track.failures >= _FAILURES
-    search.status += (
+        it = accepted(search, it, found)
+        it = replace(it, failures=0, batch=int(1.3 * it.batch) + 1)
+    status = it.status + (
         ", and no further cable can be taken away"
-        if done
+        if it.failures >= solver.failures
         else ", and thinning ended with the last evaluation"
     )
-    if search.most_cables is not None and search.taut(search.point) > search.most_cables:
-        search.status += f"; no design with {search.most_cables} cables was found that keeps every limit"
+    if most is not None and in_tension(search, it.point) > most:
+        status += f"; no design with {most} cables was found that keeps every limit"
+    return replace(it, status=status)
 
 
-def _without_slack(search: Search, track: Track) -> Track:
+def _without_slack(search: Search, it: Iterate) -> Iterate:
     """Leaves cables out of the search that are slack under all loads, once they are many: a model solves for
     every cable in it.
     """
-    design, cables = search.point.design, search.problem.shell.cables(search.point.design)
-    pulls = np.array([cables.tension(state) for state in search.point.states.values()])
+    design, cables = it.point.design, search.problem.shell.cables(it.point.design)
+    pulls = np.array([cables.tension(state) for state in it.point.states.values()])
     kept = (pulls > 0.0).any(axis=0)
-    if kept.mean() > 1.0 - _IDLE:
-        return track
+    if kept.mean() > 1.0 - search.solver.idle:
+        return it
     present = design.present.copy()
     present[np.flatnonzero(present)[~kept]] = False
-    search.evaluator.start = replace(search.evaluator.start, present=present)
-    search.braces = search.braces[kept]
-    search.point = search.evaluator.seed(replace(design, present=present), search.point.states, search.stage)
-    search.accepted[-1] = search.point
-    return replace(track, needed=track.needed[kept])
+    point = search.evaluator.seed(replace(design, present=present), it.point.states, it.stage)
+    return replace(
+        it,
+        point=point,
+        accepted=(*it.accepted[:-1], point),
+        tensioned=it.tensioned[kept],
+        needed=it.needed[kept],
+    )
 
 
-def _repair(search: Search, point: Point, budget: float) -> Point:
-    """A few steps with the cables that are left, none of which may go slack."""
-    before, search.point = search.point, point
-    for _ in range(min(_REPAIRS, search.left())):
-        model = search.model()
-        y, _ = propose(search.task(model))
-        trial = search.attempt(model, y)
-        if trial is None or search.merit(trial) >= search.merit(search.point):
-            search.window *= _SHRINK
+def _repaired(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation, Iterate]:
+    """A few steps from the trial with the cables that are left, none of which may go slack; and the iterate
+    with the window and the curvature that they found."""
+    solver, point = search.solver, it.point
+    it = replace(it, point=trial)
+    for _ in range(min(solver.repairs, search.left())):
+        model = search.models.at(it.point)
+        y, _ = propose(task(search, it, model))
+        better, it = attempt(search, it, model, y)
+        if better is None or merit(search, better) >= merit(search, it.point):
+            it = replace(it, window=it.window * solver.shrink)
         else:
-            search.window *= _GROW
-            search.point = trial
-    search.window = float(np.clip(search.window, 0.05 * search.tension, search.tension))
-    best, search.point = search.point, before
-    return best
+            it = replace(it, window=it.window * solver.grow, point=better)
+    window = float(np.clip(it.window, 0.05 * search.tension, search.tension))
+    return it.point, replace(it, point=point, window=window)
 
 
-def _spared(search: Search, model: TensionModel, needed: Flags, most: int) -> Indices:
+def _leaving(search: Search, it: Iterate, model: StepModel) -> Indices:
     """Taut cables, numbered among those present, that can go at once, from the one with the least use."""
-    state = search.point.states[search.evaluator.used()[-1]]
-    kept = kept_stiffness(model.assembly, state, search.problem.shell.cables(search.point.design))
+    state = it.point.states[search.evaluator.problem.decisive_load()]
+    kept = kept_stiffness(model.assembly, state, search.problem.shell.cables(it.point.design))
     loss = 1.0 - np.diag(kept)
     pull = model.origin[: len(loss)]
     score = loss / loss.sum() + pull / pull.sum()
-    free = np.flatnonzero((pull > 0.0) & ~needed)
-    return spared(kept, free[np.argsort(score[free], kind="stable")], most, _KEPT)
+    free = np.flatnonzero((pull > 0.0) & ~it.needed)
+    return removable(kept, free[np.argsort(score[free], kind="stable")], it.batch, search.solver.kept)

@@ -14,20 +14,25 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.catalogue import Catalogue, label, neighbours, rounded_up
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import ROD
-from shellform.optimiser import solver
+from shellform.optimiser.optimise import optimise
 from shellform.optimiser.optimum import Optimum
-from shellform.problem.problem import Problem, deviations, follow
+from shellform.optimiser.solver import SequentialConvex
+from shellform.problem.evaluation import start_weights
+from shellform.problem.paths import deviations, follow
+from shellform.problem.problem import FEASIBLE, Problem
+from shellform.problem.terms import LoadedDesign, measured
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.network import assemble
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidateSection:
     """A section of the catalogue: the `shell` with it and its `optimum` (None where none was found); the
     `objective` of the free problem, distances `deviation_max` and `deviation_mean`, m, from the target and
     stress `utilisation` under the design load, `cables`, the rods' `mass`, kg; `why` it isn't feasible, empty
@@ -76,7 +81,7 @@ def tried(
     beside: int,
     most_cables: int | None = None,
     progress: Callable[[str], None] = lambda text: None,
-) -> list[Trial]:
+) -> list[CandidateSection]:
     """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness,
     each with its cables optimised.
 
@@ -84,12 +89,9 @@ def tried(
     section. Raises InputError where no section that the net allows is stiff enough.
     """
     shell = best.problem.shell
-    base = next(iter(best.problem.loads))
-    first = follow(shell, start, {base: best.problem.loads[base]})[base].equilibrium.state
-    weights = [
-        share.share / max(float(share.term.measure(shell, start, first).value[0]), 1e-300)
-        for share in best.problem.minimise
-    ]
+    needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}
+    loads = {name: load for name, load in best.problem.loads.items() if name in needed}
+    weights = start_weights(best.problem, start, follow(shell, start, loads, stay=len(loads) > 1))
     up = rounded_up(shell, best.design, catalogue)[0].rod.section
     found = []
     for other, design in neighbours(shell, best.design, catalogue, count=beside):
@@ -98,11 +100,11 @@ def tried(
         optimum, why = _optimised(
             problem_of(other), [design, _whole(start, design)], best.stiffness, evaluations, most_cables
         )
-        found.append(_trial(name, other, optimum, why, weights, best.problem, other.rod.section == up))
+        found.append(_candidate(name, other, optimum, why, weights, best.problem, other.rod.section == up))
     return found
 
 
-def chosen(trials: Sequence[Trial]) -> Trial | None:
+def chosen(trials: Sequence[CandidateSection]) -> CandidateSection | None:
     """The rounded-up section if it is feasible, else the feasible one with the least objective, else the
     rounded-up one; None without any optimum.
     """
@@ -113,7 +115,7 @@ def chosen(trials: Sequence[Trial]) -> Trial | None:
     return min(feasible, key=lambda each: each.objective)
 
 
-def table(trials: Sequence[Trial]) -> str:
+def table(trials: Sequence[CandidateSection]) -> str:
     """The content of sections.csv."""
     text = io.StringIO()
     rows = [each.row() for each in trials]
@@ -142,13 +144,8 @@ def _optimised(
     optimum, why = None, ""
     for start in starts:
         try:
-            found = solver.optimise(
-                problem,
-                start,
-                evaluations=evaluations,
-                stiffness=_share(problem, start, least),
-                most_cables=most_cables,
-            )
+            solver = SequentialConvex(stiffness=_share(problem, start, least), most_cables=most_cables)
+            found = optimise(problem, start, solver=solver, evaluations=evaluations)
         except NotConverged as error:
             why = why or error.what
             continue
@@ -161,15 +158,15 @@ def _optimised(
 def broken(optimum: Optimum) -> str:
     """The limits that the optimum doesn't keep, in words; empty where it keeps all."""
     lost = [name for name in optimum.problem.loads if not optimum.loaded[name].on_branch]
-    over = [f"{name} {value:+.1%}" for name, value in optimum.constraints.items() if value > solver.FEASIBLE]
+    over = [f"{name} {value:+.1%}" for name, value in optimum.constraints.items() if value > FEASIBLE]
     said = [f"not stable under {', '.join(lost)}"] if lost else []
     return "; ".join(said + ([f"over its limit: {', '.join(over)}"] if over else []))
 
 
 def _share(problem: Problem, start: Design, least: float) -> float:
-    """`least`, N/m, as a share of the start's softest mode under the base load."""
-    name, load = next(iter(problem.loads.items()))
-    reached = follow(problem.shell, start, {name: load}, stay=True)[name]
+    """`least`, N/m, as a share of the start's softest mode under the design load."""
+    name = problem.design_load.name
+    reached = follow(problem.shell, start, {name: problem.design_load.force}, stay=True)[name]
     softest = (
         modes(assemble(problem.shell.network(start)), reached.equilibrium.state, 1).stiffness[0]
         if reached.on_branch
@@ -178,25 +175,28 @@ def _share(problem: Problem, start: Design, least: float) -> float:
     return float(least / softest) if softest > 0.0 else 0.0
 
 
-def _trial(
+def _candidate(
     name: str,
     shell: Gridshell,
     optimum: Optimum | None,
     why: str,
-    weights: Sequence[float],
+    weights: Reals,
     problem: Problem,
     up: bool,
-) -> Trial:
+) -> CandidateSection:
     nothing = float("nan")
     if optimum is None:
-        return Trial(name, shell, None, nothing, nothing, nothing, 0, nothing, rods_mass(shell), why, up)
-    base = next(iter(problem.loads))
+        return CandidateSection(
+            name, shell, None, nothing, nothing, nothing, 0, nothing, rods_mass(shell), why, up
+        )
+    base = problem.design_load.name
     state = optimum.states[base]
     away = deviations(shell, state)
-    objective = sum(
-        weight * float(part.term.measure(shell, optimum.design, state).value[0])
-        for weight, part in zip(weights, problem.minimise, strict=True)
-    )
+    objective = 0.0
+    for weight, part in zip(weights, problem.minimise, strict=True):
+        name_of_load = part.term.load or base
+        at = LoadedDesign(shell, optimum.design, optimum.states[name_of_load], problem.loads[name_of_load])
+        objective += weight * float(measured(part.term, at).value.sum())
     used = float(shell.utilisation(optimum.design, state).max())
     if used > 1.0:
         why = "; ".join(
@@ -205,7 +205,7 @@ def _trial(
                 f"the rods are used to {used:.0%} of their strength under the {base} load",
             ]
         )
-    return Trial(
+    return CandidateSection(
         name,
         shell,
         optimum,

@@ -1,128 +1,129 @@
-"""Optimising a gridshell with the method of moving asymptotes (operation 3; Svanberg 1987, 2002).
+"""The optimiser's settings: sequential convex programming in a trust region.
 
-MMA replaces the problem by a sequence of convex ones that are solved exactly. Its own separable approximation
-knows nothing of how cables work together, and in the rest lengths it is kinked where a cable goes slack: on a
-prestressed gridshell its first trials snap the shell through and its later ones hardly move (README, "What
-was tried"). Here each convex problem is the model in tensions (tensions.py), exact in first order and with
-the misfit's Gauss-Newton curvature; NLopt's MMA solves it within a window round the present design
-(proposal.py), and the trial is then evaluated by its true equilibria (search.py, phases.py):
-
-- it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
-- a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
-- under the additional loads no mode may become softer than a share of what the softest one has at the start under the first load
-  (checks.py: Softness): deviations don't see buckling coming, its stiffness does, and designs keep away from the end of their branch;
-- a start that doesn't bear the additional loads climbs first: steps along the gradient of that stiffness carry its stable branch up to them;
-- where no better design is found cables are kept taut under the additional loads (guard.py), and free again in turns;
-- then cables that the shell can spare are taken away in batches, the others kept taut.
-
-The search ends where the model predicts less than 0.1 % improvement in its largest window, where the smallest
-window has no better design, or where the evaluations are used up, and thinning after six single cables in a
-row that can't go; the status says which it was. At the end the cables without tension are taken away and the
-design is loaded along the documented path (loading.py); if it should not bear all loads there, the last
-accepted design that does is returned.
+Each round replaces the problem by a convex model round the present design (step_model.py), exact in first
+order and with Gauss-Newton curvature, solves it within a window, and evaluates the trial by its true
+equilibria. Where no constraint asks for many rows NLopt's MMA solves the model, else CVXOPT's interior-point
+method (proposal.py).
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, fields
 
 import numpy as np
 
-from shellform.arrays import Indices
-from shellform.gridshell.gridshell import Design
-from shellform.gridshell.grouping import averaged
-from shellform.optimiser.convex import minimise
-from shellform.optimiser.optimum import Checkpoint, Optimum, Step
-from shellform.optimiser.phases import run
-from shellform.optimiser.search import Keep, Search, Watch
-from shellform.problem.problem import FEASIBLE, Problem
-from shellform.problem.terms import Misfit, Share
-from shellform.structure.elements.threads import dense_on_one
-
-__all__ = ["FEASIBLE", "Checkpoint", "Optimum", "Step", "minimise", "optimise", "polish"]
-
-WINDOW = 0.2  # first half-width, in mean tensions of the start
-STIFFNESS = 0.08  # of the start's softest mode under the first load, kept under the additional ones
-_POLISHED = 0.8  # of that, which polishing may use up
-POLISHING = 20  # design evaluations
-_FINEST = 0.003  # window of polishing, in mean tensions, at which no better design is to be found
+from shellform.errors import InputError
 
 
-def optimise(
-    problem: Problem,
-    start: Design,
-    *,
-    evaluations: int = 100,
-    window: float = WINDOW,
-    thin: bool = True,
-    stiffness: float = STIFFNESS,
-    most_cables: int | None = None,
-    progress: Watch | None = None,
-    keep: Keep | None = None,
-    resume: Checkpoint | None = None,
-) -> Optimum:
-    """The best design found from `start` within a number of design `evaluations`.
+@dataclass(frozen=True)
+class SequentialConvex:
+    """Settings of `optimise` and `polish`. Windows and tensions are in mean cable tensions of the start under
+    the design load.
 
-    `window`: half-width of the first step, in mean cable tensions; `thin`: whether cables that do little are
-    taken away at the end; `stiffness`: what the softest mode must keep under the additional loads, as a share
-    of the start's under the first (0: nothing); `most_cables`: down to so many cables are taken away whatever
-    they do for the objective, as long as every limit is kept; `progress(step)` is called at each trial,
-    `keep(checkpoint)` before each: with `resume` the same call goes on from there to the same result.
+    What to choose:
+    - `window`: half-width of the first step.
+    - `thin`: whether cables that do little are taken away at the end.
+    - `stiffness`: what the softest mode must keep under the further loads, as a share of the start's under
+      the design load (0: nothing). Deviations don't see buckling coming, its stiffness does.
+    - `most_cables`: down to so many cables are taken away whatever they do for the objective, as long as
+      every constraint is kept.
 
-    Raises NotConverged where the start doesn't carry the first load case, with the paper's advice.
+    The trust region:
+    - `smallest`: window at which no better design is to be found, which ends a turn.
+    - `grow`, `shrink`: of the window after a step whose true improvement over the predicted one is above
+      `good`, below `poor`; shrinking is quicker, since a refused trial costs as much as an accepted one.
+    - `settled`: relative improvement predicted for the largest window that ends the optimisation: below what
+      a constraint may be violated by.
+    - `penalty`: of a violated constraint beside the objective, which is 1 at the start: a violation of a
+      tenth of the limit outweighs the whole objective.
+    - `near`: below a limit, as a share of it, from where on its curvature counts; farther off it would hold
+      steps back for nothing.
+
+    Stages of further loads that the start doesn't bear:
+    - `margin`, `least_margin`: of the whole further load, left between a stage and the end of the stable
+      branch, at first and at last: the end itself is singular.
+
+    Cables under further loads:
+    - `least_tension`: of cables that are to stay in tension.
+    - `guards`: cables of each load that are kept from going slack, the nearest ones: the step's problem is
+      dense in them.
+    - `recovery`: of what a window can change at most, which a cable below its least tension must regain.
+
+    Thinning:
+    - `batch`: the first batch takes one in so many of the cables in tension; after it they grow by a third
+      while they fit and are cut to a third where not.
+    - `kept`: of the stiffness in any direction at the decisive load, that a batch must leave: the others'
+      lengths are to make up for the rest.
+    - `thrift`: of the objective, what cables with little use may cost.
+    - `failures`: single cables in a row that can't go, after which thinning ends.
+    - `idle`: of the cables, that may be slack under all loads before they are left out of the search, whose
+      models solve for every cable in it.
+    - `repairs`: steps after each batch.
+
+    The step's problem:
+    - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA.
     """
-    with dense_on_one():
-        search = Search(problem, start, window, progress)
-        search.most_cables = most_cables
-        search.keep_stiff(stiffness * search.stiffness())
-        search.keep = keep
-        if resume is not None:
-            search.resume(resume)
-        return run(search, evaluations, thin=thin)
+
+    window: float = 0.2
+    thin: bool = True
+    stiffness: float = 0.08
+    most_cables: int | None = None
+
+    smallest: float = 0.03
+    grow: float = 1.6
+    shrink: float = 0.4
+    good: float = 0.7
+    poor: float = 0.3
+    settled: float = 1e-3
+    penalty: float = 10.0
+    near: float = 0.5
+
+    margin: float = 0.15
+    least_margin: float = 0.01
+
+    least_tension: float = 0.05
+    guards: int = 400
+    recovery: float = 0.1
+
+    batch: int = 8
+    kept: float = 0.4
+    thrift: float = 1.5
+    failures: int = 6
+    idle: float = 0.2
+    repairs: int = 2
+
+    model_evaluations: int = 2000
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value = getattr(self, each.name)
+            least = 0.0 if each.name in _MAY_BE_NONE else np.nextafter(0.0, 1.0)
+            if value is not None and not (np.isfinite(value) and value >= least):
+                raise InputError(
+                    "must be finite and positive" if least else "must be finite and not negative",
+                    where=f"solver.{each.name}",
+                    value=value,
+                )
+        if not self.shrink < 1.0 <= self.grow:
+            raise InputError(
+                "windows must shrink by less than 1 and grow by more",
+                where="solver.shrink",
+                value=(self.shrink, self.grow),
+            )
 
 
-def polish(
-    best: Optimum,
-    *,
-    evaluations: int = POLISHING,
-    groups: Indices | None = None,
-    progress: Watch | None = None,
-) -> Optimum:
-    """The design of `best` with the cables that it has and the least misfit under the first load, its limits
-    kept.
+_MAY_BE_NONE = (
+    "thin",
+    "stiffness",
+    "most_cables",
+    "guards",
+    "recovery",
+    "repairs",
+    "idle",
+    "kept",
+    "least_tension",
+)
 
-    The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
-    shape alone. The misfit never rises: where no better design is found, `best` comes back. The radius stays.
-
-    With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
-    the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
-    doesn't bear the loads.
-    """
-    base = next(iter(best.problem.loads))
-    if groups is not None:
-        best = replace(
-            best,
-            design=replace(
-                best.design, rest_length=averaged(best.design.rest_length, groups, best.design.present)
-            ),
-        )
-    problem = replace(best.problem, minimise=[Share(1.0, Misfit(base))])
-    with dense_on_one():
-        search = Search(problem, best.design, WINDOW, progress)
-        search.keep_stiff(_POLISHED * best.stiffness)
-        search.braces[:] = True
-        search.guarded = search.always_guarded = True
-        search.groups = (
-            None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
-        )
-        search.smallest = _FINEST
-        polished = run(search, evaluations, thin=False)
-    better = (
-        polished.objective < polished.objective_start
-        and polished.design.present.sum() == best.design.present.sum()
-    )
-    if (
-        better or groups is not None
-    ):  # of averaged lengths the polished design is at least that one, in its own states
-        return polished
-    return replace(best, status="no design with less misfit was found", history=polished.history)
+# A polished design serves the shape alone and is near: smaller windows, and of the stiffness kept before it
+# may use up a fifth.
+POLISHING = SequentialConvex(thin=False, stiffness=0.8, smallest=0.003)

@@ -1,4 +1,4 @@
-"""Which cables a braced shell can spare.
+"""Which cables a braced shell can do without.
 
 The L1 term empties the cables with the least tension; but tension says little about what a cable does against
 buckling. Without the cables of a set R the tangent K at a loaded state loses their stiffness, K - B k B', and
@@ -43,7 +43,7 @@ def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
     return kept
 
 
-def spared(kept: Reals, order: Indices, most: int, least: float) -> Indices:
+def removable(kept: Reals, order: Indices, most: int, least: float) -> Indices:
     """The first cables of `order`, at most `most`, without all of which every direction keeps a share of at
     least `least` of its stiffness.
 

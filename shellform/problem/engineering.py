@@ -19,16 +19,15 @@ import scipy.sparse as sp
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.gridshell import Gridshell
 from shellform.net.grid import CONNECTOR, ROD
-from shellform.problem.terms import Measure
+from shellform.problem.terms import LoadedDesign, Measurement, Term
 from shellform.structure.answers.results import end_stress, end_stress_by_force, twist
 from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.answers.stability import modes
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.sections import stress_by_size
-from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve import residual
 
@@ -42,15 +41,17 @@ _TURN = 0.1  # rad, the unit of turns
 
 
 @dataclass(frozen=True)
-class RodUtilisation:
+class RodUtilisation(Term):
     """The largest fibre stress of the rods, for round ones |N|/A + |M| r/I, at any end, over their strength;
     erection stress is in it.
     """
 
+    name = "utilisation"
     load: str
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value. Raises InputError where the rods' strength isn't known."""
+        shell, design, state = at.shell, at.design, at.state
         rod = shell.rod
         if not np.isfinite(rod.strength):
             raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
@@ -64,24 +65,26 @@ class RodUtilisation:
         rows = (by_force @ beams.local_forces_by_dof(state)[own]).reshape(len(values), 12)
         by_radius = (by_force @ rate.local_forces(state)[own][:, :, None])[:, :, 0]
         for end in range(2):
-            at = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
+            three = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
             by_radius[:, end] += (
-                np.array(section.sizes) / design.radius @ stress_by_size(section, *at) / rod.strength
+                np.array(section.sizes) / design.radius @ stress_by_size(section, *three) / rod.strength
             )
         return _largest(shell, 1.0, values, np.repeat(beams.dofs()[own], 2, axis=0), rows, by_radius.ravel())
 
 
 @dataclass(frozen=True)
-class ConnectorTurn:
+class ConnectorTurn(Term):
     """The largest turning, rad, of two crossing rods against each other about their connector's axis, from
     the stress-free grid.
     """
 
+    name = "connector_turn"
     load: str
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value, rad."""
-        beams = shell.beams(design.radius)
+        shell, state = at.shell, at.state
+        beams = shell.beams(at.design.radius)
         own = beams.of_kind(CONNECTOR)
         turn = twist(beams.local_deformations(state))[own]
         # Mx_a = GJ (theta_a - theta_b) / l0, so that its derivative is that of the twist but for a factor.
@@ -94,11 +97,12 @@ class ConnectorTurn:
 
 
 @dataclass(frozen=True)
-class LargestCableForce:
+class LargestCableForce(Term):
     """The largest cable tension, N: constraint (5) for load cases beside the design load, in one value;
     `scale`, N, is the size of tensions that matter, such as their limit. A cable at less than nine tenths of
     the largest has no weight."""
 
+    name = "cable_force"
     load: str
     scale: float
 
@@ -106,13 +110,13 @@ class LargestCableForce:
         if not self.scale > 0.0:
             raise InputError("must be positive", where="largest_cable_force.scale", value=self.scale)
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; slack cables count with the push that they would give."""
-        return _of_tensions(shell, design, state, np.flatnonzero(design.present), self.scale, 0.0, 1.0)
+        return _of_tensions(at, np.flatnonzero(at.design.present), self.scale, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Slackness:
+class LeastTension(Term):
     """2 less the least cable tension over `least`, N: at most 1 where every present cable pulls with `least`
     or more.
 
@@ -120,24 +124,26 @@ class Slackness:
     in the target don't count: those which the optimiser has done without (tensions.py).
     """
 
+    name = "slackness"
     load: str
     least: float
     let_out: float = np.inf
 
     def __post_init__(self) -> None:
         if not self.least > 0.0:
-            raise InputError("must be positive", where="slackness.least", value=self.least)
+            raise InputError("must be positive", where="least_tension.least", value=self.least)
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value. A slack cable counts with the tension that it would have if it could push, which tells
         how slack it is.
         """
-        chosen = np.flatnonzero(design.present & (design.rest_length <= self.let_out * shell.cable_lengths))
-        return _of_tensions(shell, design, state, chosen, SHARPNESS / _EASED, 2.0, -1.0 / self.least)
+        design, lengths = at.design, at.shell.cable_lengths
+        chosen = np.flatnonzero(design.present & (design.rest_length <= self.let_out * lengths))
+        return _of_tensions(at, chosen, SHARPNESS / _EASED, 2.0, -1.0 / self.least)
 
 
 @dataclass(frozen=True)
-class Softness:
+class ModalStiffness(Term):
     """2 less the square of the softest mode's stiffness under the load over `least`, N/m: at most 1 where no
     mode is softer than `least`.
 
@@ -147,15 +153,18 @@ class Softness:
     The softest four modes count, so that they may change places.
     """
 
+    name = "softness"
+    stabilises = True
     load: str
     least: float
 
     def __post_init__(self) -> None:
         if not self.least > 0.0:
-            raise InputError("must be positive", where="softness.least", value=self.least)
+            raise InputError("must be positive", where="modal_stiffness.least", value=self.least)
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value."""
+        shell, design, state = at.shell, at.design, at.state
         assembly = assemble(shell.network(design))
         found = modes(assembly, state, _MODES)
         mass = residual.ResidualNorm(assembly).mass_shape
@@ -173,7 +182,7 @@ class Softness:
         slope = -(weight @ np.array(rows)) / self.least
         spread = np.zeros(len(shell.cable_ends))
         spread[np.flatnonzero(design.present)] = -(weight @ np.array(by_rest)) / self.least
-        return Measure(
+        return Measurement(
             np.array([value]),
             sp.csr_array(slope[None]),
             sp.csr_array(spread[None]),
@@ -182,20 +191,21 @@ class Softness:
 
 
 @dataclass(frozen=True)
-class Uplift:
+class Uplift(Term):
     """The largest force, N, with which a support has to hold a rod's end down, plus `offset`, N, which keeps
     it above 0.
     """
 
+    name = "uplift"
     load: str
-    force: Reals
     offset: float = 1.0
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
-        """One value, N; `force` (n, 6) is the load case, of which supports may bear a part at once."""
+    def measure(self, at: LoadedDesign) -> Measurement:
+        """One value, N; supports may bear a part of the load at once."""
+        shell, design, state = at.shell, at.design, at.state
         assembly = assemble(shell.network(design))
         held = 6 * np.asarray(shell.net.supports) + 2
-        reaction = assembly.evaluate(state, tangent=False).force.ravel()[held] - self.force.ravel()[held]
+        reaction = assembly.evaluate(state, tangent=False).force.ravel()[held] - at.load.ravel()[held]
         rows = -reaction_rows(assembly, state, held).toarray()
         dofs = np.broadcast_to(assembly.free, rows.shape)
         rate = shell.beams_by_radius(design.radius)
@@ -207,13 +217,11 @@ class Uplift:
         return _largest(shell, self.offset, self.offset - reaction, dofs, rows, -change[held])
 
 
-def _of_tensions(
-    shell: Gridshell, design: Design, state: State, chosen: Indices, unit: float, offset: float, factor: float
-) -> Measure:
+def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, offset: float, factor: float) -> Measurement:
     """KS of offset + factor EA (l / l0 - 1) of the `chosen` candidate cables; 0 where there are none."""
+    shell, design, state = at.shell, at.design, at.state
     if not len(chosen):
-        zero = sp.csr_array((1, len(shell.cable_ends)))
-        return Measure(np.zeros(1), sp.csr_array((1, 6 * shell.node_count)), zero, np.zeros(1))
+        return Measurement(np.zeros(1))
     cables = make_cables(
         shell.cable_ends[chosen], rest_length=design.rest_length[chosen], stiffness=shell.cable.stiffness
     )
@@ -244,7 +252,7 @@ def _largest(
     by_radius: Reals,
     cables: np.ndarray | None = None,
     by_rest_length: Reals | None = None,
-) -> Measure:
+) -> Measurement:
     """KS of `values` (k,) from their derivatives `rows` (k, q) at `dofs` (k, q), `by_radius` (k,), and
     each by its own cable's rest length.
     """
@@ -254,7 +262,7 @@ def _largest(
     by_rest = np.zeros(len(shell.cable_ends))
     if cables is not None and by_rest_length is not None:
         by_rest[cables] = weight * by_rest_length
-    return Measure(
+    return Measurement(
         np.array([value]),
         sp.csr_array(slope[None]),
         sp.csr_array(by_rest[None]),

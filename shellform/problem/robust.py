@@ -33,7 +33,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Group, Realisation, Scatter, groups_of, unpacked
-from shellform.problem.terms import Measure
+from shellform.problem.terms import LoadedDesign, Measurement, Term, distance_squares
 from shellform.structure.answers.sensitivity import by_rest_length
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.parts import Part
@@ -54,8 +54,8 @@ _SHARES = ((1.0,), (0.5, 1.0), (0.25, 0.5, 0.75, 1.0))  # of a sample's variatio
 class Spread:
     """How the misfit scatters: `nominal`, m², without scatter; the `mean` to second order, of which `linear`
     is tr(X'X) and `curvature` that of the equilibria; the standard `deviation` with linear equilibria;
-    `causes`: each one's share of tr(X'X) and of the variance's 4 |X'd|²; `wander` (n,), m, the root mean
-    square motion of each node."""
+    `causes`: each one's share of tr(X'X) and of the variance's 4 |X'd|²; `node_deviation` (n,), m,
+    the root mean square motion of each node."""
 
     nominal: float
     mean: float
@@ -63,7 +63,7 @@ class Spread:
     curvature: float
     deviation: float
     causes: Mapping[str, tuple[float, float]]
-    wander: Reals
+    node_deviation: Reals
 
     def sentences(self) -> list[str]:
         """Mean and deviation, and the causes by their share of the scatter."""
@@ -77,7 +77,7 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Sample:
+class MisfitSample:
     """Misfits, m², of re-solved equilibria of drawn structures, and how many drawings were `lost` off the
     stable branch (they have no misfit).
     """
@@ -87,7 +87,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Measured:
+class RobustValue:
     """The robust value, m², and its derivative (c,), m, by the rest lengths of all candidate cables (0 for
     absent ones).
     """
@@ -120,15 +120,21 @@ def spread(shell: Gridshell, design: Design, state: State, load: Reals, scatter:
         causes[name] = (before[0] + float(one), before[1] + float(other))
     curvature = line.curvature(adjoint, along)
     nominal = float((away**2).sum())
-    wander = np.sqrt((places**2).sum(axis=1).reshape(-1, 3).sum(axis=1))
+    node_deviation = np.sqrt((places**2).sum(axis=1).reshape(-1, 3).sum(axis=1))
     return Spread(
-        nominal, nominal + linear + curvature, linear, curvature, float(np.sqrt(variance)), causes, wander
+        nominal,
+        nominal + linear + curvature,
+        linear,
+        curvature,
+        float(np.sqrt(variance)),
+        causes,
+        node_deviation,
     )
 
 
 def measure(
     shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter, *, deviations: float = 1.0
-) -> Measured:
+) -> RobustValue:
     """d'd + tr(X'X) + `deviations` times the Gauss-Newton deviation of the misfit, and its exact derivative
     by the rest lengths. Raises NotConverged.
     """
@@ -140,17 +146,17 @@ def measure(
     columns = by_rest_length(line.assembly, state, shell.cables(design))
     result = np.zeros(len(design.present))
     result[design.present] = part.by_rest_length - columns.T @ adjoint[line.assembly.free]
-    return Measured(part.value, result)
+    return RobustValue(part.value, result)
 
 
 @dataclass(frozen=True)
-class RobustMisfit:
-    """The misfit d'd, m², that is kept in spite of scatter under the load case `load`, whose forces are
-    `force` (n, 6): the Gauss-Newton mean and `deviations` standard deviations. A term for objective and
-    limits; it costs a solve for each uncertain variable."""
+class RobustMisfit(Term):
+    """The misfit d'd, m², that is kept in spite of scatter under the load case `load`: the Gauss-Newton mean
+    and `deviations` standard deviations. It costs a solve for each uncertain variable. The step model takes
+    the misfit's curvature for its own."""
 
+    name = "robust_misfit"
     load: str
-    force: Reals
     scatter: Scatter
     deviations: float = 1.0
 
@@ -160,23 +166,24 @@ class RobustMisfit:
                 "must be finite and not negative", where="robust.deviations", value=self.deviations
             )
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m². Raises NotConverged where the state isn't stable."""
-        line = _Line(shell, design, state, self.force, self.scatter)
+        line = _Line(at.shell, at.design, at.state, at.load, self.scatter)
         part = line.partial(self.deviations)
-        by_rest = np.zeros(len(design.present))
-        by_rest[design.present] = part.by_rest_length
-        return Measure(
+        by_rest = np.zeros(len(at.design.present))
+        by_rest[at.design.present] = part.by_rest_length
+        return Measurement(
             np.array([part.value]),
             sp.csr_array(part.by_state[None]),
             sp.csr_array(by_rest[None]),
             np.array([part.by_radius]),
+            squares=distance_squares(at),
         )
 
 
 def sample(
     shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter, *, count: int, seed: int
-) -> Sample:
+) -> MisfitSample:
     """Misfits of `count` drawn structures, every equilibrium solved anew on the stable branch from where the
     linear one lies.
     """
@@ -192,7 +199,7 @@ def sample(
             lost += 1
         else:
             found.append(float(((reached.positions - shell.target.positions) ** 2).sum()))
-    return Sample(np.array(found), lost)
+    return MisfitSample(np.array(found), lost)
 
 
 @dataclass(frozen=True)

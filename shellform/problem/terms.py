@@ -1,13 +1,16 @@
 """What is measured on a loaded gridshell: the terms of the objective (2) and of the constraints (5) and (6).
 
-A term gives a vector of values and its partial derivatives by the node positions and by the design; the chain
-through the equilibrium is sensitivity.py's. Each names the load case at which it is taken.
+A term says at which load case it is taken and how many values it has, and gives them with their partial
+derivatives by the nodes and by the design; the chain through the equilibrium is the evaluation's. What else
+the optimiser makes use of (squares, tensions) stands in the measurement too, and may be left out: whoever
+uses a term never asks what it is.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,108 +22,202 @@ from shellform.structure.elements.state import State
 
 
 @dataclass(frozen=True)
-class Measure:
-    """`value` (g,); `by_dof` (g, 6 n) sparse, by the nodes' translations and spins at a fixed design;
-    `by_rest_length` (g, c) sparse and `by_radius` (g,) at a fixed state. Cables are all candidates; absent
-    ones have zero derivatives."""
+class LoadedDesign:
+    """What a term is taken of: a `design` of the `shell` in its equilibrium `state` under the dead `load`
+    (n, 6), N and Nm."""
 
-    value: Reals
-    by_dof: sp.csr_array
-    by_rest_length: sp.csr_array
-    by_radius: Reals
-
-
-class Term(Protocol):
-    """Something measured at the load case `load` ("" where no state is needed)."""
-
-    @property
-    def load(self) -> str: ...
-
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure: ...
+    shell: Gridshell
+    design: Design
+    state: State
+    load: Reals
 
 
 @dataclass(frozen=True)
-class Misfit:
+class Squares:
+    """A value that is the sum of squares of residuals: `residual` (m,) and `by_dof` (m, 6 n) sparse. The step
+    model takes its curvature from them (Gauss-Newton)."""
+
+    residual: Reals
+    by_dof: sp.csr_array
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """The `value` (g,) of a term and its partial derivatives: `by_dof` (g, 6 n) sparse, by the nodes'
+    translations and spins at a fixed design; `by_rest_length` (g, c) sparse, of all candidate cables, and
+    `by_radius` (g,) at a fixed state; None stands for 0.
+
+    Two things the step model can use: `squares`, where the value is (nearly) a sum of squares, and
+    `by_tension` (g, c) sparse, where it is a function of the cables' tensions alone: through either a cable
+    without tension, which has no slope in its rest length, tells what its first tension would do.
+    """
+
+    value: Reals
+    by_dof: sp.csr_array | None = None
+    by_rest_length: sp.csr_array | None = None
+    by_radius: Reals | None = None
+    squares: Squares | None = None
+    by_tension: sp.csr_array | None = None
+
+    def completed(self, size: int, nodes: int, cables: int, name: str) -> Measurement:
+        """With zeros in the place of None. Raises InputError where a shape isn't as said."""
+        shapes = {"by_dof": (size, 6 * nodes), "by_rest_length": (size, cables)}
+        made = {each: getattr(self, each) for each in shapes}
+        rate = np.zeros(size) if self.by_radius is None else np.asarray(self.by_radius, dtype=float)
+        wanted = {"value": (size,), "by_radius": (size,), **shapes}
+        for each, found in {"value": self.value, "by_radius": rate, **made}.items():
+            if found is not None and np.shape(found) != wanted[each]:
+                raise InputError(
+                    f"has another shape than the size {size} of the term says, {wanted[each]}",
+                    where=f"{name}.{each}",
+                    value=np.shape(found),
+                )
+        rows = {each: sp.csr_array(shapes[each]) if found is None else found for each, found in made.items()}
+        return Measurement(
+            np.asarray(self.value, dtype=float),
+            rows["by_dof"],
+            rows["by_rest_length"],
+            rate,
+            self.squares,
+            self.by_tension,
+        )
+
+
+class Term(ABC):
+    """Something measured at the load case `load` ("" where no equilibrium is needed). A user's own derives
+    from this class and says `name`, `load` and `measure`, and `size` where it isn't 1.
+
+    `name` heads its column in histories. `stabilises`: whether it tells how far a state is from losing its
+    stability, so that a start that doesn't bear the further loads is led along its gradient.
+    """
+
+    name: ClassVar[str]
+    stabilises: ClassVar[bool] = False
+    load: str
+
+    def size(self, shell: Gridshell) -> int:
+        """The number of values."""
+        return 1
+
+    @abstractmethod
+    def measure(self, at: LoadedDesign) -> Measurement:
+        """The values and their partial derivatives."""
+
+    def at_limit(self, limit: float) -> float:
+        """The value that belongs to a `limit` in the unit in which users give it."""
+        return limit
+
+    @property
+    def of_each_cable(self) -> bool:
+        """Whether the values are the tensions of all candidate cables, so that limits on them bound single
+        cables."""
+        return False
+
+
+def measured(term: Term, at: LoadedDesign) -> Measurement:
+    """The term's measurement, complete. Raises InputError where its shapes aren't those that it says."""
+    shell = at.shell
+    return term.measure(at).completed(term.size(shell), shell.node_count, len(shell.cable_ends), term.name)
+
+
+@dataclass(frozen=True)
+class Misfit(Term):
     """d'd, m²: the sum over all nodes of the squared distance from the target (7), differentiated as such:
     (A.9) is 0/0 at zero distance, its product with d is not."""
 
+    name = "misfit"
     load: str
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m²."""
-        away = state.positions - shell.target.positions
+        away = at.state.positions - at.shell.target.positions
         slope = np.hstack([2.0 * away, np.zeros_like(away)])
-        return _measure(shell, [float((away**2).sum())], by_dof=sp.csr_array(slope.reshape(1, -1)))
+        return Measurement(
+            np.array([float((away**2).sum())]),
+            sp.csr_array(slope.reshape(1, -1)),
+            squares=distance_squares(at),
+        )
 
 
 @dataclass(frozen=True)
-class RmsMisfit:
-    """d'd over the number of nodes, m²; a limit on it is the square of a limit on the root mean square
-    distance (6).
-    """
+class RmsMisfit(Term):
+    """d'd over the number of nodes, m²; limits on it are given as root mean square distances, m (6)."""
 
+    name = "misfit"
     load: str
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m²."""
-        whole = Misfit(self.load).measure(shell, design, state)
-        count = len(state.positions)
-        return _measure(shell, whole.value / count, by_dof=whole.by_dof / count)
+        whole = Misfit(self.load).measure(at)
+        count = len(at.state.positions)
+        assert whole.by_dof is not None
+        return Measurement(whole.value / count, whole.by_dof / count)
+
+    def at_limit(self, limit: float) -> float:
+        """Its square."""
+        return limit**2
 
 
 @dataclass(frozen=True)
-class CableForces:
+class CableForces(Term):
     """n, N: the tension of every candidate cable, or of the `chosen` ones (5); absent cables have none."""
 
+    name = "cable_force"
     load: str
     chosen: tuple[int, ...] | None = None
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
-        """As many values as candidates, or as chosen, N."""
-        measure = _tensions(shell, design, state)
+    def size(self, shell: Gridshell) -> int:
+        """As many values as candidates, or as chosen."""
+        return len(shell.cable_ends) if self.chosen is None else len(self.chosen)
+
+    def measure(self, at: LoadedDesign) -> Measurement:
+        """`size` values, N."""
+        value, by_dof, by_rest, by_tension = _tensions(at)
         if self.chosen is None:
-            return measure
+            return Measurement(value, by_dof, by_rest, by_tension=by_tension)
         rows = list(self.chosen)
-        return Measure(
-            measure.value[rows],
-            measure.by_dof[rows],
-            measure.by_rest_length[rows],
-            measure.by_radius[rows],
-        )
+        return Measurement(value[rows], by_dof[rows], by_rest[rows], by_tension=by_tension[rows])
+
+    @property
+    def of_each_cable(self) -> bool:
+        """Whether none is left out."""
+        return self.chosen is None
 
 
 @dataclass(frozen=True)
-class CableForce:
+class CableForce(Term):
     """The sum of all cable tensions, N: the L1 norm whose weight empties cables that aren't needed (2)."""
 
+    name = "cable_force"
     load: str
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N."""
-        each = _tensions(shell, design, state)
-        return Measure(
-            np.array([each.value.sum()]),
-            sp.csr_array(each.by_dof.sum(axis=0).reshape(1, -1)),
-            sp.csr_array(each.by_rest_length.sum(axis=0).reshape(1, -1)),
-            np.zeros(1),
+        value, by_dof, by_rest, by_tension = _tensions(at)
+        return Measurement(
+            np.array([value.sum()]),
+            sp.csr_array(by_dof.sum(axis=0).reshape(1, -1)),
+            sp.csr_array(by_rest.sum(axis=0).reshape(1, -1)),
+            by_tension=sp.csr_array(by_tension.sum(axis=0).reshape(1, -1)),
         )
 
 
 @dataclass(frozen=True)
-class RodRadius:
+class RodRadius(Term):
     """The rods' radius, m."""
 
+    name = "rod_radius"
     load: str = ""
 
-    def measure(self, shell: Gridshell, design: Design, state: State) -> Measure:
+    def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m."""
-        return _measure(shell, [design.radius], by_radius=[1.0])
+        return Measurement(np.array([at.design.radius]), by_radius=np.ones(1))
 
 
 @dataclass(frozen=True)
 class Share:
     """A summand of the objective: its weight is such that it makes up `share` of the objective's value 1 at
-    the start.
+    the start. Of a term with several values it is their sum.
     """
 
     share: float
@@ -131,39 +228,18 @@ class Share:
             raise InputError("a share must be positive", where="minimise", value=self.share)
 
 
-@dataclass(frozen=True)
-class AtMost:
-    """The constraint that every value of the term is at most `limit` (in the term's unit; RmsMisfit's in m).
-
-    It is scaled to value / limit - 1 <= 0, as in figures 11 and 16.
-    """
-
-    limit: float
-    term: Term
-
-    def __post_init__(self) -> None:
-        if not self.limit > 0.0:
-            raise InputError("a limit must be positive", where="limits", value=self.limit)
-
-    @property
-    def scale(self) -> float:
-        """What the term's values are divided by."""
-        return self.limit**2 if isinstance(self.term, RmsMisfit) else self.limit
+def distance_squares(at: LoadedDesign) -> Squares:
+    """The nodes' distances from the target, m, as residuals (3 n,)."""
+    nodes = len(at.state.positions)
+    places = np.arange(6 * nodes).reshape(-1, 6)[:, :3].ravel()
+    rows = sp.csr_array((np.ones(3 * nodes), (np.arange(3 * nodes), places)), shape=(3 * nodes, 6 * nodes))
+    return Squares((at.state.positions - at.shell.target.positions).ravel(), rows)
 
 
-def _measure(
-    shell: Gridshell, value: object, *, by_dof: sp.csr_array | None = None, by_radius: object = (0.0,)
-) -> Measure:
-    nodes, cables = shell.node_count, len(shell.cable_ends)
-    return Measure(
-        np.asarray(value, dtype=float),
-        sp.csr_array((1, 6 * nodes)) if by_dof is None else by_dof,
-        sp.csr_array((1, cables)),
-        np.asarray(by_radius, dtype=float),
-    )
-
-
-def _tensions(shell: Gridshell, design: Design, state: State) -> Measure:
+def _tensions(at: LoadedDesign) -> tuple[Reals, sp.csr_array, sp.csr_array, sp.csr_array]:
+    """Tensions (c,) of all candidates, their derivatives by the nodes and by rest lengths, and what they
+    are of the tensions of those present."""
+    shell, design, state = at.shell, at.design, at.state
     cables = shell.cables(design)
     present = np.flatnonzero(design.present)
     count, nodes = len(shell.cable_ends), shell.node_count
@@ -175,4 +251,5 @@ def _tensions(shell: Gridshell, design: Design, state: State) -> Measure:
         shape=(count, 6 * nodes),
     )
     by_rest = sp.csr_array((cables.tension_by_rest_length(state), (present, present)), shape=(count, count))
-    return Measure(value, by_dof, by_rest, np.zeros(count))
+    itself = sp.csr_array((np.ones(len(present)), (present, present)), shape=(count, count))
+    return value, by_dof, by_rest, itself

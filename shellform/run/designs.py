@@ -14,7 +14,7 @@ from shellform.arrays import Reals
 from shellform.case.case import Case
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.problem.problem import follow
+from shellform.problem.paths import follow
 from shellform.run.figures import write_states
 from shellform.run.folder import Report, keep_design
 from shellform.structure.elements.state import State

@@ -27,7 +27,7 @@ from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.net.files import load_net
 from shellform.net.net import Net
 from shellform.optimiser.optimum import Step
-from shellform.problem.problem import deviations
+from shellform.problem.paths import deviations
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model, write_model
 from shellform.structure.solve.loading import Loaded

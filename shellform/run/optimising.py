@@ -16,9 +16,12 @@ from shellform.case.build_problem import below_factor, case_problem, critical_fa
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import symmetric_groups
-from shellform.optimiser.optimum import Optimum
-from shellform.problem.problem import Problem
-from shellform.problem.terms import AtMost, CableForces, Misfit, Share
+from shellform.optimiser.optimum import Optimum, Step
+from shellform.optimiser.solver import SequentialConvex
+from shellform.problem.constraints import AtMost
+from shellform.problem.problem import FEASIBLE, LoadCase, Problem
+from shellform.problem.terms import CableForces, Misfit, Share
+from shellform.problem.variables import RestLengths
 from shellform.run.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
 from shellform.run.designs import Making, followed, forget, keep
 from shellform.run.folder import history_text
@@ -30,14 +33,14 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
     """Makes the designs "optimised", "rounded", "polished" and "unloaded", as the case asks for them, and
     adds to the summary what came of it.
 
-    Raises InputError and NotConverged as `solver.optimise`.
+    Raises InputError and NotConverged as the optimiser.
     """
-    from shellform.optimiser import solver
+    from shellform.optimiser import optimise as optimiser
 
     entry, cable = making.case.optimise, making.case.cable
     start = shell.design(rest_ratio=cable.rest_ratio)
 
-    def watch(step: solver.Step) -> None:
+    def watch(step: Step) -> None:
         said = "" if step.accepted else ", rejected"
         left = step.seconds / max(step.evaluation, 1) * (entry.evaluations - step.evaluation)
         making.report(
@@ -52,12 +55,11 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
     stood = load_checkpoint(making.folder, key)
     if stood is not None:
         making.report("optimise", f"going on after evaluation {stood.numbers['evaluations']}")
-    best = solver.optimise(
+    best = optimiser.optimise(
         problem,
         start,
+        solver=SequentialConvex(stiffness=entry.stiffness_min, most_cables=entry.cables_max),
         evaluations=entry.evaluations,
-        stiffness=entry.stiffness_min,
-        most_cables=entry.cables_max,
         progress=watch,
         keep=lambda checkpoint: save_checkpoint(making.folder, key, checkpoint),
         resume=stood,
@@ -67,7 +69,7 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
     keep(making, shell, "optimised", best.design, {each: best.loaded[each] for each in loads}, loads, summary)
     write_text(making.path("history.csv"), history_text(best.history))  # whatever comes after
     rounded = (
-        _rounded(making, best, start, loads, summary) if problem.frees_radius and entry.rounded else None
+        _rounded(making, best, start, loads, summary) if entry.rod_radius > 0.0 and entry.rounded else None
     )
     if rounded is not None:
         built["rounded"] = rounded
@@ -76,7 +78,7 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
         making.report("optimise", "polishing the cables that are left")
         last = list(built.values())[-1]
         try:
-            polished = solver.polish(last, evaluations=entry.polish, groups=groups)
+            polished = optimiser.polish(last, evaluations=entry.polish, groups=groups)
         except (
             NotConverged
         ) as error:  # averaged lengths may not bear the loads; the design before them stands
@@ -117,7 +119,7 @@ def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summa
         "stiffness_min": best.stiffness,
         "status": best.status,
         "constraints": dict(best.constraints),
-        "feasible": max(best.constraints.values(), default=-1.0) <= solver.FEASIBLE
+        "feasible": max(best.constraints.values(), default=-1.0) <= FEASIBLE
         and summary["designs"]["optimised"].get("critical_factor_kept", True),
         **asked,
     }
@@ -145,19 +147,18 @@ def _came_of(making: Making, design: Design, groups: Indices | None) -> dict[str
 
 def _without_loads(making: Making, shell: Gridshell, start: Design, none: Reals) -> Design:
     """The design of the best fit of the unloaded shape, with forces within the cables' limit."""
-    from shellform.optimiser import solver
+    from shellform.optimiser import optimise as optimiser
 
     making.report("optimise", "the design without regard to the loads")
     entry, cable = making.case.optimise, making.case.cable
     problem = Problem(
         shell,
-        {"none": none},
+        LoadCase("none", none),
         [Share(1.0, Misfit("none"))],
         [AtMost(cable.force_max, CableForces("none"))],
-        entry.rest_length_min,
-        entry.rest_length_max,
+        variables=[RestLengths(entry.rest_length_min, entry.rest_length_max)],
     )
-    return solver.optimise(problem, start, evaluations=15, thin=False).design
+    return optimiser.optimise(problem, start, solver=SequentialConvex(thin=False), evaluations=15).design
 
 
 def _rounded(

@@ -24,7 +24,7 @@ class Robustness:
     """The predicted `spread`, and the `sample` that checks it (None: not asked for); `nodes` of the shell."""
 
     spread: robust.Spread
-    sample: robust.Sample | None
+    sample: robust.MisfitSample | None
     nodes: int
 
     def summary(self) -> dict[str, Any]:
@@ -38,7 +38,7 @@ class Robustness:
             "misfit_deviation": told.deviation,
             "deviation_rms": float(np.sqrt(told.nominal / self.nodes)),
             "deviation_rms_mean": float(np.sqrt(max(told.mean, 0.0) / self.nodes)),
-            "wander_max": float(told.wander.max()),
+            "wander_max": float(told.node_deviation.max()),
             "causes": {
                 name: {"shape": shape, "variance": variance}
                 for name, (shape, variance) in told.causes.items()

@@ -30,7 +30,7 @@ from shellform.arrays import Indices, Reals, indices
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
-from shellform.problem.problem import follow
+from shellform.problem.paths import follow
 from shellform.site.identifiability import Identifiability, identifiability, nuisance
 from shellform.site.scans import Match, Scan, apart, distances, laid
 from shellform.structure.answers.sensitivity import by_stiffness, respond, state_by_design, stiffness_rate

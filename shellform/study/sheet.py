@@ -9,7 +9,7 @@ from typing import Any
 
 from shellform.errors import InputError
 from shellform.output.page.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
-from shellform.problem.problem import deviations
+from shellform.problem.paths import deviations
 from shellform.run.folder import read_run
 from shellform.run.pages import FILE, write_page
 from shellform.study.front import Front, signed

@@ -20,6 +20,7 @@ from shellform.gridshell.catalogue import (
 )
 from shellform.gridshell.gridshell import erection_stress, max_radius
 from shellform.problem.engineering import RodUtilisation
+from shellform.problem.terms import LoadedDesign
 from shellform.structure.elements.sections import Rectangle, Round, Tube, isotropic, stiffness
 
 GLASS = isotropic(young=40e9, density=2000.0, strength=255e6)
@@ -241,10 +242,13 @@ def test_unknown_catalogues_and_sections_are_answered_with_the_known_ones(mine):
 def test_the_stress_of_any_section_follows_its_radius(shell, section):
     term = RodUtilisation("wet")
     made, design = with_section(shell, shell.design(), section)
-    measured = term.measure(made, design, made.target)
+    none = np.zeros((len(made.target.positions), 6))
+    measured = term.measure(LoadedDesign(made, design, made.target, none))
     step = 1e-6 * design.radius
     up, down = (
-        term.measure(made, replace(design, radius=design.radius + s * step), made.target).value[0]
+        term.measure(
+            LoadedDesign(made, replace(design, radius=design.radius + s * step), made.target, none)
+        ).value[0]
         for s in (1, -1)
     )
     assert measured.by_radius[0] == pytest.approx((up - down) / (2.0 * step), rel=1e-6)

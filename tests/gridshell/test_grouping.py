@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial import Delaunay
 
 import shellform as sf
-from shellform import mma
 from shellform.errors import InputError
 from shellform.gridshell.grouping import averaged, cut_lengths, symmetric_groups
 
@@ -37,7 +36,7 @@ def problem(dome):
     wet = dome.point_load(30.0)
     shares = [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))]
     limits = [sf.AtMost(600.0, sf.CableForces("wet")), sf.AtMost(0.01, sf.RmsMisfit("wetter"))]
-    return sf.Problem(dome, {"wet": wet, "wetter": 1.2 * wet}, shares, limits)
+    return sf.Problem(dome, sf.LoadCase("wet", wet), shares, limits, [sf.LoadCase("wetter", 1.2 * wet)])
 
 
 def test_a_round_net_s_cables_come_in_groups_of_four_that_lie_on_each_other(dome):
@@ -55,26 +54,26 @@ def test_a_net_without_symmetry_is_refused():
 
 
 def test_polished_groups_keep_one_length_each_lower_the_misfit_and_keep_the_limits(dome, problem):
-    best = mma.optimise(problem, dome.design(), evaluations=6, thin=False)
+    best = sf.optimise(problem, dome.design(), solver=sf.SequentialConvex(thin=False), evaluations=6)
     groups = symmetric_groups(dome)
-    polished = mma.polish(best, evaluations=6, groups=groups)
+    polished = sf.polish(best, evaluations=6, groups=groups)
     design = polished.design
     np.testing.assert_allclose(
         averaged(design.rest_length, groups, design.present), design.rest_length, rtol=1e-12
     )
     assert polished.objective < polished.objective_start
-    assert max(polished.constraints.values()) <= mma.FEASIBLE
+    assert max(polished.constraints.values()) <= sf.FEASIBLE
 
 
 def test_cables_are_taken_away_down_to_the_number_asked_for(dome, problem):
-    free = mma.optimise(problem, dome.design(), evaluations=10, thin=False)
-    capped = mma.optimise(problem, dome.design(), evaluations=60, most_cables=60)
+    free = sf.optimise(problem, dome.design(), solver=sf.SequentialConvex(thin=False), evaluations=10)
+    capped = sf.optimise(problem, dome.design(), solver=sf.SequentialConvex(most_cables=60), evaluations=60)
     assert capped.design.present.sum() <= 60 < free.design.present.sum()
-    assert max(capped.constraints.values()) <= mma.FEASIBLE
+    assert max(capped.constraints.values()) <= sf.FEASIBLE
 
 
 def test_a_number_of_cables_that_cannot_be_reached_is_told(dome, problem):
-    capped = mma.optimise(problem, dome.design(), evaluations=12, most_cables=1)
+    capped = sf.optimise(problem, dome.design(), solver=sf.SequentialConvex(most_cables=1), evaluations=12)
     assert "no design with 1 cables was found" in capped.status
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform import mma
 from shellform.errors import InputError, NotConverged
 from shellform.optimiser.comparison import METHODS, Plain, compare, violation
 
@@ -21,15 +20,21 @@ def problem(shell, force, *limits, radius=False):
     if radius:
         shares.append(sf.Share(0.2, sf.RodRadius()))
     limits = [*limits, sf.AtMost(0.002, sf.RmsMisfit("wetter"))]
+    variables = [sf.RestLengths(), sf.FreeRadius(0.0008, 0.0012)] if radius else [sf.RestLengths()]
     return sf.Problem(
-        shell, {"wet": wet, "wetter": 1.2 * wet}, shares, limits, radius_bounds=(0.0008, 0.0012)
+        shell,
+        sf.LoadCase("wet", wet),
+        shares,
+        limits,
+        [sf.LoadCase("wetter", 1.2 * wet)],
+        variables,
     )
 
 
 def found(asked, evaluations=60):
-    """mma.optimise without what it adds to a problem, then SciPy's methods."""
+    """optimise without what it adds to a problem, then SciPy's methods."""
     start = asked.shell.design()
-    best = mma.optimise(asked, start, stiffness=0.0, thin=False)
+    best = sf.optimise(asked, start, solver=sf.SequentialConvex(stiffness=0.0, thin=False))
     return best, *(
         compare(asked, start, method=name, evaluations=evaluations, tolerance=1e-6) for name in METHODS
     )
@@ -37,8 +42,8 @@ def found(asked, evaluations=60):
 
 def test_all_methods_come_to_the_same_optimum_with_trials_off_the_branch_on_their_way(coarse):
     """4 N on every crossing, half of which the unbraced grid bears: trust-constr 0.2857 in 60 evaluations, 16
-    of them off the branch, mma.optimise 0.2902 in 13, SLSQP 0.2928 in 60. The optimum lies where the branch
-    ends and where cables go slack, kinks in the rest lengths: SLSQP stops there, and mma.optimise where its
+    of them off the branch, optimise 0.2902 in 13, SLSQP 0.2928 in 60. The optimum lies where the branch
+    ends and where cables go slack, kinks in the rest lengths: SLSQP stops there, and optimise where its
     smallest window has no better design that stays on the branch."""
     best, interior, quadratic = found(problem(coarse, 4.0))
     least = min(best.objective, interior.objective, quadratic.objective)

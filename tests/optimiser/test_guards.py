@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform import mma
-from shellform.optimiser.convex import minimise_quadratic
 from shellform.optimiser.guards import guard
-from shellform.problem.problem import Evaluator
+from shellform.optimiser.quadratic import minimise_quadratic
+from shellform.problem.evaluation import Evaluator
 
 
 @pytest.fixture(scope="module")
@@ -15,9 +14,10 @@ def start(shell):
     wet = shell.point_load(2.0, every=2)
     problem = sf.Problem(
         shell,
-        {"wet": wet, "wetter": 1.2 * wet},
+        sf.LoadCase("wet", wet),
         [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
         [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+        [sf.LoadCase("wetter", 1.2 * wet)],
     )
     evaluator = Evaluator(problem, shell.design())
     states = {name: loaded.equilibrium.state for name, loaded in evaluator.begin().items()}
@@ -26,7 +26,9 @@ def start(shell):
 
 def changed(evaluator, point, size):
     rng = np.random.default_rng(3)
-    return evaluator.design(point.variables + size * rng.normal(size=len(point.variables)))
+    return evaluator.blocks.design(
+        point.variables + size * rng.normal(size=len(point.variables)), point.design.present
+    )
 
 
 def test_a_guard_predicts_tensions_under_the_additional_load_to_second_order(shell, start):
@@ -40,7 +42,7 @@ def test_a_guard_predicts_tensions_under_the_additional_load_to_second_order(she
     errors = []
     for size in (4e-5, 2e-5):
         design = changed(evaluator, point, size)
-        moved = evaluator.evaluate(evaluator.variables(design), point.states, 1.0)
+        moved = evaluator.evaluate(design, point.states, 1.0)
         found = shell.cables(design).tension(moved.states["wetter"])[near]
         told = held.tension + held.tension_by_design @ (design.rest_length - point.design.rest_length)
         errors.append(np.linalg.norm((found - told)[(found > 0) & (told > 0)]))
@@ -52,7 +54,7 @@ def test_predicted_states_are_near_to_second_order(shell, start):
     errors = []
     for size in (4e-5, 2e-5):
         design = changed(evaluator, point, size)
-        found = evaluator.evaluate(evaluator.variables(design), point.states, 1.0).states
+        found = evaluator.evaluate(design, point.states, 1.0).states
         told = evaluator.predicted(point, design)
         errors.append(max(np.abs(found[name].positions - told[name].positions).max() for name in found))
     assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3
@@ -60,8 +62,8 @@ def test_predicted_states_are_near_to_second_order(shell, start):
 
 def test_polishing_lowers_the_misfit_with_the_same_cables_none_of_which_goes_slack(shell, start):
     evaluator, _ = start
-    best = mma.optimise(evaluator.problem, shell.design(), evaluations=12)
-    polished = mma.polish(best, evaluations=6)
+    best = sf.optimise(evaluator.problem, shell.design(), evaluations=12)
+    polished = sf.polish(best, evaluations=6)
     assert polished.objective < 0.9
     np.testing.assert_array_equal(polished.design.present, best.design.present)
     cables = shell.cables(polished.design)
@@ -101,15 +103,16 @@ def test_a_start_that_snaps_through_under_the_additional_load_is_led_to_a_design
     wet = 1.1 * shell.point_load(6.9, every=2, openings=openings)
     problem = sf.Problem(
         shell,
-        {"wet": wet, "wetter": 1.2 * wet},
+        sf.LoadCase("wet", wet),
         [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
         [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+        [sf.LoadCase("wetter", 1.2 * wet)],
     )
     start = sf.follow(shell, shell.design(), problem.loads, stay=True)
     assert start["wet"].on_branch
     assert not start["wetter"].on_branch
-    best = mma.optimise(problem, shell.design(), evaluations=12, thin=False)
+    best = sf.optimise(problem, shell.design(), solver=sf.SequentialConvex(thin=False), evaluations=12)
     assert best.history[0].stage < 1.0
     assert all(each.on_branch and each.equilibrium.stable for each in best.loaded.values())
-    assert max(best.constraints.values()) <= mma.FEASIBLE
+    assert max(best.constraints.values()) <= sf.FEASIBLE
     assert best.objective < 0.6

@@ -2,7 +2,7 @@
 
 Both are gridshells of one straight rod in the plane x-z. A gridshell's supports are pins; the one thing that
 these two need besides is a support that slides, so that `InPlane` says which degrees of freedom are held and
-leaves everything else, from `Problem` to `mma.optimise`, as it is.
+leaves everything else, from `Problem` to `sf.optimise`, as it is.
 """
 
 import dataclasses
@@ -13,7 +13,6 @@ from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
 import shellform as sf
-from shellform import mma
 from shellform.net.grid import Grid, GridRod
 from shellform.net.net import Net
 from shellform.net.quality import MAPS, Quality
@@ -95,8 +94,8 @@ def test_a_bow_gets_the_closed_form_rest_length_for_its_height():
     for elements in (20, 40, 80):
         shell = bow(elements)
         none = np.zeros((elements + 1, 6))
-        problem = sf.Problem(shell, {"none": none}, [sf.Share(1.0, sf.Misfit("none"))])
-        best = mma.optimise(problem, shell.design(rest_ratio=0.9), thin=False)
+        problem = sf.Problem(shell, sf.LoadCase("none", none), [sf.Share(1.0, sf.Misfit("none"))])
+        best = sf.optimise(problem, shell.design(rest_ratio=0.9), solver=sf.SequentialConvex(thin=False))
         assert best.evaluations <= 10
         assert best.states["none"].positions[:, 2].max() == pytest.approx(HEIGHT, abs=0.2 / elements**2)
         found.append(float(best.design.rest_length[0]))
@@ -126,10 +125,10 @@ def optimum_at(share):
     shell = pulled()
     problem = sf.Problem(
         shell,
-        {"none": np.zeros((3, 6))},
+        sf.LoadCase("none", np.zeros((3, 6))),
         [sf.Share(1.0 - share, sf.Misfit("none")), sf.Share(share, sf.CableForce("none"))],
     )
-    best = mma.optimise(problem, shell.design(rest_ratio=0.99), thin=False)
+    best = sf.optimise(problem, shell.design(rest_ratio=0.99), solver=sf.SequentialConvex(thin=False))
     return best, float(shell.cables(best.design).tension(best.states["none"]).sum())
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform import mma
 
 
 @pytest.fixture(scope="module")
@@ -18,9 +17,10 @@ def problem(shell):
     )  # whose 1.2 times the start doesn't bear: all phases are passed
     return sf.Problem(
         shell,
-        {"wet": wet, "wetter": 1.2 * wet},
+        sf.LoadCase("wet", wet),
         [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
         [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+        [sf.LoadCase("wetter", 1.2 * wet)],
     )
 
 
@@ -33,12 +33,12 @@ def told(history):
 
 def test_a_search_resumed_in_any_phase_ends_with_the_same_design_and_history_to_the_bit(shell, problem):
     kept = []
-    whole = mma.optimise(problem, shell.design(), evaluations=22, keep=kept.append)
+    whole = sf.optimise(problem, shell.design(), evaluations=22, keep=kept.append)
     phases = [each.numbers["phase"] for each in kept]
     assert set(phases) == {"climb", "descend", "thin"}
     wary = next(k for k, each in enumerate(kept) if phases[k] == "descend" and each.arrays["excess"].any())
     for place in (phases.index("climb"), wary, phases.index("thin")):
-        again = mma.optimise(problem, shell.design(), evaluations=22, resume=kept[place])
+        again = sf.optimise(problem, shell.design(), evaluations=22, resume=kept[place])
         np.testing.assert_array_equal(again.design.rest_length, whole.design.rest_length)
         np.testing.assert_array_equal(again.design.present, whole.design.present)
         assert told(again.history) == told(whole.history)

@@ -34,10 +34,10 @@ def shown():
 
 def optimum(shell):
     """An optimum that took no search: the shell's first design."""
-    loads = {"wet": shell.point_load(6.9, every=2)}
-    problem = sf.Problem(shell, loads, [sf.Share(1.0, sf.Misfit("wet"))])
+    wet = sf.LoadCase("wet", shell.point_load(6.9, every=2))
+    problem = sf.Problem(shell, wet, [sf.Share(1.0, sf.Misfit("wet"))])
     design = shell.design(rest_ratio=0.99)
-    loaded = sf.follow(shell, design, {"none": 0.0 * loads["wet"], **loads})
+    loaded = sf.follow(shell, design, {"none": 0.0 * wet.force, "wet": wet.force})
     return Optimum(problem, design, loaded, 1.0, 1.0, {}, [], "no search", 0, 0, 0, 0, 0, 0.0)
 
 

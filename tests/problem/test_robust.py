@@ -9,8 +9,9 @@ import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.scatter import Scatter, groups_of
 from shellform.problem import robust
-from shellform.problem.problem import Evaluator
+from shellform.problem.evaluation import Evaluator
 from shellform.problem.robust import RobustMisfit, _Line, measure, sample, spread
+from shellform.problem.terms import LoadedDesign
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -158,15 +159,19 @@ def test_drawings_off_the_stable_branch_are_counted_and_have_no_misfit(shell, lo
 def test_the_gradient_of_the_robust_misfit_as_a_term_agrees_with_re_solved_equilibria(shell, loaded, cause):
     design, state, load = loaded
     scatter = Scatter(**{cause: getattr(ALL, cause)})
-    term = RobustMisfit("wet", load, scatter, 2.0)
+    term = RobustMisfit("wet", scatter, 2.0)
     shares = [sf.Share(0.6, sf.Misfit("wet")), sf.Share(0.4, sf.RodRadius())]
     problem = sf.Problem(
-        shell, {"wet": load}, shares, [sf.AtMost(0.01, term)], radius_bounds=(0.0005, 0.0014)
+        shell,
+        sf.LoadCase("wet", load),
+        shares,
+        [sf.AtMost(0.01, term)],
+        variables=[sf.RestLengths(), sf.FreeRadius(0.0005, 0.0014)],
     )
     evaluator = Evaluator(problem, design)
     point = evaluator.seed(design, {"wet": solved(shell, design, state, load)}, 1.0)
     assert (
-        term.measure(shell, design, point.states["wet"]).value[0]
+        term.measure(LoadedDesign(shell, design, point.states["wet"], load)).value[0]
         == measure(shell, design, point.states["wet"], load, scatter, deviations=2.0).value
     )
     for direction in (
@@ -175,12 +180,12 @@ def test_the_gradient_of_the_robust_misfit_as_a_term_agrees_with_re_solved_equil
     ):
         values = []
         for h in (4e-6, -4e-6, 2e-6, -2e-6):
-            other = evaluator.design(point.variables + h * direction)
+            other = evaluator.blocks.design(point.variables + h * direction, design.present)
             there = solved(shell, other, point.states["wet"], load)
-            values.append(term.measure(shell, other, there).value[0] / 0.01)
+            values.append(term.measure(LoadedDesign(shell, other, there, load)).value[0] / 0.01)
         wide, near = (values[0] - values[1]) / 8e-6, (values[2] - values[3]) / 4e-6
         assert point.constraints_by_variables[0] @ direction == pytest.approx(
             (4.0 * near - wide) / 3.0, rel=1e-5
         )
     with pytest.raises(InputError, match=r"robust\.deviations"):
-        RobustMisfit("wet", load, scatter, -1.0)
+        RobustMisfit("wet", scatter, -1.0)

@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image
 
 from shellform.case.case import load_case
-from shellform.problem.problem import follow
+from shellform.problem.paths import follow
 from shellform.run.folder import keep_design, read_run
 from shellform.run.run import run_case, stage_keys
 

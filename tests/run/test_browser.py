@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from shellform.problem.problem import deviations
+from shellform.problem.paths import deviations
 from shellform.run.folder import read_run
 from shellform.run.pages import write_report
 from tests.run.small_run import begin, finish

@@ -95,12 +95,12 @@ def test_a_number_of_cables_that_cannot_be_reached_is_said(file, tmp_path):
 
 
 def test_lengths_that_cannot_be_made_equal_leave_the_design_before_them(file, tmp_path, monkeypatch):
-    from shellform.optimiser import solver
+    from shellform.optimiser import optimise
 
     def refused(*_, **__):
         raise NotConverged("the load isn't borne")
 
-    monkeypatch.setattr(solver, "polish", refused)
+    monkeypatch.setattr(optimise, "polish", refused)
     case = load_case(file, ["optimise.symmetric=true", "optimise.polish=2"])
     summary = run_case(case, tmp_path, until="optimise")
     assert summary["optimisation"]["not_polished"] == "the load isn't borne"

@@ -27,7 +27,7 @@ from shellform.output.page import charts, verdict
 from shellform.output.page.embed import Picture
 from shellform.output.page.template import filled, part
 from shellform.output.pictures.colours import VIRIDIS
-from shellform.problem.problem import deviations
+from shellform.problem.paths import deviations
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 

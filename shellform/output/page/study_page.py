@@ -19,7 +19,7 @@ from shellform.arrays import Reals
 from shellform.gridshell.gridshell import Gridshell
 from shellform.output.page.template import filled, part
 from shellform.output.pictures.colours import VIRIDIS
-from shellform.problem.problem import deviations
+from shellform.problem.paths import deviations
 from shellform.structure.elements.state import State
 
 MOST_ROWS = 4000  # that are drawn; the front is always among them

@@ -18,7 +18,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.net import Net
 from shellform.net.quality import shear_angles
 from shellform.output.pictures.panel import Panel
-from shellform.problem.problem import deviations
+from shellform.problem.paths import deviations
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.sections import stiffness
 from shellform.structure.elements.state import State

@@ -1,0 +1,202 @@
+"""Optimising a gridshell by sequential convex programming (operation 3).
+
+Svanberg's method of moving asymptotes (1987, 2002) replaces a problem by a sequence of convex ones that are
+solved exactly. Its own separable approximation knows nothing of how cables work together, and in the rest
+lengths it is kinked where a cable goes slack: on a prestressed gridshell its first trials snap the shell
+through and its later ones hardly move (README, "What was tried"). Here each convex problem is the model in
+tensions (step_model.py), exact in first order and with Gauss-Newton curvature; NLopt's MMA solves it within
+a window round the present design (proposal.py), and the trial is then evaluated by its true equilibria
+(trials.py, phases.py):
+
+- it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
+- a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
+- under the further loads no mode may become softer than a share of what the softest one has at the start under the design load
+  (engineering.py: ModalStiffness): deviations don't see buckling coming, its stiffness does, and designs keep away from the end of
+  their branch;
+- a start that doesn't bear the further loads climbs first: steps along the gradient of that stiffness carry its stable branch up to them;
+- where no better design is found cables are kept taut under the further loads (guards.py), and free again in turns;
+- then cables that the shell can do without are taken away in batches, the others kept taut.
+
+The search ends where the model predicts too little improvement in its largest window, where the smallest
+window has no better design, or where the evaluations are used up, and thinning after some single cables in a
+row that can't go; the status says which it was. At the end the cables without tension are taken away and the
+design is loaded along the documented path (loading.py); if it should not bear all loads there, the last
+accepted design that does is returned.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from shellform.arrays import Indices
+from shellform.gridshell.gridshell import Design
+from shellform.gridshell.grouping import averaged
+from shellform.optimiser.optimum import Checkpoint, Optimum
+from shellform.optimiser.phases import run
+from shellform.optimiser.solver import POLISHING, SequentialConvex
+from shellform.optimiser.state import Iterate, Keep, Models, Search, Watch, finish, record, resumed
+from shellform.optimiser.trials import reach, staged
+from shellform.problem.constraints import AtMost, Constraint
+from shellform.problem.engineering import ModalStiffness
+from shellform.problem.evaluation import Evaluator
+from shellform.problem.problem import Problem
+from shellform.problem.terms import Misfit, Share
+from shellform.structure.answers.stability import modes
+from shellform.structure.elements.threads import dense_on_one
+
+
+def optimise(
+    problem: Problem,
+    start: Design,
+    *,
+    solver: SequentialConvex | None = None,
+    evaluations: int = 100,
+    progress: Watch | None = None,
+    keep: Keep | None = None,
+    resume: Checkpoint | None = None,
+) -> Optimum:
+    """The best design found from `start` within a number of design `evaluations`.
+
+    `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes
+    on from there to the same result.
+
+    Raises NotConverged where the start doesn't carry the design load, with the paper's advice.
+    """
+    solver = solver or SequentialConvex()
+    with dense_on_one():
+        search, it = begin(
+            problem, start, solver, lambda softest: solver.stiffness * softest, evaluations, progress, keep
+        )
+        if resume is not None:
+            search, it = resumed(search, resume)
+        return finish(search, run(search, it))
+
+
+def polish(
+    best: Optimum,
+    *,
+    solver: SequentialConvex = POLISHING,
+    evaluations: int = 20,
+    groups: Indices | None = None,
+    progress: Watch | None = None,
+) -> Optimum:
+    """The design of `best` with the cables that it has and the least misfit under the design load, its
+    constraints kept; the solver's `stiffness` is a share of what `best` had to keep.
+
+    The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
+    shape alone. The misfit never rises: where no better design is found, `best` comes back. Only the cables'
+    lengths are varied, where they are variables of their own.
+
+    With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
+    the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
+    doesn't bear the loads.
+    """
+    if groups is not None:
+        lengths = averaged(best.design.rest_length, groups, best.design.present)
+        best = replace(best, design=replace(best.design, rest_length=lengths))
+    cables = [block for block in best.problem.variables if block.of_each_cable]
+    problem = replace(
+        best.problem,
+        minimise=[Share(1.0, Misfit(best.problem.design_load.name))],
+        variables=cables or best.problem.variables,
+    )
+    alike = None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
+    with dense_on_one():
+        search, it = begin(
+            problem, best.design, solver, lambda _: solver.stiffness * best.stiffness, evaluations, progress
+        )
+        search = replace(search, always_guarded=True, groups=alike)
+        it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned))
+        polished = finish(search, run(search, it))
+    better = (
+        polished.objective < polished.objective_start
+        and polished.design.present.sum() == best.design.present.sum()
+    )
+    # of averaged lengths the polished design is at least that one, in its own states
+    if better or groups is not None:
+        return polished
+    return replace(best, status="no design with less misfit was found", history=polished.history)
+
+
+def begin(
+    problem: Problem,
+    start: Design,
+    solver: SequentialConvex,
+    kept: Callable[[float], float],
+    evaluations: int,
+    progress: Watch | None = None,
+    keep: Keep | None = None,
+) -> tuple[Search, Iterate]:
+    """A search of the problem and its first iterate. `kept` gives the stiffness, N/m, that no mode may fall
+    below under the further loads, from that of the start's softest mode under the design load."""
+    began = time.perf_counter()
+    # Limits on the design load's cable forces are bounds of the model; the others stay constraints.
+    bounded = tuple(part for part in problem.constraints if _is_bound(part, problem))
+    inner = replace(
+        problem, constraints=[part for part in problem.constraints if not _is_bound(part, problem)]
+    )
+    evaluator = Evaluator(inner, start)
+    reached = evaluator.begin()
+    used, base = inner.used(), evaluator.base
+    state = reached[base].equilibrium.state
+    if all(reached[name].on_branch for name in used):
+        stage, states = 1.0, {name: reached[name].equilibrium.state for name in used}
+    else:
+        stage = reach(evaluator, start, state, 0.0, solver.margin)
+        states = staged(evaluator, start, state, stage)
+    softest = float(modes(evaluator.assembly(start), state, 1).stiffness[0])
+    added = _stiff(inner, kept(softest))
+    evaluator.problem = replace(inner, constraints=[*inner.constraints, *added])
+    point = evaluator.seed(start, states, stage)
+    pull = problem.shell.cables(start).tension(point.states[base])
+    mean = float(np.mean(pull)) if len(pull) else 0.0
+    search = Search(
+        problem,
+        solver,
+        evaluator,
+        bounded,
+        evaluations,
+        mean if mean > 0.0 else 1.0,  # N: what cables that all are slack may be given
+        point.objective,
+        kept(softest) if added else 0.0,
+        None,
+        False,
+        progress,
+        keep,
+        began,
+        Models(evaluator, mean),
+    )
+    it = Iterate(
+        point,
+        (point,),
+        (record(search, point, stage, True),),
+        stage,
+        search.first_window,
+        solver.margin,
+        guarded=False,
+        tensioned=np.zeros(int(start.present.sum()), dtype=bool),
+        excess=np.zeros(len(point.constraints)),
+    )
+    return search, it
+
+
+def _is_bound(part: Constraint, problem: Problem) -> bool:
+    each_cable = any(block.of_each_cable for block in problem.variables)
+    return (
+        each_cable
+        and part.term.of_each_cable
+        and part.term.load == problem.design_load.name
+        and part.lower == -np.inf
+    )
+
+
+def _stiff(problem: Problem, least: float) -> list[Constraint]:
+    """The constraints on the softest mode, N/m, under each further load that has none yet."""
+    base = problem.design_load.name
+    own = {part.term.load for part in problem.constraints if part.term.stabilises}
+    further = [name for name in problem.used() if name not in (base, *own) and problem.loads[name].any()]
+    return [AtMost(1.0, ModalStiffness(name, least)) for name in further] if least > 0.0 else []

@@ -1,0 +1,141 @@
+"""A search's dealings with true equilibria: trials, the documented path of a design, and stages of further
+loads that a design doesn't bear whole.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.gridshell.gridshell import Design
+from shellform.gridshell.grouping import averaged
+from shellform.optimiser.proposal import Task
+from shellform.optimiser.state import Iterate, Search, noted, violation
+from shellform.optimiser.step_model import StepModel
+from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch
+from shellform.problem.paths import follow, without_slack
+from shellform.structure.elements.state import State
+from shellform.structure.solve.loading import apply_load
+
+_COARSE, _FINE = 0.5, 0.125  # load steps of a search for the end of a branch, the first and the smallest
+
+
+def task(search: Search, it: Iterate, model: StepModel) -> Task:
+    """What the next step is asked for."""
+    return Task(
+        search.solver,
+        model,
+        it.window,
+        search.tension,
+        search.bounded,
+        it.tensioned,
+        search.models.guards(it.point) if it.guarded else [],
+        it.climbing,
+        search.groups,
+        it.excess * it.window**2,
+    )
+
+
+def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Linearisation | None, Iterate]:
+    """The linearisation at the model's `y` (y,), None where an equilibrium leaves the stable branch; and the
+    iterate with what the trial shows of the constraints' curvature."""
+    evaluator = search.evaluator
+    design = model.design(y)
+    if search.groups is not None:
+        rest = design.rest_length.copy()
+        every = np.ones(len(search.groups), dtype=bool)
+        rest[design.present] = averaged(rest[design.present], search.groups, every)
+        design = replace(design, rest_length=rest)
+    near = {**evaluator.predicted(it.point, design, but=search.base), search.base: model.predicted(y)}
+    try:
+        trial = evaluator.evaluate(evaluator.rounded(design), near, it.stage, lead=not it.guarded)
+    except OffBranch:
+        return None, it
+    above = np.maximum(trial.constraints - model.constraints_at(y), 0.0) / it.window**2
+    return trial, replace(it, excess=np.where(trial.constraints > -search.solver.near, above, 0.0))
+
+
+def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indices) -> Linearisation | None:
+    """The linearisation without the cables `leaving`, the others at the rest lengths that they have: the
+    shell moves less than at their tensions. None where it leaves the stable branch."""
+    evaluator, design = search.evaluator, it.point.design
+    rest = design.rest_length.copy()
+    rest[np.flatnonzero(design.present)[leaving]] = model.longest[leaving]
+    try:
+        return evaluator.evaluate(
+            evaluator.rounded(replace(design, rest_length=rest)), it.point.states, it.stage
+        )
+    except OffBranch:
+        return None
+
+
+def sound(search: Search, point: Linearisation) -> Linearisation | None:
+    """The same design in the states to which the documented path leads, without its slack cables; None where
+    it doesn't bear all loads there or breaks a constraint: of two equilibria side by side, a search from design
+    to design may have come to the other one."""
+    evaluator, problem = search.evaluator, search.problem
+    design = without_slack(problem.shell, point.design, point.states[search.base])
+    loaded = follow(problem.shell, design, problem.loads, stay=True)
+    evaluator.factorisations += sum(each.factorisations for each in loaded.values())
+    if not all(each.on_branch for each in loaded.values()):
+        return None
+    states = {name: loaded[name].equilibrium.state for name in evaluator.problem.used()}
+    try:
+        found = evaluator.seed(point.design, states, 1.0)
+    except OffBranch:
+        return None
+    return found if violation(search, found) <= max(violation(search, point), 0.0) else None
+
+
+def accepted(search: Search, it: Iterate, trial: Linearisation) -> Iterate:
+    """Goes on from `trial`, as near to the whole further loads as its stable branch allows."""
+    it = _raised(search, replace(it, point=trial))
+    return noted(search, replace(it, accepted=(*it.accepted, it.point)), it.point, True)
+
+
+def _raised(search: Search, it: Iterate) -> Iterate:
+    if it.stage == 1.0:
+        return it
+    evaluator, design, state = search.evaluator, it.point.design, it.point.states[search.base]
+    stage = reach(evaluator, design, state, it.stage, it.margin)
+    if stage <= it.stage:
+        # Far from the end of its branch a design feels no constraint on its softest mode, and nothing drives
+        # it on: go nearer.
+        return replace(it, margin=max(0.5 * it.margin, search.solver.least_margin))
+    point = evaluator.seed(design, staged(evaluator, design, state, stage), stage)
+    return replace(it, stage=stage, point=point)
+
+
+def reach(evaluator: Evaluator, design: Design, state: State, least: float, margin: float) -> float:
+    """The stage to which the design's stable branch under the further loads allows to go, `margin` before
+    its end and not below `least`."""
+    stages = []
+    for name in evaluator.problem.used():
+        if name != evaluator.base:
+            before, after = evaluator.load(evaluator.base, 1.0), evaluator.problem.loads[name]
+            loaded = apply_load(
+                evaluator.assembly(design),
+                state,
+                before,
+                after,
+                step=_COARSE,
+                smallest=min(_FINE, margin),
+                stay=True,
+            )
+            evaluator.factorisations += loaded.factorisations
+            stages.append(1.0 if loaded.on_branch else max(least, loaded.share - margin))
+    return min(stages, default=1.0)
+
+
+def staged(evaluator: Evaluator, design: Design, state: State, stage: float) -> dict[str, State]:
+    """The states of all load cases at a stage, reached step by step from the design load's."""
+    states = {evaluator.base: state}
+    for name in evaluator.problem.used():
+        if name != evaluator.base:
+            before, after = evaluator.load(evaluator.base, 1.0), evaluator.load(name, stage)
+            loaded = apply_load(evaluator.assembly(design), state, before, after)
+            evaluator.factorisations += loaded.factorisations
+            states[name] = loaded.equilibrium.state
+    return states

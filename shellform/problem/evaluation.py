@@ -1,0 +1,320 @@
+"""The evaluation of a design problem on the stable branch.
+
+A trial design is evaluated from the nearest design that was evaluated before: its equilibria are where
+Newton's method starts, and it may not lose definiteness on the way (`on_branch`). A trial that leaves the
+stable branch is given up at once: `OffBranch`. Loads beside the design load are staged: stage t in [0, 1]
+stands for design load + t (load - design load), so that a start that doesn't bear a further load can be led
+to a design that does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Flags, Reals
+from shellform.errors import NotConverged
+from shellform.gridshell.gridshell import Design
+from shellform.problem.constraints import residual_rows, residuals
+from shellform.problem.paths import follow
+from shellform.problem.problem import Problem
+from shellform.problem.terms import LoadedDesign, Measurement, Squares, measured
+from shellform.problem.variables import Blocks
+from shellform.structure.answers.sensitivity import (
+    by_rest_length,
+    by_stiffness,
+    gradients,
+    predicted,
+    respond,
+)
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.factorisation import NotPositiveDefinite
+from shellform.structure.solve.loading import Loaded, apply_load
+
+_TRIAL = 12  # factorisations for one trial equilibrium; from a near design five are enough
+_LED = 0.5  # of a further load, the steps by which it is led
+_FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed …
+_NEAR = 0.02  # … but for one whose root mean square distance is below this share of the target's size
+
+
+class OffBranch(Exception):
+    """A trial design whose equilibrium isn't on the stable branch."""
+
+
+@dataclass(frozen=True)
+class Linearisation:
+    """A design on the stable branch with values and first derivatives: `variables` (s,), `states` by load
+    case, `objective`, its weighted `terms`, `constraints` (k,), residuals at most 0 where met, and the
+    derivatives `objective_by_variables` (s,), `constraints_by_variables` (k, s); for the step model the
+    `measurements` of the objective's terms."""
+
+    variables: Reals
+    design: Design
+    states: Mapping[str, State]
+    objective: float
+    terms: Reals
+    constraints: Reals
+    objective_by_variables: Reals
+    constraints_by_variables: Reals
+    measurements: tuple[Measurement, ...]
+    stage: float
+
+
+class Evaluator:
+    """Evaluates designs of one problem, its objective weighted as at the start, and counts its work."""
+
+    def __init__(self, problem: Problem, start: Design) -> None:
+        self.problem, self.start = problem, start
+        self.shell, self.base = problem.shell, problem.design_load.name
+        self.blocks = Blocks(problem.variables, problem.shell, start)
+        self.weights: Reals = np.ones(len(problem.minimise))
+        self.factorisations = self.equilibria = self.evaluations = self.rejected = self.wasted = 0
+        self._assembly: Assembly | None = None
+        self._present: Flags | None = None
+        self._far = np.inf
+
+    def begin(self) -> dict[str, Loaded]:
+        """Loads the start design step by step, sets the objective's weights, and returns how far each load
+        case came.
+
+        Raises NotConverged where the design load snaps through.
+        """
+        reached = follow(self.shell, self.start, self.problem.loads)
+        for each in reached.values():
+            self._count(each.factorisations)
+        first = reached[self.base]
+        if not first.on_branch:
+            raise not_carried(self.base, first, "Choose a denser grid, thicker rods or stiffer cables.")
+        found = [each.equilibrium.state for each in reached.values() if each.on_branch]
+        target = self.shell.target.positions
+        near = len(target) * (_NEAR * float(np.ptp(target, axis=0).max())) ** 2
+        self._far = max(near, _FAR * max(float(((each.positions - target) ** 2).sum()) for each in found))
+        self.weights = start_weights(self.problem, self.start, reached)
+        return reached
+
+    def load(self, name: str, stage: float) -> Reals:
+        """The load case at a stage."""
+        first = self.problem.design_load.force
+        return np.asarray(first + stage * (self.problem.loads[name] - first))
+
+    def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Linearisation:
+        """The linearisation of a design whose equilibria `states` at the stage are known. Raises OffBranch
+        where one isn't stable.
+        """
+        self.factorisations += len(states)
+        try:
+            return self._linearised(self.assembly(design), design, states, stage)
+        except NotPositiveDefinite as error:
+            raise OffBranch(str(error)) from error
+
+    def evaluate(
+        self, design: Design, near: Mapping[str, State], stage: float, *, lead: bool = False
+    ) -> Linearisation:
+        """The design's linearisation, its equilibria sought from the states `near` them; where those of
+        further loads turn out too far off, with `lead` from the design load's, along the load's own path.
+        Raises OffBranch."""
+        self.evaluations += 1
+        before = self.factorisations
+        assembly = self.assembly(design)
+        used = self.problem.used()
+        try:
+            found: dict[str, State] = {}
+            # The loads that a design may not bear first, so that giving up costs little; to lead, the design
+            # load's state is needed.
+            for name in used if lead else reversed(used):
+                known = found.get(self.base) if lead else None
+                found[name] = self._settled(assembly, near[name], known, self.load(name, stage))
+            return self.seed(design, {name: found[name] for name in used}, stage)
+        except OffBranch:
+            self.rejected += 1
+            self.wasted += self.factorisations - before
+            raise
+
+    def rounded(self, design: Design) -> Design:
+        """The design as its variables give it, to the last bit."""
+        return self.blocks.design(self.blocks.of(design), design.present)
+
+    def predicted(self, point: Linearisation, design: Design, *, but: str = "") -> dict[str, State]:
+        """Where a change of the point's design, with the same cables, takes its states, to first order; all
+        `but` one load's.
+        """
+        shell, before = self.shell, point.design
+        change = (design.rest_length - before.rest_length)[before.present]
+        rates = []
+        if self.blocks.moves_radius:
+            change = np.append(change, design.radius - before.radius)
+            rates = [shell.beams_by_radius(before.radius)]
+        assembly, cables, found = self.assembly(before), shell.cables(before), {}
+        for name, state in point.states.items():
+            if name == but:
+                continue
+            self.factorisations += 1
+            columns = by_rest_length(assembly, state, cables), by_stiffness(assembly, state, *rates)
+            found[name] = predicted(assembly, respond(assembly, state, *columns), change)
+        return found
+
+    def assembly(self, design: Design) -> Assembly:
+        """The assembly of a design; its pattern is kept while the same cables are present."""
+        parts = (self.shell.beams(design.radius), self.shell.cables(design))
+        if (
+            self._assembly is None
+            or self._present is None
+            or not np.array_equal(self._present, design.present)
+        ):
+            self._assembly, self._present = assemble(self.shell.network(design)), design.present
+            return self._assembly
+        return self._assembly.with_parts(parts)
+
+    def _settled(self, assembly: Assembly, near: State, known: State | None, load: Reals) -> State:
+        """The equilibrium next to `near`, or where that is too far off, the one that the load leads to from
+        the design load's, if that is `known`.
+        """
+        try:
+            return self.settle(assembly, near, load)
+        except OffBranch:
+            if known is None:
+                raise
+        loaded = apply_load(
+            assembly, known, self.load(self.base, 1.0), load, step=_LED, smallest=_LED, stay=True
+        )
+        self._count(loaded.factorisations)
+        if not loaded.on_branch:
+            raise OffBranch("the design doesn't bear the load on its stable branch")
+        return loaded.equilibrium.state
+
+    def settle(self, assembly: Assembly, start: State, load: Reals) -> State:
+        """The stable equilibrium next to the state `start` under the `load`. Raises OffBranch."""
+        try:
+            found = find_equilibrium(assembly, start, load, limit=_TRIAL, on_branch=True)
+        except NotConverged as error:
+            self._count(error.iterations)
+            raise OffBranch(str(error)) from error
+        self._count(found.factorisations)
+        misfit = float(((found.state.positions - self.shell.target.positions) ** 2).sum())
+        if not found.stable or misfit > self._far:
+            raise OffBranch("the equilibrium found isn't next to the start")
+        return found.state
+
+    def _count(self, factorisations: int) -> None:
+        self.factorisations += factorisations
+        self.equilibria += 1
+
+    def _linearised(
+        self, assembly: Assembly, design: Design, states: Mapping[str, State], stage: float
+    ) -> Linearisation:
+        """Values and derivatives of objective and constraints at a design whose equilibria are known
+        (appendix A)."""
+        problem, blocks = self.problem, self.blocks
+        variables = blocks.of(design)
+        rates = blocks.rates(design).multiply(variable_units(blocks, design, variables)).tocsc()
+        terms = problem.terms
+        found: list[tuple[Measurement, Reals]] = [(_NOTHING, np.zeros((0, blocks.size)))] * len(terms)
+        for name in dict.fromkeys(term.load for term in terms):
+            own = [k for k, term in enumerate(terms) if term.load == name]
+            at = LoadedDesign(
+                self.shell,
+                design,
+                states[name or self.base],
+                self.load(name or self.base, stage),
+            )
+            measurements = [measured(terms[k], at) for k in own]
+            total = _chained(measurements, at, assembly if name else None, blocks.moves_radius)
+            by_variables = np.empty_like(total, shape=(len(total), blocks.size))
+            by_variables[...] = total @ rates[: total.shape[1]]
+            pieces = np.split(by_variables, np.cumsum([len(each.value) for each in measurements])[:-1])
+            for k, measurement, piece in zip(own, measurements, pieces, strict=True):
+                found[k] = (measurement, piece)
+        summands, kept = found[: len(problem.minimise)], found[len(problem.minimise) :]
+        objective = np.array(
+            [w * each.value.sum() for w, (each, _) in zip(self.weights, summands, strict=True)]
+        )
+        slopes = [w * piece.sum(axis=0) for w, (_, piece) in zip(self.weights, summands, strict=True)]
+        values = [
+            residuals(part, each.value) for part, (each, _) in zip(problem.constraints, kept, strict=True)
+        ]
+        rows = [
+            residual_rows(part, piece) for part, (_, piece) in zip(problem.constraints, kept, strict=True)
+        ]
+        return Linearisation(
+            variables.copy(),
+            design,
+            dict(states),
+            float(objective.sum()),
+            objective,
+            np.concatenate([np.zeros(0), *values]),
+            np.array(slopes).sum(axis=0),
+            np.vstack([np.zeros((0, blocks.size)), *rows]),
+            tuple(_for_the_step(each) for each, _ in summands),
+            stage,
+        )
+
+
+def start_weights(problem: Problem, start: Design, reached: Mapping[str, Loaded]) -> Reals:
+    """What the objective's terms are multiplied by, so that each makes up its share of 1 at the start; those
+    at a load that the start doesn't bear are taken at the design load."""
+    base, loads, values = problem.design_load.name, problem.loads, []
+    for part in problem.minimise:
+        name = part.term.load if part.term.load and reached[part.term.load].on_branch else base
+        at = LoadedDesign(problem.shell, start, reached[name].equilibrium.state, loads[name])
+        values.append(measured(part.term, at).value.sum())
+    return np.array([part.share for part in problem.minimise]) / np.maximum(np.abs(values), 1e-300)
+
+
+def not_carried(name: str, loaded: Loaded, remedy: str) -> NotConverged:
+    """What to say of an initial design that doesn't bear a load case."""
+    return NotConverged(
+        f"The initial design doesn't carry the load case {name!r}: it loses stability at {loaded.share:.2f} of it",
+        state=loaded.equilibrium.state,
+        remedy=remedy,
+    )
+
+
+def variable_units(blocks: Blocks, design: Design, variables: Reals) -> Reals:
+    """(s,): what the values of a design change with its variables."""
+    values = blocks.values(design)
+    each = np.zeros(blocks.size, dtype=bool)
+    for block, own in zip(blocks.variables, blocks.slices, strict=True):
+        each[own] = block.of_each_cable
+    known = (variables != 0.0) & ~each
+    return np.where(known, values / np.where(known, variables, 1.0), blocks.unit)
+
+
+def _chained(
+    measurements: list[Measurement], at: LoadedDesign, assembly: Assembly | None, moves_radius: bool
+) -> Reals:
+    """Total derivatives (g, c) by all rest lengths, and (g, c + 1) by the radius where it moves; where no
+    equilibrium is needed there is no `assembly`."""
+    shell, design, state = at.shell, at.design, at.state
+    partial = sp.hstack(
+        [
+            sp.vstack([each.by_rest_length for each in measurements]),
+            sp.csr_array(np.concatenate([each.by_radius for each in measurements])[:, None]),
+        ]
+    ).toarray()[:, : len(shell.cable_ends) + moves_radius]
+    if assembly is None:
+        return np.asarray(partial)
+    # A column of each candidate cable, empty for the absent ones.
+    present = np.flatnonzero(design.present)
+    spread = sp.csr_array(
+        (np.ones(len(present)), (np.arange(len(present)), present)),
+        shape=(len(present), len(shell.cable_ends)),
+    )
+    rates = [shell.beams_by_radius(design.radius)] if moves_radius else []
+    columns = sp.csc_array(by_rest_length(assembly, state, shell.cables(design)) @ spread)
+    response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
+    by_state = sp.vstack([each.by_dof for each in measurements]).tocsc()[:, assembly.free].toarray()
+    return gradients(response, by_state, partial)
+
+
+def _for_the_step(measurement: Measurement) -> Measurement:
+    """What a step model needs of an objective's term."""
+    return Measurement(measurement.value, squares=measurement.squares, by_tension=measurement.by_tension)
+
+
+_NOTHING = Measurement(np.zeros(0), squares=Squares(np.zeros(0), sp.csr_array((0, 0))))

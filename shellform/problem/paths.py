@@ -1,0 +1,67 @@
+"""A design's documented path: its states under each load case, and what is read off them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from shellform.arrays import Flags, Reals
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.structure.elements.state import State
+from shellform.structure.elements.threads import side_by_side
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.loading import Loaded, apply_load
+
+_SLACK_MARGIN = 1e-6  # relative tension below which a cable counts as slack
+
+
+def follow(
+    shell: Gridshell, design: Design, loads: Mapping[str, Reals], *, stay: bool = False
+) -> dict[str, Loaded]:
+    """The documented path of a design: unloaded from the target shape by relaxation, then each load case on
+    its own from there, step by step (loading.py). `shellform analyse` goes the same way.
+
+    The cases are solved side by side on the cores. With `stay` snap-through isn't followed. Raises
+    NotConverged where no equilibrium is found.
+    """
+    none = np.zeros((shell.node_count, 6))
+    network = shell.network(design)
+    idle = [
+        assemble(network)
+    ]  # assemblies that no case is using: each keeps one factor, and the cases go side by side
+    unloaded = find_equilibrium(idle[0], shell.target, none)
+
+    def loaded(load: Reals) -> Loaded:
+        if not load.any():
+            return Loaded(unloaded, 1.0, unloaded.factorisations)
+        try:
+            own = idle.pop()
+        except IndexError:
+            own = assemble(network)
+        found = apply_load(own, unloaded.state, none, load, stay=stay)
+        idle.append(own)
+        return found
+
+    return dict(zip(loads, side_by_side(loaded, list(loads.values())), strict=True))
+
+
+def in_tension(shell: Gridshell, design: Design, state: State) -> Flags:
+    """Which candidate cables (c,) are present and under tension in the state."""
+    cables = shell.cables(design)
+    pulled = cables.lengths(state) > cables.rest_length * (1.0 + _SLACK_MARGIN)
+    result = np.zeros(len(shell.cable_ends), dtype=bool)
+    result[np.flatnonzero(design.present)[pulled]] = True
+    return result
+
+
+def without_slack(shell: Gridshell, design: Design, state: State) -> Design:
+    """The design without the cables that are slack in the state: the shell doesn't notice."""
+    return replace(design, present=in_tension(shell, design, state))
+
+
+def deviations(shell: Gridshell, state: State) -> Reals:
+    """Distance (n,), m, of every node from its place in the target (7)."""
+    return np.linalg.norm(state.positions - shell.target.positions, axis=1)
