@@ -1,0 +1,167 @@
+"""A user's own term and variable, through public names only."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+import shellform as sf
+
+
+@dataclass(frozen=True)
+class Sag(sf.Term):  # how far each of some nodes lies below the target, m
+    name = "sag"
+    load: str
+    nodes: tuple[int, ...]
+
+    def size(self, shell):
+        return len(self.nodes)
+
+    def measure(self, at):
+        nodes, rows = list(self.nodes), sp.lil_array((len(self.nodes), 6 * len(at.state.positions)))
+        rows[np.arange(len(nodes)), 6 * np.array(nodes) + 2] = -1.0
+        drop = at.shell.target.positions[nodes, 2] - at.state.positions[nodes, 2]
+        return sf.Measurement(drop, by_dof=sp.csr_array(rows))
+
+
+@dataclass(frozen=True)
+class Ratios(sf.Variable):  # one rest length over target length for the cables of each quadrant
+    def quadrant(self, shell):
+        x, y = shell.target.positions[shell.cable_ends].mean(axis=1).T[:2]
+        return (x > 0.0) + 2 * (y > 0.0)
+
+    def size(self, shell):
+        return 4
+
+    def values(self, shell, design):
+        ratio = design.rest_length / shell.cable_lengths
+        return np.bincount(self.quadrant(shell), ratio, 4) / np.bincount(self.quadrant(shell), minlength=4)
+
+    def applied(self, shell, design, values):
+        return replace(design, rest_length=values[self.quadrant(shell)] * shell.cable_lengths)
+
+    def bounds(self, shell, start):
+        return np.full(4, 0.97), np.full(4, 1.01)
+
+    def rates(self, shell, design):
+        rows, quadrant = np.arange(len(shell.cable_ends)), self.quadrant(shell)
+        return sf.Rates(
+            rest_length=sp.csc_array((shell.cable_lengths, (rows, quadrant)), shape=(len(rows), 4))
+        )
+
+
+@pytest.fixture(scope="module")
+def coarse(vault, shell):
+    net = sf.pull_net(vault, spacing=0.14, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    return sf.brace(net, shell.rod, shell.joint, shell.cable, below=vault)
+
+
+def problem(shell, *constraints, variables, minimise=None):
+    wet = shell.point_load(1.0)
+    shares = minimise or [sf.Share(1.0, sf.Misfit("wet"))]
+    return sf.Problem(
+        shell,
+        sf.LoadCase("wet", wet),
+        shares,
+        constraints,
+        [sf.LoadCase("wetter", 1.2 * wet)],
+        variables,
+    )
+
+
+def lowest(shell, count=3):
+    design = shell.design()
+    state = sf.follow(shell, design, {"wet": shell.point_load(1.0)})["wet"].equilibrium.state
+    drop = shell.target.positions[:, 2] - state.positions[:, 2]
+    nodes = np.argsort(-drop)[:count]
+    return tuple(int(each) for each in nodes), drop[nodes]
+
+
+def assert_taylor(asked, start):
+    """Value and derivatives of every residual and of the objective along a random direction: what is left over
+    falls with the square of the step."""
+    plain = sf.comparison.Plain(asked, start)
+    lower, upper = plain.bounds()
+    step = 2e-4 * (upper - lower) * np.random.default_rng(1).normal(size=len(plain.start))
+    slope, slopes = plain.gradient(plain.start), plain.jacobian(plain.start)
+    left = []
+    for size in (1.0, 0.5):
+        there = plain.start + size * step
+        gone = [plain.value(there) - plain.value(plain.start) - size * slope @ step]
+        gone += list(plain.constraints(there) - plain.constraints(plain.start) - size * slopes @ step)
+        left.append(np.linalg.norm(gone))
+    assert 1.9 < np.log2(left[0] / left[1]) < 2.1
+    assert left[0] < 0.05 * np.linalg.norm([slope @ step, *(slopes @ step)])
+
+
+def test_a_user_s_vector_term_and_variable_improve_a_gridshell_and_their_limits_are_kept(coarse):
+    nodes, drop = lowest(coarse)
+    limit = sf.AtMost(0.85 * float(drop.max()), Sag("wet", nodes))
+    asked = problem(coarse, limit, sf.AtMost(4.0, sf.CableForces("wet")), variables=[Ratios()])
+    start = coarse.design()
+    assert_taylor(asked, start)
+    best = sf.optimise(asked, start, evaluations=20)
+    assert best.objective < 0.95
+    assert max(best.constraints.values()) <= sf.FEASIBLE
+    assert best.constraints.keys() >= {"sag", "cable_force"}
+    ratio = best.design.rest_length / coarse.cable_lengths
+    assert len(np.unique(np.round(ratio, 12))) <= 4
+
+
+def test_a_user_s_vector_term_is_limited_from_below_and_minimised_beside_the_cables_own_lengths(coarse):
+    nodes, drop = lowest(coarse)
+    sag = Sag("wet", nodes)
+    shares = [sf.Share(0.5, sf.Misfit("wet")), sf.Share(0.5, sag)]
+    variables = [sf.RestLengths(), sf.FreeRadius(0.0008, 0.0012)]
+    bounds = sf.Between(0.1 * float(drop.min()), 2.0 * float(drop.max()), sag)
+    asked = problem(coarse, bounds, variables=variables, minimise=shares)
+    assert asked.places() == [slice(0, 6)]
+    assert_taylor(asked, coarse.design())
+    best = sf.optimise(asked, coarse.design(), evaluations=15, solver=sf.SequentialConvex(thin=False))
+    assert best.objective < 0.6
+    assert best.constraints["sag"] <= sf.FEASIBLE
+    state = best.states["wet"]
+    sunk = (coarse.target.positions - state.positions)[list(nodes), 2]
+    assert sunk.min() >= 0.1 * drop.min() - sf.FEASIBLE * bounds.scale
+
+
+@dataclass(frozen=True)
+class Wrong(Sag):
+    def size(self, shell):
+        return 1
+
+
+@dataclass(frozen=True)
+class Askew(Ratios):
+    def rates(self, shell, design):
+        return sf.Rates(radius=np.ones(3))
+
+
+def test_a_term_or_variable_whose_shapes_are_not_those_that_it_says_is_refused(coarse):
+    start = coarse.design()
+    wrong = problem(coarse, sf.AtMost(1.0, Wrong("wet", (1, 2))), variables=[sf.RestLengths()])
+    with pytest.raises(sf.InputError, match=r"sag\.value"):
+        sf.optimise(wrong, start, evaluations=1)
+    with pytest.raises(sf.InputError, match="rates must have the shapes"):
+        sf.optimise(problem(coarse, variables=[Askew()]), start, evaluations=1)
+    with pytest.raises(sf.InputError, match="two blocks change the same cable"):
+        sf.optimise(problem(coarse, variables=[sf.RestLengths(), Ratios()]), start, evaluations=1)
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: sf.AtMost(0.0, sf.RodRadius()), "must be positive"),
+        (lambda: sf.AtLeast(np.inf, sf.RodRadius()), "must be finite"),
+        (lambda: sf.AtLeast(0.0, sf.RodRadius(), of=-1.0), "positive and finite"),
+        (lambda: sf.Between(2.0, 1.0, sf.RodRadius()), "must lie below"),
+        (lambda: sf.RestLengths(least=0.0), "must be positive"),
+        (lambda: sf.SequentialConvex(window=0.0), r"solver\.window"),
+        (lambda: sf.SequentialConvex(stiffness=-1.0), r"solver\.stiffness"),
+        (lambda: sf.SequentialConvex(shrink=1.5), "must shrink"),
+    ],
+)
+def test_limits_bounds_and_settings_that_make_no_sense_are_refused(make, said):
+    with pytest.raises(sf.InputError, match=said):
+        make()
