@@ -1,7 +1,7 @@
 """Designing bending-active gridshells as falsework for concrete shells.
 
     import shellform as sf
-    from shellform import cad, mma, render
+    from shellform import cad, render
 
 The public names stand in `__init__.pyi`. Each is loaded when it is first used: `import shellform` itself loads
 no large library.

@@ -24,10 +24,13 @@ from shellform.net.grid import GridRod as GridRod
 from shellform.net.net import Net as Net
 from shellform.net.quality import Quality as Quality
 from shellform.optimiser import comparison as comparison
-from shellform.optimiser import solver as _solver
+from shellform.optimiser.optimise import optimise as optimise
+from shellform.optimiser.optimise import polish as polish
 from shellform.optimiser.optimum import Checkpoint as Checkpoint
 from shellform.optimiser.optimum import Optimum as Optimum
 from shellform.optimiser.optimum import Step as Step
+from shellform.optimiser.solver import POLISHING as POLISHING
+from shellform.optimiser.solver import SequentialConvex as SequentialConvex
 from shellform.output.exchange import exports as exports
 from shellform.output.pictures import plots as plots
 from shellform.output.pictures import render as render
@@ -35,26 +38,37 @@ from shellform.output.workshop import drawings as drawings
 from shellform.output.workshop import nesting as nesting
 from shellform.output.workshop import schedules as schedules
 from shellform.problem import robust as robust
+from shellform.problem.constraints import AtLeast as AtLeast
+from shellform.problem.constraints import AtMost as AtMost
+from shellform.problem.constraints import Between as Between
+from shellform.problem.constraints import Constraint as Constraint
 from shellform.problem.engineering import ConnectorTurn as ConnectorTurn
 from shellform.problem.engineering import LargestCableForce as LargestCableForce
+from shellform.problem.engineering import LeastTension as LeastTension
+from shellform.problem.engineering import ModalStiffness as ModalStiffness
 from shellform.problem.engineering import RodUtilisation as RodUtilisation
-from shellform.problem.engineering import Slackness as Slackness
-from shellform.problem.engineering import Softness as Softness
 from shellform.problem.engineering import Uplift as Uplift
-from shellform.problem.problem import Point as Point
+from shellform.problem.evaluation import Linearisation as Linearisation
+from shellform.problem.paths import deviations as deviations
+from shellform.problem.paths import follow as follow
+from shellform.problem.problem import FEASIBLE as FEASIBLE
+from shellform.problem.problem import LoadCase as LoadCase
 from shellform.problem.problem import Problem as Problem
-from shellform.problem.problem import deviations as deviations
-from shellform.problem.problem import follow as follow
 from shellform.problem.robust import RobustMisfit as RobustMisfit
-from shellform.problem.terms import AtMost as AtMost
 from shellform.problem.terms import CableForce as CableForce
 from shellform.problem.terms import CableForces as CableForces
-from shellform.problem.terms import Measure as Measure
+from shellform.problem.terms import LoadedDesign as LoadedDesign
+from shellform.problem.terms import Measurement as Measurement
 from shellform.problem.terms import Misfit as Misfit
 from shellform.problem.terms import RmsMisfit as RmsMisfit
 from shellform.problem.terms import RodRadius as RodRadius
 from shellform.problem.terms import Share as Share
+from shellform.problem.terms import Squares as Squares
 from shellform.problem.terms import Term as Term
+from shellform.problem.variables import FreeRadius as FreeRadius
+from shellform.problem.variables import Rates as Rates
+from shellform.problem.variables import RestLengths as RestLengths
+from shellform.problem.variables import Variable as Variable
 from shellform.site import calibration as calibration
 from shellform.site import erection as erection
 from shellform.site import retensioning as retensioning
@@ -81,6 +95,5 @@ from shellform.surface.shape.target import Surface as Surface
 from shellform.surface.shape.target import make_surface as make_surface
 
 __version__: str
-mma = _solver
 
 def load_ipython_extension(ipython: object) -> None: ...

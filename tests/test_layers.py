@@ -51,7 +51,7 @@ FLOORS = {
 # common: to draw, to write VTP, to read VTK's own files. Of CVXOPT two: CHOLMOD, and interior points.
 DOORS = {
     "binpacking": "output/workshop/nesting.py",
-    "cvxopt": "optimiser/convex.py",
+    "cvxopt": "optimiser/quadratic.py",
     "cvxopt.cholmod": "structure/solve/factorisation.py",
     "dask": "study/engine.py",
     "distributed": "study/engine.py",

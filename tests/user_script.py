@@ -7,22 +7,21 @@ import numpy as np
 import scipy.sparse as sp  # type: ignore[import-untyped]  # SciPy brings no types
 
 import shellform as sf
-from shellform import cad, mma, render
+from shellform import cad, render
 
 
 @dataclass(frozen=True)
-class Sag:
+class Sag(sf.Term):
     """The mean sag below the target, m: a term that the package doesn't have."""
 
+    name = "sag"
     load: str
 
-    def measure(self, shell: sf.Gridshell, design: sf.Design, state: sf.State) -> sf.Measure:
-        nodes, cables = len(state.positions), len(design.rest_length)
-        sag = float((shell.target.positions - state.positions)[:, 2].mean())
+    def measure(self, at: sf.LoadedDesign) -> sf.Measurement:
+        nodes = len(at.state.positions)
+        sag = float((at.shell.target.positions - at.state.positions)[:, 2].mean())
         slope = np.tile([0.0, 0.0, -1.0 / nodes, 0.0, 0.0, 0.0], nodes)
-        return sf.Measure(
-            np.array([sag]), sp.csr_array(slope.reshape(1, -1)), sp.csr_array((1, cables)), np.zeros(1)
-        )
+        return sf.Measurement(np.array([sag]), sp.csr_array(slope.reshape(1, -1)))
 
 
 def braced(surface: sf.Surface, spacing: float) -> sf.Gridshell:
@@ -37,11 +36,12 @@ def designed(shell: sf.Gridshell) -> sf.Optimum:
     term: sf.Term = Sag("wet")
     problem = sf.Problem(
         shell,
-        {"wet": wet, "wetter": 1.2 * wet},
+        design_load=sf.LoadCase("wet", wet),
+        further=[sf.LoadCase("wetter", 1.2 * wet)],
         minimise=[sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        limits=[sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.01, term)],
+        constraints=[sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.01, term)],
     )
-    return mma.polish(mma.optimise(problem, shell.design(rest_ratio=0.99), evaluations=10))
+    return sf.polish(sf.optimise(problem, shell.design(rest_ratio=0.99), evaluations=10))
 
 
 def main() -> None:

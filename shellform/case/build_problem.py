@@ -24,7 +24,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Scatter
 from shellform.net.grid import CONNECTOR
-from shellform.problem.constraints import AtMost, Constraint
+from shellform.problem.constraints import AtLeast, AtMost, Constraint
 from shellform.problem.engineering import (
     ConnectorTurn,
     LargestCableForce,
@@ -85,7 +85,7 @@ def case_problem(
         ):
             critical.append(f"critical {each}")
             used[critical[-1]] = factor * loads[each]
-            constraints.append(AtMost(1.0, ModalStiffness(critical[-1], least)))
+            constraints.append(AtLeast(least, ModalStiffness(critical[-1], least)))
     order = ["none", *others, *sorted(critical, key="critical design".__eq__)]
     return Problem(
         shell,
@@ -138,13 +138,13 @@ def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list
         if entry.connector_turn is not None:
             found.append(AtMost(entry.connector_turn, ConnectorTurn(name)))
         if entry.uplift is not None:
-            offset = max(entry.uplift, -float(loads["design"][:, 2].sum()) / len(shell.net.supports))
-            found.append(AtMost(offset + entry.uplift, Uplift(name, offset)))
+            scale = max(entry.uplift, -float(loads["design"][:, 2].sum()) / len(shell.net.supports))
+            found.append(AtMost(entry.uplift, Uplift(name, scale), of=scale + entry.uplift))
     if entry.slack_min is not None:
         longest = case.cable.rest_ratio * case.optimise.rest_length_max
         let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
         for name in _known("limits.slack_loads", entry.slack_loads, list(loads)):
-            found.append(AtMost(1.0, LeastTension(name, entry.slack_min, let_out)))
+            found.append(AtLeast(entry.slack_min, LeastTension(name, entry.slack_min, let_out)))
     return found
 
 

@@ -40,7 +40,7 @@ from shellform.optimiser.phases import run
 from shellform.optimiser.solver import POLISHING, SequentialConvex
 from shellform.optimiser.state import Iterate, Keep, Models, Search, Watch, finish, record, resumed
 from shellform.optimiser.trials import reach, staged
-from shellform.problem.constraints import AtMost, Constraint
+from shellform.problem.constraints import AtLeast, Constraint
 from shellform.problem.engineering import ModalStiffness
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.problem import Problem
@@ -199,4 +199,4 @@ def _stiff(problem: Problem, least: float) -> list[Constraint]:
     base = problem.design_load.name
     own = {part.term.load for part in problem.constraints if part.term.stabilises}
     further = [name for name in problem.used() if name not in (base, *own) and problem.loads[name].any()]
-    return [AtMost(1.0, ModalStiffness(name, least)) for name in further] if least > 0.0 else []
+    return [AtLeast(least, ModalStiffness(name, least)) for name in further] if least > 0.0 else []

@@ -62,7 +62,7 @@ def propose(task: Task) -> tuple[Reals, float]:
     slope = _slope(task)
     values = model.point.constraints + task.excess
     falls, margins = _guarding(task, width)
-    scaled_slope, scaled_rows = slope * width, np.vstack([model.constraints_by_y() * width, falls])
+    scaled_slope, scaled_rows = slope * width, np.vstack([model.constraints_by_y * width, falls])
     values = np.append(values, margins)
     scaled_curvature = np.asarray(_curvature(model)) * width * width[:, None]
 

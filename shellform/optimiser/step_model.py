@@ -59,7 +59,7 @@ class StepModel:
     bounds of the rest lengths. `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,) the
     largest changes of the other values. `length` (c,), m, and `length_by_y` (c, y); `variables_by_y` (s, y)
     of the problem's variables; `parameters_by_y` (c or c + 1, y) of the present rest lengths and, where it
-    moves, the radius. `quadratics`: of each term of the objective, None where it has none. `pull` (f, y), the
+    moves, the radius; `constraints_by_y` (k, y). `quadratics`: of each term of the objective, None where it has none. `pull` (f, y), the
     forces on the free degrees of freedom by y, and `middle` (c, y), the changes of tension that make K's
     answer to them K_t's.
     """
@@ -78,6 +78,7 @@ class StepModel:
     length_by_y: Reals
     variables_by_y: Reals
     parameters_by_y: Reals
+    constraints_by_y: Reals
     quadratics: tuple[Quadratic | None, ...]
     pull: sp.csc_array
     middle: Reals
@@ -105,16 +106,10 @@ class StepModel:
         whole[self.assembly.free] = -self.assembly.factor(self.state).solve(force)
         return moved(self.state, self.assembly.chords.corrected(self.state, whole.reshape(-1, 6)))
 
-    def constraints_by_y(self) -> Reals:
-        """(k, y): the constraints' derivatives."""
-        return self.point.constraints_by_variables @ self.variables_by_y
-
     def constraints_at(self, y: Reals) -> Reals:
         """(k,): the constraints' linear model. Linear in y: in the rest lengths a cable that dies leaps to
         the longest one."""
-        return self.point.constraints + self.point.constraints_by_variables @ (
-            self.variables_by_y @ (y - self.origin)
-        )
+        return self.point.constraints + self.constraints_by_y @ (y - self.origin)
 
     def _rest_lengths(self, y: Reals) -> Reals:
         """Rest lengths (c,), m, that the model gives to the tensions of y."""
@@ -161,19 +156,20 @@ def step_model(evaluator: Evaluator, point: Linearisation) -> StepModel:
     whole = np.eye(right.shape[1])
     whole[:count] += middle
 
-    variables_by_y = np.zeros((blocks.size, right.shape[1]))
+    values_by_y = np.zeros((blocks.size, right.shape[1]))
     if each is not None:
         ea = shell.cable.stiffness
         rest_by_y = (ea / (ea + tension))[:, None] * length_by_y
         rest_by_y[:, :count] -= np.diag(ea * length / (ea + tension) ** 2)
         # A dead cable at its longest stays there until it is given tension, which its own column then asks
         # for at full length.
-        variables_by_y[each.start + present] = rest_by_y / blocks.unit[each][present, None]
+        values_by_y[each.start + present] = rest_by_y
+    values_by_y[other, count:] = np.eye(int(other.sum()))
+    variables_by_y = values_by_y / blocks.unit[:, None]
+    kept = np.append(present, rates.shape[0] - 1) if blocks.moves_radius else present
     values = blocks.values(design)
-    variables_by_y[other, count:] = np.diag(_over(point.variables, values, blocks.unit)[other])
-    lower, upper = (side * blocks.unit for side in blocks.bounds())
-    longest = upper[each][present] if each is not None else np.zeros(0)
-    shortest = blocks.value_bounds()[0][each][present] if each is not None else np.zeros(0)
+    lower, upper = blocks.value_bounds()
+    shortest, longest = (np.zeros(0) if each is None else side[each][present] for side in (lower, upper))
     return StepModel(
         evaluator,
         assembly,
@@ -188,7 +184,8 @@ def step_model(evaluator: Evaluator, point: Linearisation) -> StepModel:
         length[:count],
         length_by_y,
         variables_by_y,
-        _parameters(evaluator, design, rates, variables_by_y, point.variables),
+        np.asarray(sp.csr_array(rates)[kept] @ values_by_y),
+        point.constraints_by_variables @ variables_by_y,
         _quadratics(evaluator, point, residuals, moved_by, whole),
         right,
         middle,
@@ -210,28 +207,6 @@ def _forces(
         np.add.at(change, beams.dofs(), beams.evaluate(state, tangent=False).force)
         result = result + sp.csc_array(change[assembly.free][:, None] * rate[[-1]].toarray())
     return sp.csc_array(result)
-
-
-def _parameters(
-    evaluator: Evaluator, design: Design, rates: sp.csc_array, variables_by_y: Reals, variables: Reals
-) -> Reals:
-    """(c or c + 1, y): the present rest lengths and, where it moves, the radius by y."""
-    blocks = evaluator.blocks
-    values_by_y = variables_by_y * blocks.unit[:, None]
-    for block, own in zip(blocks.variables, blocks.slices, strict=True):
-        if not block.of_each_cable:
-            values = blocks.values(design)[own]
-            known = variables[own] != 0.0
-            values_by_y[own][known] = (
-                variables_by_y[own][known] * values[known, None] / variables[own][known, None]
-            )
-    kept = np.append(np.flatnonzero(design.present), [rates.shape[0] - 1] if blocks.moves_radius else [])
-    return np.asarray(sp.csr_array(rates)[kept.astype(int)] @ values_by_y)
-
-
-def _over(variables: Reals, values: Reals, unit: Reals) -> Reals:
-    known = values != 0.0
-    return np.where(known, variables / np.where(known, values, 1.0), 1.0 / unit)
 
 
 def _distinct(evaluator: Evaluator, point: Linearisation) -> list[Squares]:

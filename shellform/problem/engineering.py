@@ -112,40 +112,43 @@ class LargestCableForce(Term):
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; slack cables count with the push that they would give."""
-        return _of_tensions(at, np.flatnonzero(at.design.present), self.scale, 0.0, 1.0)
+        return _of_tensions(at, np.flatnonzero(at.design.present), self.scale, 1.0)
 
 
 @dataclass(frozen=True)
 class LeastTension(Term):
-    """2 less the least cable tension over `least`, N: at most 1 where every present cable pulls with `least`
-    or more.
+    """The least cable tension, N, of the present cables; `scale`, N, is the size of tensions that matter, such
+    as the limit that it is to keep.
 
-    It is kept with up to ln(number) / 10 of `least` to spare. Cables longer than `let_out` times their length
+    It is told up to ln(number) / 10 of `scale` too low. Cables longer than `let_out` times their length
     in the target don't count: those which the optimiser has done without (tensions.py).
     """
 
     name = "slackness"
     load: str
-    least: float
+    scale: float
     let_out: float = np.inf
 
     def __post_init__(self) -> None:
-        if not self.least > 0.0:
-            raise InputError("must be positive", where="least_tension.least", value=self.least)
+        if not self.scale > 0.0:
+            raise InputError("must be positive", where="least_tension.scale", value=self.scale)
 
     def measure(self, at: LoadedDesign) -> Measurement:
-        """One value. A slack cable counts with the tension that it would have if it could push, which tells
-        how slack it is.
+        """One value, N, twice `scale` where there are no cables. A slack cable counts with the tension that it would
+        have if it could push, which tells how slack it is.
         """
         design, lengths = at.design, at.shell.cable_lengths
         chosen = np.flatnonzero(design.present & (design.rest_length <= self.let_out * lengths))
-        return _of_tensions(at, chosen, SHARPNESS / _EASED, 2.0, -1.0 / self.least)
+        if not len(chosen):
+            return Measurement(np.array([2.0 * self.scale]))
+        return _of_tensions(at, chosen, SHARPNESS / _EASED * self.scale, -1.0)
 
 
 @dataclass(frozen=True)
 class ModalStiffness(Term):
-    """2 less the square of the softest mode's stiffness under the load over `least`, N/m: at most 1 where no
-    mode is softer than `least`.
+    """The square of the softest mode's stiffness under the load, (N/m)², negative where that is; limits on it
+    are given in N/m, and `scale`, N/m, is the size of stiffness that matters, such as the limit that it is to
+    keep.
 
     The square, because that stiffness goes with the root of the distance to a limit point: its square is
     nearly linear in the design. Stability ends where that stiffness comes to 0, long before deviations tell
@@ -156,14 +159,18 @@ class ModalStiffness(Term):
     name = "softness"
     stabilises = True
     load: str
-    least: float
+    scale: float
 
     def __post_init__(self) -> None:
-        if not self.least > 0.0:
-            raise InputError("must be positive", where="modal_stiffness.least", value=self.least)
+        if not self.scale > 0.0:
+            raise InputError("must be positive", where="modal_stiffness.scale", value=self.scale)
+
+    def at_limit(self, limit: float) -> float:
+        """Its square."""
+        return limit * abs(limit)
 
     def measure(self, at: LoadedDesign) -> Measurement:
-        """One value."""
+        """One value, (N/m)²."""
         shell, design, state = at.shell, at.design, at.state
         assembly = assemble(shell.network(design))
         found = modes(assembly, state, _MODES)
@@ -176,29 +183,32 @@ class ModalStiffness(Term):
             rows.append(bilinear_by_dof(assembly, state, mode, mode))
             by_radius.append(bilinear(rate, state, mode, mode))
             by_rest.append(bilinear_by_rest_length(cables, state, mode, mode))
-        ratio = found.stiffness / self.least
-        weight, value = _smooth(2.0 - ratio * np.abs(ratio), SHARPNESS)
-        weight = 2.0 * np.abs(ratio) * weight
-        slope = -(weight @ np.array(rows)) / self.least
+        stiffness = found.stiffness
+        weight, largest = _smooth(-stiffness * np.abs(stiffness), SHARPNESS / self.scale**2)
+        weight = 2.0 * np.abs(stiffness) * weight
         spread = np.zeros(len(shell.cable_ends))
-        spread[np.flatnonzero(design.present)] = -(weight @ np.array(by_rest)) / self.least
+        spread[np.flatnonzero(design.present)] = weight @ np.array(by_rest)
         return Measurement(
-            np.array([value]),
-            sp.csr_array(slope[None]),
+            np.array([-largest]),
+            sp.csr_array((weight @ np.array(rows))[None]),
             sp.csr_array(spread[None]),
-            np.array([-float(weight @ np.array(by_radius)) / self.least]),
+            np.array([float(weight @ np.array(by_radius))]),
         )
 
 
 @dataclass(frozen=True)
 class Uplift(Term):
-    """The largest force, N, with which a support has to hold a rod's end down, plus `offset`, N, which keeps
-    it above 0.
+    """The largest force, N, with which a support has to hold a rod's end down, negative where all press;
+    `scale`, N, is the size of reactions that matter.
     """
 
     name = "uplift"
     load: str
-    offset: float = 1.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.scale > 0.0:
+            raise InputError("must be positive", where="uplift.scale", value=self.scale)
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; supports may bear a part of the load at once."""
@@ -214,11 +224,12 @@ class Uplift(Term):
         cables = shell.cables(design)
         if np.isin(cables.ends, shell.net.supports).any():
             raise InputError("cables that end at supports are not provided for", where="uplift")
-        return _largest(shell, self.offset, self.offset - reaction, dofs, rows, -change[held])
+        return _largest(shell, self.scale, -reaction, dofs, rows, -change[held])
 
 
-def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, offset: float, factor: float) -> Measurement:
-    """KS of offset + factor EA (l / l0 - 1) of the `chosen` candidate cables; 0 where there are none."""
+def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, sign: float) -> Measurement:
+    """The largest (`sign` 1) or least (-1) of EA (l / l0 - 1), N, of the `chosen` candidate cables, smooth in
+    the `unit`, N; 0 where there are none."""
     shell, design, state = at.shell, at.design, at.state
     if not len(chosen):
         return Measurement(np.zeros(1))
@@ -227,20 +238,25 @@ def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, offset: float, 
     )
     chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
     length = np.linalg.norm(chord, axis=1)
-    slope = factor * cables.stiffness / cables.rest_length
+    slope = sign * cables.stiffness / cables.rest_length
     toward = (slope / length)[:, None] * chord
-    values = offset + slope * (length - cables.rest_length)
-    by_rest = -slope * length / cables.rest_length
-    return _largest(
+    largest = _largest(
         shell,
         unit,
-        values,
+        slope * (length - cables.rest_length),
         cables.dofs(),
         np.hstack([-toward, toward]),
-        np.zeros(len(values)),
+        np.zeros(len(length)),
         chosen,
-        by_rest,
+        -slope * length / cables.rest_length,
     )
+    return largest if sign > 0.0 else _negative(largest)
+
+
+def _negative(measurement: Measurement) -> Measurement:
+    assert measurement.by_dof is not None
+    assert measurement.by_rest_length is not None
+    return Measurement(-measurement.value, -measurement.by_dof, -measurement.by_rest_length)
 
 
 def _largest(

@@ -212,7 +212,7 @@ class Evaluator:
         (appendix A)."""
         problem, blocks = self.problem, self.blocks
         variables = blocks.of(design)
-        rates = blocks.rates(design).multiply(variable_units(blocks, design, variables)).tocsc()
+        rates = blocks.rates(design).multiply(blocks.unit).tocsc()
         terms = problem.terms
         found: list[tuple[Measurement, Reals]] = [(_NOTHING, np.zeros((0, blocks.size)))] * len(terms)
         for name in dict.fromkeys(term.load for term in terms):
@@ -273,16 +273,6 @@ def not_carried(name: str, loaded: Loaded, remedy: str) -> NotConverged:
         state=loaded.equilibrium.state,
         remedy=remedy,
     )
-
-
-def variable_units(blocks: Blocks, design: Design, variables: Reals) -> Reals:
-    """(s,): what the values of a design change with its variables."""
-    values = blocks.values(design)
-    each = np.zeros(blocks.size, dtype=bool)
-    for block, own in zip(blocks.variables, blocks.slices, strict=True):
-        each[own] = block.of_each_cable
-    known = (variables != 0.0) & ~each
-    return np.where(known, values / np.where(known, variables, 1.0), blocks.unit)
 
 
 def _chained(

@@ -86,7 +86,7 @@ def test_the_smooth_maximum_is_never_below_the_largest_and_little_above(shell, w
 def test_supports_that_would_lift_are_told_with_their_force(shell, wet):
     evaluator = Evaluator(limited(shell, wet, Uplift("wet", 2.0)), shell.design())
     state = evaluator.begin()["wet"].equilibrium.state
-    told = Uplift("wet", 2.0).measure(LoadedDesign(shell, shell.design(), state, wet)).value[0] - 2.0
+    told = Uplift("wet", 2.0).measure(LoadedDesign(shell, shell.design(), state, wet)).value[0]
     assembly = evaluator.assembly(shell.design())
     reaction = (assembly.evaluate(state, tangent=False).force - wet)[shell.net.supports, 2]
     assert reaction.sum() == pytest.approx(-wet[:, 2].sum(), rel=1e-6)
@@ -94,12 +94,14 @@ def test_supports_that_would_lift_are_told_with_their_force(shell, wet):
 
 
 def test_limits_that_make_no_sense_are_refused(shell, wet):
-    with pytest.raises(InputError, match=r"least_tension\.least"):
+    with pytest.raises(InputError, match=r"least_tension\.scale"):
         LeastTension("wet", 0.0)
     with pytest.raises(InputError, match=r"largest_cable_force\.scale"):
         LargestCableForce("wet", 0.0)
-    with pytest.raises(InputError, match=r"modal_stiffness\.least"):
+    with pytest.raises(InputError, match=r"modal_stiffness\.scale"):
         ModalStiffness("wet", -1.0)
+    with pytest.raises(InputError, match=r"uplift\.scale"):
+        Uplift("wet", 0.0)
     unknown = dataclasses.replace(shell, rod=sf.Rod.round(young=40e9, radius=0.001))
     state = shell.target
     with pytest.raises(InputError, match="strength"):
@@ -117,11 +119,11 @@ def test_the_largest_cable_force_is_told_little_above_and_cables_let_out_are_not
     lengths = design.rest_length.copy()
     lengths[7] = 1.08 * shell.cable_lengths[7]
     loose = dataclasses.replace(design, rest_length=lengths)
-    assert LeastTension("wet", 0.5).measure(LoadedDesign(shell, loose, state, wet)).value[0] > 10.0
+    assert LeastTension("wet", 0.5).measure(LoadedDesign(shell, loose, state, wet)).value[0] < -4.0
     others = LeastTension("wet", 0.5, let_out=1.05).measure(LoadedDesign(shell, loose, state, wet)).value[0]
-    assert (
-        others <= LeastTension("wet", 0.5).measure(LoadedDesign(shell, design, state, wet)).value[0] + 1e-12
-    )
+    least = LeastTension("wet", 0.5).measure(LoadedDesign(shell, design, state, wet)).value[0]
+    assert others >= least - 1e-12
+    assert pull.min() - 0.5 * np.log(len(pull)) / 10.0 <= least <= pull.min()
     none = shell.unbraced()
     assert LargestCableForce("wet", 5.0).measure(LoadedDesign(shell, none, state, wet)).value[0] == 0.0
-    assert LeastTension("wet", 0.5).measure(LoadedDesign(shell, none, state, wet)).value[0] == 0.0
+    assert LeastTension("wet", 0.5).measure(LoadedDesign(shell, none, state, wet)).value[0] == 1.0
