@@ -37,8 +37,8 @@ from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.optimum import Checkpoint, Optimum
 from shellform.optimiser.phases import run
+from shellform.optimiser.search_state import Iterate, Keep, Models, Search, Watch, finish, record, resumed
 from shellform.optimiser.solver import POLISHING, SequentialConvex
-from shellform.optimiser.state import Iterate, Keep, Models, Search, Watch, finish, record, resumed
 from shellform.optimiser.trials import reach, staged
 from shellform.problem.constraints import AtLeast, Constraint
 from shellform.problem.engineering import ModalStiffness

@@ -1,5 +1,5 @@
 """The phases of a search, each from an iterate to an iterate: rounds of proposal (proposal.py), trial
-(trials.py) and judgement (state.py).
+(trials.py) and judgement (search_state.py).
 
 Climbing, where the start doesn't bear the further loads; descending, by the objective; thinning, which takes
 cables away.
@@ -13,7 +13,7 @@ import numpy as np
 
 from shellform.arrays import Indices
 from shellform.optimiser.proposal import propose
-from shellform.optimiser.state import Iterate, Search, in_tension, merit, noted, tell, violation
+from shellform.optimiser.search_state import Iterate, Search, in_tension, merit, noted, tell, violation
 from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.thinning import kept_stiffness, removable
 from shellform.optimiser.trials import accepted, attempt, attempt_without, reach, sound, staged, task

@@ -12,7 +12,7 @@ from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.proposal import Task
-from shellform.optimiser.state import Iterate, Search, noted, violation
+from shellform.optimiser.search_state import Iterate, Search, noted, violation
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch
 from shellform.problem.paths import follow, without_slack
