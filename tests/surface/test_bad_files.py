@@ -248,7 +248,7 @@ def test_files_beyond_the_stated_limits_are_refused_before_they_are_read(tmp_pat
         ("raise RuntimeError('no such luck')", ["meshio failed on it: RuntimeError: no such luck"]),
         (
             "import numpy; read = lambda *a, **k: numpy.ones(10**15)",
-            ["can't be read as PLY", "Unable to allocate"],
+            ["can't be read as MSH", "Unable to allocate"],
         ),
         ("raise MemoryError", ["needs more memory"]),
         ("import time; time.sleep(60)", ["meshio hadn't read it after 2 s"]),
@@ -257,12 +257,12 @@ def test_files_beyond_the_stated_limits_are_refused_before_they_are_read(tmp_pat
 def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(
     tmp_path, monkeypatch, code, words
 ):
-    file = tmp_path / "a.ply"
-    meshio.Mesh(POINTS, [("quad", QUADS)]).write(file)
+    file = tmp_path / "a.msh"
+    meshio.Mesh(POINTS, [("quad", QUADS)]).write(file, file_format="gmsh")
     (tmp_path / "meshio.py").write_text(code)
     monkeypatch.setenv("PYTHONPATH", f"{tmp_path}{os.pathsep}{ROOT}")
     with pytest.raises(InputError) as caught:
-        foreign.read_foreign(file, "ply", SETTINGS, longest=2.0)
+        foreign.read_foreign(file, "msh", SETTINGS, longest=2.0)
     for word in [str(file), *words]:
         assert word in str(caught.value)
     assert (
@@ -307,3 +307,83 @@ def test_wrong_settings_are_refused_before_the_file_is_read(tmp_path):
     ]:
         with pytest.raises(InputError, match=word.replace(".", r"\.")):
             read_surface(file, **choice)
+
+
+@pytest.mark.parametrize(
+    ("corners", "words"),
+    [
+        ("3 0 1 7", "names vertex 8, of 4"),
+        ("3 0 1 2.5", "can't be read as PLY"),
+        ("3 0 1", "can't be read as PLY"),
+    ],
+)
+def test_a_ply_file_whose_faces_can_not_be_is_refused(tmp_path, corners, words):
+    head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    (tmp_path / "a.ply").write_text(head + "0 0 0\n1 0 0\n1 1 0\n0 1 0\n" + corners + "\n")
+    refused(tmp_path / "a.ply", words)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("vertex_indices", "edges", "no list vertex_indices"),
+        ("uchar int", "uchar float", "no whole numbers"),
+        ("property float z\n", "property float height\n", "holds no points"),
+        ("float y", "list uchar float y", "PLY"),
+        ("vertex 4", "vertex 4000000000000", "PLY|memory"),
+        ("ascii", "binary_little_endian", "PLY"),
+    ],
+)
+def test_a_ply_file_whose_head_says_something_else_is_refused(tmp_path, old, new, words):
+    text = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    text += "element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+    text += "0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 " + ("3.5" if new == "uchar float" else "3") + "\n"
+    assert old in text
+    (tmp_path / "a.ply").write_text(text.replace(old, new))
+    with pytest.raises(InputError, match=words):
+        read_surface(tmp_path / "a.ply")
+
+
+def gltf_tree(folder):
+    return json.loads(write_gltf(folder / "a.gltf", POINTS, TRIANGLES).read_text())
+
+
+def test_gltf_nodes_with_two_parents_and_in_circles_are_refused(tmp_path):
+    tree = gltf_tree(tmp_path)
+    doubled = [{"children": [k + 1, k + 1]} for k in range(60)] + [{"mesh": 0}]
+    shared = [{"children": [1, 2]}, {"children": [3]}, {"children": [3]}, {"mesh": 0}]
+    circle = [{"children": [1]}, {"children": [0], "mesh": 0}]
+    for nodes in (doubled, shared, circle):
+        changed = {**tree, "nodes": nodes, "scenes": [{"nodes": [0]}]}
+        (tmp_path / "a.gltf").write_text(json.dumps(changed))
+        refused(tmp_path / "a.gltf", "has two parents, or its nodes go round in a circle")
+
+
+def test_a_gltf_file_that_places_one_mesh_beyond_all_limits_is_refused(tmp_path):
+    tree = gltf_tree(tmp_path)
+    nodes = [{"mesh": 0}] * 60_000
+    (tmp_path / "a.gltf").write_text(
+        json.dumps({**tree, "nodes": nodes, "scenes": [{"nodes": list(range(len(nodes)))}]})
+    )
+    refused(tmp_path / "a.gltf", "places its meshes 60,000 times")
+
+
+@pytest.mark.parametrize("uri", ["../secret.bin", "%2e%2e/secret.bin", "/etc/hostname", "link.bin"])
+def test_a_gltf_buffer_outside_the_file_s_folder_is_not_read(tmp_path, uri):
+    (tmp_path / "secret.bin").write_bytes(bytes(100_000))
+    inner = tmp_path / "scene"
+    inner.mkdir()
+    (inner / "link.bin").symlink_to(tmp_path / "secret.bin")
+    tree = gltf_tree(inner)
+    tree["buffers"][0]["uri"] = uri
+    (inner / "a.gltf").write_text(json.dumps(tree))
+    refused(inner / "a.gltf", "lies outside its folder")
+
+
+@pytest.mark.parametrize("entry", [{"count": -1}, {"byteOffset": -8}, {"count": 10**12}])
+def test_gltf_accessors_beyond_their_buffers_are_refused(tmp_path, entry):
+    tree = gltf_tree(tmp_path)
+    tree["accessors"][0] |= entry
+    (tmp_path / "a.gltf").write_text(json.dumps(tree))
+    refused(tmp_path / "a.gltf", "buffers are shorter than it says")

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import meshio
 import numpy as np
+import plyfile
 import pytest
 import pyvista
 import rhino3dm
+import trimesh
 
 from shellform.errors import InputError
 from shellform.surface import cad
@@ -380,3 +382,120 @@ def test_a_surface_of_revolution_closes_over_its_seam_and_pole(tmp_path):
     assert surface.area == pytest.approx(2 * np.pi * 9, rel=5e-3)
     np.testing.assert_allclose(np.linalg.norm(surface.vertices, axis=1), 3.0, atol=1e-6)
     np.testing.assert_allclose(surface.normals, surface.vertices / 3.0, atol=1e-3)
+
+
+def ply(form, properties, elements=()):
+    """A PLY file of the shell: `form` of its numbers, `properties` of vertices and faces with the numbers that
+    stand before the corners and after them, `elements` before the faces."""
+    order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[form]
+    codes = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+             "double": "f8", "int16": "i2", "uint16": "u2", "float64": "f8"}  # fmt: skip
+    place, count, corner, quality = properties
+    head = [
+        "ply",
+        f"format {form} 1.0",
+        "comment made by hand",
+        "obj_info none",
+        f"element vertex {len(POINTS)}",
+    ]
+    head += [*(f"property {place} {axis}" for axis in "xyz"), "property uchar red", "property float quality"]
+    head += [line for line, _ in elements]
+    head += [f"element face {len(QUADS)}", f"property list {count} {corner} vertex_indices"]
+    head += [f"property list uchar {quality} texcoord", f"property {quality} quality", "end_header"]
+    rows = [[*((place, x) for x in point), ("uchar", 200), ("float", 0.5)] for point in POINTS.tolist()]
+    rows += [row for _, row in elements if row]
+    rows += [
+        [
+            (count, 4),
+            *((corner, k) for k in quad),
+            ("uchar", 2),
+            (quality, 0.25),
+            (quality, 1.0),
+            (quality, 3),
+        ]
+        for quad in QUADS.tolist()
+    ]
+    text = "\n".join(head) + "\n"
+    if form == "ascii":
+        return (text + "\n".join(" ".join(f"{value:.9g}" for _, value in row) for row in rows)).encode()
+    return text.encode() + b"".join(
+        np.array(v).astype(order + codes[kind]).tobytes() for row in rows for kind, v in row
+    )
+
+
+MATERIALS = (
+    ("element material 1", ()),
+    ("property uchar ambient_red", ()),
+    ("property list uchar float gloss", ()),
+    (
+        "property double coefficient",
+        [("uchar", 7), ("uchar", 2), ("float", 1.0), ("float", 2.0), ("double", 0.5)],
+    ),
+)
+
+
+@pytest.mark.parametrize("form", ["ascii", "binary_little_endian", "binary_big_endian"])
+@pytest.mark.parametrize("elements", [(), MATERIALS])
+@pytest.mark.parametrize(
+    "properties",
+    [
+        ("float", "uchar", "int", "float"),  # MeshLab's
+        ("double", "uchar", "uint", "double"),  # MeshLab's, of doubles
+        ("float64", "ushort", "uint16", "float"),
+        ("double", "int", "short", "double"),
+        ("double", "uchar", "float", "float"),  # corners as numbers that are whole
+    ],
+)
+def test_ply_files_are_read_with_lists_and_elements_of_any_type(tmp_path, form, elements, properties):
+    (tmp_path / "a.ply").write_bytes(ply(form, properties, elements))
+    same_shell(read_surface(tmp_path / "a.ply"), atol=1e-5)
+
+
+def test_ply_files_of_other_libraries_are_read(tmp_path):
+    trimesh.Trimesh(POINTS, TRIANGLES, process=False).export(tmp_path / "binary.ply")
+    trimesh.Trimesh(POINTS, TRIANGLES, process=False).export(tmp_path / "text.ply", encoding="ascii")
+    polydata().triangulate().save(tmp_path / "vtk.ply")
+    vertex = np.array([tuple(p) for p in POINTS], dtype=[(axis, "f8") for axis in "xyz"])
+    face = np.empty(len(QUADS), dtype=[("vertex_index", "O")])
+    face["vertex_index"] = list(QUADS)
+    elements = [
+        plyfile.PlyElement.describe(vertex, "vertex"),
+        plyfile.PlyElement.describe(face, "face", val_types={"vertex_index": "u4"}),
+    ]
+    plyfile.PlyData(elements, text=True).write(tmp_path / "plyfile.ply")
+    text = (tmp_path / "text.ply").read_bytes().replace(b"\n", b"\r\n")
+    (tmp_path / "windows.ply").write_bytes(text)
+    for name in ("binary", "text", "vtk", "plyfile", "windows"):
+        same_shell(read_surface(tmp_path / f"{name}.ply"), atol=1e-5)
+
+
+def test_strips_of_triangles_in_a_ply_file_are_read(tmp_path):
+    head = "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\n"
+    head += "element tristrips 1\nproperty list int int vertex_indices\nend_header\n"
+    points = "0 0 0\n0 1 0\n1 0 0\n1 1 0\n2 0 0.1\n2 1 0.1\n"
+    (tmp_path / "a.ply").write_text(head + points + "9 0 1 2 3 -1 2 3 4 5\n")
+    surface = read_surface(tmp_path / "a.ply")
+    assert len(surface.triangles) == 4
+    assert surface.mended == ()
+
+
+def test_a_gltf_buffer_s_name_is_decoded_and_may_stand_in_a_folder_below(tmp_path):
+    file = write_gltf(tmp_path / "a.gltf", y_up(POINTS), TRIANGLES)
+    tree = json.loads(file.read_text())
+    (tmp_path / "the buffers").mkdir()
+    content = base64.b64decode(tree["buffers"][0]["uri"].partition(",")[2])
+    (tmp_path / "the buffers/größe 1.bin").write_bytes(content)
+    tree["buffers"][0]["uri"] = "the%20buffers/gr%C3%B6%C3%9Fe%201.bin"
+    file.write_text(json.dumps(tree))
+    assert len(read_surface(file).triangles) == len(TRIANGLES)
+
+
+def test_a_mesh_that_many_nodes_place_is_read_once_and_chosen_from_by_name(tmp_path):
+    file = write_gltf(tmp_path / "a.gltf", y_up(POINTS), TRIANGLES)
+    tree = json.loads(file.read_text())
+    tree["nodes"] = [{"mesh": 0, "name": f"copy {k}", "translation": [10.0 * k, 0, 0]} for k in range(20_000)]
+    tree["scenes"] = [{"nodes": list(range(20_000))}]
+    file.write_text(json.dumps(tree))
+    surface = read_surface(file, name="copy 17")
+    assert len(surface.triangles) == len(TRIANGLES)
+    assert surface.vertices[:, 0].mean() == pytest.approx(170.0 + y_up(POINTS)[:, 0].mean(), abs=1.0)

@@ -1,7 +1,7 @@
-"""Foreign readers in a process of their own, so that a crash, a hang or a flood of memory in them becomes a
-message.
+"""Readers of foreign libraries and of nested formats in a process of their own, so that a crash, a hang or a
+flood of memory in them becomes a message.
 
-The child imports one reader (gmsh, rhino3dm, meshio or VTK; 0.3 to 0.7 s), reads, and leaves its arrays in a
+The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.7 s), reads, and leaves its arrays in a
 file.
 """
 
@@ -26,8 +26,8 @@ _LONGEST = 600.0  # seconds for one file
 _MEMORY = 0.8  # of the machine's, for the reader
 _ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
 _LIBRARIES = {
-    "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "meshio", "msh": "meshio",
-    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK",
+    "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
+    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader",
 }  # fmt: skip
 KINDS = tuple(_LIBRARIES)
 
@@ -129,10 +129,18 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
             up=settings["up"],
             face=settings["face"],
         )
-    if _LIBRARIES[kind] == "meshio":
+    if kind == "ply":
+        from shellform.surface.readers import ply
+
+        return ply.read_ply(file, choice)
+    if kind == "msh":
         from shellform.surface.readers import meshes
 
-        return meshes.read_meshio(file, choice, kind)
+        return meshes.read_msh(file, choice)
+    if kind == "gltf":
+        from shellform.surface.readers import gltf
+
+        return gltf.read_gltf(file, choice)
     from shellform.surface.readers import vtkfiles
 
     return vtkfiles.read_vtk(file, choice, kind)

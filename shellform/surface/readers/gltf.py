@@ -1,8 +1,9 @@
 """GLTF and GLB scenes (Khronos glTF 2.0): their meshes, placed by their nodes; and GLB files written.
 
 The format's unit is the metre (many programs write others all the same: state it) and its vertical axis y.
-Buffers may stand in the GLB, in the text as base64, or in files beside it. Compressed meshes (Draco, meshopt)
-and sparse accessors are refused by name.
+Buffers may stand in the GLB, in the text as base64, or in files beside it or in folders below. Compressed
+meshes (Draco, meshopt) and sparse accessors are refused by name, and so are nodes with two parents, which the
+format forbids: they could place a mesh without end.
 """
 
 from __future__ import annotations
@@ -10,23 +11,33 @@ from __future__ import annotations
 import base64
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.readers.draft import Choice, Draft, MeshObject, check_points, joined
+from shellform.surface.readers.draft import (
+    MOST_TRIANGLES,
+    Choice,
+    Draft,
+    MeshObject,
+    among,
+    check_points,
+    joined,
+)
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_DEEPEST = 64
+_MOST_BYTES = 512 * 1024**2  # of one buffer, as of any file
+_TOLD = 80  # characters of an address that are quoted
 _VERTICES, _ELEMENTS = 34962, 34963  # what a buffer view is for
 
 
@@ -42,7 +53,7 @@ def read_gltf(file: Path, choice: Choice) -> Draft:
             if tree.get("scenes")
             else range(len(tree.get("nodes", [])))
         )
-        parts = [part for root in roots for part in scene.parts(root, np.eye(4), 0)]
+        parts = scene.parts(scene.placed(roots), choice)
     except InputError:
         raise
     except (
@@ -53,13 +64,14 @@ def read_gltf(file: Path, choice: Choice) -> Draft:
         AttributeError,
         struct.error,
         OSError,
+        OverflowError,
         RecursionError,
     ) as error:
         said = f"{type(error).__name__}: {error}"
         raise InputError(
             f"can't be read as glTF: {said}", where=str(file), remedy="Export it anew, uncompressed."
         ) from error
-    draft = joined(parts, choice, str(file))
+    draft = joined(parts, Choice(), str(file))
     return Draft(draft.points, draft.triangles, up="y")
 
 
@@ -156,52 +168,98 @@ def write_glb(path: Path, solids: Sequence[Solid]) -> None:
     path.write_bytes(b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks)
 
 
+@dataclass(frozen=True)
+class _Placed:
+    """A mesh's `primitive`, not yet loaded, at its `place` (4, 4) in the scene."""
+
+    name: str
+    layer: str
+    primitive: dict[str, Any]
+    place: Reals
+
+
 class _Scene:
     """A scene's tables and its buffers, each loaded once."""
 
     def __init__(self, file: Path, tree: dict[str, Any], inside: bytes) -> None:
         self._file, self._tree, self._inside = file, tree, inside
         self._loaded: dict[int, bytes] = {}
+        self._read: dict[int, NDArray[Any]] = {}
         for name in tree.get("extensionsRequired", []):
             if "draco" in name or "meshopt" in name:
                 raise InputError(
                     f"is compressed ({name})", where=str(file), remedy="Export it without compression."
                 )
 
-    def parts(self, node: int, above: Reals, depth: int) -> list[MeshObject]:
-        """The meshes of a node and of those below it, placed by the transformation (4, 4) from `above`."""
-        if depth > _DEEPEST:
-            raise InputError(
-                "its nodes go round in a circle", where=str(self._file), remedy="Export it anew."
-            )
-        entry = self._tree["nodes"][node]
-        here = above @ _placement(entry)
-        found = []
-        if "mesh" in entry:
-            mesh = self._tree["meshes"][entry["mesh"]]
-            name = str(entry.get("name") or mesh.get("name") or "")
-            for primitive in mesh["primitives"]:
-                found += self._part(primitive, name, str(mesh.get("name") or ""), here)
-        for child in entry.get("children", []):
-            found += self.parts(child, here, depth + 1)
+    def placed(self, roots: Iterable[int]) -> list[_Placed]:
+        """Every mesh that the nodes from `roots` on place, in their order."""
+        entries, found, seen = self._tree.get("nodes", []), [], set()
+        waiting = [(root, np.eye(4)) for root in reversed(list(roots))]
+        while waiting:
+            node, above = waiting.pop()
+            if node in seen:
+                raise InputError(
+                    f"its node {node} has two parents, or its nodes go round in a circle",
+                    where=str(self._file),
+                    remedy="Export it anew.",
+                )
+            seen.add(node)
+            entry = entries[node]
+            here = above @ _placement(entry)
+            if "mesh" in entry:
+                mesh = self._tree["meshes"][entry["mesh"]]
+                layer = str(mesh.get("name") or "")
+                name = str(entry.get("name") or layer)
+                found += [_Placed(name, layer, primitive, here) for primitive in mesh["primitives"]]
+            waiting += [(child, here) for child in reversed(entry.get("children", []))]
         return found
 
-    def _part(self, primitive: dict[str, Any], name: str, layer: str, place: Reals) -> list[MeshObject]:
+    def parts(self, placed: Sequence[_Placed], choice: Choice) -> list[MeshObject]:
+        """The chosen ones of the placed meshes, loaded."""
+        chosen = among([(each.layer, each.name) for each in placed], choice, str(self._file))
+        result: list[MeshObject] = []
+        corners = 0
+        for each in (mesh for mesh, meant in zip(placed, chosen, strict=True) if meant):
+            loaded = self._part(each)
+            result += loaded
+            corners += sum(len(one.points) + one.faces[0].size for one in loaded)
+            if corners > 6 * MOST_TRIANGLES:
+                raise InputError(
+                    f"places its meshes {len(placed):,} times, with more than {MOST_TRIANGLES:,} triangles or their corners",
+                    where=str(self._file),
+                    remedy="Choose one by surface.object (--object), or export the surface alone.",
+                )
+        return result
+
+    def _part(self, placed: _Placed) -> list[MeshObject]:
+        primitive, place = placed.primitive, placed.place
         mode = primitive.get("mode", _TRIANGLES)
         if mode not in (_TRIANGLES, _STRIP, _FAN) or "POSITION" not in primitive["attributes"]:
             return []
-        points = np.asarray(self._accessor(primitive["attributes"]["POSITION"]), dtype=float)
+        points = np.asarray(self._accessor(primitive["attributes"]["POSITION"], 3), dtype=float)
         check_points(points, str(self._file))
         order = (
-            np.asarray(self._accessor(primitive["indices"]), dtype=np.int64).ravel()
+            np.asarray(self._accessor(primitive["indices"], 1), dtype=np.int64).ravel()
             if "indices" in primitive
             else np.arange(len(points))
         )
-        placed = points @ place[:3, :3].T + place[:3, 3]
-        return [MeshObject(name, layer, placed, (_faces(order, mode),))]
+        moved = points @ place[:3, :3].T + place[:3, 3]
+        return [MeshObject(placed.name, placed.layer, moved, (_faces(order, mode),))]
 
-    def _accessor(self, index: int) -> NDArray[Any]:
-        entry = self._tree["accessors"][index]
+    def _accessor(self, index: int, wide: int) -> NDArray[Any]:
+        """The rows (n, wide) of an accessor, read once."""
+        if index not in self._read:
+            self._read[index] = self._rows(self._tree["accessors"][index])
+        rows = self._read[index]
+        if rows.shape[1] != wide:
+            raise InputError(
+                f"its accessor {index} has {rows.shape[1]} numbers a row, not {wide}",
+                where=str(self._file),
+                remedy="Export it anew.",
+            )
+        return rows
+
+    def _rows(self, entry: dict[str, Any]) -> NDArray[Any]:
         if "sparse" in entry or "bufferView" not in entry:
             raise InputError(
                 "has sparse accessors", where=str(self._file), remedy="Export it with plain ones."
@@ -212,10 +270,11 @@ class _Scene:
             _WIDTH[entry["type"]],
             int(entry["count"]),
         )
-        stride = view.get("byteStride") or kind.itemsize * width
+        row = kind.itemsize * width
+        stride = view.get("byteStride") or row
         begin = view.get("byteOffset", 0) + entry.get("byteOffset", 0)
         data = self._buffer(view["buffer"])
-        if begin + (count - 1) * stride + kind.itemsize * width > len(data):
+        if count < 1 or stride < row or begin < 0 or begin + (count - 1) * stride + row > len(data):
             raise InputError(
                 "its buffers are shorter than it says",
                 where=str(self._file),
@@ -231,15 +290,33 @@ class _Scene:
             elif uri.startswith("data:"):
                 self._loaded[index] = base64.b64decode(uri.partition(",")[2])
             else:
-                beside = self._file.parent / uri
-                if not beside.is_file():
-                    raise InputError(
-                        f"its buffer {uri} isn't beside it",
-                        where=str(self._file),
-                        remedy="Copy both, or export a GLB.",
-                    )
-                self._loaded[index] = beside.read_bytes()
+                self._loaded[index] = self._beside(uri).read_bytes()
         return self._loaded[index]
+
+    def _beside(self, uri: str) -> Path:
+        """The file that a buffer's address names, in the scene's folder or below. Raises InputError."""
+        folder = self._file.parent.resolve()
+        named = unquote(uri)
+        beside = (folder / named).resolve()
+        if not beside.is_relative_to(folder) or "\0" in named:
+            raise InputError(
+                f"its buffer {uri[:_TOLD]!r} lies outside its folder, where nothing is read",
+                where=str(self._file),
+                remedy="Copy both into one folder, or export a GLB.",
+            )
+        if not beside.is_file():
+            raise InputError(
+                f"its buffer {uri[:_TOLD]} isn't beside it",
+                where=str(self._file),
+                remedy="Copy both, or export a GLB.",
+            )
+        if beside.stat().st_size > _MOST_BYTES:
+            raise InputError(
+                f"its buffer {uri[:_TOLD]} is {beside.stat().st_size / 1024**2:,.0f} MB large",
+                where=str(self._file),
+                remedy="Export a coarser mesh, or the surface alone.",
+            )
+        return beside
 
 
 def _placement(entry: dict[str, Any]) -> Reals:

@@ -1,4 +1,4 @@
-"""PLY and MSH files, and meshes and lines written; the door to meshio."""
+"""MSH files, and meshes and lines written; the door to meshio."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ _WRITTEN = {
 _CORNERS = {"triangle6": 3, "triangle7": 3, "quad8": 4, "quad9": 4}  # of curved elements, which come first
 
 
-def read_meshio(file: Path, choice: Choice, kind: str) -> Draft:
-    """The polygons of a file of `kind` "ply" or "msh". Raises InputError for what can't be used."""
+def read_msh(file: Path, choice: Choice) -> Draft:
+    """The polygons of a MSH file. Raises InputError for what can't be used."""
     try:
-        mesh = meshio.read(file, file_format={"ply": "ply", "msh": "gmsh"}[kind])
+        mesh = meshio.read(file, file_format="gmsh")
     except (
         Exception,
         SystemExit,
     ) as error:  # meshio raises whatever its readers stumble over, and even exits
         raise InputError(
-            f"can't be read as {kind.upper()}: {error or type(error).__name__}",
+            f"can't be read as MSH: {error or type(error).__name__}",
             where=str(file),
             remedy="Check that the file is whole and that its ending fits its content.",
         ) from error

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from shellform.errors import InputError
-from shellform.surface.readers import compas, foreign, gltf, plain
+from shellform.surface.readers import compas, foreign, plain
 from shellform.surface.readers.draft import Choice, Draft
 from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended
@@ -36,7 +36,6 @@ _OWN = {
     "obj": plain.read_obj,
     "off": plain.read_off,
     "stl": plain.read_stl,
-    "gltf": gltf.read_gltf,
     "compas": compas.read_compas,
 }
 _OTHERS = {  # the first bytes of what people also send
