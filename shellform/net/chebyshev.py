@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -17,7 +18,10 @@ from shellform.net.net import Net
 from shellform.net.pull import (
     FROM_COMPASS,
     FROM_FLAT,
+    LIMIT,
+    REACH,
     SHEAR_STIFFNESS,
+    TOLERANCE,
     Progress,
     Pulled,
     compass_start,
@@ -26,19 +30,31 @@ from shellform.net.pull import (
     pull,
 )
 from shellform.net.quality import measure, refuse_distance, refuse_folds
+from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
 from shellform.surface.shape.locate import Locator
-from shellform.surface.shape.target import Surface, largest_curvature
+from shellform.surface.shape.target import Surface
 
 MERGE = 0.2  # of the spacing
 ELEMENTS = 4  # a segment, as in section 4.1
-_SHARPEST = 1.0  # largest curvature times spacing
 _MARGINS = (
     1.5,
     2.5,
     4.0,
 )  # spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
 _BEYOND = 1.5  # spacings that the surface goes on past the margin
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Of the pulling: at most `limit` factorisations a density, steps of up to `reach` spacings, down to a
+    residual of `tolerance`; and by how many segments rods go on past the lattice's last crossing, `tail`."""
+
+    limit: int = LIMIT
+    reach: float = REACH
+    tolerance: float = TOLERANCE
+    tail: int = 0
+
 
 Method = Literal["pull", "compass"]
 Start = Literal["compass", "flat"]
@@ -61,6 +77,7 @@ def pull_net(
     merge: float = MERGE,
     ground: float | None = None,
     outline: ArrayLike | None = None,
+    tuning: Tuning | None = None,
     progress: Progress | None = None,
 ) -> Net:
     """The Chebyshev net of rods `spacing` m apart along u (`spacing_v` along v), the two layers `gap` m
@@ -73,20 +90,28 @@ def pull_net(
     grid (`start`); "compass" leaves the compass net as it is. `spring_density` (EI/s³, rising) and
     `shear_stiffness` (EI/s a radian) of the pulling (net/pull.py). Rods end at the surface's edge, at the
     `ground` level, m, and at the closed curve `outline` (k, 2), m in plan; joints nearer to the end than
-    `merge` spacings are left out.
+    `merge` spacings are left out. `tuning` of the numbers behind it (left out: as most nets need it).
 
-    Raises InputError for settings that can't work on this surface and for surfaces too curved for one net,
-    NotConverged where the pull fails.
+    Raises InputError for settings that can't work on this surface, NoNet for surfaces too curved for one net,
+    Stalled where the pull fails.
     """
     steps = (spacing, spacing if spacing_v is None else spacing_v)
+    tuned = tuning or Tuning()
     check_settings(surface, steps, gap, elements, merge)
+    if not np.isfinite([angle, *offset]).all():
+        raise InputError(
+            "must be numbers",
+            where="net.angle, net.offset",
+            value=[float(np.rad2deg(angle)), *offset],
+            remedy="Give degrees, and spacings.",
+        )
     limits = Limits(ground, None if outline is None else reals("net.outline", outline, (None, 2)))
     density = _densities(spring_density, start)
     for margin in _MARGINS:
         finder = Locator(surface, reach=(margin + _BEYOND) * max(steps))
         origin, frame, lines = _origin(surface, finder, steps, angle, offset, guides)
         places, points = covering_lattice(finder, origin, lines, steps, margin=margin * max(steps))
-        grid = lattice_grid(places, spacing=steps, gap=gap, elements=elements)
+        grid = lattice_grid(places, spacing=steps, gap=gap, elements=elements, tail=tuned.tail)
         begin = compass_start(grid, finder, places, points)
         bare = bare_rods(grid, begin, finder, limits)
         if bare:  # what the compass net leaves bare, no pulling covers
@@ -105,16 +130,19 @@ def pull_net(
                     shear_stiffness=shear_stiffness,
                     guided=guides is not None,
                     progress=progress,
+                    limit=tuned.limit,
+                    reach=tuned.reach,
+                    tolerance=tuned.tolerance,
                 )
             trimmed = trim(grid, pulled.state, finder, merge=merge, limits=limits)
         except Uncovered as error:
             bare = error.rods
             continue
         return _net(surface, finder, grid, pulled, trimmed)
-    raise InputError(
-        f"the net doesn't cover the surface: {bare} rods end short of its edge",
+    raise NoNet(
+        Reason.SHORT,
+        f"the net doesn't cover the surface: {bare} rods end short of its edge at {np.rad2deg(angle):.4g}°",
         where="net.angle",
-        value=angle,
         remedy="Try another angle or a smaller spacing; a surface that is curved too much takes no single net.",
     )
 
@@ -145,14 +173,6 @@ def check_settings(
     if not 0.0 < gap < 0.5 * min(steps):
         raise InputError(
             "must be positive and well below the spacing", where="joint.gap", value=gap, remedy="Give metres."
-        )
-    bent = largest_curvature(surface)
-    if bent * max(steps) > _SHARPEST:
-        raise InputError(
-            f"is too large for a surface that bends to a radius of {1.0 / bent:.3g} m",
-            where="net.spacing",
-            value=max(steps),
-            remedy=f"Choose a spacing below {_SHARPEST / bent:.3g} m, or a smoother surface.",
         )
     if elements < 1:
         raise InputError("must be at least 1", where="net.elements", value=elements)

@@ -23,6 +23,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError
+from shellform.net.refusal import NoNet, Reason
 
 _ITERATIONS = 30
 _CLOSE = 1e-10  # of the spacing
@@ -130,7 +131,8 @@ def _guide(finder: Finder, origin: Reals, guide: Guide, spacing: float, margin: 
         chord = there - here
         chord = chord - (chord @ foot.normal[0]) * foot.normal[0]
         here, heading, upright = there, chord / np.linalg.norm(chord), foot.normal[0]
-    raise InputError(
+    raise NoNet(
+        Reason.CIRCLING,
         f"a guide doesn't leave the surface in {_MOST_STEPS} steps: it runs in circles",
         where="net.angle",
         remedy="Choose another angle or origin, or a surface that isn't nearly closed.",
@@ -250,7 +252,8 @@ def _broken(
         if all(p in points for p in ((a, b), (a + step_i, b), (a + step_i, b + step_j), (a, b + step_j)))
     ]
     total = float(gaussian(finder, np.array(cells)).sum()) if cells else 0.0
-    return InputError(
+    return NoNet(
+        Reason.BROKEN,
         "the surface is curved too much for one net: its rods come to run in one direction at "
         f"{at.round(3).tolist()}; from the net's "
         f"origin to there its Gaussian curvature adds up to {total:.2f} (no patch of a net holds 2π = "

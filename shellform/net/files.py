@@ -13,6 +13,7 @@ from shellform.errors import InputError
 from shellform.net.grid import Grid, GridRod
 from shellform.net.net import Net
 from shellform.net.quality import MAPS, Quality
+from shellform.net.refusal import Attempt, Change, Reason
 from shellform.structure.elements.state import State
 from shellform.written import write_arrays
 
@@ -66,6 +67,7 @@ def save_net(path: Path, net: Net) -> None:
                     "quality": net.quality.summary(),
                     "notes": net.notes,
                     "indices": [rod.index for rod in grid.rods],
+                    **({"attempts": [_row(each) for each in net.attempts]} if net.attempts else {}),
                 }
             )
         ),
@@ -101,8 +103,21 @@ def load_net(path: Path) -> Net:
         )
         quality = Quality(**meta["quality"], **{name: data[f"map_{name}"] for name in MAPS})
         target = State(data["positions"], data["quaternions"])
-        return Net(grid, target, data["supports"], quality, tuple(meta["notes"]))
+        attempts = tuple(_attempt(row) for row in meta.get("attempts", ()))
+        return Net(grid, target, data["supports"], quality, tuple(meta["notes"]), attempts)
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:
         raise InputError(f"is damaged: {error}", where=str(path), remedy="Run again with --fresh.") from error
+
+
+def _row(attempt: Attempt) -> list[Any]:
+    reason = attempt.reason.name if attempt.reason else None
+    return [attempt.change.name, attempt.angle, list(attempt.offset), reason]
+
+
+def _attempt(row: list[Any]) -> Attempt:
+    change, angle, offset, reason = row
+    return Attempt(
+        Change[change], float(angle), (float(offset[0]), float(offset[1])), Reason[reason] if reason else None
+    )

@@ -127,9 +127,11 @@ def grid_beams(
     )
 
 
-def lattice_grid(lattice: Indices, *, spacing: tuple[float, float], gap: float, elements: int) -> Grid:
+def lattice_grid(
+    lattice: Indices, *, spacing: tuple[float, float], gap: float, elements: int, tail: int = 0
+) -> Grid:
     """The grid with crossings at the places `lattice` (c, 2), `spacing` m apart along u and v, `elements`
-    elements a segment.
+    elements a segment; rods go on past their first and last crossing by `tail` segments.
 
     Neighbouring places of one row are joined; a place without neighbour in both directions is left out.
     """
@@ -144,9 +146,10 @@ def lattice_grid(lattice: Indices, *, spacing: tuple[float, float], gap: float, 
     for layer, direction in enumerate("uv"):
         for run in _runs(ordered, layer):
             share = run[0][1 - layer]
-            along = run[0][layer] + np.arange((len(run) - 1) * elements + 1) / elements
+            steps = np.arange((len(run) - 1 + 2 * tail) * elements + 1)
+            along = run[0][layer] - tail + steps / elements
             nodes = len(flat) + np.arange(len(along))
-            at = np.arange(len(run)) * elements
+            at = (np.arange(len(run)) + tail) * elements
             crossings = np.array([number[place] for place in run])
             crossing_nodes[crossings, layer] = nodes[at]
             place = np.full((len(along), 3), (layer - 0.5) * gap)

@@ -20,18 +20,20 @@ import numpy as np
 
 from shellform.compiled import set_num_threads
 from shellform.errors import InputError, ShellformError
-from shellform.net.chebyshev import Method, pull_net
+from shellform.net.chebyshev import Method, Tuning, pull_net
+from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.pull import SHEAR_STIFFNESS
 from shellform.surface.shape.target import Surface
 
 _ANGLES = 12  # compass nets, over a quarter turn: u and v are alike
-_BEST = 6  # angles that are pulled
+_BEST = 4  # angles that are pulled
+_TAILS = (0, 2)  # segments; longer rods where at no angle a compass net covers the surface
 _OFFSETS = ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5))
 
 
-Job = tuple[float, tuple[float, float], Method]
-"""Angle, rad, offset in spacings, and how the net is made."""
+Job = tuple[float, tuple[float, float], Method, int]
+"""Angle, rad, offset in spacings, how the net is made, and the segments by which its rods are longer."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,7 @@ def oriented_net(
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[Net, float, tuple[float, float]]:
     """The net with the other `settings` of pull_net at the `angle`, rad, and `offset`, or at those that
-    `best_orientation` finds; and which these are."""
+    `best_orientation` finds, or the first on the ladder from there; and which these are."""
     if angle == "auto":
         best, _ = best_orientation(surface, settings, workers=workers, progress=progress)
         angle, offset = best.angle, best.offset
@@ -71,7 +73,8 @@ def oriented_net(
     def watch(what: str, residual: float) -> None:
         progress(f"{what}, residual {residual:.1e}")
 
-    return pull_net(surface, **settings, angle=angle, offset=offset, progress=watch), angle, offset
+    net, given = climbed_net(surface, settings, angle=angle, offset=offset, progress=progress, watch=watch)
+    return net, given.angle, given.offset
 
 
 def best_orientation(
@@ -81,7 +84,8 @@ def best_orientation(
     workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[TriedNet, list[TriedNet]]:
-    """The best trial and all of them; `settings` are those of pull_net but for angle and offset.
+    """The best trial and all of those pulled, the best compass net's where no pull succeeds; `settings` are those
+    of pull_net but for angle and offset.
 
     Raises InputError where no orientation gives a net.
     """
@@ -102,10 +106,13 @@ def best_orientation(
                 )
             return found
 
-        compass = stage("compass net", [(angle, (0.0, 0.0), "compass") for angle in angles])
-        usable = sorted(
-            (trial for trial in compass if math.isfinite(trial.cost)), key=lambda trial: trial.cost
-        )
+        for tail in _TAILS:
+            compass = stage("compass net", [(angle, (0.0, 0.0), "compass", tail) for angle in angles])
+            usable = sorted(
+                (trial for trial in compass if math.isfinite(trial.cost)), key=lambda trial: trial.cost
+            )
+            if usable:
+                break
         if not usable:
             raise InputError(
                 f"no angle gives a net: {compass[0].reason}",
@@ -113,23 +120,20 @@ def best_orientation(
                 value="auto",
                 remedy="Choose a smaller spacing.",
             )
-        pulled = stage("pulled net", [(trial.angle, (0.0, 0.0), "pull") for trial in usable[:_BEST]])
+        pulled = stage("pulled net", [(trial.angle, (0.0, 0.0), "pull", tail) for trial in usable[:_BEST]])
         best = min(pulled, key=lambda trial: trial.cost)
         tried += pulled
         # Between the best angle and its neighbours, and with other offsets
         half = 0.5 * quarter / _ANGLES
-        turned = stage("pulled net", [(best.angle + side * half, (0.0, 0.0), "pull") for side in (-1.0, 1.0)])
+        turned = stage(
+            "pulled net", [(best.angle + side * half, (0.0, 0.0), "pull", tail) for side in (-1.0, 1.0)]
+        )
         best = min([best, *turned], key=lambda trial: trial.cost)
-        shifted = stage("pulled net", [(best.angle, offset, "pull") for offset in _OFFSETS[1:]])
+        shifted = stage("pulled net", [(best.angle, offset, "pull", tail) for offset in _OFFSETS[1:]])
         tried += turned + shifted
         best = min([best, *shifted], key=lambda trial: trial.cost)
     if not math.isfinite(best.cost):
-        raise InputError(
-            f"no angle gives a net: {best.reason}",
-            where="net.angle",
-            value="auto",
-            remedy="Choose a smaller spacing.",
-        )
+        return usable[0], tried  # for the ladder to begin at
     return best, tried
 
 
@@ -164,9 +168,10 @@ def _run(job: Job) -> TriedNet:
 
 
 def _try(surface: Surface, settings: dict[str, Any], job: Job) -> TriedNet:
-    angle, offset, method = job
+    angle, offset, method, tail = job
+    changed = {**settings, "angle": angle, "offset": offset, "method": method}
     try:
-        net = pull_net(surface, **{**settings, "angle": angle, "offset": offset, "method": method})
+        net = pull_net(surface, **changed, tuning=Tuning(tail=tail))
     except ShellformError as error:
         return TriedNet(angle, offset, math.inf, str(error))
     return TriedNet(angle, offset, float(np.round(cost(net), 12)))

@@ -23,6 +23,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import NotConverged
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, grid_beams
+from shellform.net.refusal import Stalled
 from shellform.net.springs import Distance, SlidingSprings
 from shellform.structure.elements import rotation
 from shellform.structure.elements.beam import Beams
@@ -35,12 +36,15 @@ FROM_COMPASS = (5.0,)  # the compass net lies on the surface already
 SHEAR_STIFFNESS = (
     0.1  # of a connector against turning in the grid's plane, EI/s a radian; at 0.01 nets slide for ever
 )
-_REACH = 1.0  # spacing a step
+REACH = 1.0  # spacing a step
+LIMIT = 200  # factorisations at one density; nets that are found take up to half of that
+_STALL = 40  # steps that bring the residual down by less than a fifth, once it is
+_LITTLE = 1e-3
 _SLENDERNESS = 50.0  # s/r
 _TORSION = 1.0 / 1.3  # GJ/EI of a round rod with Poisson's ratio 0.3
 _CONNECTOR = 10.0  # bending stiffness of a connector, EI/s a radian: stiff beside the rods
 _TETHER = 5.0  # of the springs that hold the net's place and direction, EI/s³
-_TOLERANCE = 1e-8  # residual
+TOLERANCE = 1e-8  # residual
 _LEADING = 1e-3
 
 Progress = Callable[[str, float], None]
@@ -75,13 +79,17 @@ def compass_start(grid: Grid, finder: Finder, places: Indices, points: Reals) ->
         curve = CubicSpline(rod.marks, through[rod.crossings]) if len(rod.crossings) > 2 else None
         if curve is None:
             ends = through[rod.crossings]
-            share = (rod.arc / rod.length)[:, None]
+            share = ((rod.arc - rod.marks[0]) / (rod.marks[-1] - rod.marks[0]))[:, None]
             place[rod.nodes], tangent[rod.nodes] = (
                 (1.0 - share) * ends[0] + share * ends[-1],
                 ends[-1] - ends[0],
             )
         else:
-            place[rod.nodes], tangent[rod.nodes] = curve(rod.arc), curve(rod.arc, 1)
+            within = np.clip(rod.arc, rod.marks[0], rod.marks[-1])  # straight on past its last crossing
+            place[rod.nodes], tangent[rod.nodes] = curve(within), curve(within, 1)
+            beyond = (rod.arc - within)[:, None]
+            if beyond.any():
+                place[rod.nodes] += beyond * tangent[rod.nodes]
         across[rod.nodes] = rod.direction == "v"
     foot = finder.foot(place)
     normal = foot.normal
@@ -107,13 +115,16 @@ def pull(
     shear_stiffness: float = SHEAR_STIFFNESS,
     guided: bool = False,
     progress: Progress | None = None,
-    limit: int = 400,
+    limit: int = LIMIT,
+    reach: float = REACH,
+    tolerance: float = TOLERANCE,
 ) -> Pulled:
     """The state of the grid pulled onto the surface of `finder` from the state `start`.
 
     `origin` (3,) and `frame` (3, 3) of u, v and normal are where the lattice's origin is to stay; where the
-    start is `guided` by a curve, the rod through the origin keeps to it instead of a plane. Raises
-    NotConverged.
+    start is `guided` by a curve, the rod through the origin keeps to it instead of a plane. At most `limit`
+    factorisations a density, steps of at most `reach` spacings, down to a residual of `tolerance`. Raises
+    Stalled, which it does early where steps have stopped to bring anything.
     """
     beams = fictitious_beams(grid, shear_stiffness)
     state = start
@@ -131,17 +142,17 @@ def pull(
                 assembly,
                 state,
                 none,
-                tolerance=_TOLERANCE if last else _LEADING,
+                tolerance=tolerance if last else _LEADING,
                 limit=limit,
-                reach=_REACH * grid.scale,
-                progress=_named(progress, density),
+                reach=reach * grid.scale,
+                progress=_watched(progress, density),
             )
         except NotConverged as error:
-            raise NotConverged(
+            raise Stalled(
                 f"The grid could not be pulled onto the surface with springs of density {density:g}: {error.what}",
                 state=error.state,
                 residual=error.residual,
-                iterations=error.iterations,
+                iterations=spent + error.iterations,
                 remedy="Try a smaller spacing, another angle, more shear_stiffness, or more steps in spring_density.",
             ) from error
         state, spent = found.state, spent + found.factorisations
@@ -151,10 +162,20 @@ def pull(
     )
 
 
-def _named(progress: Progress | None, density: float) -> Callable[[int, float], None] | None:
-    if progress is None:
-        return None
-    return lambda _, residual: progress(f"springs of {density:g} EI/s³", residual)
+def _watched(progress: Progress | None, density: float) -> Callable[[int, float], None]:
+    """Tells the `progress` of one density, and ends a relaxation that has stopped to come nearer: what is
+    left then is the surface's, known to a finite order, against which no step helps."""
+    residuals: list[float] = []
+
+    def watch(spent: int, residual: float) -> None:
+        if progress is not None:
+            progress(f"springs of {density:g} EI/s³", residual)
+        residuals.append(residual)
+        recent = residuals[-_STALL:]
+        if len(recent) == _STALL and max(recent) < _LITTLE and residual > 0.8 * recent[0]:
+            raise NotConverged(f"The residual stays at {residual:.1e}", residual=residual, iterations=spent)
+
+    return watch
 
 
 def fictitious_beams(grid: Grid, shear_stiffness: float) -> Beams:

@@ -15,9 +15,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Reals, reals
-from shellform.errors import InputError
 from shellform.net.compass import Finder, gaussian
 from shellform.net.grid import Grid, cells, crossing_points, neighbours
+from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
@@ -155,7 +155,8 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
     folded = turned.any(axis=1)
     if folded.any():
         middle = corner[np.argmax(folded)].mean(axis=0).round(3).tolist()
-        raise InputError(
+        raise NoNet(
+            Reason.FOLDED,
             f"the net folds over itself in {int(folded.sum())} cells, first at {middle}: the surface, whose "
             "Gaussian curvature adds up "
             f"to {float(gaussian(finder, corner).sum()):.2f} there, is curved more than rods at this spacing "
@@ -168,7 +169,8 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
     apart = np.abs(grid.lattice[close[:, 0]] - grid.lattice[close[:, 1]]).max(axis=1, initial=0) > 1
     if apart.any():
         place = points[close[np.argmax(apart), 0]].round(3).tolist()
-        raise InputError(
+        raise NoNet(
+            Reason.OVERLAPPING,
             f"two parts of the net lie on one another in {int(apart.sum())} places, first at {place}",
             where="net.spacing",
             value=float(grid.spacing),
@@ -180,7 +182,8 @@ def refuse_distance(quality: Quality, grid: Grid, state: State) -> None:
     """Raises InputError for a net that stays off its surface."""
     if quality.distance_max > _FAR * grid.scale:
         worst = crossing_points(grid, state)[np.argmax(np.abs(quality.distance))].round(3).tolist()
-        raise InputError(
+        raise NoNet(
+            Reason.OFF,
             f"the net stays {quality.distance_max:.3g} m off the surface at {worst}: "
             "it is curved more there than a grid of straight rods can follow",
             where="net.spacing",

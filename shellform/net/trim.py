@@ -15,9 +15,9 @@ from itertools import pairwise
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
+from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
 from shellform.structure.network import connected
@@ -218,7 +218,8 @@ def _keep(grid: Grid, pieces: list[_Piece], merge: float) -> tuple[list[tuple[_P
             remaining -= each.keys()
     remaining = _largest(pieces, joints, remaining)
     if not remaining:
-        raise InputError(
+        raise NoNet(
+            Reason.EMPTY,
             "no grid fits the surface at this spacing: no rod keeps two joints",
             where="net.spacing",
             value=grid.spacing,

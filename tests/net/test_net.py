@@ -71,11 +71,11 @@ def test_a_net_is_the_same_after_saving(tmp_path, net):
         load_net(tmp_path / "bad.npz")
 
 
-def test_a_surface_sharper_than_the_spacing_is_refused(vault):
+def test_a_surface_with_a_spike_is_refused(vault):
     peak = vault.vertices.copy()
     away = np.linalg.norm(peak[:, :2], axis=1)
     peak[:, 2] += 0.3 * np.exp(-((away / 0.05) ** 2))
-    with pytest.raises(InputError, match="radius of"):
+    with pytest.raises(InputError, match="curved too much"):
         sf.pull_net(sf.make_surface(peak, vault.triangles), spacing=0.055, gap=0.002)
 
 
@@ -88,6 +88,8 @@ def test_a_surface_sharper_than_the_spacing_is_refused(vault):
         ({"spacing": 0.055, "gap": 0.05}, "below the spacing"),
         ({"spacing": 0.055, "gap": 0.002, "elements": 0}, "at least 1"),
         ({"spacing": 0.055, "gap": 0.002, "merge": 0.9}, "between 0 and 0.5"),
+        ({"spacing": 0.055, "gap": 0.002, "angle": float("nan")}, "must be numbers"),
+        ({"spacing": 0.055, "gap": 0.002, "offset": (float("inf"), 0.0)}, "must be numbers"),
     ],
 )
 def test_settings_that_cannot_work_are_refused(vault, settings, said):

@@ -1,0 +1,154 @@
+"""A net that doesn't give up: where the first attempt fails, a fixed ladder of small changes is climbed.
+
+Each rung changes one thing of what was asked for and names the reasons that it may help against; those that
+can't help are passed over. So the same surface and settings always end with the same net, and where the
+first attempt succeeds nothing is changed. What is left of a surface that no rung covers is refused with the
+reason of the first attempt and with what was tried.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from shellform.net.chebyshev import Tuning, pull_net
+from shellform.net.net import Net
+from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Progress
+from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
+from shellform.surface.shape.target import Surface, largest_curvature
+
+TOLERANCE = math.radians(10.0)  # of the angle asked for
+_SETTLED = 1e-5  # residual that will do: distances and lengths are measured, whatever is left of it
+_MOST = 600  # factorisations of pulls that failed, all rungs together
+_SMALL = 1e-3  # residual of a stall that a looser tolerance may end
+_QUICK = 120  # factorisations at one density, of rungs
+_ANY = frozenset(Reason)
+_PULL = frozenset({Reason.STALLED, Reason.FOLDED, Reason.OVERLAPPING, Reason.OFF})
+_REACHED = frozenset({Reason.SHORT, Reason.BROKEN})
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A change and the reasons it may help `against`: the net turned by `turn`, rad, shifted by `shift` spacings,
+    its shear stiffness times `shear`, its springs of the `density` given, EI/s³, its `start` and its `tuning`."""
+
+    change: Change
+    against: frozenset[Reason] = _ANY
+    turn: float = 0.0
+    shift: tuple[float, float] = (0.0, 0.0)
+    shear: float = 1.0
+    density: tuple[float, ...] = ()
+    flat: bool = False
+    tuning: Tuning = field(default_factory=lambda: Tuning(limit=_QUICK))
+
+
+def _turned(degrees: float, tail: int = 0) -> Rung:
+    return Rung(Change.TURNED, turn=math.radians(degrees), tuning=Tuning(limit=_QUICK, tail=tail))
+
+
+LADDER = (
+    Rung(Change.NOTHING, tuning=Tuning()),
+    Rung(Change.LOOSER, frozenset({Reason.STALLED}), tuning=Tuning(tolerance=_SETTLED)),
+    Rung(Change.LONGER, _REACHED, tuning=Tuning(limit=_QUICK, tail=2)),
+    Rung(Change.TIGHTER, frozenset({Reason.OFF}), density=(*FROM_COMPASS, 50.0, 500.0), tuning=Tuning(limit=_QUICK, tolerance=_SETTLED)),
+    Rung(Change.GENTLER, _PULL, density=FROM_FLAT, tuning=Tuning(limit=_QUICK, reach=0.5, tolerance=_SETTLED)),
+    Rung(Change.SHEAR, _PULL, shear=5.0),
+    _turned(5.0),
+    _turned(-5.0),
+    _turned(10.0, 2),
+    _turned(-10.0, 2),
+    Rung(Change.SHIFTED, shift=(0.5, 0.5)),
+    Rung(Change.SHIFTED, shift=(0.5, 0.0), tuning=Tuning(limit=_QUICK, tail=2, tolerance=_SETTLED)),
+    Rung(Change.FLAT, _PULL, density=FROM_FLAT, flat=True, tuning=Tuning(limit=_QUICK, reach=0.5, tolerance=_SETTLED)),
+)  # fmt: skip
+
+
+def climbed_net(
+    surface: Surface,
+    settings: dict[str, Any],
+    *,
+    angle: float,
+    offset: tuple[float, float] = (0.0, 0.0),
+    tolerance: float = TOLERANCE,
+    progress: Callable[[str], None] = lambda text: None,
+    watch: Progress | None = None,
+) -> tuple[Net, Attempt]:
+    """The net with the `settings` of pull_net at the `angle`, rad, and `offset`, or the first on the ladder, turned
+    by at most `tolerance`, rad; and the attempt that gave it.
+
+    Raises InputError for settings that can't work, NoNet or Stalled where no rung helps.
+    """
+    attempts: list[Attempt] = []
+    first: NoNet | Stalled | None = None
+    reasons: set[Reason] = set()
+    spent = 0
+    for rung in LADDER:
+        if attempts and (
+            abs(rung.turn) > tolerance or not reasons & rung.against or _vain(rung, settings, first)
+        ):
+            continue
+        turned = angle + rung.turn
+        shifted = (offset[0] + rung.shift[0], offset[1] + rung.shift[1])
+        try:
+            net = pull_net(
+                surface,
+                **_changed(settings, rung),
+                angle=turned,
+                offset=shifted,
+                tuning=rung.tuning,
+                progress=watch,
+            )
+        except (NoNet, Stalled) as error:
+            attempts.append(Attempt(rung.change, turned, shifted, error.reason))
+            progress(attempts[-1].told())
+            reasons.add(error.reason)
+            first = first or error
+            spent += error.iterations if isinstance(error, Stalled) else 0
+            if spent > _MOST:
+                break
+            continue
+        given = Attempt(rung.change, turned, shifted, None)
+        if not attempts:
+            return net, given
+        notes = (*net.notes, *(each.told() for each in (*attempts, given)))
+        return dataclasses.replace(net, notes=notes, attempts=(*attempts, given)), given
+    assert first is not None
+    raise _refused(first, attempts, surface) from first
+
+
+def _vain(rung: Rung, settings: dict[str, Any], first: NoNet | Stalled | None) -> bool:
+    """Whether a rung changes nothing: guides fix the angle and the origin, the compass method has no springs, a
+    density given is kept to, and a tolerance ends no stall far from rest."""
+    if rung.change is Change.LOOSER:
+        return not (isinstance(first, Stalled) and first.residual < _SMALL)
+    placed = settings.get("guides") is not None and rung.change in (Change.TURNED, Change.SHIFTED)
+    alone = settings.get("method", "pull") == "compass" and rung.against <= _PULL
+    return placed or alone or (settings.get("spring_density") is not None and bool(rung.density))
+
+
+def _changed(settings: dict[str, Any], rung: Rung) -> dict[str, Any]:
+    """The settings as the rung has them."""
+    changed = dict(settings)
+    if rung.shear != 1.0:
+        changed["shear_stiffness"] = rung.shear * settings.get("shear_stiffness", SHEAR_STIFFNESS)
+    if rung.density:
+        changed["spring_density"] = rung.density
+    if rung.flat:
+        changed["start"] = "flat"
+    return changed
+
+
+def _refused(first: NoNet | Stalled, attempts: list[Attempt], surface: Surface) -> NoNet | Stalled:
+    """The first refusal, with what was tried besides and the surface's own radius."""
+    bent = largest_curvature(surface)
+    radius = f" (it bends to a radius of {1.0 / bent:.3g} m)" if bent > 0.0 else ""
+    others = ", ".join(sorted({each.reason.value for each in attempts if each.reason}))
+    what = f"{first.what}{radius}; {len(attempts)} attempts, with other angles, offsets, springs and starts, ended: {others}"
+    if isinstance(first, Stalled):
+        return Stalled(
+            what, state=first.state, residual=first.residual, iterations=first.iterations, remedy=first.remedy
+        )
+    return NoNet(first.reason, what, where=first.where, value=first.value, remedy=first.remedy)

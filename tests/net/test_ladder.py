@@ -1,0 +1,138 @@
+"""The ladder of attempts: nothing where the first succeeds, the same net each time where it doesn't, and what was
+tried where none helps.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError, NotConverged
+from shellform.net.files import load_net, save_net
+from shellform.net.ladder import LADDER, Rung, _changed, _vain, climbed_net
+from shellform.net.orientation import oriented_net
+from shellform.net.pull import _watched
+from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
+from shellform.surface.shape.target import make_surface
+from tests.net.test_settings import ball, bowl
+
+SETTINGS = {"spacing": 0.9, "gap": 0.9 / 27.5, "elements": 2}
+
+
+@pytest.fixture(scope="module")
+def umbrella():
+    """Four hypars that meet in creases, 12 × 12 m."""
+    line = np.linspace(-6.0, 6.0, 29)
+    x, y = (each.ravel() for each in np.meshgrid(line, line, indexing="ij"))
+    i = np.arange(29 * 29).reshape(29, 29)
+    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
+    z = 2.4 * (1.0 - np.abs(x / 6.0)) * (1.0 - np.abs(y / 6.0))
+    return make_surface(
+        np.column_stack([x, y, z]), np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    )
+
+
+def test_where_the_first_attempt_succeeds_nothing_is_changed():
+    surface, settings = bowl(), {"spacing": 0.25, "gap": 0.005, "elements": 2}
+    plain = sf.pull_net(surface, **settings, angle=0.3)
+    net, given = climbed_net(surface, settings, angle=0.3)
+    assert given == Attempt(Change.NOTHING, 0.3, (0.0, 0.0), None)
+    assert net.attempts == ()
+    assert net.notes == plain.notes
+    assert (net.target.positions == plain.target.positions).all()
+    assert (net.quality.curvature == plain.quality.curvature).all()
+
+
+def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tmp_path):
+    with pytest.raises(NoNet) as caught:
+        sf.pull_net(umbrella, **SETTINGS, angle=math.pi / 4)
+    assert caught.value.reason is Reason.OFF
+    said = []
+    net, angle, _ = oriented_net(umbrella, SETTINGS, angle=math.pi / 4, progress=said.append)
+    assert [(each.change, each.reason) for each in net.attempts] == [
+        (Change.NOTHING, Reason.OFF),
+        (Change.TIGHTER, None),
+    ]
+    assert angle == math.pi / 4
+    assert net.quality.distance_max < 0.05 * net.spacing
+    assert net.notes[-2:] == tuple(each.told() for each in net.attempts)
+    assert net.attempts[0].told() in said
+    save_net(tmp_path / "net.npz", net)
+    assert load_net(tmp_path / "net.npz").attempts == net.attempts
+    again, _ = climbed_net(umbrella, SETTINGS, angle=math.pi / 4)
+    assert (again.target.positions == net.target.positions).all()
+
+
+def test_a_surface_that_takes_no_net_is_refused_with_all_that_was_tried():
+    with pytest.raises(
+        NoNet, match=r"bends to a radius of .* attempts, with other angles.* one direction"
+    ) as caught:
+        climbed_net(ball(30), {"spacing": 0.3, "gap": 0.005, "elements": 2}, angle=0.1)
+    assert caught.value.reason is Reason.BROKEN
+
+
+def test_settings_that_can_not_work_are_refused_at_once():
+    tried = []
+    with pytest.raises(InputError, match="must be numbers"):
+        climbed_net(bowl(), {"spacing": 0.25, "gap": 0.005}, angle=math.nan, progress=tried.append)
+    assert tried == []
+
+
+def test_the_net_turns_no_further_than_its_tolerance(monkeypatch):
+    turns = []
+
+    def fails(surface, *, angle, offset, tuning, progress, **settings):
+        turns.append(math.degrees(angle))
+        raise NoNet(Reason.SHORT, "too short")
+
+    monkeypatch.setattr("shellform.net.ladder.pull_net", fails)
+    with pytest.raises(NoNet, match="too short"):
+        climbed_net(bowl(), {}, angle=math.radians(45.0), tolerance=math.radians(6.0))
+    assert min(turns) == pytest.approx(40.0)
+    assert max(turns) == pytest.approx(50.0)
+
+
+def test_the_ladder_is_left_where_pulls_that_failed_have_cost_too_much(monkeypatch):
+    calls = []
+
+    def stalls(surface, *, progress, **settings):
+        calls.append(settings)
+        raise Stalled("stalled", residual=0.9, iterations=250)
+
+    monkeypatch.setattr("shellform.net.ladder.pull_net", stalls)
+    with pytest.raises(Stalled, match="3 attempts") as caught:
+        climbed_net(bowl(), {}, angle=0.0)
+    assert len(calls) == 3
+    assert caught.value.residual == 0.9
+
+
+def test_rungs_keep_to_what_was_stated():
+    placed = {"guides": ([], [])}
+    assert all(
+        _vain(rung, placed, None) == (rung.change in (Change.TURNED, Change.SHIFTED))
+        for rung in LADDER
+        if rung.change is not Change.LOOSER
+    )
+    tighter = next(rung for rung in LADDER if rung.change is Change.TIGHTER)
+    assert _vain(tighter, {"spring_density": [5.0]}, None)
+    assert not _vain(tighter, {"spring_density": None}, None)
+    looser = next(rung for rung in LADDER if rung.change is Change.LOOSER)
+    assert _vain(looser, {}, Stalled("", residual=0.5, iterations=1))
+    assert not _vain(looser, {}, Stalled("", residual=1e-6, iterations=1))
+    sheared = _changed({"shear_stiffness": 0.2}, dataclasses.replace(Rung(Change.SHEAR), shear=5.0))
+    assert sheared == {"shear_stiffness": 1.0}
+
+
+def test_a_relaxation_that_comes_no_nearer_is_ended_early_but_not_one_on_its_way():
+    watch = _watched(None, 5.0)
+    for k in range(300):
+        watch(k, 0.5)  # far from rest it may wander
+    for k in range(39):
+        watch(k, 4.9e-6 * 0.999**k)
+    with pytest.raises(NotConverged, match="stays at"):
+        watch(39, 4.8e-6)
+    falling = _watched(None, 5.0)
+    for k in range(300):
+        falling(k, 1e-3 * 0.99**k)
