@@ -24,7 +24,6 @@ TOLERANCE = math.radians(10.0)  # of the angle asked for
 _SETTLED = 1e-5  # residual that will do: distances and lengths are measured, whatever is left of it
 _MOST = 600  # factorisations of pulls that failed, all rungs together
 _SMALL = 1e-3  # residual of a stall that a looser tolerance may end
-_QUICK = 120  # factorisations at one density, of rungs
 _ANY = frozenset(Reason)
 _PULL = frozenset({Reason.STALLED, Reason.FOLDED, Reason.OVERLAPPING, Reason.OFF})
 _REACHED = frozenset({Reason.SHORT, Reason.BROKEN})
@@ -32,8 +31,9 @@ _REACHED = frozenset({Reason.SHORT, Reason.BROKEN})
 
 @dataclass(frozen=True)
 class Rung:
-    """A change and the reasons it may help `against`: the net turned by `turn`, rad, shifted by `shift` spacings,
-    its shear stiffness times `shear`, its springs of the `density` given, EI/s³, its `start` and its `tuning`."""
+    """A change and the reasons it may help `against`: the net turned by `turn`, rad, shifted by `shift`
+    spacings, its shear stiffness times `shear`, its springs of the `density` given, EI/s³, begun `flat`, and its
+    `tuning`."""
 
     change: Change
     against: frozenset[Reason] = _ANY
@@ -42,27 +42,27 @@ class Rung:
     shear: float = 1.0
     density: tuple[float, ...] = ()
     flat: bool = False
-    tuning: Tuning = field(default_factory=lambda: Tuning(limit=_QUICK))
+    tuning: Tuning = field(default_factory=Tuning)
 
 
 def _turned(degrees: float, tail: int = 0) -> Rung:
-    return Rung(Change.TURNED, turn=math.radians(degrees), tuning=Tuning(limit=_QUICK, tail=tail))
+    return Rung(Change.TURNED, turn=math.radians(degrees), tuning=Tuning(tail=tail))
 
 
 LADDER = (
     Rung(Change.NOTHING, tuning=Tuning()),
     Rung(Change.LOOSER, frozenset({Reason.STALLED}), tuning=Tuning(tolerance=_SETTLED)),
-    Rung(Change.LONGER, _REACHED, tuning=Tuning(limit=_QUICK, tail=2)),
-    Rung(Change.TIGHTER, frozenset({Reason.OFF}), density=(*FROM_COMPASS, 50.0, 500.0), tuning=Tuning(limit=_QUICK, tolerance=_SETTLED)),
-    Rung(Change.GENTLER, _PULL, density=FROM_FLAT, tuning=Tuning(limit=_QUICK, reach=0.5, tolerance=_SETTLED)),
+    Rung(Change.LONGER, _REACHED, tuning=Tuning(tail=2)),
+    Rung(Change.TIGHTER, frozenset({Reason.OFF}), density=(*FROM_COMPASS, 50.0, 500.0), tuning=Tuning(tolerance=_SETTLED)),
+    Rung(Change.GENTLER, _PULL, density=FROM_FLAT, tuning=Tuning(reach=0.5, tolerance=_SETTLED)),
     Rung(Change.SHEAR, _PULL, shear=5.0),
     _turned(5.0),
     _turned(-5.0),
     _turned(10.0, 2),
     _turned(-10.0, 2),
     Rung(Change.SHIFTED, shift=(0.5, 0.5)),
-    Rung(Change.SHIFTED, shift=(0.5, 0.0), tuning=Tuning(limit=_QUICK, tail=2, tolerance=_SETTLED)),
-    Rung(Change.FLAT, _PULL, density=FROM_FLAT, flat=True, tuning=Tuning(limit=_QUICK, reach=0.5, tolerance=_SETTLED)),
+    Rung(Change.SHIFTED, shift=(0.5, 0.0), tuning=Tuning(tail=2, tolerance=_SETTLED)),
+    Rung(Change.FLAT, _PULL, density=FROM_FLAT, flat=True, tuning=Tuning(reach=0.5, tolerance=_SETTLED)),
 )  # fmt: skip
 
 
@@ -76,8 +76,8 @@ def climbed_net(
     progress: Callable[[str], None] = lambda text: None,
     watch: Progress | None = None,
 ) -> tuple[Net, Attempt]:
-    """The net with the `settings` of pull_net at the `angle`, rad, and `offset`, or the first on the ladder, turned
-    by at most `tolerance`, rad; and the attempt that gave it.
+    """The net with the `settings` of pull_net at the `angle`, rad, and `offset`, or the first on the ladder,
+    turned by at most `tolerance`, rad; and the attempt that gave it.
 
     Raises InputError for settings that can't work, NoNet or Stalled where no rung helps.
     """
@@ -120,8 +120,8 @@ def climbed_net(
 
 
 def _vain(rung: Rung, settings: dict[str, Any], first: NoNet | Stalled | None) -> bool:
-    """Whether a rung changes nothing: guides fix the angle and the origin, the compass method has no springs, a
-    density given is kept to, and a tolerance ends no stall far from rest."""
+    """Whether a rung changes nothing: guides fix the angle and the origin, the compass method has no springs,
+    a density given is kept to, and a tolerance ends no stall far from rest."""
     if rung.change is Change.LOOSER:
         return not (isinstance(first, Stalled) and first.residual < _SMALL)
     placed = settings.get("guides") is not None and rung.change in (Change.TURNED, Change.SHIFTED)
@@ -146,7 +146,8 @@ def _refused(first: NoNet | Stalled, attempts: list[Attempt], surface: Surface) 
     bent = largest_curvature(surface)
     radius = f" (it bends to a radius of {1.0 / bent:.3g} m)" if bent > 0.0 else ""
     others = ", ".join(sorted({each.reason.value for each in attempts if each.reason}))
-    what = f"{first.what}{radius}; {len(attempts)} attempts, with other angles, offsets, springs and starts, ended: {others}"
+    tried = f"{len(attempts)} attempts, with other angles, offsets, springs and starts, ended: {others}"
+    what = f"{first.what}{radius}; {tried}"
     if isinstance(first, Stalled):
         return Stalled(
             what, state=first.state, residual=first.residual, iterations=first.iterations, remedy=first.remedy

@@ -84,8 +84,8 @@ def best_orientation(
     workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[TriedNet, list[TriedNet]]:
-    """The best trial and all of those pulled, the best compass net's where no pull succeeds; `settings` are those
-    of pull_net but for angle and offset.
+    """The best trial and all of those pulled, the best compass net's where no pull succeeds; `settings` are
+    those of pull_net but for angle and offset.
 
     Raises InputError where no orientation gives a net.
     """

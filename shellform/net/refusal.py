@@ -1,4 +1,6 @@
-"""Why a surface takes no net, and what was tried, as types: what is tried next depends on them, not on words."""
+"""Why a surface takes no net, and what was tried, as types: what is tried next depends on them, not on
+words.
+"""
 
 from __future__ import annotations
 
@@ -60,8 +62,8 @@ class Change(Enum):
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt at a net: what it changed, its `angle`, rad, and `offset`, spacings, and why it failed; None: it
-    gave the net."""
+    """One attempt at a net: what it changed, its `angle`, rad, and `offset`, spacings, and why it failed; None:
+    it gave the net."""
 
     change: Change
     angle: float

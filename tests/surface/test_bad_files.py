@@ -387,3 +387,14 @@ def test_gltf_accessors_beyond_their_buffers_are_refused(tmp_path, entry):
     tree["accessors"][0] |= entry
     (tmp_path / "a.gltf").write_text(json.dumps(tree))
     refused(tmp_path / "a.gltf", "buffers are shorter than it says")
+
+
+def test_separate_pieces_are_listed_with_their_sizes_and_the_option_given_takes_each(tmp_path):
+    away = np.vstack([POINTS, 0.5 * POINTS + [20.0, 0.0, 0.0]])
+    write_obj(tmp_path / "a.obj", away, np.vstack([QUADS, QUADS + len(POINTS)]))
+    with pytest.raises(InputError) as caught:
+        read_surface(tmp_path / "a.obj")
+    for number in (1, 2):
+        surface = read_surface(tmp_path / "a.obj", piece=number)
+        size = " × ".join(f"{extent:.3g}" for extent in surface.size)
+        assert f"--piece {number} is {size} m about (" in caught.value.remedy

@@ -189,13 +189,24 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         raise InputError(
             f"has {count} separate pieces, of {listed} m²",
             where=where,
-            remedy="Choose one (surface.piece, --piece, 1 is the largest; or by object or layer), or join "
-            "their edges.",
+            remedy=f"Choose one (surface.piece): {_choices(draft, label, order[:_PIECES_TOLD])}; or by object or "
+            "layer; or join their edges.",
         )
     kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])
     return noted(
         without_unused(kept)[0], f"piece {piece} of {count} was taken, {area[order[piece - 1]]:.3g} m²"
     )
+
+
+def _choices(draft: Draft, label: Indices, pieces: Indices) -> str:
+    """The option that takes each of the `pieces` (p,), and how large that is, so that it is known again."""
+    told = []
+    for number, piece in enumerate(pieces.tolist(), 1):
+        points = draft.points[np.unique(draft.triangles[label == piece])]
+        size = " × ".join(f"{extent:.3g}" for extent in np.ptp(points, axis=0))
+        middle = ", ".join(f"{x:.3g}" for x in 0.5 * (points.min(axis=0) + points.max(axis=0)))
+        told.append(f"--piece {number} is {size} m about ({middle})")
+    return ", ".join(told)
 
 
 def _open(draft: Draft, face: str | None, where: str) -> Draft:
