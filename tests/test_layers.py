@@ -68,6 +68,7 @@ DOORS = {
     "PIL": "output/pictures/images.py",
     "pyarrow": "study/store.py",
     "pyvista": "output/pictures/scene.py",
+    "plyfile": "surface/readers/ply.py",
     "rhino3dm": "surface/readers/rhino.py",
     "threadpoolctl": "structure/elements/threads.py",
     "vtk": "output/pictures/scene.py",
