@@ -47,14 +47,16 @@ class Table:
         return [row[place] for row in self.rows]
 
 
-def table_text(table: Table) -> str:
-    """The table as CSV: heads, then rows, numbers to six decimals."""
+def table_text(table: Table, *, exact: bool = False, line_end: str = "\n") -> str:
+    """The table as CSV: heads, then rows, numbers to six decimals or, if they are to be `exact`, with all
+    their digits.
+    """
     text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
+    writer = csv.writer(text, lineterminator=line_end)
     writer.writerow(table.columns)
     for row in table.rows:
         writer.writerow(
-            [f"{value:.6f}" if isinstance(value, float) else "" if value is None else value for value in row]
+            [f"{value:.6f}" if isinstance(value, float) and not exact else value for value in row]
         )
     return text.getvalue()
 
