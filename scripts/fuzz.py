@@ -194,6 +194,7 @@ def sound(folder: Path) -> dict[str, list[Path]]:
 
     from shellform.case.case import load_case
     from shellform.run.run import run_case
+    from shellform.study.outcome import Outcome, Status
     from shellform.study.store import Log
     from tests.cli.test_commands import MODEL
     from tests.stubs import study_file
@@ -247,19 +248,7 @@ def sound(folder: Path) -> dict[str, list[Path]]:
         if file.suffix in (".json", ".npz", ".toml") and "states" not in file.parts
     ]
     with Log(folder / "results.jsonl") as log:
-        log.add(
-            [
-                {
-                    "key": f"{k:032d}",
-                    "status": "done",
-                    "reason": "",
-                    "values": {"x": k},
-                    "seconds": {},
-                    "worker": "",
-                }
-                for k in range(20)
-            ]
-        )
+        log.add([Outcome(f"{k:032d}", Status.DONE, values={"x": k}) for k in range(20)])
     files["log"] = [folder / "results.jsonl"]
     return dict(files)
 

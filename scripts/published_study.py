@@ -18,11 +18,15 @@ from pathlib import Path
 
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
-from shellform.run import published
+from shellform.records.progress import Event
 from shellform.run.folder import Run, read_run
 from shellform.run.run import run_case
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from scripts import published  # noqa: E402
+
 CASES = {"fixed": "scale_model.toml", "radius": "scale_model_radius.toml"}
 
 
@@ -61,9 +65,9 @@ def write(study: str, done: Path | None, output: Path | None, fixed: Path | None
     return published.write_beside(run, fixed=_fixed(fixed) if study == "radius" else None)
 
 
-def tell(stage: str, text: str) -> None:
+def tell(event: Event) -> None:
     """A line of progress."""
-    print(f"{stage:9} {text}", flush=True)
+    print(f"{event.stage:9} {event.text}", flush=True)
 
 
 def _fixed(folder: Path | None) -> Run | None:

@@ -19,6 +19,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -27,7 +28,8 @@ if str(ROOT) not in sys.path:
 
 from shellform.case.case import load_case  # noqa: E402
 from shellform.study.engine import Engine, engine, sweep  # noqa: E402
-from shellform.study.jobs import Job, Outcome, work  # noqa: E402
+from shellform.study.jobs import Job, work  # noqa: E402
+from shellform.study.outcome import Outcome, Status, flat  # noqa: E402
 
 
 def timed(job: Job, before: Outcome | None = None) -> Outcome:
@@ -42,13 +44,13 @@ def timed(job: Job, before: Outcome | None = None) -> Outcome:
         "cpu": time.thread_time() - began,
         "memory": psutil.Process(os.getpid()).memory_info().rss / 1024**2,
     }
-    return {**outcome, "seconds": {**outcome["seconds"], **here}}
+    return replace(outcome, seconds={**outcome.seconds, **here})
 
 
 def nothing(job: Job, before: Outcome | None = None) -> Outcome:
     """A design without work, with a row as large as a real one."""
     summary = {"designs": {f"d{k}": {f"v{j}": random.random() for j in range(30)} for k in range(5)}}
-    return {"key": job.key, "status": "done", "reason": "", "summary": summary, "seconds": {}, "worker": ""}
+    return Outcome(job.key, Status.DONE, values=flat(summary))
 
 
 async def asleep(job: Job, before: Outcome | None = None) -> Outcome:
@@ -236,7 +238,7 @@ def many(workers: int, seconds: float) -> None:
     import dask
     import distributed  # noqa: F401 (it adds its own settings, before ours)
 
-    from shellform.study.store import Log, flat
+    from shellform.study.store import Log
     from tests.stubs import study_file
 
     place = Path(tempfile.mkdtemp(prefix="study_many"))
@@ -254,7 +256,7 @@ def many(workers: int, seconds: float) -> None:
         came: list[float] = []
         for batch in sweep(on, (Job(f"{k:032d}", case, "net", "") for k in range(total)), asleep):
             before = time.perf_counter()
-            log.add([{**outcome, "values": flat(outcome["summary"])} for outcome in batch])
+            log.add(batch)
             store += time.perf_counter() - before
             count += len(batch)
             came += [time.perf_counter()] * len(batch)

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shellform.errors import InputError
+from shellform.errors import Damaged, InputError
 
 Reals = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -77,7 +77,7 @@ class Arrays(dict[str, Any]):
         self.path = path
 
     def __missing__(self, name: str) -> Any:
-        raise InputError(
+        raise Damaged(
             f"is damaged: {name} is missing", where=str(self.path), remedy="Run again with --fresh."
         )
 
@@ -104,7 +104,7 @@ def read_arrays(path: Path) -> Arrays:
         cause: Exception = error
     except (KeyError, OverflowError, SyntaxError, zipfile.BadZipFile, zlib.error) as error:
         cause = error
-    raise InputError(f"is damaged: {cause}", where=str(path), remedy="Run again with --fresh.") from cause
+    raise Damaged(f"is damaged: {cause}", where=str(path), remedy="Run again with --fresh.") from cause
 
 
 def _shaped(name: str, raw: NDArray[_T], shape: Shape) -> NDArray[_T]:

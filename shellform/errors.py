@@ -31,6 +31,12 @@ class InputError(ShellformError, ValueError):
         super().__init__(f"{head}{found}{tail}")
 
 
+class Damaged(InputError):
+    """A file that shellform wrote, or should have, and that can't be taken up: what it holds has to be made
+    anew.
+    """
+
+
 class NotConverged(ShellformError, RuntimeError):
     """A computation that ended without a usable result.
 

@@ -5,6 +5,7 @@ import signal
 import time
 from pathlib import Path
 
+from shellform.study.outcome import Outcome, Status, flat
 from shellform.written import write_text
 
 ROOT = Path(__file__).parent.parent
@@ -86,11 +87,5 @@ def read_json_number(file):
 
 
 def outcome(job, status, reason, summary=None):
-    return {
-        "key": job.key,
-        "status": status,
-        "reason": reason,
-        "summary": summary or {},
-        "seconds": {"here": 0.01, "total": time.time() % 1},
-        "worker": "here",
-    }
+    seconds = {"here": 0.01, "total": time.time() % 1}
+    return Outcome(job.key, Status(status), reason, flat(summary or {}), seconds, "here")

@@ -27,7 +27,7 @@ FLOORS = {
         ["gridshell"],
         ["problem"],
         ["optimiser"],
-        ["site"],
+        ["site", "records"],
         ["output"],
         ["case"],
         ["run"],

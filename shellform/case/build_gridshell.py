@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -77,17 +78,22 @@ def rod_of(entry: OwnRodEntry | StockRodEntry, net: Net) -> Rod:
     return Rod(Round(radius, material))
 
 
-def rod_limits(entry: OwnRodEntry | StockRodEntry, net: Net) -> dict[str, float]:
-    """For the summary: the farthest that the outermost fibre may lie from a rod's axis, m, the curvature that
-    the rods bear, 1/m, and the net's largest over it."""
+@dataclass(frozen=True)
+class RodLimits:
+    """What a net allows of rods: the farthest that the outermost fibre may lie from a rod's axis
+    (`radius_max`, m), the curvature that the rods bear, 1/m, and the net's largest over it."""
+
+    radius_max: float
+    curvature_limit: float
+    curvature_utilisation: float
+
+
+def rod_limits(entry: OwnRodEntry | StockRodEntry, net: Net) -> RodLimits:
+    """What the net allows of the case's rods."""
     material, section = rod_material(entry), given_section(entry)
     most = net.max_radius(young=material.young, strength=material.strength)
     limit = material.strength / (material.young * (most if section is None else max(section.fibres)))
-    return {
-        "rod_radius_max": most,
-        "curvature_limit": limit,
-        "curvature_utilisation": net.quality.curvature_max / limit if limit > 0.0 else 0.0,
-    }
+    return RodLimits(most, limit, net.quality.curvature_max / limit if limit > 0.0 else 0.0)
 
 
 def rod_bounds(case: Case, shell: Gridshell) -> tuple[float, float]:

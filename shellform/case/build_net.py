@@ -1,19 +1,22 @@
-"""From a case's entries to its surface and its net, and what the summary tells of them."""
+"""From a case's entries to its surface and its net, and their records in the summary."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shellform.arrays import Reals
+from shellform.case.build_gridshell import RodLimits
 from shellform.case.case import Case, check_script
 from shellform.case.entries import NetEntry, SurfaceEntry
 from shellform.errors import InputError
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
+from shellform.records.summary import NetRecord, SurfaceRecord
 from shellform.surface.shape.target import Surface
 
 
@@ -47,19 +50,20 @@ def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
     )
 
 
-def surface_summary(surface: Surface, source: str) -> dict[str, Any]:
+def surface_record(surface: Surface, source: str) -> SurfaceRecord:
     """The `surface` part of summary.json."""
-    return {
-        "source": source,
-        "area": surface.area,
-        "size": surface.size.tolist(),
-        "triangles": len(surface.triangles),
-        "holes": surface.holes,
-        "mended": list(surface.mended),
-    }
+    x, y, z = surface.size.tolist()
+    return SurfaceRecord(
+        source=source,
+        area=surface.area,
+        size=(x, y, z),
+        triangles=len(surface.triangles),
+        holes=surface.holes,
+        mended=tuple(surface.mended),
+    )
 
 
-def told_size(size: Sequence[float] | Reals) -> str:
+def size_text(size: Sequence[float] | Reals) -> str:
     """The extents (3,), m, in words, so that a wrong unit is seen."""
     x, y, z = size
     return f"{x:.4g} × {y:.4g} × {z:.4g} m (is the unit right?)"
@@ -104,14 +108,29 @@ def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
     return {name: getattr(entry, name) for name in names} | {"outline": entry.outline, "gap": gap}
 
 
-def net_summary(net: Net) -> dict[str, Any]:
-    """The `net` part of summary.json but for the rod's radius."""
-    return {
-        "spacing": net.spacing,
-        "crossings": len(net.grid.lattice),
-        "rods": len(net.grid.rods),
-        "supports": len(net.supports),
-        "spacing_v": net.grid.spacing_v,
+def net_record(
+    net: Net, *, angle: float, offset: tuple[float, float], rods: RodLimits | None = None
+) -> NetRecord:
+    """The `net` part of summary.json; `rods` as `build_gridshell.rod_limits` finds them."""
+    record = NetRecord(
+        spacing=net.spacing,
+        crossings=len(net.grid.lattice),
+        rods=len(net.grid.rods),
+        supports=len(net.supports),
+        spacing_v=net.grid.spacing_v,
         **net.quality.summary(),
-        "notes": list(net.notes),
-    }
+        notes=tuple(net.notes),
+        angle=angle,
+        offset=offset,
+    )
+    return record if rods is None else with_rods(record, rods)
+
+
+def with_rods(record: NetRecord, rods: RodLimits) -> NetRecord:
+    """The record with what the net allows of rods."""
+    return replace(
+        record,
+        rod_radius_max=rods.radius_max,
+        curvature_limit=rods.curvature_limit,
+        curvature_utilisation=rods.curvature_utilisation,
+    )

@@ -23,6 +23,7 @@ import shellform
 from shellform.case.entries import (
     CableEntry,
     ConcreteEntry,
+    Entry,
     FiguresEntry,
     JointEntry,
     JointsWeightEntry,
@@ -35,7 +36,6 @@ from shellform.case.entries import (
     PointsEntry,
     RobustEntry,
     RodsWeightEntry,
-    Section,
     SheetEntry,
     StockRodEntry,
     SurfaceEntry,
@@ -44,7 +44,7 @@ from shellform.errors import InputError
 from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
 
 
-class Case(Section):
+class Case(Entry):
     """One design job."""
 
     title: str = ""
@@ -144,7 +144,7 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
     try:
         case = Case.model_validate(data)
     except ValidationError as error:
-        raise InputError("; ".join(told(each, Case) for each in error.errors()), where=str(file)) from error
+        raise refusal(error, Case, file) from error
     place = (file.parent / case.surface.file).resolve()
     found: dict[str, Any] = {"surface": case.surface.model_copy(update={"file": str(place)})}
     if case.optimise.catalogue is not None:
@@ -206,15 +206,20 @@ def set_entry(data: dict[str, Any], key: str, value: Any, *, where: str) -> None
     """Puts a value in place of the entry named like "net.spacing". Raises InputError where that lies inside
     another value.
     """
-    *sections, last = key.split(".")
-    for section in sections:
-        data = data.setdefault(section, {})
+    *tables, last = key.split(".")
+    for table in tables:
+        data = data.setdefault(table, {})
         if not isinstance(data, dict):
             raise InputError("names an entry inside a value", where=where, value=key)
     data[last] = value
 
 
-def told(error: Any, root: type[BaseModel]) -> str:
+def refusal(error: ValidationError, root: type[BaseModel], file: Path) -> InputError:
+    """What to say of a file of `root`'s kind with wrong entries."""
+    return InputError("; ".join(_in_words(each, root) for each in error.errors()), where=str(file))
+
+
+def _in_words(error: Any, root: type[BaseModel]) -> str:
     """One validation error in words: the entry of the file of `root`'s kind, what is wrong, the value, and
     the nearest known name.
     """
@@ -237,31 +242,31 @@ def told(error: Any, root: type[BaseModel]) -> str:
 
 
 def _entry(place: Sequence[int | str], root: type[BaseModel]) -> tuple[str, Any]:
-    """The name of an entry as the file has it, and the section in which it stands; where an entry may be of
+    """The name of an entry as the file has it, and the table in which it stands; where an entry may be of
     several kinds, the place that pydantic gives names the kind too."""
     names: list[str] = []
     kind: Any = root
-    section: Any = root
+    table: Any = root
     for part in place:
         plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
         if (
             get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain)
         ):  # a table that may be left out
             plain = next(each for each in get_args(plain) if each is not NoneType)
-        told = {tag: each for each in get_args(plain) for tag in _tags(each)}
-        if part in told:
-            kind = told[part]
+        choices = {tag: each for each in get_args(plain) for tag in _tags(each)}
+        if part in choices:
+            kind = choices[part]
             continue
         names.append(str(part))
         if get_origin(plain) in (list, dict):
             kind = get_args(plain)[-1]
         elif isinstance(plain, type) and issubclass(plain, BaseModel):
-            section = plain
+            table = plain
             field = plain.model_fields.get(str(part))
             kind = Any if field is None else field.annotation
         else:
             kind = Any
-    return ".".join(names) or root.__name__.lower(), section
+    return ".".join(names) or root.__name__.lower(), table
 
 
 def _tags(choice: Any) -> list[str]:

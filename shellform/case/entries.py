@@ -20,13 +20,13 @@ from pydantic import (
 _Polygon = list[tuple[float, float]]
 
 
-class Section(BaseModel):
+class Entry(BaseModel):
     """A table of the case file: no unknown entries, finite numbers."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class SurfaceEntry(Section):
+class SurfaceEntry(Entry):
     """What is to be built."""
 
     file: str = Field(description="surface file, or a builder script, relative to the case file")
@@ -48,7 +48,7 @@ class SurfaceEntry(Section):
     dimensions: dict[str, PositiveFloat] = Field({}, description="named dimensions of a builder script, m")
 
 
-class NetEntry(Section):
+class NetEntry(Entry):
     """The Chebyshev net."""
 
     spacing: PositiveFloat = Field(description="between rods, m")
@@ -88,7 +88,7 @@ class NetEntry(Section):
         return self
 
 
-class _BoughtEntry(Section):
+class _BoughtEntry(Entry):
     stock_length: PositiveFloat | None = Field(
         None, description="in which rods are bought, m; left out: the catalogue's, or 6 m"
     )
@@ -130,7 +130,7 @@ class StockRodEntry(_BoughtEntry):
     )
 
 
-class JointEntry(Section):
+class JointEntry(Entry):
     """The connection of two crossing rods, a short beam."""
 
     axial: PositiveFloat = Field(description="EA, N")
@@ -139,7 +139,7 @@ class JointEntry(Section):
     gap: PositiveFloat = Field(description="between the rods' axes, m")
 
 
-class CableEntry(Section):
+class CableEntry(Entry):
     """Bracing cables."""
 
     stiffness: PositiveFloat = Field(description="EA, N")
@@ -155,7 +155,7 @@ class CableEntry(Section):
     )
 
 
-class LoadEntry(Section):
+class LoadEntry(Entry):
     """Wet concrete as point loads."""
 
     force: PositiveFloat = Field(description="on each loaded crossing, N")
@@ -164,7 +164,7 @@ class LoadEntry(Section):
     openings: list[_Polygon] = Field([], description="plan polygons without load, m")
 
 
-class LoadCaseEntry(Section):
+class LoadCaseEntry(Entry):
     """A named load case: factors times parts. The cases "design" and "additional" must be there."""
 
     name: str = Field(pattern=r"^\w[\w .-]*$", description="of the case, and of its files")
@@ -174,7 +174,7 @@ class LoadCaseEntry(Section):
     )
 
 
-class PointsEntry(Section):
+class PointsEntry(Entry):
     """Point loads on crossings."""
 
     kind: Literal["points"]
@@ -184,7 +184,7 @@ class PointsEntry(Section):
     inside: list[_Polygon] = Field([], description="plan polygons with load, m; left out: everywhere")
 
 
-class _SpreadEntry(Section):
+class _SpreadEntry(Entry):
     openings: list[_Polygon] = Field([], description="plan polygons where there is none, m")
     inside: list[_Polygon] = Field(
         [], description="plan polygons where there is some, m; left out: everywhere"
@@ -213,20 +213,20 @@ class SheetEntry(_SpreadEntry):
     mass: PositiveFloat = Field(description="kg/m²")
 
 
-class RodsWeightEntry(Section):
+class RodsWeightEntry(Entry):
     """The rods' own weight."""
 
     kind: Literal["rods"]
 
 
-class JointsWeightEntry(Section):
+class JointsWeightEntry(Entry):
     """The joints' own weight."""
 
     kind: Literal["joints"]
     mass: PositiveFloat = Field(description="of each, kg")
 
 
-class OptimiseEntry(Section):
+class OptimiseEntry(Entry):
     """Objective (2), bounds (3, 4) and constraint (6)."""
 
     misfit: float = Field(
@@ -290,13 +290,13 @@ class OptimiseEntry(Section):
         return self
 
 
-class FiguresEntry(Section):
+class FiguresEntry(Entry):
     """Pictures."""
 
     limit: PositiveFloat = Field(0.010, description="end of the colour scale, m")
 
 
-class LimitsEntry(Section):
+class LimitsEntry(Entry):
     """What an engineer limits besides constraints (5) and (6), each under every load case and without load;
     left out: not limited.
     """
@@ -322,7 +322,7 @@ class LimitsEntry(Section):
     )
 
 
-class RobustEntry(Section):
+class RobustEntry(Entry):
     """Standard deviations of what isn't known exactly, each relative where no unit is named; 0 leaves a cause
     out.
     """

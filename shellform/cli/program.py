@@ -1,4 +1,7 @@
-"""The program: runs a command (commands.py) and ends with its status (contracts/run-folder.md)."""
+"""The program: one module a command, and the status with which it ends (contracts/run-folder.md).
+
+Large libraries are loaded by the command that needs them.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,73 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Annotated
 
 import typer
 
-from shellform.cli.commands import app
+import shellform
+from shellform.cli.analyse import analyse
+from shellform.cli.calibrate import calibrate
+from shellform.cli.check import check
+from shellform.cli.design import design
+from shellform.cli.erect import erect
+from shellform.cli.net import net
+from shellform.cli.new import new
+from shellform.cli.render import render
+from shellform.cli.report import report
+from shellform.cli.study import study
+from shellform.cli.survey import survey
+from shellform.cli.verify import verify
 from shellform.errors import InputError, NotConverged
 
 _STOPPED = 130
 _KEPT = "stopped; what was computed is kept, and the same command goes on from there"
+
+
+app = typer.Typer(
+    name="shellform",
+    help="Design bending-active gridshells as falsework for concrete shells.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+for _command in (
+    check,
+    new,
+    net,
+    design,
+    analyse,
+    render,
+    study,
+    report,
+    calibrate,
+    survey,
+    erect,
+    verify,
+):
+    app.command()(_command)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from importlib.metadata import PackageNotFoundError, version
+
+        print(f"shellform {shellform.__version__}")
+        for name in ("numpy", "scipy", "numba", "cvxopt", "gmsh", "nlopt", "pyvista", "ezdxf", "dask"):
+            try:
+                print(f"{name} {version(name)}")
+            except PackageNotFoundError:
+                print(f"{name} is missing")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show versions.")
+    ] = False,
+) -> None:
+    pass
 
 
 def main() -> None:

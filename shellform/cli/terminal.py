@@ -3,9 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from shellform.errors import NotConverged
+from shellform.records.progress import Event, Kind
+
+if TYPE_CHECKING:
+    from shellform.records.summary import Summary, VerdictRecord
+    from shellform.run.onsite import SiteResult
+
+_LASTING = (Kind.BEGAN, Kind.NOTE, Kind.KEPT, Kind.DONE)  # which stay as lines
 
 
 class Progress:
@@ -20,46 +27,54 @@ class Progress:
         self.status = self.console.status("starting")
         self.status.start()
 
-    def __call__(self, stage: str, text: str) -> None:
-        if text.startswith(("done", "kept", "loading", "no pictures", "note", "size", "going on")):
-            self.console.print(f"{stage}: {text}")
-        self.status.update(f"{stage}: {text}")
+    def __call__(self, event: Event) -> None:
+        if event.kind in _LASTING:
+            self.console.print(f"{event.stage}: {event.text}")
+        self.status.update(f"{event.stage}: {event.text}")
 
     def close(self) -> None:
         """Ends the spinner."""
         self.status.stop()
 
 
-def tell_designs(summary: dict[str, Any]) -> None:
+def tell_designs(summary: Summary) -> None:
     """What a designer asks first."""
-    for name, design in summary.get("designs", {}).items():
-        row = design["loads"]
+    for name, design in summary.designs.items():
         cells = [
-            f"{each}: {1e3 * row[each]['deviation_max']:6.1f} mm max, {1e3 * row[each]['deviation_mean']:5.1f} mean"
-            + ("" if row[each]["on_branch"] else " (snapped)")
-            for each in row
+            f"{load}: {1e3 * row.deviation_max:6.1f} mm max, {1e3 * row.deviation_mean:5.1f} mean"
+            + ("" if row.on_branch else " (snapped)")
+            for load, row in design.loads.items()
         ]
-        print(f"{name:>10}  {design['cables']:4d} cables  " + "   ".join(cells))
-    if "optimisation" in summary:
-        told = summary["optimisation"]
-        print(f"objective {told['objective_start']:.3g} -> {told['objective_end']:.3g}: {told['status']}")
-        over = [f"{name} by {value:.1%}" for name, value in told["constraints"].items() if value > 1e-3]
+        print(f"{name:>10}  {design.cables:4d} cables  " + "   ".join(cells))
+    found = summary.optimisation
+    if found is not None:
+        print(f"objective {found.objective_start:.3g} -> {found.objective_end:.3g}: {found.status}")
+        over = [f"{name} by {value:.1%}" for name, value in found.constraints.items() if value > 1e-3]
         if over:
             print(f"limits that are not kept: {', '.join(over)}")
-    for name, design in summary.get("designs", {}).items():
-        if not design.get("critical_factor_kept", True):
+    for name, design in summary.designs.items():
+        if design.critical_factor_kept is False:
             print(
                 f"the {name} design loses stability before the critical factor asked for (critical_factor in summary.json)"
             )
-    for each in summary.get("sections", []):
-        found = (
-            f"objective {each['objective']:.3g}, {each['cables']} cables"
-            if each["objective"] is not None
-            else "no design"
+    for each in summary.sections or ():
+        tried = (
+            "no design" if each.objective is None else f"objective {each.objective:.3g}, {each.cables} cables"
         )
-        print(f"{each['section']:>10}  {found}{'' if each['feasible'] else ': ' + each['why_not']}")
-    for sentence in summary.get("robust", {}).get("sentences", []):
+        print(f"{each.section:>10}  {tried}{'' if each.feasible else ': ' + each.why_not}")
+    for sentence in () if summary.robust is None else summary.robust.sentences:
         print(sentence)
+    if summary.verdict is not None:
+        tell_verdict(summary.verdict)
+
+
+def tell_verdict(verdict: VerdictRecord) -> None:
+    """Whether the design to build holds; each check that fails or could not be made."""
+    print(f"the {verdict.design} design {'holds' if verdict.holds else 'does not hold'}")
+    for name in verdict.failed:
+        print(f"  fails: {name}")
+    for name in verdict.not_examined:
+        print(f"  not examined: {name}")
 
 
 def tell_labelled(lines: Mapping[str, Any]) -> None:
@@ -68,9 +83,9 @@ def tell_labelled(lines: Mapping[str, Any]) -> None:
         print(f"{label:>22}  {value}")
 
 
-def tell_lines(told: Any) -> None:
+def tell_lines(result: SiteResult) -> None:
     """The lines of a command's result, then its files."""
-    for line in [*told.lines, *told.files]:
+    for line in [*result.lines, *result.files]:
         print(line)
 
 

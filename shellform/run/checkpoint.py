@@ -23,12 +23,12 @@ FILE = "optimise.npz"
 
 def save_checkpoint(folder: Path, key: str, checkpoint: Checkpoint) -> None:
     """Writes the checkpoint of the stage with the `key`. Raises InputError where it can't be written."""
-    told = {
+    meta = {
         "key": key,
         "numbers": dict(checkpoint.numbers),
         "history": [asdict(step) for step in checkpoint.history],
     }
-    arrays: dict[str, Any] = {**checkpoint.arrays, "told": np.array(json.dumps(told))}
+    arrays: dict[str, Any] = {**checkpoint.arrays, "told": np.array(json.dumps(meta))}
     with whole(folder / FILE, ".npz") as partial:
         np.savez(partial, **arrays)
 
@@ -41,10 +41,10 @@ def load_checkpoint(folder: Path, key: str) -> Checkpoint | None:
         return None
     try:
         arrays = dict(read_arrays(folder / FILE))
-        told = json.loads(str(arrays.pop("told")))
-        if told["key"] != key:
+        meta = json.loads(str(arrays.pop("told")))
+        if meta["key"] != key:
             return None
-        return Checkpoint(told["numbers"], arrays, tuple(Step(**step) for step in told["history"]))
+        return Checkpoint(meta["numbers"], arrays, tuple(Step(**step) for step in meta["history"]))
     except (InputError, KeyError, TypeError, ValueError):  # what can't be read is computed anew
         return None
 

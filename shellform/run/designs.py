@@ -4,43 +4,24 @@ are outdated.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+import numpy as np
 
 from shellform.arrays import Reals
-from shellform.case.case import Case
+from shellform.case.build_problem import shown
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.problem.paths import follow
+from shellform.problem.paths import deviations, follow
+from shellform.records.summary import DesignRecord, LoadRecord, Summary, write_summary
 from shellform.run.figures import write_states
-from shellform.run.folder import Report, keep_design
+from shellform.run.workspace import Workspace
 from shellform.structure.elements.state import State
+from shellform.structure.model import Model, write_model
 from shellform.structure.solve.equilibrium import Equilibrium
 from shellform.structure.solve.loading import Loaded
-from shellform.written import write_text
-
-
-@dataclass(frozen=True)
-class Making:
-    """A run that is being made: its `case`, its `folder`, whom to `report` progress to, and the `keys` of its
-    stages.
-    """
-
-    case: Case
-    folder: Path
-    report: Report
-    keys: Mapping[str, str]
-
-    def path(self, name: str) -> Path:
-        """Of a file in the folder."""
-        return self.folder / name
-
-    def tell(self, summary: Mapping[str, Any]) -> None:
-        """Writes summary.json."""
-        write_text(self.path("summary.json"), json.dumps(summary, indent=1))
+from shellform.written import write_arrays
 
 
 def followed(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:
@@ -59,31 +40,86 @@ def followed(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> di
 
 
 def keep(
-    making: Making,
+    workspace: Workspace,
     shell: Gridshell,
     name: str,
     design: Design,
     loaded: Mapping[str, Loaded],
     loads: Mapping[str, Reals],
-    summary: dict[str, Any],
-) -> None:
-    """Writes a design's model file, states and summary."""
-    summary["designs"][name] = keep_design(making.folder, shell, name, design, loaded, loads)
-    write_states(making.folder, shell, name, design, {each: loaded[each].equilibrium.state for each in loads})
-    making.tell(summary)
+    summary: Summary,
+) -> Summary:
+    """Writes a design's model file, its states, and the summary with it, which is returned."""
+    record = write_design(workspace.folder, shell, name, design, loaded, loads)
+    states = {each: loaded[each].equilibrium.state for each in loads}
+    write_states(workspace.folder, shell, name, design, states)
+    summary = summary.with_design(name, record)
+    write_summary(workspace.folder, summary)
+    return summary
 
 
-def forget(making: Making, names: Sequence[str], summary: dict[str, Any]) -> None:
+def forget(folder: Path, names: Sequence[str], summary: Summary) -> Summary:
     """Takes designs of an earlier run away, some of which this one may not make, with every picture and film
-    of them.
+    of them; returns the summary without them.
     """
     for name in names:
-        summary["designs"].pop(name, None)
         for part in (f"designs/{name}.npz", f"designs/{name}.json"):
-            making.path(part).unlink(missing_ok=True)
-        pictures = [file for file in making.folder.glob("figures/*") if name in file.stem.split("-")]
-        for file in [*making.folder.glob(f"states/{name}-*.vtp"), *pictures]:
+            (folder / part).unlink(missing_ok=True)
+        pictures = [file for file in folder.glob("figures/*") if name in file.stem.split("-")]
+        for file in [*folder.glob(f"states/{name}-*.vtp"), *pictures]:
             file.unlink()
-    for key in ("sections", "robust"):
-        summary.pop(key, None)
-        making.path(f"schedules/{key}.csv").unlink(missing_ok=True)
+    for table in ("sections", "robust"):
+        (folder / f"schedules/{table}.csv").unlink(missing_ok=True)
+    return summary.without_designs(names)
+
+
+def write_design(
+    folder: Path,
+    shell: Gridshell,
+    name: str,
+    design: Design,
+    loaded: Mapping[str, Loaded],
+    loads: Mapping[str, Reals],
+) -> DesignRecord:
+    """Writes a design's model file and states; returns its record."""
+    supports = tuple(int(node) for node in shell.net.supports)
+    network = shell.network(design)
+    model = Model(network, {each: loads[each] for each in loads if loads[each].any()}, shell.target, supports)
+    write_model(folder / f"designs/{name}.json", model)
+    states = {each: loaded[each].equilibrium.state for each in loads}
+    write_arrays(
+        folder / f"designs/{name}.npz",
+        rest_length=design.rest_length,
+        present=design.present,
+        radius=np.array(design.radius),
+        **{f"{each}_positions": state.positions for each, state in states.items()},
+        **{f"{each}_quaternions": state.quaternions for each, state in states.items()},
+    )
+    pull = shell.cables(design).tension(states["design"])
+    weight = loads["design"][:, 2].sum()
+    return DesignRecord(
+        cables=int(design.present.sum()),
+        rod_radius=design.radius,
+        cable_force_sum=float(pull.sum()),
+        cable_force_max=float(pull.max(initial=0.0)),
+        loads={
+            each: _under(shell, design, loaded[each], load, float(load[:, 2].sum() / weight))
+            for each, load in loads.items()
+        },
+    )
+
+
+def _under(shell: Gridshell, design: Design, loaded: Loaded, load: Reals, factor: float) -> LoadRecord:
+    """The record of a design under a load, so many times the design load."""
+    state = loaded.equilibrium.state
+    away = deviations(shell, state)
+    return LoadRecord(
+        factor=round(factor, 12) + 0.0,  # no -0
+        deviation_max=float(away.max()),
+        deviation_mean=float(away.mean()),
+        deviation_rms=float(np.sqrt((away**2).mean())),
+        stable=loaded.equilibrium.stable,
+        on_branch=loaded.on_branch,
+        residual=loaded.equilibrium.residual,
+        rod_utilisation_max=float(shell.bending_utilisation(design, state).max()),
+        **shown(shell, design, state, load),
+    )

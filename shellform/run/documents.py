@@ -4,14 +4,14 @@ best design.
 
 from __future__ import annotations
 
-from typing import Any
-
 from shellform.case.case import Case, StockRodEntry
 from shellform.gridshell.catalogue import read_catalogue
 from shellform.output.exchange import exports
 from shellform.output.workshop import drawings, nesting, schedules
 from shellform.output.workshop.schedules import Built
-from shellform.run.folder import Report, Run
+from shellform.records.progress import Event, Kind, Report, unheard
+from shellform.records.summary import DocumentsRecord
+from shellform.run.folder import Run
 
 
 def built_design(run: Run) -> Built:
@@ -37,7 +37,7 @@ def stock_length(case: Case) -> float:
     return rod.stock_length or sold or nesting.STOCK
 
 
-def write_documents(run: Run, *, report: Report = lambda stage, text: None) -> dict[str, Any]:
+def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     """Writes drawings/, schedules/ and models/ of a run and returns their part of the summary.
 
     Raises InputError where they can't be written. Without gmsh's system libraries there is no STEP file, and
@@ -45,24 +45,24 @@ def write_documents(run: Run, *, report: Report = lambda stage, text: None) -> d
     """
     built = built_design(run)
     cutting = nesting.cut(run.net.grid, stock=stock_length(run.case), kerf=run.case.rod.kerf)
-    report("documents", f"schedules of the {built.name} design")
+    report(Event("documents", f"schedules of the {built.name} design"))
     schedules.write_schedules(run.folder / "schedules", built, cutting)
-    report("documents", "drawings")
+    report(Event("documents", "drawings"))
     drawings.write_drawings(run.folder / "drawings", built, cutting)
-    report("documents", "models")
+    report(Event("documents", "models"))
     exports.write_exports(run.folder / "models", built, run.surface, run.loads)
     if exports.no_step():
-        report("documents", f"note: no STEP file: {exports.no_step()}")
+        report(Event("documents", f"no STEP file: {exports.no_step()}", Kind.NOTE))
     notes = schedules.cutting_notes(cutting, schedules.rod_names(run.net.grid))
     for note in notes[1:]:
-        report("documents", f"note: {note}")
-    return {
-        "design": built.name,
-        "stock_length": cutting.stock,
-        "bars": len(cutting.bars),
-        "bars_least": cutting.least,
-        "waste": cutting.waste,
-        "spliced": list(cutting.spliced),
-        "notes": list(notes),
+        report(Event("documents", note, Kind.NOTE))
+    return DocumentsRecord(
+        design=built.name,
+        stock_length=cutting.stock,
+        bars=len(cutting.bars),
+        bars_least=cutting.least,
+        waste=cutting.waste,
+        spliced=tuple(cutting.spliced),
+        notes=tuple(notes),
         **schedules.cut_counts(built),
-    }
+    )

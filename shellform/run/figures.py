@@ -4,7 +4,6 @@ files.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +12,9 @@ from typing import Any
 
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.run.folder import Report, Run, read_run
+from shellform.records import history
+from shellform.records.progress import Event, Kind, Report, unheard
+from shellform.run.folder import Run, read_run
 from shellform.structure.elements.state import State
 from shellform.written import folder as made
 
@@ -101,7 +102,7 @@ def _pixels(text: str) -> tuple[int, int]:
     return width, height
 
 
-def draw_everything(run: Run, *, report: Report = lambda stage, text: None) -> bool:
+def draw_everything(run: Run, *, report: Report = unheard) -> bool:
     """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False."""
     from shellform.output.pictures.net_maps import draw_net  # loads no OpenGL
 
@@ -114,11 +115,11 @@ def draw_everything(run: Run, *, report: Report = lambda stage, text: None) -> b
             except (
                 NotConverged
             ) as error:  # of a shell at its limit no mode may be found; the other maps stand
-                report("figures", f"no pictures of the {quantity}: {error}")
+                report(Event("figures", f"no pictures of the {quantity}: {error}", Kind.NOTE))
         for view in ("top", "front", "side"):
             draw_designs(run, Wish(run.best, "design", view=view), report=report)
         draw_net(run.net, run.folder / "figures")
-    if (run.folder / "history.csv").is_file():
+    if (run.folder / history.FILE).is_file():
         draw_histories(run)
     return drawn
 
@@ -129,18 +130,19 @@ def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:
     """
     from shellform.output.pictures import plots
 
-    source = run.folder / "history.csv"
-    if not source.is_file():
+    steps = [step for step in history.read_history(run.folder) if step.accepted]
+    if not steps:
         raise InputError(
             "isn't there: nothing was optimised yet",
-            where=str(source),
+            where=str(run.folder / history.FILE),
             remedy="Run shellform design on it again.",
         )
-    with source.open(encoding="utf-8", newline="") as file:
-        history = plots.read_history(csv.DictReader(file))
+    at = [float(step.evaluation) for step in steps]
+    terms = {name: [step.terms[name] for step in steps] for name in steps[0].terms}
+    constraints = {name: [step.constraints[name] for step in steps] for name in steps[0].constraints}
     files = [made(run.folder / "figures") / f"{name}{ending}" for name in ("objective", "constraints")]
-    plots.objective_history(files[0], history.evaluation, history.terms, cables=history.cables)
-    plots.constraint_history(files[1], history.evaluation, history.constraints)
+    plots.objective_history(files[0], at, terms, cables=[float(step.cables) for step in steps])
+    plots.constraint_history(files[1], at, constraints)
     return files
 
 
@@ -151,7 +153,7 @@ def pictures_possible(report: Report) -> bool:
 
         scene.require()
     except InputError as error:
-        report("figures", f"no pictures: {error}")
+        report(Event("figures", f"no pictures: {error}", Kind.NOTE))
         return False
     return True
 
@@ -161,9 +163,7 @@ def draw_run(folder: str | Path, wish: Wish | None = None) -> list[Path]:
     return draw_designs(read_run(folder), wish)
 
 
-def draw_designs(
-    run: Run, wish: Wish | None = None, *, report: Report = lambda stage, text: None
-) -> list[Path]:
+def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard) -> list[Path]:
     """As `draw_run`, of a run that is read already."""
     from shellform.output.pictures import net_maps, render
     from shellform.output.pictures.panel import Look
@@ -181,7 +181,7 @@ def draw_designs(
         )
         return [net_maps.draw_map(run.net, "springs", figures / f"net-springs{asked.endings[0]}", look=look)]
     names, loads = chosen(run, asked.design, asked.load)
-    report("figures", f"{asked.quantity} of {', '.join(names)}")
+    report(Event("figures", f"{asked.quantity} of {', '.join(names)}"))
     rows = [[panel_of(run, name, each, asked.quantity) for each in loads] for name in names]
     look = look_of(run, asked, [panel for row in rows for panel in row])
     files = [figures / f"{_stem(asked, name, each)}{asked.endings[0]}" for name in names for each in loads]
@@ -209,8 +209,7 @@ def panel_of(run: Run, design: str, load: str, quantity: str = "deviation") -> A
     """A design under a load."""
     from shellform.output.pictures import maps
 
-    told = _LOADS.get(load, f"load: {load}")
-    title = f"{design} design, {told}"
+    title = f"{design} design, {_LOADS.get(load, f'load: {load}')}"
     state = run.states[design][load]
     try:
         return maps.panel_of(

@@ -16,8 +16,9 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError
+from shellform.records.progress import Event, Report, unheard
 from shellform.run.figures import Wish, look_of, titled
-from shellform.run.folder import Report, Run
+from shellform.run.folder import Run
 from shellform.site.erection import erect
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -29,7 +30,7 @@ _FRAMES = 24  # of a stage
 _SIZE = (960, 600)
 
 
-def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = lambda stage, text: None) -> list[Path]:
+def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> list[Path]:
     """Writes figures/pour-DESIGN-LOAD or figures/erection-DESIGN in the wish's formats; the design is the
     best one unless it is named.
 
@@ -54,7 +55,7 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = lambda stage,
         stem = f"erection-{name}"
     look = look_of(run, replace(wish, size=wish.size or _SIZE), panels)
     files = [made(run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings]
-    report("film", f"drawing {len(panels)} frames")
+    report(Event("film", f"drawing {len(panels)} frames"))
     render.film(files, [titled(run, panel) for panel in panels], look)
     return files
 
@@ -86,7 +87,7 @@ def _pour(run: Run, name: str, stages: Sequence[str], quantity: str, report: Rep
 
         def note(share: float, reached: Equilibrium, found: list[tuple[float, State]] = found) -> None:
             found.append((share, reached.state))
-            report("film", f"at {100.0 * share:.0f} %")
+            report(Event("film", f"at {100.0 * share:.0f} %", fraction=share))
 
         reached = apply_load(assembly, state, before, after, step=1.0 / _FRAMES, report=note)
         first = 1 if panels else 0
@@ -123,7 +124,7 @@ def _between(found: Sequence[tuple[float, State]], share: float) -> State:
 def _erection(run: Run, name: str, wish: Wish, report: Report) -> list[Any]:
     from shellform.output.pictures import maps
 
-    report("film", "following the grid from the ground")
+    report(Event("film", "following the grid from the ground"))
     design, shell = run.designs[name], run.shell_of(name)
     load = run.loads[wish.load] if wish.load else None
     steps = erect(shell, design, load=load, step=1.0 / _FRAMES).steps

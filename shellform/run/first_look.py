@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,13 +13,17 @@ from pydantic import ValidationError
 
 import shellform
 from shellform.case.build_gridshell import rod_material
-from shellform.case.build_net import net_summary, surface_of, surface_summary, told_size
+from shellform.case.build_net import net_record, size_text, surface_of, surface_record
 from shellform.case.case import SurfaceEntry, load_case
 from shellform.errors import InputError
 from shellform.net.files import net_document, save_net
 from shellform.net.orientation import oriented_net
+from shellform.records import stages
+from shellform.records.files import plain
+from shellform.records.progress import Event, Kind, Report
+from shellform.records.summary import Summary, SurfaceRecord, write_summary
 from shellform.run.figures import pictures_possible
-from shellform.run.folder import FORMAT, VERSION, Report, refuse_overwriting
+from shellform.run.folder import refuse_overwriting
 from shellform.surface.readers.reading import FORMATS, kind_of
 from shellform.surface.shape.target import largest_curvature
 from shellform.written import folder as made
@@ -28,11 +33,41 @@ _GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
 YOUNG, STRENGTH = 40e9, 255e6  # Pa, of the paper's GFRP rods
 
 
-def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Expected:
+    """What to expect of a case's net: about so many `crossings`, and degrees of `freedoms`, at its
+    `spacing`, m."""
+
+    spacing: float
+    crossings: int
+    freedoms: int
+
+
+@dataclass(frozen=True)
+class FirstLook:
+    """What a surface is: its record, the file's `format` and `unit`, its largest curvature, 1/m, and the
+    largest radius, m, of rods on it by equation (1) (None: any); of a case what to expect of its net."""
+
+    surface: SurfaceRecord
+    format: str
+    unit: str
+    curvature_max: float
+    rod_radius_max: float | None
+    expected: Expected | None = None
+
+    def document(self) -> dict[str, Any]:
+        """As JSON says it: the surface's keys stand beside the others."""
+        found: dict[str, Any] = plain(self.surface)
+        found |= {"format": self.format, "unit": self.unit, "curvature_max": self.curvature_max}
+        found |= {"rod_radius_max": self.rod_radius_max}
+        return found | ({} if self.expected is None else {"expected": plain(self.expected)})
+
+
+def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -> FirstLook:
     """What a surface file or a case's surface is, in SI units; `options` are the entries of [surface] in a
     case.
 
-    For a case they take the place of its own, and what to expect of its net is told too.
+    For a case they take the place of its own, and what to expect of its net is said too.
     """
     case = load_case(file) if file.suffix.lower() == ".toml" else None
     entry = (
@@ -45,20 +80,15 @@ def check_file(file: Path, options: Mapping[str, Any], *, allow_scripts: bool) -
     bent = largest_curvature(surface)
     material = rod_material(case.rod) if case else None
     young, strength = (material.young, material.strength) if material else (YOUNG, STRENGTH)
-    found = surface_summary(surface, str(path)) | {
-        "format": "builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
-        "unit": _unit(path, entry.unit),
-        "curvature_max": bent,
-        "rod_radius_max": largest_radius(young, strength, bent),
-    }
-    if case:
-        cells = surface.area / case.net.spacing**2
-        found["expected"] = {
-            "spacing": case.net.spacing,
-            "crossings": round(cells),
-            "freedoms": round(48 * cells),
-        }
-    return found
+    cells = 0.0 if case is None else surface.area / case.net.spacing**2
+    return FirstLook(
+        surface=surface_record(surface, str(path)),
+        format="builder script" if path.suffix == ".py" else FORMATS[kind_of(path)],
+        unit=_unit(path, entry.unit),
+        curvature_max=bent,
+        rod_radius_max=largest_radius(young, strength, bent),
+        expected=None if case is None else Expected(case.net.spacing, round(cells), round(48 * cells)),
+    )
 
 
 def largest_radius(young: float, strength: float, curvature: float) -> float | None:
@@ -68,31 +98,28 @@ def largest_radius(young: float, strength: float, curvature: float) -> float | N
     return strength / (young * curvature) if curvature > 0.0 else None
 
 
-def told(found: Mapping[str, Any]) -> dict[str, str]:
+def labelled(found: FirstLook) -> dict[str, str]:
     """What `check_file` found, as labelled lines."""
-    bent, largest = found["curvature_max"], found["rod_radius_max"]
+    surface, bent = found.surface, found.curvature_max
     lines = {
-        "surface": found["source"],
-        "format": found["format"],
-        "unit": found["unit"],
-        "size": told_size(found["size"]),
-        "area": f"{found['area']:.4g} m²",
-        "triangles": str(found["triangles"]),
-        "holes": str(found["holes"]),
-        "mended": "nothing" if not found["mended"] else found["mended"][0],
-        **{f"mended {k}": text for k, text in enumerate(found["mended"][1:], 2)},
+        "surface": surface.source,
+        "format": found.format,
+        "unit": found.unit,
+        "size": size_text(surface.size),
+        "area": f"{surface.area:.4g} m²",
+        "triangles": str(surface.triangles),
+        "holes": str(surface.holes),
+        "mended": surface.mended[0] if surface.mended else "nothing",
+        **{f"mended {k}": text for k, text in enumerate(surface.mended[1:], 2)},
         "largest curvature": f"{bent:.3g} 1/m, radius {1.0 / bent:.3g} m" if bent > 0.0 else "none",
     }
-    expected = found.get("expected")
-    if expected:
-        lines["crossings to expect"] = f"about {expected['crossings']} at {expected['spacing']:g} m"
-        lines["freedoms to expect"] = f"about {expected['freedoms']}"
-    source = (
-        "equation 1, at the surface's largest curvature"
-        if expected
-        else "in GFRP, strength/E = 255 MPa/40 GPa"
-    )
-    lines["largest rod radius"] = f"at least {largest:.3g} m ({source})" if largest else "any"
+    source = "in GFRP, strength/E = 255 MPa/40 GPa"
+    if found.expected is not None:
+        lines["crossings to expect"] = f"about {found.expected.crossings} at {found.expected.spacing:g} m"
+        lines["freedoms to expect"] = f"about {found.expected.freedoms}"
+        source = "equation 1, at the surface's largest curvature"
+    largest = found.rod_radius_max
+    lines["largest rod radius"] = "any" if largest is None else f"at least {largest:.3g} m ({source})"
     return lines
 
 
@@ -130,41 +157,38 @@ def net_alone(
     gap: float | None,
     allow_scripts: bool,
     report: Report,
-) -> dict[str, Any]:
+) -> Summary:
     """Writes net.json, net.npz and summary.json of the net on a surface file; returns what summary.json says.
 
     `options` are the entries of [surface] in a case; `angle` degrees or "auto".
     """
     refuse_overwriting(folder)
-    if (folder / "stages.json").is_file():
+    if (folder / stages.FILE).is_file():
         raise InputError(
             "holds a run of shellform design",
             where=str(folder),
             remedy="Choose another --output for the net alone.",
         )
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
-    report("surface", f"size {told_size(surface.size)}")
+    report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
     settings = {"spacing": spacing, "gap": gap or _GAP * spacing}
     net, found, offset = oriented_net(
-        surface, settings, angle=_angle(angle), progress=lambda text: report("net", text)
+        surface, settings, angle=_angle(angle), progress=lambda text: report(Event("net", text))
     )
-    summary = net_summary(net) | {"angle": found, "offset": list(offset)}
     made(folder)
     save_net(folder / "net.npz", net)
     write_text(folder / "net.json", json.dumps(net_document(net)))
-    document = {
-        "format": FORMAT,
-        "version": VERSION,
-        "shellform": shellform.__version__,
-        "surface": surface_summary(surface, str(file)),
-        "net": summary,
-    }
-    write_text(folder / "summary.json", json.dumps(document, indent=1))
+    summary = Summary(
+        shellform=shellform.__version__,
+        surface=surface_record(surface, str(file)),
+        net=net_record(net, angle=found, offset=offset),
+    )
+    write_summary(folder, summary)
     if pictures_possible(report):
         from shellform.output.pictures.net_maps import draw_net
 
         draw_net(net, folder / "figures")
-    return document
+    return summary
 
 
 def _angle(text: str) -> float | Literal["auto"]:

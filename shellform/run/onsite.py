@@ -25,12 +25,13 @@ from shellform.site import calibration, erection, measurements, retensioning
 from shellform.site.scans import Scan, match, read_points
 from shellform.structure.elements.state import State
 from shellform.surface.units import METRES
+from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
 
 
 @dataclass(frozen=True)
-class Told:
+class SiteResult:
     """Lines to print and the files that were written."""
 
     lines: Sequence[str]
@@ -50,7 +51,7 @@ def calibrate(
     offsets: bool = False,
     output: Path | None = None,
     allow_scripts: bool = False,
-) -> Told:
+) -> SiteResult:
     """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design` or, unbraced, as
     a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
     Raises InputError, NotConverged."""
@@ -70,7 +71,7 @@ def calibrate(
     write_text(files[1], tomli_w.dumps({"joint": joint}))
     seen = 1e3 * found.after[np.isfinite(found.after)]
     line = f"distances to the model: {seen.mean():.3f} mm on average, {seen.max():.3f} mm at most"
-    return Told([*found.sentences(), line], files)
+    return SiteResult([*found.sentences(), line], files)
 
 
 def _built(
@@ -135,7 +136,7 @@ class Survey:
         return retensioning.Crew(self.step, self.largest, self.cables)
 
 
-def survey(folder: Path, measured: Path, options: Survey, output: Path | None = None) -> Told:
+def survey(folder: Path, measured: Path, options: Survey, output: Path | None = None) -> SiteResult:
     """The next turns of the turnbuckles from a survey of a run's grid as built. Writes turns.csv,
     predicted.csv and belief.npz, which `options.after` of the next round names. Raises InputError,
     NotConverged."""
@@ -171,7 +172,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     ]
     if step.halved:
         lines.append(f"the turns were halved {step.halved} times, to stay on the stable branch")
-    return Told(lines, files)
+    return SiteResult(lines, files)
 
 
 def replay(
@@ -183,7 +184,7 @@ def replay(
     slip: float,
     markers: Path | None = None,
     output: Path | None = None,
-) -> Told:
+) -> SiteResult:
     """The loop of survey and turning played with random length errors, `options.noise` and the crew's `slip`.
     Writes replay.csv. Raises InputError, NotConverged.
     """
@@ -210,22 +211,24 @@ def replay(
         seed=seed + 1,
         slip=slip,
     )
-    lines = ["round,rms distance from the design [mm],cables turned,turns"]
     turned = [
         (0, 0),
         *((int(np.count_nonzero(each.turns)), int(np.abs(each.turns).sum())) for each in played.adjustments),
     ]
-    for number, (misfit, (cables, turns)) in enumerate(zip(played.misfits, turned, strict=True)):
-        lines.append(f"{number},{_mm(misfit, len(goal))},{cables},{turns}")
-    file = made(output or run.folder / "schedules") / "replay.csv"
-    write_text(file, "\n".join(lines) + "\n")
-    return Told(
-        [
-            *lines,
-            f"{100.0 * played.removed:.0f} % of the misfit are gone after {len(played.adjustments)} rounds",
-        ],
-        [file],
+    text = table_text(
+        Table(
+            "replay",
+            ("round", "rms distance from the design [mm]", "cables turned", "turns"),
+            tuple(
+                (number, _mm(misfit, len(goal)), cables, turns)
+                for number, (misfit, (cables, turns)) in enumerate(zip(played.misfits, turned, strict=True))
+            ),
+        )
     )
+    file = made(output or run.folder / "schedules") / "replay.csv"
+    write_text(file, text)
+    gone = f"{100.0 * played.removed:.0f} % of the misfit are gone after {len(played.adjustments)} rounds"
+    return SiteResult([*text.splitlines(), gone], [file])
 
 
 def erect(
@@ -239,7 +242,7 @@ def erect(
     way: Path | None = None,
     step: float = erection.STEP,
     output: Path | None = None,
-) -> Told:
+) -> SiteResult:
     """From the flat grid to the erected, tightened and loaded shell. Writes erection.csv, a line a step, and
     erection.npz with the shapes. Raises InputError, NotConverged.
     """
@@ -266,7 +269,7 @@ def erect(
         stage=np.array([each.stage for each in done.steps]),
     )
     worst, last = done.worst, done.steps[-1]
-    return Told(
+    return SiteResult(
         [
             f"{len(done.steps)} steps: {', '.join(dict.fromkeys(each.stage for each in done.steps))}",
             f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the strength, at {worst.share:.2f} of {worst.stage}; "
@@ -358,15 +361,16 @@ def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, g
     """predicted.csv: each crossing's predicted place, m, and how far it is from its goal before and after the
     turns, mm.
     """
-    lines = ["crossing,node,x,y,z,distance before [mm],distance after [mm]"]
     after = step.belief.state.positions
-    for number, node in enumerate(shell.net.grid.crossing_nodes[:, 1]):
-        place = ",".join(f"{each:.6f}" for each in after[node])
-        was, then = (
-            1e3 * float(np.linalg.norm(each[node] - goal[node])) for each in (before.positions, after)
-        )
-        lines.append(f"{number},{node},{place},{was:.3f},{then:.3f}")
-    return "\n".join(lines) + "\n"
+    rows = []
+    for number, node in enumerate(shell.net.grid.crossing_nodes[:, 1].tolist()):
+        away = [
+            f"{1e3 * float(np.linalg.norm(each[node] - goal[node])):.3f}"
+            for each in (before.positions, after)
+        ]
+        rows.append((number, node, *(f"{each:.6f}" for each in after[node]), *away))
+    heads = ("crossing", "node", "x", "y", "z", "distance before [mm]", "distance after [mm]")
+    return table_text(Table("predicted", heads, tuple(rows)))
 
 
 def _design(run: Run, name: str | None, usual: str) -> str:

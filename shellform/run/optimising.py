@@ -5,8 +5,7 @@ its limits examined.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
-from typing import Any
+from dataclasses import fields, replace
 
 import numpy as np
 
@@ -17,140 +16,178 @@ from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import symmetric_groups
 from shellform.optimiser.optimum import Optimum, Step
+from shellform.optimiser.rounding import CandidateSection
 from shellform.optimiser.solver import SequentialConvex
 from shellform.problem.constraints import AtMost
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.problem.terms import CableForces, Misfit, Share
 from shellform.problem.variables import RestLengths
+from shellform.records.history import write_history
+from shellform.records.progress import Event, Kind
+from shellform.records.summary import (
+    CableCountRecord,
+    OptimisationRecord,
+    SectionRecord,
+    Summary,
+    SymmetryRecord,
+)
 from shellform.run.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
-from shellform.run.designs import Making, followed, forget, keep
-from shellform.run.folder import history_text
+from shellform.run.designs import followed, forget, keep
 from shellform.run.robustness import robustness
+from shellform.run.workspace import Workspace
+from shellform.tables import Table, table_text
 from shellform.written import write_text
 
 
-def optimise(making: Making, shell: Gridshell, loads: Mapping[str, Reals], summary: dict[str, Any]) -> None:
+def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals], summary: Summary) -> Summary:
     """Makes the designs "optimised", "rounded", "polished" and "unloaded", as the case asks for them, and
-    adds to the summary what came of it.
+    returns the summary with what came of it.
 
     Raises InputError and NotConverged as the optimiser.
     """
+    entry = workspace.case.optimise
+    start = shell.design(rest_ratio=workspace.case.cable.rest_ratio)
+    groups = symmetric_groups(shell) if entry.symmetric else None  # at once: it may be refused
+    best = _best(workspace, shell, start, loads)
+    summary = forget(workspace.folder, ("unloaded", "optimised", "rounded", "polished"), summary)
+    reached = {each: best.loaded[each] for each in loads}
+    summary = keep(workspace, shell, "optimised", best.design, reached, loads, summary)
+    write_history(workspace.folder, best.history)  # whatever comes after
+    built = {"optimised": best}
+    if entry.rod_radius > 0.0 and entry.rounded:
+        rounded, summary = _rounded(workspace, best, start, loads, summary)
+        built |= {} if rounded is None else {"rounded": rounded}
+    not_polished = None
+    if entry.polish:
+        last = list(built.values())[-1]
+        polished, not_polished = _polished(workspace, last, groups, loads)
+        if polished is not None:
+            built["polished"] = polished
+            reached = {each: polished.loaded[each] for each in loads}
+            shell_of_it = last.problem.shell
+            summary = keep(workspace, shell_of_it, "polished", polished.design, reached, loads, summary)
+            section = summary.designs["rounded"].section if "rounded" in summary.designs else None
+            summary = summary.with_design("polished", replace(summary.designs["polished"], section=section))
+    name, final = list(built.items())[-1]
+    cable_count, symmetry = _wishes(workspace, final.design, groups)
+    for each, found in built.items():
+        summary = _examined(workspace, each, found, loads, summary)
+    if workspace.case.robust is not None:
+        workspace.say("optimise", "what scatter does to the shape")
+        scattered = robustness(
+            workspace.case.robust, final.problem.shell, final.design, final.states["design"], loads["design"]
+        )
+        summary = replace(summary, robust=scattered.record(name))
+        write_text(workspace.path("schedules/robust.csv"), table_text(scattered.table()))
+    if entry.unloaded:
+        unloaded = _without_loads(workspace, shell, start, loads["none"])
+        reached = followed(shell, unloaded, loads)
+        summary = keep(workspace, shell, "unloaded", unloaded, reached, loads, summary)
+    record = _record(best, summary.designs["optimised"].critical_factor_kept is not False)
+    record = replace(record, not_polished=not_polished, cables_max=cable_count, symmetric=symmetry)
+    drop_checkpoint(workspace.folder)
+    return replace(summary, optimisation=record)
+
+
+def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[str, Reals]) -> Optimum:
+    """The optimised design, begun anew or gone on with from a checkpoint."""
     from shellform.optimiser import optimise as optimiser
 
-    entry, cable = making.case.optimise, making.case.cable
-    start = shell.design(rest_ratio=cable.rest_ratio)
+    entry = workspace.case.optimise
 
     def watch(step: Step) -> None:
-        said = "" if step.accepted else ", rejected"
+        rejected = "" if step.accepted else ", rejected"
         left = step.seconds / max(step.evaluation, 1) * (entry.evaluations - step.evaluation)
-        making.report(
-            "optimise",
-            f"evaluation {step.evaluation}/{entry.evaluations}: objective {step.objective:.4f}, {step.cables} cables, "
-            f"{100 * step.stage:.0f} % of the additional load{said}, {left:.0f} s left at most",
+        workspace.report(
+            Event(
+                "optimise",
+                f"evaluation {step.evaluation}/{entry.evaluations}: objective {step.objective:.4f}, "
+                f"{step.cables} cables, {100 * step.stage:.0f} % of the additional load{rejected}, "
+                f"{left:.0f} s left at most",
+                fraction=step.evaluation / entry.evaluations,
+                seconds_left=left,
+            )
         )
 
-    problem = case_problem(making.case, shell, loads, start)
-    groups = symmetric_groups(shell) if entry.symmetric else None  # at once: it may be refused
-    key = making.keys["optimise"]
-    stood = load_checkpoint(making.folder, key)
-    if stood is not None:
-        making.report("optimise", f"going on after evaluation {stood.numbers['evaluations']}")
-    best = optimiser.optimise(
+    problem = case_problem(workspace.case, shell, loads, start)
+    key = workspace.keys["optimise"]
+    checkpoint = load_checkpoint(workspace.folder, key)
+    if checkpoint is not None:
+        reached = checkpoint.numbers["evaluations"]
+        workspace.say("optimise", f"going on after evaluation {reached}", Kind.BEGAN)
+    return optimiser.optimise(
         problem,
         start,
         solver=SequentialConvex(stiffness=entry.stiffness_min, most_cables=entry.cables_max),
         evaluations=entry.evaluations,
         progress=watch,
-        keep=lambda checkpoint: save_checkpoint(making.folder, key, checkpoint),
-        resume=stood,
+        keep=lambda checkpoint: save_checkpoint(workspace.folder, key, checkpoint),
+        resume=checkpoint,
     )
-    forget(making, ("unloaded", "optimised", "rounded", "polished"), summary)
-    built = {"optimised": best}
-    keep(making, shell, "optimised", best.design, {each: best.loaded[each] for each in loads}, loads, summary)
-    write_text(making.path("history.csv"), history_text(best.history))  # whatever comes after
-    rounded = (
-        _rounded(making, best, start, loads, summary) if entry.rod_radius > 0.0 and entry.rounded else None
-    )
-    if rounded is not None:
-        built["rounded"] = rounded
-    asked: dict[str, Any] = {}
-    if entry.polish:
-        making.report("optimise", "polishing the cables that are left")
-        last = list(built.values())[-1]
-        try:
-            polished = optimiser.polish(last, evaluations=entry.polish, groups=groups)
-        except (
-            NotConverged
-        ) as error:  # averaged lengths may not bear the loads; the design before them stands
-            making.report("optimise", f"not polished: {error.what}")
-            asked["not_polished"] = error.what
-        else:
-            here = last.problem.shell
-            reached = followed(here, polished.design, loads)
-            built["polished"] = replace(
-                polished, loaded={**polished.loaded, **reached}
-            )  # its own are of unequal lengths where none was better
-            keep(making, here, "polished", polished.design, reached, loads, summary)
-        if "polished" in built and "section" in summary["designs"].get("rounded", {}):
-            summary["designs"]["polished"]["section"] = summary["designs"]["rounded"]["section"]
-    asked |= _came_of(making, list(built.values())[-1].design, groups)
-    for name, found in built.items():
-        _examine(making, name, found, loads, summary)
-    if making.case.robust is not None:
-        making.report("optimise", "what scatter does to the shape")
-        name, found = list(built.items())[-1]
-        told = robustness(
-            making.case.robust, found.problem.shell, found.design, found.states["design"], loads["design"]
-        )
-        summary["robust"] = {"design": name, **told.summary()}
-        write_text(making.path("schedules/robust.csv"), told.table())
-    if entry.unloaded:
-        unloaded = _without_loads(making, shell, start, loads["none"])
-        keep(making, shell, "unloaded", unloaded, followed(shell, unloaded, loads), loads, summary)
-    summary["optimisation"] = {
-        "objective_start": best.objective_start,
-        "objective_end": best.objective,
-        "iterations": sum(step.accepted for step in best.history) - 1,
-        "evaluations": best.evaluations,
-        "rejected": best.rejected,
-        "equilibria": best.equilibria,
-        "factorisations": best.factorisations,
-        "factorisations_rejected": best.wasted,
-        "stiffness_min": best.stiffness,
-        "status": best.status,
-        "constraints": dict(best.constraints),
-        "feasible": max(best.constraints.values(), default=-1.0) <= FEASIBLE
-        and summary["designs"]["optimised"].get("critical_factor_kept", True),
-        **asked,
-    }
-    drop_checkpoint(making.folder)
 
 
-def _came_of(making: Making, design: Design, groups: Indices | None) -> dict[str, Any]:
-    """For the summary: whether the design to build keeps `cables_max`, and how many lengths it has for how
-    many groups where symmetry was asked for."""
-    entry, found = making.case.optimise, dict[str, Any]()
-    if entry.cables_max is not None:
+def _record(best: Optimum, critical_factor_kept: bool) -> OptimisationRecord:
+    """What came of the optimisation."""
+
+    return OptimisationRecord(
+        objective_start=best.objective_start,
+        objective_end=best.objective,
+        iterations=sum(step.accepted for step in best.history) - 1,
+        evaluations=best.evaluations,
+        equilibria=best.equilibria,
+        factorisations=best.factorisations,
+        status=best.status,
+        constraints=dict(best.constraints),
+        rejected=best.rejected,
+        factorisations_rejected=best.wasted,
+        stiffness_min=best.stiffness,
+        feasible=max(best.constraints.values(), default=-1.0) <= FEASIBLE and critical_factor_kept,
+    )
+
+
+def _polished(
+    workspace: Workspace, last: Optimum, groups: Indices | None, loads: Mapping[str, Reals]
+) -> tuple[Optimum | None, str | None]:
+    """The last design polished, followed under the loads; or None, and why."""
+    from shellform.optimiser import optimise as optimiser
+
+    workspace.say("optimise", "polishing the cables that are left")
+    try:
+        polished = optimiser.polish(last, evaluations=workspace.case.optimise.polish, groups=groups)
+    except NotConverged as error:  # averaged lengths may not bear the loads; the design before them stands
+        workspace.say("optimise", f"not polished: {error.what}", Kind.NOTE)
+        return None, error.what
+    # its own states are of unequal lengths where none was better
+    reached = followed(last.problem.shell, polished.design, loads)
+    return replace(polished, loaded={**polished.loaded, **reached}), None
+
+
+def _wishes(
+    workspace: Workspace, design: Design, groups: Indices | None
+) -> tuple[CableCountRecord | None, SymmetryRecord | None]:
+    """Whether the design to build keeps `cables_max`, and how many lengths it has for how many groups where
+    symmetry was asked for."""
+    most = workspace.case.optimise.cables_max
+    cables = symmetry = None
+    if most is not None:
         count = int(design.present.sum())
-        found["cables_max"] = {"asked": entry.cables_max, "cables": count, "kept": count <= entry.cables_max}
-        if count > entry.cables_max:
-            making.report(
-                "optimise",
-                f"note: {count} cables are left, not {entry.cables_max}: with fewer a limit is broken",
-            )
+        cables = CableCountRecord(most, count, count <= most)
+        if count > most:
+            text = f"{count} cables are left, not {most}: with fewer a limit is broken"
+            workspace.say("optimise", text, Kind.NOTE)
     if groups is not None:
         numbers, lengths = groups[design.present], design.rest_length[design.present]
-        alike = all(np.ptp(lengths[numbers == each]) <= 1e-9 for each in np.unique(numbers))
-        found["symmetric"] = {"groups": len(np.unique(numbers)), "kept": alike}
-    return found
+        alike = all(bool(np.ptp(lengths[numbers == each]) <= 1e-9) for each in np.unique(numbers))
+        symmetry = SymmetryRecord(len(np.unique(numbers)), alike)
+    return cables, symmetry
 
 
-def _without_loads(making: Making, shell: Gridshell, start: Design, none: Reals) -> Design:
+def _without_loads(workspace: Workspace, shell: Gridshell, start: Design, none: Reals) -> Design:
     """The design of the best fit of the unloaded shape, with forces within the cables' limit."""
     from shellform.optimiser import optimise as optimiser
 
-    making.report("optimise", "the design without regard to the loads")
-    entry, cable = making.case.optimise, making.case.cable
+    workspace.say("optimise", "the design without regard to the loads")
+    entry, cable = workspace.case.optimise, workspace.case.cable
     problem = Problem(
         shell,
         LoadCase("none", none),
@@ -162,52 +199,75 @@ def _without_loads(making: Making, shell: Gridshell, start: Design, none: Reals)
 
 
 def _rounded(
-    making: Making, best: Optimum, start: Design, loads: Mapping[str, Reals], summary: dict[str, Any]
-) -> Optimum | None:
-    """Operation 4: keeps the design "rounded" and the table of sections. None without a catalogue or a
+    workspace: Workspace, best: Optimum, start: Design, loads: Mapping[str, Reals], summary: Summary
+) -> tuple[Optimum | None, Summary]:
+    """Operation 4: keeps the design "rounded" and the table of sections; None without a catalogue or a
     design.
     """
     from shellform.optimiser import rounding
 
-    entry = making.case.optimise
-    catalogue = rounding_catalogue(making.case)
+    entry = workspace.case.optimise
+    catalogue = rounding_catalogue(workspace.case)
     if catalogue is None:
-        return None
+        return None, summary
     trials = rounding.tried(
         best,
         start,
         catalogue,
-        lambda shell: case_problem(making.case, shell, loads, start, frees_radius=False),
+        lambda shell: case_problem(workspace.case, shell, loads, start, frees_radius=False),
         evaluations=entry.rounded,
         beside=entry.neighbours,
         most_cables=entry.cables_max,
-        progress=lambda text: making.report("optimise", text),
+        progress=lambda text: workspace.say("optimise", text),
     )
-    summary["sections"] = [each.row() for each in trials]
-    write_text(making.path("schedules/sections.csv"), rounding.table(trials))
+    sections = tuple(_section(each) for each in trials)
+    summary = replace(summary, sections=sections)
+    heads = tuple(field.name for field in fields(SectionRecord))
+    rows = tuple(tuple(getattr(each, head) for head in heads) for each in sections)
+    text = table_text(Table("sections", heads, rows), exact=True)
+    write_text(workspace.path("schedules/sections.csv"), text)
     taken = rounding.chosen(trials)
     if taken is None or taken.optimum is None:
-        return None
+        return None, summary
     design = taken.optimum.design
-    keep(making, taken.shell, "rounded", design, followed(taken.shell, design, loads), loads, summary)
-    summary["designs"]["rounded"] |= {
-        "section": taken.section,
-        "feasible": not taken.why,
-        "why_not": taken.why,
-        "objective": taken.objective,
-    }
-    return taken.optimum
+    reached = followed(taken.shell, design, loads)
+    summary = keep(workspace, taken.shell, "rounded", design, reached, loads, summary)
+    record = replace(
+        summary.designs["rounded"],
+        section=taken.section,
+        feasible=not taken.why,
+        why_not=taken.why,
+        objective=taken.objective,
+    )
+    return taken.optimum, summary.with_design("rounded", record)
 
 
-def _examine(
-    making: Making, name: str, found: Optimum, loads: Mapping[str, Reals], summary: dict[str, Any]
-) -> None:
-    """Adds to a design's part of the summary how far each load could grow."""
-    making.report("optimise", f"critical load factors of the {name} design")
-    wanted = making.case.limits.critical_factor
+def _section(trial: CandidateSection) -> SectionRecord:
+    """A section that was tried, whose numbers are known where it has a design."""
+    known = trial.optimum is not None
+    return SectionRecord(
+        section=trial.section,
+        rod_radius=trial.shell.rod.radius,
+        rod_mass=trial.mass,
+        rounded_up=trial.rounded_up,
+        objective=trial.objective if known else None,
+        deviation_max=trial.deviation_max if known else None,
+        deviation_mean=trial.deviation_mean if known else None,
+        cables=trial.cables if known else None,
+        stress_utilisation_max=trial.utilisation if known else None,
+        feasible=not trial.why,
+        why_not=trial.why,
+    )
+
+
+def _examined(
+    workspace: Workspace, name: str, found: Optimum, loads: Mapping[str, Reals], summary: Summary
+) -> Summary:
+    """The summary with how far each load of a design could grow."""
+    workspace.say("optimise", f"critical load factors of the {name} design")
+    limits, record = workspace.case.limits, summary.designs[name]
+    wanted = limits.critical_factor
     factors = critical_factors(found.problem.shell, found.design, found.states["none"], loads, wanted=wanted)
-    for each, told in factors.items():
-        summary["designs"][name]["loads"][each] |= told
-    if wanted is not None:
-        short = below_factor(factors, wanted, making.case.limits.critical_loads)
-        summary["designs"][name]["critical_factor_kept"] = not short
+    rows = {each: replace(row, **factors.get(each, {})) for each, row in record.loads.items()}
+    kept = None if wanted is None else not below_factor(factors, wanted, limits.critical_loads)
+    return summary.with_design(name, replace(record, loads=rows, critical_factor_kept=kept))

@@ -4,7 +4,6 @@ at all.
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -13,10 +12,14 @@ from platform import python_version
 import shellform
 from shellform.errors import InputError
 from shellform.output.page.embed import KINDS, embed
-from shellform.output.page.report import GENERATOR, Entry, html
-from shellform.output.page.verdict import Bounds
-from shellform.run.folder import DESIGNS, Report, Run, read_json, read_run
-from shellform.run.run import stage_keys
+from shellform.output.page.report import GENERATOR, ShownRun, html
+from shellform.records.history import read_history
+from shellform.records.progress import Event, Report, unheard
+from shellform.records.stages import read_stages
+from shellform.records.summary import VerdictRecord
+from shellform.records.verdict import Bounds, Check, checks, verdict
+from shellform.run.folder import DESIGNS, Run, read_run
+from shellform.run.keys import stage_keys
 from shellform.written import write_text
 
 FILE = "report.html"
@@ -30,7 +33,7 @@ def write_report(
     folders: Sequence[str | Path],
     file: str | Path | None = None,
     *,
-    report: Report = lambda stage, text: None,
+    report: Report = unheard,
 ) -> Path:
     """Writes the page of one run, or of several side by side, and returns its file: `file`, or report.html in
     the one run's folder or, for several, in the present one. Raises InputError for what is no run, and for a
@@ -39,7 +42,7 @@ def write_report(
         raise InputError("there is no run to report", where="report", remedy="Name one or more run folders.")
     runs = []
     for folder in folders:
-        report("report", f"reading {folder}")
+        report(Event("report", f"reading {folder}"))
         runs.append(read_run(folder))
     return write_page(
         runs, Path(file) if file is not None else (runs[0].folder if len(runs) == 1 else Path()) / FILE
@@ -49,25 +52,65 @@ def write_report(
 def write_page(runs: Sequence[Run], file: Path) -> Path:
     """As `write_report`, of runs that are read already."""
     _refuse_foreign(file)
-    text = html([entry(run, _BUDGET // len(runs)) for run in runs], versions())
+    text = html([shown_run(run, _BUDGET // len(runs)) for run in runs], versions())
     write_text(file, text)
     return file
 
 
-def entry(run: Run, budget: int = _BUDGET) -> Entry:
+def run_checks(run: Run) -> list[Check]:
+    """Every check of the run's designs."""
+    limits = run.case.limits
+    bounds = Bounds(
+        force=run.case.cable.force_max,
+        misfit=run.case.optimise.misfit_rms_additional,
+        stress=limits.utilisation,
+        turn=limits.connector_turn,
+        uplift=limits.uplift,
+        critical=limits.critical_factor,
+    )
+    return checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
+
+
+def judged(run: Run) -> VerdictRecord:
+    """The verdict on the run's design to build."""
+    return verdict(run_checks(run), run.best)
+
+
+def shown_run(run: Run, budget: int = _BUDGET) -> ShownRun:
     """A run as the page takes it, with at most `budget` bytes of pictures."""
-    told = run.summary.get("designs", {})
-    known = [name for name in run.designs if name in told]  # in the order in which they were made
-    if not known:
-        raise InputError(
-            "the run's summary tells of no design",
-            where=str(run.folder),
-            remedy="Run shellform design on it again.",
-        )
-    done = _done(run)
     pictures, left = embed(_pictures(run), budget=budget)
+    found = run_checks(run)
+    return ShownRun(
+        title=run.case.title or run.folder.resolve().name,
+        place=run.folder.name or str(run.folder),
+        shells={name: run.shell_of(name) for name in run.designs},
+        surface=run.surface,
+        loads=run.loads,
+        designs=run.designs,
+        states=run.states,
+        best=run.best,
+        summary=run.summary,
+        checks=found,
+        verdict=verdict(found, run.best),
+        history=read_history(run.folder),
+        settings=(run.folder / "case.toml").read_text(encoding="utf-8"),
+        pictures=pictures,
+        limit=run.case.figures.limit,
+        force_max=run.case.cable.force_max,
+        notes=[*_notes(run, bool(pictures)), *left],
+        files=sorted(
+            file.relative_to(run.folder).as_posix()
+            for file in run.folder.rglob("*")
+            if file.is_file() and ".part" not in file.name
+        ),
+    )
+
+
+def _notes(run: Run, has_pictures: bool) -> list[str]:
+    """What is missing on the page, or to be known."""
+    done = _done(run)
     broken_off = [
-        name for name in DESIGNS if name not in told and (run.folder / f"designs/{name}.npz").is_file()
+        name for name in DESIGNS if name not in run.designs and (run.folder / f"designs/{name}.npz").is_file()
     ]
     notes = [
         f"The design “{name}” is not shown: its stage has not finished. Run shellform design again."
@@ -78,50 +121,21 @@ def entry(run: Run, budget: int = _BUDGET) -> Entry:
             "What is shown was computed before the last change of the case, of its surface, or of shellform: "
             "run shellform design again."
         )
-    elif "optimise" not in done and "optimisation" in run.summary:
+    elif "optimise" not in done and run.summary.optimisation is not None:
         notes.append(
             "The optimised designs were computed before the last change of the case: run shellform design again."
         )
-    if "optimisation" not in run.summary:
+    if run.summary.optimisation is None:
         notes.append(
             "The run is not optimised (yet): run shellform design without --until, and the optimised design is added."
         )
-    if not pictures:
+    if not has_pictures:
         notes.append(
             "There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them."
         )
-    for stage, why in run.summary.get("failed", {}).items():
+    for stage, why in run.summary.failed.items():
         notes.append(f"The stage “{stage}” failed: {why}")
-    limits = run.case.limits
-    return Entry(
-        run.case.title or run.folder.resolve().name,
-        run.folder.name or str(run.folder),
-        {name: run.shell_of(name) for name in known},
-        run.surface,
-        run.loads,
-        {name: run.designs[name] for name in known},
-        {name: run.states[name] for name in known},
-        run.best if run.best in known else known[-1],
-        run.summary,
-        _history(run.folder / "history.csv"),
-        (run.folder / "case.toml").read_text(encoding="utf-8"),
-        pictures,
-        run.case.figures.limit,
-        Bounds(
-            run.case.cable.force_max,
-            run.case.optimise.misfit_rms_additional,
-            limits.utilisation,
-            limits.connector_turn,
-            limits.uplift,
-            limits.critical_factor,
-        ),
-        [*notes, *left],
-        sorted(
-            file.relative_to(run.folder).as_posix()
-            for file in run.folder.rglob("*")
-            if file.is_file() and ".part" not in file.name
-        ),
-    )
+    return notes
 
 
 def versions() -> dict[str, str]:
@@ -139,20 +153,10 @@ def _done(run: Run) -> set[str]:
     """The stages whose results are those of the case as it stands; where its surface is elsewhere, all that
     were finished.
     """
-    kept = read_json(run.folder / "stages.json")
+    kept = read_stages(run.folder)
     file = Path(run.case.surface.file)
-    keys = stage_keys(run.case) if file.is_file() else kept
-    return {stage for stage, key in kept.items() if keys.get(stage) == key}
-
-
-def _history(file: Path) -> list[dict[str, str]]:
-    if not file.is_file():
-        return []
-    try:
-        with file.open(encoding="utf-8", newline="") as rows:
-            return list(csv.DictReader(rows))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"is damaged: {error}", where=str(file), remedy="Run again with --fresh.") from error
+    keys = stage_keys(run.case) if file.is_file() else kept.keys
+    return {stage for stage in kept.keys if kept.has(stage, keys.get(stage, ""))}
 
 
 def _pictures(run: Run) -> list[Path]:

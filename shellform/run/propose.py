@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from shellform.case.build_net import surface_of, told_size
+from shellform.case.build_net import size_text, surface_of
 from shellform.errors import InputError
 from shellform.run.first_look import STRENGTH, YOUNG, largest_radius, surface_entry
 from shellform.surface.shape.target import largest_curvature
@@ -62,7 +62,7 @@ def propose_case(
         else f"; thinner than the paper's × {k:.3g}, so look whether they bear the load"
     )
     text = f"""\
-# Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {told_size(surface.size)}, {surface.area:.4g} m².
+# Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {size_text(surface.size)}, {surface.area:.4g} m².
 # If that size is wrong, the unit is: run `shellform new` again with --unit. Lengths are {k:.3g} × the paper's scale model's.
 title = {json.dumps(file.stem, ensure_ascii=False)}
 
@@ -104,7 +104,7 @@ limit = {_short(0.010 * k)!r}      # m, end of the colour scale
 """
     write_text(output, text)
     return {
-        "size": told_size(surface.size),
+        "size": size_text(surface.size),
         "spacing": f"{spacing:g} m",
         "rod radius": f"{radius:g} m (equation 1 allows {allowed:.3g}){thin}",
         "case": str(output),

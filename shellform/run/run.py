@@ -3,48 +3,64 @@
 surface -> net -> initial -> optimise -> figures -> documents -> report. Each stage leaves its result in the
 folder and a key in `stages.json`: a hash of the entries it depends on, the surface file's bytes, the
 package's version and the stage before. Run again, a stage whose key is unchanged is loaded instead of
-computed.
+computed. Stages hand on what they made, and the summary with what they add to it.
 """
 
 from __future__ import annotations
 
-import hashlib
 import json
 import platform
 import time
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import shellform
-from shellform.case.build_gridshell import catalogue_bytes, gridshell, rod_limits
-from shellform.case.build_net import net_of, net_summary, surface_of, surface_summary, told_size
+from shellform.arrays import Reals
+from shellform.case.build_gridshell import gridshell, rod_limits
+from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
 from shellform.case.case import Case, check_script, dump_case
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.gridshell import Gridshell
 from shellform.net.files import load_net, net_document, save_net
 from shellform.net.net import Net
+from shellform.records.progress import Event, Kind, Report, unheard
+from shellform.records.stages import SHOWING, STAGES, StagesDone, read_stages, write_stages
+from shellform.records.summary import ModelRecord, Summary, read_summary, write_summary
 from shellform.run import designs
 from shellform.run.checkpoint import drop_checkpoint
-from shellform.run.designs import Making
 from shellform.run.figures import draw_everything
-from shellform.run.folder import (
-    FORMAT,
-    VERSION,
-    Report,
-    load_surface,
-    read_json,
-    read_run,
-    refuse_overwriting,
-    save_surface,
-)
+from shellform.run.folder import load_surface, read_run, refuse_overwriting, save_surface
+from shellform.run.keys import stage_keys
 from shellform.run.log import logged
+from shellform.run.pages import FILE, judged, write_page
+from shellform.run.workspace import Workspace
 from shellform.surface.shape.target import Surface
-from shellform.written import folder as made
+from shellform.written import folder as made_folder
 from shellform.written import write_text
 
-STAGES = ("surface", "net", "initial", "optimise", "figures", "documents", "report")
-_SHOWING = STAGES[4:]  # which show what was found: none of them needs another
+_T = TypeVar("_T")
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What the stages hand on; None until its stage is done."""
+
+    surface: Surface | None = None
+    net: Net | None = None
+    shell: Gridshell | None = None
+    loads: Mapping[str, Reals] | None = None
+
+
+@dataclass(frozen=True)
+class _Ended:
+    """What a stage gives back: the parts, the summary, and whether its result is `complete`: pictures without
+    OpenGL aren't, so that the next run makes them."""
+
+    parts: Parts
+    summary: Summary
+    complete: bool = True
 
 
 def run_case(
@@ -54,8 +70,8 @@ def run_case(
     until: str = STAGES[-1],
     fresh: bool = False,
     allow_scripts: bool = False,
-    report: Report = lambda stage, text: None,
-) -> dict[str, Any]:
+    report: Report = unheard,
+) -> Summary:
     """Runs the case's stages up to `until` in `folder` and returns the summary.
 
     Raises InputError for bad input and NotConverged where a stage finds no result; what was computed stays in
@@ -72,198 +88,177 @@ def run_case(
     keys = stage_keys(case)
     if not fresh:
         refuse_overwriting(folder)
-    done = {} if fresh else read_json(folder / "stages.json")
-    results: dict[str, Any] = {}
+    done = StagesDone() if fresh else read_stages(folder)
     began = time.perf_counter()
-    if done.get("surface") != keys["surface"]:  # before anything is written: most bad input is a bad surface
-        report("surface", f"reading {file}")
-        results["surface"] = surface_of(case.surface, allow_scripts=allow_scripts)
-        report("surface", f"size {told_size(results['surface'].size)}")
-    summary = read_json(folder / "summary.json") if done else {}
-    summary = {**summary, "format": FORMAT, "version": VERSION, "shellform": shellform.__version__}
-    summary.setdefault("seconds", {})
+    parts = Parts()
+    if not done.has(
+        "surface", keys["surface"]
+    ):  # before anything is written: most bad input is a bad surface
+        report(Event("surface", f"reading {file}"))
+        parts = Parts(surface=surface_of(case.surface, allow_scripts=allow_scripts))
+        report(Event("surface", f"size {size_text(_there(parts.surface).size)}", Kind.NOTE))
+    summary = replace(
+        read_summary(folder) if done.keys else Summary(), shellform=shellform.__version__, failed={}
+    )
     for part in ("designs", "states", "figures", "schedules"):
-        made(folder / part)
-    report = logged(folder, report)
-    report("run", f"shellform {shellform.__version__}, Python {platform.python_version()}, up to {until}")
-    making = Making(case, folder, report, keys)
+        made_folder(folder / part)
+    workspace = Workspace(case, folder, logged(folder, report), keys)
+    workspace.say(
+        "run", f"shellform {shellform.__version__}, Python {platform.python_version()}, up to {until}"
+    )
     if fresh:
         drop_checkpoint(folder)
-    steps = {
+    first = next((stage for stage in STAGES if not done.has(stage, keys[stage])), None)
+    if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
+        summary, done = _outdated(summary, first), done.before(first)
+        write_stages(folder, done)
+        write_summary(folder, summary)
+    write_text(folder / "case.toml", dump_case(case))
+    return _stages(workspace, until, parts, summary, done, began)
+
+
+def _stages(
+    workspace: Workspace, until: str, parts: Parts, summary: Summary, done: StagesDone, began: float
+) -> Summary:
+    """Stage after stage. Raises the first error of those that only show what was found, once all were tried;
+    any other at once."""
+    reusable, failures = True, list[Exception]()
+    for stage in STAGES[: STAGES.index(until) + 1]:
+        reusable = reusable and done.has(stage, workspace.keys[stage])
+        kind = Kind.KEPT if reusable else Kind.DONE
+        try:
+            ended = _steps()[stage](workspace, parts, summary, reusable)
+        except Exception as error:
+            workspace.say(stage, f"ended: {error}", Kind.FAILED)
+            if stage not in SHOWING:
+                raise
+            failures.append(error)
+            kind = Kind.FAILED
+            ended = _Ended(parts, replace(summary, failed={**summary.failed, stage: str(error)}), False)
+        parts, summary = ended.parts, ended.summary
+        spent = time.perf_counter() - began
+        if not reusable:
+            summary = summary.with_seconds(stage, spent)
+            if ended.complete:
+                done = done.also(stage, workspace.keys[stage])
+        summary = summary.totalled()
+        write_summary(workspace.folder, summary)
+        write_stages(workspace.folder, done)
+        workspace.say(stage, f"{kind.value} in {spent:.1f} s", kind)
+        began = time.perf_counter()
+    if failures:
+        raise failures[0]
+    return summary
+
+
+def _steps() -> dict[str, Callable[[Workspace, Parts, Summary, bool], _Ended]]:
+    """What each stage does, by its name."""
+    return {
         "surface": _surface,
         "net": _net,
         "initial": _initial,
         "optimise": _optimise,
         "figures": _figures,
+        "documents": _documents,
+        "report": _report,
     }
-    steps |= {"documents": _documents, "report": _report}
-    first = next((stage for stage in STAGES if done.get(stage) != keys[stage]), None)
-    if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
-        _outdate(summary, first)
-        done = {stage: done[stage] for stage in STAGES[: STAGES.index(first)]}
-        write_text(folder / "stages.json", json.dumps(done))
-        making.tell(summary)
-    write_text(folder / "case.toml", dump_case(case))
-    summary.pop("failed", None)
-    reusable, failures = True, dict[str, Exception]()
-    for stage in STAGES[: STAGES.index(until) + 1]:
-        reusable = reusable and done.get(stage) == keys[stage]
-        try:
-            results[stage] = steps[stage](making, results, summary, reusable)
-        except Exception as error:
-            report(stage, f"ended: {error}")
-            if stage not in _SHOWING:
-                raise
-            failures[stage], results[stage] = error, False
-            summary.setdefault("failed", {})[stage] = str(error)
-        if not reusable:
-            summary["seconds"][stage] = round(time.perf_counter() - began, 3)
-            if (
-                results[stage] is not False
-            ):  # pictures without OpenGL aren't done: once it is there, the next run makes them
-                done = {**done, stage: keys[stage]}
-        summary["seconds"]["total"] = round(sum(v for k, v in summary["seconds"].items() if k != "total"), 3)
-        making.tell(summary)
-        write_text(folder / "stages.json", json.dumps(done))
-        ended = "failed" if stage in failures else "kept" if reusable else "done"
-        report(stage, f"{ended} in {time.perf_counter() - began:.1f} s")
-        began = time.perf_counter()
-    for first_failure in failures.values():
-        raise first_failure
+
+
+def _outdated(summary: Summary, stage: str) -> Summary:
+    """Without what a stage and those after it will find anew."""
+    if STAGES.index(stage) <= STAGES.index("initial"):
+        summary = replace(summary, designs={}, verdict=None)
+    if STAGES.index(stage) <= STAGES.index("optimise"):
+        summary = replace(
+            summary.without_designs(("unloaded", "optimised", "rounded", "polished")), optimisation=None
+        )
     return summary
 
 
-def _outdate(summary: dict[str, Any], stage: str) -> None:
-    """Takes out of the summary what a stage and those after it will find anew."""
-    if STAGES.index(stage) <= STAGES.index("initial"):
-        summary.pop("designs", None)
-    if STAGES.index(stage) <= STAGES.index("optimise"):
-        for key in ("optimisation", "sections", "robust"):
-            summary.pop(key, None)
-        for name in ("unloaded", "optimised", "rounded", "polished"):
-            summary.get("designs", {}).pop(name, None)
-
-
-def stage_keys(case: Case) -> dict[str, str]:
-    """A hash for each stage of all that it depends on; of the surface file that is its name and content,
-    wherever it lies.
-    """
-    entries = case.model_dump(mode="json")
-    file = Path(case.surface.file)
-    entries["surface"]["file"] = file.name
-    stock = catalogue_bytes(case)
-    entries["stock"] = {
-        name: entries["rod"].pop(name) for name in ("stock_length", "kerf")
-    }  # which no design depends on
-    entries["stock"] |= {"adjustment": entries["cable"].pop("adjustment")}
-    needs = {
-        "surface": ["surface"],
-        "net": ["net", "joint"],
-        "initial": ["rod", "cable", "load", "part"],
-        "optimise": ["optimise", "limits", "robust"],
-        "figures": ["figures", "title"],
-        "documents": ["stock"],
-        "report": [],
-    }
-    told = file.stat()
-    digest = hashlib.sha256(
-        shellform.__version__.encode() + _content(str(file), told.st_size, told.st_mtime_ns)
-    )
-    keys = {}
-    for stage in STAGES:
-        digest.update(stock if stage == "initial" else b"")
-        digest.update(json.dumps({name: entries[name] for name in needs[stage]}, sort_keys=True).encode())
-        keys[stage] = digest.hexdigest()
-    return keys
-
-
-@cache
-def _content(file: str, size: int, written: int) -> bytes:
-    """A hash of a file as it was when it had this size and time: studies ask for the same ones many times."""
-    return hashlib.sha256(Path(file).read_bytes()).digest()
-
-
-def _surface(making: Making, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> Surface:
-    store, entry = making.path("surface.npz"), making.case.surface
+def _surface(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
+    store, entry = workspace.path("surface.npz"), workspace.case.surface
     if keep:
-        return load_surface(store, entry.file)
-    surface: Surface = results["surface"]
+        return _Ended(Parts(surface=load_surface(store, entry.file)), summary)
+    surface = _there(parts.surface)
     save_surface(store, surface)
-    summary["surface"] = surface_summary(surface, entry.file)
-    return surface
+    return _Ended(parts, replace(summary, surface=surface_record(surface, entry.file)))
 
 
-def _net(making: Making, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> Net:
+def _net(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
     if keep:
-        return load_net(making.path("net.npz"))
+        return _Ended(replace(parts, net=load_net(workspace.path("net.npz"))), summary)
     net, angle, offset = net_of(
-        making.case, results["surface"], progress=lambda text: making.report("net", text)
+        workspace.case, _there(parts.surface), progress=lambda text: workspace.say("net", text)
     )
-    save_net(making.path("net.npz"), net)
-    write_text(making.path("net.json"), json.dumps(net_document(net)))
-    summary["net"] = {
-        **net_summary(net),
-        **rod_limits(making.case.rod, net),
-        "angle": angle,
-        "offset": list(offset),
-    }
-    return net
+    save_net(workspace.path("net.npz"), net)
+    write_text(workspace.path("net.json"), json.dumps(net_document(net)))
+    record = net_record(net, angle=angle, offset=offset, rods=rod_limits(workspace.case.rod, net))
+    return _Ended(replace(parts, net=net), replace(summary, net=record))
 
 
-def _initial(
-    making: Making, results: Mapping[str, Any], summary: dict[str, Any], keep: bool
-) -> dict[str, Any]:
-    case = making.case
-    shell, loads = gridshell(case, results["net"], results["surface"])
-    summary["net"] |= rod_limits(case.rod, shell.net)
-    found: dict[str, Any] = {"shell": shell, "loads": loads}
+def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
+    case = workspace.case
+    shell, loads = gridshell(case, _there(parts.net), _there(parts.surface))
+    parts = replace(parts, shell=shell, loads=loads)
+    net = with_rods(_there(summary.net), rod_limits(case.rod, shell.net))
+    summary = replace(summary, net=net)
     if keep:
-        return found
-    network = shell.network(shell.design(rest_ratio=case.cable.rest_ratio))
-    summary["model"] = {
-        "nodes": len(network.nodes),
-        "beams": len(network.beams.ends),
-        "cables": len(network.cables.ends),
-        "freedoms": int(6 * len(network.nodes)),
-    }
-    summary["designs"] = {}
-    designs.forget(making, ("unbraced", "initial"), summary)  # whose load cases may have had other names
+        return _Ended(parts, summary)
+    start = shell.design(rest_ratio=case.cable.rest_ratio)
+    network = shell.network(start)
+    nodes = len(network.nodes)
+    model = ModelRecord(nodes, len(network.beams.ends), len(network.cables.ends), 6 * nodes)
+    summary = replace(summary, model=model, designs={})
+    # whose load cases may have had other names
+    summary = designs.forget(workspace.folder, ("unbraced", "initial"), summary)
     unbraced = {"unbraced": shell.unbraced()} if case.cable.without else {}
-    for name, design in {**unbraced, "initial": shell.design(rest_ratio=case.cable.rest_ratio)}.items():
-        making.report("initial", f"loading the {name} design")
-        designs.keep(making, shell, name, design, designs.followed(shell, design, loads), loads, summary)
-    first = summary["designs"]["initial"]["loads"]["design"]
-    span = float(max(summary["surface"]["size"][:2]))
-    if not first["on_branch"] or first["deviation_max"] > 0.1 * span:
+    for name, design in {**unbraced, "initial": start}.items():
+        workspace.say("initial", f"loading the {name} design", Kind.BEGAN)
+        reached = designs.followed(shell, design, loads)
+        summary = designs.keep(workspace, shell, name, design, reached, loads, summary)
+    first = summary.designs["initial"].loads["design"]
+    span = max(_there(summary.surface).size[:2])
+    if not first.on_branch or first.deviation_max > 0.1 * span:
         raise NotConverged(
-            f"The initial design deforms excessively under the design load ({1e3 * first['deviation_max']:.0f} mm); its states "
-            f"are kept in {making.path('states')}",
-            remedy="Choose a denser grid (net.spacing), thicker rods (rod.radius) or stiffer cables (cable.stiffness).",
+            "The initial design deforms excessively under the design load "
+            f"({1e3 * first.deviation_max:.0f} mm); its states are kept in {workspace.path('states')}",
+            remedy="Choose a denser grid (net.spacing), thicker rods (rod.radius) or stiffer cables "
+            "(cable.stiffness).",
         )
-    return found
+    return _Ended(parts, summary)
 
 
-def _optimise(making: Making, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
+def _optimise(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
+    if keep:
+        return _Ended(parts, summary)
+    from shellform.run.optimising import optimise
+
+    summary = optimise(workspace, _there(parts.shell), _there(parts.loads), summary)
+    write_summary(workspace.folder, summary)
+    return _Ended(parts, replace(summary, verdict=judged(read_run(workspace.folder))))
+
+
+def _figures(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
+    complete = keep or draw_everything(read_run(workspace.folder), report=workspace.report)
+    return _Ended(parts, summary, complete)
+
+
+def _documents(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
+    if keep:
+        return _Ended(parts, summary)
+    from shellform.run.documents import write_documents
+
+    record = write_documents(read_run(workspace.folder), report=workspace.report)
+    return _Ended(parts, replace(summary, documents=record))
+
+
+def _report(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
     if not keep:
-        from shellform.run.optimising import optimise
-
-        optimise(making, results["initial"]["shell"], results["initial"]["loads"], summary)
-
-
-def _figures(making: Making, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> bool:
-    """Whether all pictures are there."""
-    return keep or draw_everything(read_run(making.folder), report=making.report)
+        write_page([read_run(workspace.folder)], workspace.path(FILE))
+    return _Ended(parts, summary)
 
 
-def _documents(making: Making, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
-    if not keep:
-        from shellform.run.documents import write_documents
-
-        summary["documents"] = write_documents(read_run(making.folder), report=making.report)
-
-
-def _report(making: Making, results: Mapping[str, Any], summary: dict[str, Any], keep: bool) -> None:
-    if not keep:
-        from shellform.run.pages import FILE, write_page
-
-        write_page([read_run(making.folder)], making.path(FILE))
+def _there(part: _T | None) -> _T:
+    """A part that an earlier stage has made."""
+    assert part is not None
+    return part

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from shellform.errors import InputError
-from shellform.study.jobs import Job, Outcome
-from shellform.study.store import CRASHED
+from shellform.study.jobs import Job
+from shellform.study.outcome import Outcome, Status
 
 Work = Callable[[Job, Outcome | None], Outcome]
 _DEATHS = 2  # that a job survives
@@ -220,7 +220,7 @@ def _begun(client: Any, job: Job, work: Work, shared: dict[str, list[Any]]) -> A
 
 
 def _crashed(job: Job, reason: str) -> Outcome:
-    return {"key": job.key, "status": CRASHED, "reason": reason, "summary": {}, "seconds": {}, "worker": ""}
+    return Outcome(job.key, Status.CRASHED, reason)
 
 
 def _reason(error: Exception) -> str:

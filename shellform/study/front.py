@@ -7,7 +7,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+
+from shellform.study.outcome import Row, Status, Value
 
 
 @dataclass(frozen=True)
@@ -23,19 +24,17 @@ class Front:
     limits: Mapping[str, float]
     found: dict[str, tuple[float, ...]] = field(default_factory=dict)
 
-    def add(self, key: str, row: Mapping[str, Any]) -> list[str]:
-        """Takes a design's columns into account; returns the keys that have no place on the front, perhaps
-        its own.
-        """
-        goals = objectives(row, self.signs)
+    def add(self, row: Row) -> list[str]:
+        """Takes a design into account; returns the keys that have no place on the front, perhaps its own."""
+        goals = objectives(row.columns, self.signs)
         if goals is None or not usable(row, self.limits):
-            return [key]
+            return [row.key]
         if any(_beats(other, goals) for other in self.found.values()):
-            return [key]
+            return [row.key]
         beaten = [other for other, theirs in self.found.items() if _beats(goals, theirs)]
         for other in beaten:
             del self.found[other]
-        self.found[key] = goals
+        self.found[row.key] = goals
         return beaten
 
 
@@ -44,22 +43,26 @@ def signed(objective: Mapping[str, str]) -> dict[str, float]:
     return {name: 1.0 if way == "min" else -1.0 for name, way in objective.items()}
 
 
-def objectives(row: Mapping[str, Any], signs: Mapping[str, float]) -> tuple[float, ...] | None:
+def objectives(columns: Mapping[str, Value | None], signs: Mapping[str, float]) -> tuple[float, ...] | None:
     """A design's objectives, all to be small; None where one of them is missing or there are none."""
-    found = [row.get(name) for name in signs]
-    if not found or any(
-        value is None or isinstance(value, str) or not math.isfinite(value) for value in found
-    ):
-        return None
-    return tuple(sign * float(value) for sign, value in zip(signs.values(), found, strict=True))  # type: ignore[arg-type]
+    found: list[float] = []
+    for name, sign in signs.items():
+        value = columns.get(name)
+        if value is None or isinstance(value, str) or not math.isfinite(value):
+            return None
+        found.append(sign * float(value))
+    return tuple(found) or None
 
 
-def usable(row: Mapping[str, Any], limits: Mapping[str, float]) -> bool:
+def usable(row: Row, limits: Mapping[str, float]) -> bool:
     """Whether a design is done and keeps the limits."""
-    if row.get("status") != "done":
+    if row.status is not Status.DONE:
         return False
-    values = {name: row.get(name) for name in limits}
-    return all(value is not None and value <= limits[name] for name, value in values.items())
+    values = {name: row.columns.get(name) for name in limits}
+    return all(
+        value is not None and not isinstance(value, str) and value <= limits[name]
+        for name, value in values.items()
+    )
 
 
 def _beats(one: tuple[float, ...], other: tuple[float, ...]) -> bool:

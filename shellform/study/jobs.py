@@ -1,8 +1,8 @@
 """One design of a study, as a worker runs it: its stages in a folder of its own, begun with what it shares
 with others.
 
-Whatever happens ends as a row with a status: done, refused (the input), no result (NotConverged or the
-memory), error (a fault of shellform's). A full disk is no property of a design: its status stops the study.
+Whatever happens ends as an outcome with a status. A full disk is no property of a design: its status stops
+the study.
 """
 
 from __future__ import annotations
@@ -12,21 +12,20 @@ import shutil
 import socket
 import time
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from shellform.case.case import Case
-from shellform.errors import InputError, NotConverged
+from shellform.errors import Damaged, InputError, NotConverged
+from shellform.records import stages, summary
+from shellform.records.summary import Summary, document, read_summary
+from shellform.study.outcome import Outcome, Status, flat
 
-Outcome = Mapping[str, Any]
-"""Of a job: key, status, reason, summary, seconds by stage, worker."""
-
-NO_ROOM = "no room"
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
-_SHARED = ("stages.json", "summary.json")
+_SHARED = (stages.FILE, summary.FILE)
+_NOT_FOUND = ("format", "version", "seconds")  # by the design: the same for all, or different each time
 
 
 @dataclass(frozen=True)
@@ -47,66 +46,61 @@ def work(job: Job, before: Outcome | None = None) -> Outcome:
     """Runs a job's stages that aren't in its folder yet; `before` is the outcome of the last job that it
     builds on.
     """
-    if before is not None and before["status"] != "done":
-        return {**before, "key": job.key}
+    if before is not None and before.status is not Status.DONE:
+        return replace(before, key=job.key)
     began = time.perf_counter()
     folder = Path(job.folder)
-    status, reason = "done", ""
-    summary: dict[str, Any] = {}
+    status, reason = Status.DONE, ""
+    found = Summary()
     try:
         with _alone(folder):
             if job.before:
                 _begin(folder, Path(job.before[-1].folder))
-            summary = _run(job, folder)
+            found = _run(job, folder)
     except NotConverged as error:
-        status, reason = "no result", str(error)
+        status, reason = Status.NO_RESULT, str(error)
     except MemoryError:
-        status, reason = "no result", "the memory is full"
+        status, reason = Status.NO_RESULT, "the memory is full"
+    except InputError as error:
+        status = Status.NO_ROOM if disk_is_full(error) else Status.REFUSED
+        reason = str(error)
     except Exception as error:  # whatever one design raises, the others go on
-        refused = isinstance(error, InputError)
-        status = NO_ROOM if disk_is_full(error) else "refused" if refused else "error"
+        status = Status.NO_ROOM if disk_is_full(error) else Status.ERROR
         last = traceback.extract_tb(error.__traceback__)[-1]
-        reason = (
-            str(error)
-            if refused
-            else f"{type(error).__name__}: {error} ({Path(last.filename).name}, line {last.lineno})"
-        )
-    if status != "done":
-        summary = _kept(folder)
-    seconds = summary.pop("seconds", {})
-    return {
-        "key": job.key,
-        "status": status,
-        "reason": reason.replace(str(folder), "RUN"),
-        "summary": summary,
-        "seconds": {**seconds, "here": round(time.perf_counter() - began, 4)},
-        "worker": socket.gethostname(),
-    }
+        place = f"{Path(last.filename).name}, line {last.lineno}"
+        reason = f"{type(error).__name__}: {error} ({place})"
+    if status is not Status.DONE:
+        found = _kept(folder)
+    tree = {name: part for name, part in document(found).items() if name not in _NOT_FOUND}
+    return Outcome(
+        key=job.key,
+        status=status,
+        reason=reason.replace(str(folder), "RUN"),
+        values=flat(tree),
+        seconds={**found.seconds, "here": round(time.perf_counter() - began, 4)},
+        worker=socket.gethostname(),
+    )
 
 
-def _run(job: Job, folder: Path) -> dict[str, Any]:
+def _run(job: Job, folder: Path) -> Summary:
     from shellform.compiled import set_num_threads
-    from shellform.run.run import run_case
+    from shellform.run import run
+    from shellform.run.folder import NoRunFolder
 
     set_num_threads(1)
-    settings = {"until": job.until, "allow_scripts": job.allow_scripts}
     try:
-        return run_case(job.case, folder, **settings)  # type: ignore[arg-type]
-    except InputError as error:
+        return run.run_case(job.case, folder, until=job.until, allow_scripts=job.allow_scripts)
+    except (Damaged, NoRunFolder):
         # By a machine switched off while it wrote, or killed before its first stage was done.
-        if not error.what.startswith(("is damaged", "is no run folder")):
-            raise
-        return run_case(job.case, folder, fresh=True, **settings)  # type: ignore[arg-type]
+        return run.run_case(job.case, folder, until=job.until, allow_scripts=job.allow_scripts, fresh=True)
 
 
-def _kept(folder: Path) -> dict[str, Any]:
+def _kept(folder: Path) -> Summary:
     """The summary of what was computed before a job failed."""
-    from shellform.run.folder import read_json
-
     try:
-        return read_json(folder / "summary.json")
+        return read_summary(folder)
     except InputError:
-        return {}
+        return Summary()
 
 
 def _begin(folder: Path, source: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from shellform.study.outcome import Status, Value
 from shellform.study.studies import Progress
 
 _EVERY = 10.0  # seconds between lines
@@ -25,7 +26,7 @@ class Live:
             if self._console.is_terminal
             else None
         )
-        self._told = 0.0
+        self._last = 0.0
         self._dashboard = ""
 
     def __enter__(self) -> Live:
@@ -43,8 +44,8 @@ class Live:
             self._console.print(f"dashboard: {progress.dashboard}")
         if self._drawn:
             self._drawn.update(_table(progress))
-        elif time.perf_counter() - self._told > _EVERY:
-            self._told = time.perf_counter()
+        elif time.perf_counter() - self._last > _EVERY:
+            self._last = time.perf_counter()
             self._console.print(_line(progress))
 
 
@@ -64,16 +65,14 @@ def _table(progress: Progress) -> Any:
     from rich.table import Table
 
     table = Table(title=_line(progress), title_justify="left", caption=progress.dashboard or None)
-    names = [name for name in (progress.rows[-1] if progress.rows else {}) if name not in ("key", "reason")]
-    for name in names:
+    names = list(progress.rows[-1].columns) if progress.rows else []
+    for name in ["status", *names] if progress.rows else []:
         table.add_column(name)
     for row in progress.rows:
-        table.add_row(*(_cell(row, name) for name in names))
+        status = str(row.status) if row.status is Status.DONE else f"{row.status}: {row.reason[:60]}"
+        table.add_row(status, *(_cell(row.columns.get(name)) for name in names))
     return table
 
 
-def _cell(row: dict[str, Any], name: str) -> str:
-    value = row.get(name)
-    if name == "status" and value != "done":
-        return f"{value}: {row['reason'][:60]}"
+def _cell(value: Value | None) -> str:
     return "" if value is None else f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -40,9 +40,10 @@ from pydantic import (
     model_validator,
 )
 
-from shellform.case.case import Case, make_case, read_toml, set_entry, told
+from shellform.case.case import Case, make_case, read_toml, refusal, set_entry
 from shellform.errors import InputError
 from shellform.study.expressions import evaluate
+from shellform.study.outcome import Value
 
 _MOST = 1_000_000  # designs
 _LEAVES = {"values", "low", "high", "count", "scale", "whole", "files"}
@@ -53,16 +54,15 @@ _COLUMNS = {
     "utilisation": "designs.best.loads.design.rod_utilisation_max",
 }
 
-Value = bool | int | float | str
 Unit = Callable[[float], Value]
 """From [0, 1) to a value."""
 
 
-class _Part(BaseModel):
+class _Entry(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class VaryEntry(_Part):
+class VaryEntry(_Entry):
     """How one entry of the case varies: a list, a range, or files."""
 
     values: list[Value] | None = Field(None, min_length=1, description="the values themselves")
@@ -89,7 +89,7 @@ class VaryEntry(_Part):
         return self
 
 
-class Study(_Part):
+class Study(_Entry):
     """A study file's entries."""
 
     title: str = ""
@@ -184,7 +184,7 @@ def read_study(path: str | Path) -> Plan:
     try:
         study = Study.model_validate(read_toml(file))
     except ValidationError as error:
-        raise InputError("; ".join(told(each, Study) for each in error.errors()), where=str(file)) from error
+        raise refusal(error, Study, file) from error
     return make_plan(study, file)
 
 
@@ -302,7 +302,7 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
                 else evaluate(text, f"{plan.file}: function.{name}", entry)
             )
             return found[name]
-        value = given[name] if name in given else _entry(plan.base, name)
+        value = given[name] if name in given else _value_of(plan.base, name)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError("is no number of the case", where=f"{plan.file}: function", value=name)
         return float(value)
@@ -316,10 +316,10 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
 
 def _as_the_base(plan: Plan, name: str, value: float) -> Value:
     """Whole numbers stay whole, so that a count may follow from others."""
-    return round(value) if isinstance(_entry(plan.base, name), int) and value == round(value) else value
+    return round(value) if isinstance(_value_of(plan.base, name), int) and value == round(value) else value
 
 
-def _entry(tables: Any, name: str) -> Any:
+def _value_of(tables: Any, name: str) -> Any:
     for part in name.split("."):
         if not isinstance(tables, Mapping) or part not in tables:
             return None

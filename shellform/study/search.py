@@ -13,12 +13,13 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from typing import Any
 
 from shellform.study.front import objectives, signed
-from shellform.study.plan import Plan, Value
+from shellform.study.outcome import Row, Status, Value
+from shellform.study.plan import Plan
 
 
 def generations(
     plan: Plan,
-) -> Generator[Callable[[], Iterable[Mapping[str, Value]]], list[dict[str, Any]], None]:
+) -> Generator[Callable[[], Iterable[Mapping[str, Value]]], list[Row], None]:
     """Generation after generation, each told the rows (with the study's columns) of the one before."""
     import optuna
 
@@ -31,7 +32,7 @@ def generations(
             seed=entry.seed,
             constraints_func=_excess if entry.limit else None,
         )
-    search = optuna.create_study(directions=["minimise"] * len(signs), sampler=sampler)
+    search = optuna.create_study(directions=["minimize"] * len(signs), sampler=sampler)
     left = int(entry.count or 0)
     while left > 0:
         trials = [search.ask() for _ in range(min(left, entry.population))]
@@ -39,17 +40,20 @@ def generations(
         designs = [{name: _asked(plan, trial, name) for name in entry.vary} for trial in trials]
         rows = yield lambda designs=designs: designs  # type: ignore[misc]
         for trial, row in zip(trials, rows, strict=True):
-            goals = objectives(row, signs) if row["status"] == "done" else None
+            goals = objectives(row.columns, signs) if row.status is Status.DONE else None
             if goals is None:
                 search.tell(trial, state=optuna.trial.TrialState.FAIL)
                 continue
             if entry.limit:
-                excess = [
-                    float(row[name]) - most if row[name] is not None else 1.0
-                    for name, most in entry.limit.items()
-                ]
-                trial.set_user_attr("excess", excess)
+                trial.set_user_attr(
+                    "excess", [_beyond(row.columns[name], most) for name, most in entry.limit.items()]
+                )
             search.tell(trial, goals)
+
+
+def _beyond(value: Value | None, most: float) -> float:
+    """How far a value is beyond its limit; one that isn't known is."""
+    return float(value) - most if value is not None else 1.0
 
 
 def _excess(trial: Any) -> list[float]:

@@ -13,20 +13,18 @@ of its lines, so that a study that was stopped ends with the same bytes as one t
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import os
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from shellform.errors import InputError
+from shellform.records.files import plain
+from shellform.study.outcome import ListedDesign, Outcome, Status, Value
+from shellform.tables import Table, table_text
 from shellform.written import write_text
-
-CRASHED = "crashed"
-"""Status of a design that took its worker down: not final, a later call tries again."""
 
 _GROUP = 4096  # rows of a row group, and all that are in memory at once
 _KINDS = {"bool": 0, "int": 1, "float": 2, "str": 3}
@@ -54,15 +52,15 @@ class Log:
         self._open.seek(0)
         with open(file, "rb") as lines:
             for line in lines:
-                row = _row(line)
-                if row is None:
+                outcome = _outcome(line)
+                if outcome is None:
                     if lines.read(1):
                         self._open.close()
                         raise InputError(
                             "is damaged", where=f"{file}, byte {self._end}", remedy="Choose another --output."
                         )
                     break
-                self._enter(row, self._end)
+                self._enter(outcome, self._end)
                 self._end += len(line)
         self._open.truncate(self._end)
         self._begin = self._end
@@ -87,98 +85,100 @@ class Log:
         """Whether there was a result that stands when the log was opened."""
         return key in self and self._places[key] < self._begin
 
-    def get(self, key: str) -> dict[str, Any] | None:
-        """A design's row, crashed ones too."""
+    def get(self, key: str) -> Outcome | None:
+        """A design's outcome, crashed ones too."""
         if key not in self._places:
             return None
         with open(self.file, "rb") as file:
             return self._at(file, key)
 
-    def rows(self, keys: Iterable[str]) -> Iterator[dict[str, Any] | None]:
+    def outcomes(self, keys: Iterable[str]) -> Iterator[Outcome | None]:
         """As `get`, for many."""
         with open(self.file, "rb") as file:
             for key in keys:
                 yield self._at(file, key) if key in self._places else None
 
-    def _at(self, file: Any, key: str) -> dict[str, Any]:
+    def _at(self, file: BinaryIO, key: str) -> Outcome:
         file.seek(self._places[key])
-        row = _row(file.readline())
-        if row is None:
+        outcome = _outcome(file.readline())
+        if outcome is None:
             raise InputError("has been changed by somebody else", where=str(self.file))
-        return row
+        return outcome
 
-    def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Adds rows with one write and one wait for the disk. Raises OSError, and holds none of them, where
-        there is no room.
+    def add(self, outcomes: Sequence[Outcome]) -> None:
+        """Adds outcomes with one write and one wait for the disk. Raises OSError, and holds none of them,
+        where there is no room.
         """
-        lines = [_line(row) for row in rows]
-        block, told = b"".join(lines), 0
+        lines = [_line(outcome) for outcome in outcomes]
+        block, written = b"".join(lines), 0
         try:
-            while told < len(block):
-                told += self._open.write(block[told:])
+            while written < len(block):
+                written += self._open.write(block[written:])
             os.fsync(self._open.fileno())
         except OSError:
             self._open.truncate(self._end)
             raise
-        for row, line in zip(rows, lines, strict=True):
-            self._enter(row, self._end)
+        for outcome, line in zip(outcomes, lines, strict=True):
+            self._enter(outcome, self._end)
             self._end += len(line)
 
-    def _enter(self, row: Mapping[str, Any], place: int) -> None:
-        key = row["key"]
+    def _enter(self, outcome: Outcome, place: int) -> None:
+        key = outcome.key
         self._places[key] = place
-        (self._crashed.add if row["status"] == CRASHED else self._crashed.discard)(key)
-        for name, value in row["values"].items():
+        (self._crashed.add if outcome.status is Status.CRASHED else self._crashed.discard)(key)
+        for name, value in outcome.values.items():
             kind = _KINDS[type(value).__name__]
             known = self.kinds.get(name, kind)
             # Booleans among numbers become numbers.
             self.kinds[name] = kind if kind == known else max(kind, known, 2)
 
 
-def _line(row: Mapping[str, Any]) -> bytes:
-    text = json.dumps(row, separators=(",", ":")).encode()
+def _line(outcome: Outcome) -> bytes:
+    text = json.dumps(plain(outcome), separators=(",", ":")).encode()
     return b"%08x %s\n" % (zlib.crc32(text), text)
 
 
-def _row(line: bytes) -> dict[str, Any] | None:
-    """The row of a whole line; None of a torn one."""
+def _outcome(line: bytes) -> Outcome | None:
+    """The outcome in a whole line; None of a torn one. Raises InputError for a whole one of another kind."""
     if not line.endswith(b"\n") or line[8:9] != b" " or line[:8] != b"%08x" % zlib.crc32(line[9:-1]):
         return None
-    found: dict[str, Any] = json.loads(line[9:])
-    return found
+    try:
+        found = json.loads(line[9:])
+        return Outcome(
+            key=found["key"],
+            status=Status(found["status"]),
+            reason=found["reason"],
+            values=found["values"],
+            seconds=found["seconds"],
+            worker=found["worker"],
+        )
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(
+            f"is no line of a study's results: {error}",
+            where="results.jsonl",
+            remedy="Choose another --output.",
+        ) from error
 
 
-def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
-    """The numbers, words and flags of a summary by dotted name; short lists of numbers by place, lists of
-    words joined.
-    """
-    found: dict[str, Any] = {}
-    if isinstance(tree, Mapping):
-        for key, value in tree.items():
-            found |= flat(value, f"{prefix}.{key}" if prefix else str(key))
-    elif isinstance(tree, list):
-        if all(isinstance(each, str) for each in tree):
-            found[prefix] = "; ".join(tree)
-        elif len(tree) <= 3 and all(isinstance(each, int | float) for each in tree):
-            found |= {f"{prefix}.{k}": value for k, value in enumerate(tree)}
-    elif isinstance(tree, bool | int | float | str):
-        found[prefix] = tree
-    return found
-
-
-def picked(values: Mapping[str, Any], columns: Mapping[str, str]) -> dict[str, Any]:
-    """The columns that were asked for, of a row's values; None where a design has no such number."""
+def picked(values: Mapping[str, Value], columns: Mapping[str, str]) -> dict[str, Value | None]:
+    """The columns that were asked for, of an outcome's values; None where a design has no such number."""
     best = next((name for name in _BUILT if f"designs.{name}.cables" in values), "initial")
     return {
         name: values.get(path.replace("designs.best.", f"designs.{best}.")) for name, path in columns.items()
     }
 
 
-def designs_of(file: Path) -> Iterator[dict[str, Any]]:
-    """The designs of a study in order: key and own entries, as `run_study` lists them."""
+def line_of(design: ListedDesign) -> str:
+    """A design as a line of designs.jsonl."""
+    return json.dumps(plain(design)) + "\n"
+
+
+def designs_of(file: Path) -> Iterator[ListedDesign]:
+    """The designs of a study in order, as `run_study` lists them."""
     with open(file, encoding="utf-8") as lines:
         for line in lines:
-            yield json.loads(line)
+            found = json.loads(line)
+            yield ListedDesign(found["key"], found["own"])
 
 
 def write_table(folder: Path, log: Log, columns: Mapping[str, str]) -> int:
@@ -188,7 +188,7 @@ def write_table(folder: Path, log: Log, columns: Mapping[str, str]) -> int:
 
     own: dict[str, int] = {}
     for design in designs_of(folder / "designs.jsonl"):
-        for name, value in design["own"].items():
+        for name, value in design.own.items():
             kind = _KINDS[type(value).__name__]
             own[name] = kind if own.get(name, kind) == kind else max(kind, own[name], 2)
     types = [pa.bool_(), pa.int64(), pa.float64(), pa.string()]
@@ -204,28 +204,26 @@ def write_table(folder: Path, log: Log, columns: Mapping[str, str]) -> int:
         *((name, log.kinds[name]) for name in names if name not in picks),
     ]
     schema = pa.schema([(name, types[kind]) for name, kind in fields])
-    text, seconds = io.StringIO(), io.StringIO()
-    short, long = csv.writer(text, lineterminator="\n"), csv.writer(seconds, lineterminator="\n")
-    head = [name for name, _ in fields[: 4 + len(own) + len(picks)]]
-    short.writerow(head)
-    long.writerow(["number", "key", "worker", "stage", "seconds"])
-    count = 0
+    heads = tuple(name for name, _ in fields[: 4 + len(own) + len(picks)])
+    short: list[tuple[Any, ...]] = []
+    spent: list[tuple[Any, ...]] = []
     partial = folder / "table.parquet.part"
     with pq.ParquetWriter(partial, schema, compression="zstd") as writer:
         for group in _groups(folder, log, columns):
-            count += len(group)
             arrays = [_array(pa, group, name, kind, types[kind]) for name, kind in fields]
             writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
             for row in group:
-                short.writerow([_cell(row.get(name), kind) for name, kind in fields[: len(head)]])
-                for stage, spent in row["seconds"].items():
-                    long.writerow([row["number"], row["key"], row["worker"], stage, spent])
+                short.append(tuple(_cell(row.get(name), kind) for name, kind in fields[: len(heads)]))
+                who = row["number"], row["key"], row["worker"]
+                spent += [(*who, stage, seconds) for stage, seconds in row["seconds"].items()]
     with open(partial, "rb") as written:
         os.fsync(written.fileno())
     os.replace(partial, folder / "table.parquet")
-    write_text(folder / "table.csv", text.getvalue())
-    write_text(folder / "seconds.csv", seconds.getvalue())
-    return count
+    write_text(folder / "table.csv", table_text(Table("table", heads, tuple(short)), exact=True))
+    columns_of_seconds = ("number", "key", "worker", "stage", "seconds")
+    seconds_table = Table("seconds", columns_of_seconds, tuple(spent))
+    write_text(folder / "seconds.csv", table_text(seconds_table, exact=True))
+    return len(short)
 
 
 def _cell(value: Any, kind: int) -> Any:
@@ -244,16 +242,16 @@ def _kind_of_pick(path: str, kinds: Mapping[str, int]) -> int:
 def _groups(folder: Path, log: Log, columns: Mapping[str, str]) -> Iterator[list[dict[str, Any]]]:
     group: list[dict[str, Any]] = []
     designs = list(enumerate(designs_of(folder / "designs.jsonl")))
-    found = log.rows(design["key"] for _, design in designs)
+    found = log.outcomes(design.key for _, design in designs)
     for (number, design), row in zip(designs, found, strict=True):
         if row is None:
             continue
         group.append(
             {
-                **row["values"],
-                **picked(row["values"], columns),
-                **{f"case.{name}": value for name, value in design["own"].items()},
-                **{name: row[name] for name in ("key", "status", "reason", "seconds", "worker")},
+                **row.values,
+                **picked(row.values, columns),
+                **{f"case.{name}": value for name, value in design.own.items()},
+                **{name: getattr(row, name) for name in ("key", "status", "reason", "seconds", "worker")},
                 "number": number,
             }
         )

@@ -28,13 +28,15 @@ from typing import Any
 import shellform
 from shellform.case.case import Case, check_script
 from shellform.errors import InputError, NotConverged
-from shellform.run.run import STAGES, stage_keys
+from shellform.records.stages import STAGES
+from shellform.run.keys import stage_keys
 from shellform.study.engine import Engine, Work, engine, sweep
 from shellform.study.front import Front, signed
-from shellform.study.jobs import NO_ROOM, Job, Outcome, disk_is_full, locked, work
-from shellform.study.plan import Plan, Value, changes, length, read_study, resolved
-from shellform.study.sheet import write_study_page
-from shellform.study.store import Log, designs_of, flat, picked, write_table
+from shellform.study.jobs import Job, disk_is_full, locked, work
+from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
+from shellform.study.plan import Plan, changes, length, read_study, resolved
+from shellform.study.report import write_study_page
+from shellform.study.store import Log, designs_of, line_of, picked, write_table
 from shellform.written import write_text
 
 _SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
@@ -52,7 +54,7 @@ class Progress:
     found: int = 0
     dashboard: str = ""
     began: float = field(default_factory=time.perf_counter)
-    rows: list[dict[str, Any]] = field(default_factory=list)
+    rows: list[Row] = field(default_factory=list)
 
 
 Batch = Callable[[], Iterable[Mapping[str, Value]]]
@@ -138,7 +140,8 @@ def run_study(
 
 def _go(study: _Studying, work: Work, workers: int | None, scheduler: str | None) -> None:
     """Batch after batch: one, or a search's generations."""
-    if study.plan.study.method == "search":
+    searching = study.plan.study.method == "search"
+    if searching:
         from shellform.study.search import generations
 
         batches = generations(study.plan)
@@ -154,14 +157,17 @@ def _go(study: _Studying, work: Work, workers: int | None, scheduler: str | None
                 study.progress.dashboard = opened.dashboard
             if fresh and opened is not None:
                 _compute(study, opened, _jobs(study, batch, shared), work)
-            rows = study.log.rows(keys) if study.plan.study.method == "search" else []
+            known = keys if searching else []
+            outcomes = study.log.outcomes(known)
             try:
-                batch = batches.send([_told(study, row) for row in rows])
+                batch = batches.send(
+                    [_row(study, key, outcome) for key, outcome in zip(known, outcomes, strict=True)]
+                )
             except StopIteration:
                 batch = None
 
 
-def _at_once(plan: Plan) -> Generator[Batch, list[dict[str, Any]], None]:
+def _at_once(plan: Plan) -> Generator[Batch, list[Row], None]:
     yield lambda: changes(plan)
 
 
@@ -175,20 +181,20 @@ def _list(study: _Studying, batch: Batch, listed: Any) -> tuple[list[str], Count
     old = set()
     for own in batch():
         design = _identify(study, own)
-        listed.write(json.dumps({"key": design.key, "own": dict(design.own)}) + "\n")
+        listed.write(line_of(ListedDesign(design.key, design.own)))
         keys.append(design.key)
         if design.key in study.log:
             if study.log.old(design.key):
                 old.add(design.key)
         elif design.case is None:
-            refused.append(_row(design.key, "refused", design.reason))
+            refused.append(Outcome(design.key, Status.REFUSED, design.reason))
         elif design.key not in fresh:
             fresh.add(design.key)
             shared.update(design.keys[stage] for stage in stages)
     listed.flush()
     study.progress.found += len(old)
     if refused:
-        _enter(study, list({row["key"]: row for row in refused}.values()))
+        _enter(study, list({each.key: each for each in refused}.values()))
     study.show(study.progress)
     return keys, shared, len(fresh)
 
@@ -245,7 +251,7 @@ def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) 
     written, cost = time.perf_counter(), 0.0
     try:
         for outcomes in sweep(opened, jobs, work):
-            _enter(study, [_row_of(outcome) for outcome in outcomes])
+            _enter(study, outcomes)
             study.show(study.progress)
             now = time.perf_counter()
             if now - written > max(2.0, cost / _SHARE_OF_TIME):
@@ -257,63 +263,48 @@ def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) 
         raise
 
 
-def _row(key: str, status: str, reason: str) -> dict[str, Any]:
-    return {"key": key, "status": status, "reason": reason, "values": {}, "seconds": {}, "worker": ""}
-
-
-def _row_of(outcome: Outcome) -> dict[str, Any]:
-    if outcome["status"] == NO_ROOM:
-        raise NotConverged(
-            f"A worker found no room: {outcome['reason']}", remedy="Make room and run the same command again."
-        )
-    values = {
-        name: value
-        for name, value in outcome["summary"].items()
-        if name not in ("format", "version", "seconds")
-    }
-    return {
-        **_row(outcome["key"], outcome["status"], outcome["reason"]),
-        "values": flat(values),
-        "seconds": outcome["seconds"],
-        "worker": outcome["worker"],
-    }
-
-
-def _enter(study: _Studying, rows: Sequence[dict[str, Any]]) -> None:
-    """Into the log first; then run folders that nobody wants may go."""
-    if not rows:
+def _enter(study: _Studying, outcomes: Sequence[Outcome]) -> None:
+    """Into the log first; then run folders that nobody wants may go. Raises NotConverged where a worker found
+    no room on the disk."""
+    for outcome in outcomes:
+        if outcome.status is Status.NO_ROOM:
+            raise NotConverged(
+                f"A worker found no room: {outcome.reason}",
+                remedy="Make room and run the same command again.",
+            )
+    if not outcomes:
         return
-    study.log.add(rows)
-    for row in rows:
+    study.log.add(outcomes)
+    for outcome in outcomes:
         study.progress.done += 1
-        study.progress.failed += row["status"] != "done"
-        study.progress.rows.append(_told(study, row))
+        study.progress.failed += outcome.status is not Status.DONE
+        row = _row(study, outcome.key, outcome)
+        study.progress.rows.append(row)
         for key in _unwanted(study, row):
             _drop(study.folder / "runs" / key)
     del study.progress.rows[:-_LATEST]
 
 
-def _told(study: _Studying, row: dict[str, Any] | None) -> dict[str, Any]:
-    """A row with the columns that were asked for, alone."""
-    if row is None:
-        return {"status": "missing"}
-    told = {name: row[name] for name in ("key", "status", "reason")}
-    return {**told, **picked(row["values"], study.plan.study.column)}
+def _row(study: _Studying, key: str, outcome: Outcome | None) -> Row:
+    """A design with the columns that were asked for."""
+    if outcome is None:
+        return Row(key, Status.MISSING, "", {})
+    return Row(key, outcome.status, outcome.reason, picked(outcome.values, study.plan.study.column))
 
 
-def _unwanted(study: _Studying, row: dict[str, Any]) -> list[str]:
+def _unwanted(study: _Studying, row: Row) -> list[str]:
     """The runs that aren't kept, now that this design is known."""
     keep = study.plan.study.keep
-    off = study.front.add(row["key"], _told(study, row))
-    return off if keep == "best" else [row["key"]] if keep == "none" else []
+    off = study.front.add(row)
+    return off if keep == "best" else [row.key] if keep == "none" else []
 
 
 def _tidy(study: _Studying) -> None:
     """Brings the front up to the log, and drops what an earlier call had no time to drop."""
     keys = list(study.log)
-    for row in study.log.rows(keys):
-        if row is not None:
-            for key in _unwanted(study, row):
+    for found, outcome in zip(keys, study.log.outcomes(keys), strict=True):
+        if outcome is not None:
+            for key in _unwanted(study, _row(study, found, outcome)):
                 _drop(study.folder / "runs" / key)
 
 
@@ -330,23 +321,22 @@ def _finish(study: _Studying) -> Finding:
         _drop(study.folder / "stages")
     failed, reason, count = 0, "", 0
     empty = set(plan.study.column)
-    keys = [design["key"] for design in designs_of(study.folder / "designs.jsonl")]
-    for row in study.log.rows(keys):
+    keys = [design.key for design in designs_of(study.folder / "designs.jsonl")]
+    for outcome in study.log.outcomes(keys):
         count += 1
-        if row is None or row["status"] != "done":
+        if outcome is None or outcome.status is not Status.DONE:
             failed += 1
-            reason = reason or ("" if row is None else f"{row['status']}: {row['reason']}")
+            reason = reason or ("" if outcome is None else f"{outcome.status}: {outcome.reason}")
         elif empty:
-            empty -= {
-                name for name, value in picked(row["values"], plan.study.column).items() if value is not None
-            }
+            found = picked(outcome.values, plan.study.column)
+            empty -= {name for name, value in found.items() if value is not None}
     if failed == count:
         raise NotConverged(f"None of {count} designs has a result. The first was {reason}")
-    found = sum(study.log.old(key) for key in set(keys))
+    old = sum(study.log.old(key) for key in set(keys))
     return Finding(
         count,
         failed,
-        found,
+        old,
         tuple(name for name in plan.study.column if name in empty),
         study.folder / "table.parquet",
         page,

@@ -161,15 +161,15 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
         "cable_force.additional",
     ]
     assert {f"constraint.{name}" for name in named} <= set(row)
-    best = summary["designs"]["optimised"]["loads"]
-    assert summary["optimisation"]["feasible"]
-    assert best["design"]["critical_factor"] > 1.25
-    assert best["none"]["cable_force_min"] > 0.05
-    assert max(each["stress_utilisation_max"] for each in best.values()) < 0.9
-    assert max(each["uplift_max"] for each in best.values()) < 7.0
-    assert summary["robust"]["design"] == "optimised"
-    assert summary["robust"]["misfit_mean"] > summary["robust"]["misfit"]
-    assert summary["robust"]["sample"]["count"] == 5
+    best = summary.designs["optimised"].loads
+    assert summary.optimisation.feasible
+    assert best["design"].critical_factor > 1.25
+    assert best["none"].cable_force_min > 0.05
+    assert max(each.stress_utilisation_max for each in best.values()) < 0.9
+    assert max(each.uplift_max for each in best.values()) < 7.0
+    assert summary.robust.design == "optimised"
+    assert summary.robust.misfit_mean > summary.robust.misfit
+    assert summary.robust.sample.count == 5
     with (tmp_path / "schedules/robust.csv").open(encoding="utf-8", newline="") as file:
         causes = list(csv.DictReader(file))
     assert {each["cause"] for each in causes} == {"supports", "loads_all"}
@@ -183,21 +183,21 @@ def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried(tmp
     summary = run_case(
         load_case(ROOT / "scripts/scale_model_rounded.toml", settings), tmp_path, until="optimise"
     )
-    designs, sections = summary["designs"], summary["sections"]
-    free = designs["optimised"]["rod_radius"]
-    up = next(each for each in sections if each["rounded_up"])
-    assert up["rod_radius"] >= free
-    assert all(each["rod_radius"] < free for each in sections if each["rod_radius"] < up["rod_radius"])
+    designs, sections = summary.designs, summary.sections
+    free = designs["optimised"].rod_radius
+    up = next(each for each in sections if each.rounded_up)
+    assert up.rod_radius >= free
+    assert all(each.rod_radius < free for each in sections if each.rod_radius < up.rod_radius)
     assert 2 <= len(sections) <= 3
-    assert designs["rounded"]["rod_radius"] in [each["rod_radius"] for each in sections]
+    assert designs["rounded"].rod_radius in [each.rod_radius for each in sections]
     with (tmp_path / "schedules/sections.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [row["section"] for row in rows] == [each["section"] for each in sections]
+    assert [row["section"] for row in rows] == [each.section for each in sections]
     for each in sections:
-        assert each["feasible"] == (not each["why_not"])
+        assert each.feasible == (not each.why_not)
     run = read_run(tmp_path)
     assert run.best == "rounded"
-    assert run.shell_of("rounded").rod.radius == designs["rounded"]["rod_radius"]
+    assert run.shell_of("rounded").rod.radius == designs["rounded"].rod_radius
     # Another case in the same folder leaves nothing of this one behind.
     again = run_case(
         load_case(
@@ -207,7 +207,7 @@ def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried(tmp
         tmp_path,
         until="optimise",
     )
-    assert "rounded" not in again["designs"]
+    assert "rounded" not in again.designs
     assert "sections" not in json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
     assert read_run(tmp_path).best == "optimised"
 

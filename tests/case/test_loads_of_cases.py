@@ -11,6 +11,7 @@ from shellform.case.case import dump_case, load_case
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import read_catalogue
 from shellform.gridshell.gridshell import max_radius
+from shellform.records.progress import Kind
 from shellform.run.run import run_case
 from shellform.structure.elements.sections import Rectangle, Round, Tube
 
@@ -166,8 +167,8 @@ def test_the_radius_is_bounded_by_the_net_or_by_the_catalogue(tmp_path, net, vau
     shell, _ = gridshell(case, net, vault)
     assert rod_bounds(case, shell) == (pytest.approx(0.00075), shell.rod.radius)
     limits = rod_limits(case.rod, net)
-    assert shell.rod.radius <= limits["rod_radius_max"]
-    assert limits["curvature_utilisation"] == pytest.approx(1.0)
+    assert shell.rod.radius <= limits.radius_max
+    assert limits.curvature_utilisation == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
@@ -258,22 +259,22 @@ def test_a_run_follows_every_case_and_starts_again_where_the_catalogue_has_chang
             case,
             tmp_path / "run",
             until="initial",
-            report=lambda stage, line: said.append(f"{stage}: {line}"),
+            report=lambda event: said.append((event.stage, event.kind)),
         )
 
     summary = run()
-    cases = summary["designs"]["initial"]["loads"]
+    cases = summary.designs["initial"].loads
     assert list(cases) == ["none", "design", "additional", "pour 1", "pour 2", "rest"]
-    assert cases["none"]["factor"] == 0.0
-    assert cases["design"]["factor"] == 1.0
-    assert cases["additional"]["factor"] == pytest.approx(1.2 / 0.5, rel=0.05)
+    assert cases["none"].factor == 0.0
+    assert cases["design"].factor == 1.0
+    assert cases["additional"].factor == pytest.approx(1.2 / 0.5, rel=0.05)
     model = json.loads((tmp_path / "run/designs/initial.json").read_text(encoding="utf-8"))
     assert set(model["loads"]) == set(cases) - {"none"}
     for name in cases:
         assert (tmp_path / f"run/states/initial-{name}.vtp").is_file()
     run()
-    assert any(line.startswith("initial: kept") for line in said)
+    assert ("initial", Kind.KEPT) in said
     (tmp_path / "ours.toml").write_text(shipped.replace("young = 40e9", "young = 41e9"), encoding="utf-8")
     run()
-    assert any(line.startswith("net: kept") for line in said)
-    assert any(line.startswith("initial: done") for line in said)
+    assert ("net", Kind.KEPT) in said
+    assert ("initial", Kind.DONE) in said

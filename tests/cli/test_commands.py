@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from shellform.cli import program
-from shellform.run.run import STAGES
+from shellform.records.stages import STAGES
 
 ROOT = Path(__file__).parent.parent.parent
 MODEL = {

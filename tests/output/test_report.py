@@ -1,4 +1,4 @@
-"""What the page says: checks, answers, numbers, charts, embedded pictures, and a surface made light."""
+"""What the page says: answers, numbers, charts, embedded pictures, and a surface made light."""
 
 import math
 import re
@@ -11,17 +11,13 @@ from PIL import Image
 import shellform as sf
 from shellform.errors import InputError
 from shellform.output.page import report
+from shellform.output.page.answers import answers
 from shellform.output.page.charts import line_chart
 from shellform.output.page.embed import embed
-from shellform.output.page.verdict import Bounds, answers, asked, checks, failed, number
+from shellform.records.summary import VerdictRecord
+from shellform.records.words import number
 from shellform.structure.elements.state import State
-
-LOADS = {
-    "none": {"factor": 0.0, "deviation_max": 0.002, "deviation_mean": 0.001, "deviation_rms": 0.0012},
-    "design": {"factor": 1.0, "deviation_max": 0.004, "deviation_mean": 0.002, "deviation_rms": 0.0024},
-    "additional": {"factor": 1.2, "deviation_max": 0.008, "deviation_mean": 0.003, "deviation_rms": 0.004},
-}
-SOUND = {"stable": True, "on_branch": True, "residual": 1e-10, "rod_utilisation_max": 0.8}
+from tests.records.made import summary
 
 
 @pytest.fixture
@@ -33,153 +29,41 @@ def designs(shell):
     }
 
 
-def told(designs, load=None, constraints=None, **changes):
-    """A summary with one load's row of the last design changed."""
-    rows = {
-        name: {"cable_force_max": 7.0, "loads": {each: {**row, **SOUND} for each, row in LOADS.items()}}
-        for name in designs
-    }
-    last = rows[list(designs)[-1]]
-    (last["loads"][load] if load else last).update(changes)
-    return {"designs": rows, "optimisation": {"constraints": constraints or {"cable_force": -0.65}}}
-
-
-BOUNDS = Bounds(20.0, 0.005)
-
-
-def every(shell, designs):
-    return {name: shell for name in designs}
-
-
-def fails(shell, designs, *arguments, **changes):
-    found = checks(every(shell, designs), designs, told(designs, *arguments, **changes), BOUNDS)
-    return [check.name for check in failed(found, "polished")]
-
-
-def test_a_sound_design_holds_all_checks_those_of_the_optimiser_among_them(shell, designs):
-    found = checks(every(shell, designs), designs, told(designs), BOUNDS)
-    assert failed(found, "polished") == []
-    assert asked(found, "polished") == len(found) == 3 + 3 + 1 + 1 + 1 + 1 + 3
-    assert asked(found, "initial") == len(found) - 1
-
-
-@pytest.mark.parametrize(
-    ("load", "changes", "name"),
-    [
-        ("design", {"stable": False}, "Stands under the design load"),
-        ("additional", {"on_branch": False}, "Stands under 1.2 × the load"),
-        ("none", {"rod_utilisation_max": 1.01}, "Rods under no load"),
-        ("additional", {"deviation_rms": 0.0051}, "Deviation under 1.2 × the load, root mean square (6)"),
-        ("design", {"residual": float("nan")}, "In equilibrium under the design load"),
-        (
-            None,
-            {"cable_force_max": 20.1},
-            "Largest cable force under the design load and those beyond it (5)",
-        ),
-    ],
-)
-def test_each_check_fails_alone_where_its_number_is_past_the_limit(shell, designs, load, changes, name):
-    assert fails(shell, designs, load, **changes) == [name]
-
-
-def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, designs):
-    values = {
-        "cable_force": -0.65,
-        "misfit.additional": -0.75,
-        "softness.additional": 0.19,
-        "slackness.none": -0.5,
-        "uplift.wind": 0.5,
-    }
-    values |= {"uplift": -0.1, "other_thing": math.nan}
-    summary = told(designs, constraints=values)
-    found = {
-        check.name: check.cells["optimised"]
-        for check in checks(every(shell, designs), designs, summary, BOUNDS)
-        if check.name.startswith("Optimiser")
-    }
-    assert [cell.told for cell in found.values()] == [
-        "35 %",
-        "50 %",
-        "0.90 ×",
-        "1.50 ×",
-        "beyond",
-        "within",
-        "not known",
-    ]
-    assert [cell.holds for cell in found.values()] == [True, True, False, True, False, True, False]
-    assert {"Optimiser: uplift of supports, wind load", "Optimiser: other thing"} < set(found)
-
-
-@pytest.mark.parametrize(
-    ("bound", "load", "changes", "words"),
-    [
-        ({"stress": 0.9}, "none", {"stress_utilisation_max": 0.95}, "95 % of the strength"),
-        ({"turn": 0.1}, "design", {"connector_turn_max": 0.2}, "11.5 °"),
-        ({"uplift": 1.0}, "additional", {"uplift_max": 1.5}, "1.5 N"),
-        ({"critical": 1.5}, "design", {"critical_factor": 1.4}, "1.40 ×"),
-        ({"critical": 4.0}, "design", {"critical_factor": None, "critical_sought": 3.0}, "beyond 3 ×"),
-        ({"force": 20.0}, "additional", {"cable_force_max": 21.0}, "21 N"),
-    ],
-)
-def test_an_engineer_s_limits_are_checked_where_they_are_asked_for(
-    shell, designs, bound, load, changes, words
-):
-    summary = told(designs, load, **changes)
-    found = failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **bound)), "polished")
-    assert [check.cells["polished"].told for check in found] == [words]
-    unasked = replace(BOUNDS, force=np.inf)
-    assert failed(checks(every(shell, designs), designs, summary, unasked), "polished") == []
-    looser = {name: 0.5 * limit if name == "critical" else 2.0 * limit for name, limit in bound.items()}
-    assert (
-        failed(checks(every(shell, designs), designs, summary, replace(BOUNDS, **looser)), "polished") == []
-    )
-
-
-def test_the_polished_design_does_not_fail_by_what_only_the_optimised_one_broke(shell, designs):
-    summary = told(designs)
-    summary["designs"]["optimised"]["cable_force_max"] = 30.0
-    assert failed(checks(every(shell, designs), designs, summary, BOUNDS), "polished") == []
-    assert len(failed(checks(every(shell, designs), designs, summary, BOUNDS), "optimised")) == 1
-
-
-def test_rods_thicker_than_the_net_bears_fail_by_equation_1(shell, designs):
-    thick = designs | {"polished": replace(designs["polished"], radius=0.002)}
-    assert fails(shell, thick) == ["Rods bent into the shape (1)"]
-
-
 def test_the_answers_are_numbers_of_the_design(shell, designs):
     design, states = designs["polished"], {"design": shell.target}
-    found = {answer.question: answer for answer in answers(shell, "polished", design, states, told(designs))}
+    found = {
+        answer.question: answer for answer in answers(shell, "polished", design, states, summary(designs))
+    }
     pull = shell.cables(design).tension(shell.target)
-    assert found["How far off is the shell?"].told == "4 mm at most"
+    assert found["How far off is the shell?"].words == "4 mm at most"
     assert found["How many cables?"].detail.startswith(f"{number(pull.max())} N at most in one")
-    assert found["Which rods?"].told == "⌀ 2 mm"
+    assert found["Which rods?"].words == "⌀ 2 mm"
     length = sum(rod.length for rod in shell.net.grid.rods)
-    assert found["What to buy?"].told == f"{number(length)} m of rod"
+    assert found["What to buy?"].words == f"{number(length)} m of rod"
     assert found["Is it safe at 1.2 × the load?"].good
     assert "isn't known" in found["Is it safe at 1.2 × the load?"].detail
     for known, words in [
         ({"critical_factor": 1.85}, "ends at 1.85 ×"),
         ({"critical_factor": None, "critical_sought": 3.0}, "up to 3 ×"),
     ]:
-        sought = told(designs, "design", **known)
+        sought = summary(designs, "design", **known)
         assert words in answers(shell, "polished", design, states, sought)[3].detail
     for change, words in [
         ({"on_branch": False}, "No, it snaps through"),
         ({"stable": False}, "No, it is unstable"),
         ({"rod_utilisation_max": 1.1}, "No, rods break"),
     ]:
-        answer = answers(shell, "polished", design, states, told(designs, "additional", **change))[3]
-        assert answer.told == words
+        answer = answers(shell, "polished", design, states, summary(designs, "additional", **change))[3]
+        assert answer.words == words
         assert answer.good is False
 
 
 def test_the_mass_of_the_rods_is_told_where_their_density_is_known(shell, designs):
     material = replace(shell.rod.section.material, density=2000.0)
     heavy = replace(shell, rod=sf.Rod(replace(shell.rod.section, material=material)))
-    buy = answers(heavy, "polished", designs["polished"], {}, told(designs))[-1]
+    buy = answers(heavy, "polished", designs["polished"], {}, summary(designs))[-1]
     mass = 2000.0 * math.pi * 0.001**2 * sum(rod.length for rod in shell.net.grid.rods)
-    assert f"({number(mass)} kg)" in buy.told
+    assert f"({number(mass)} kg)" in buy.words
 
 
 @pytest.mark.parametrize(
@@ -264,7 +148,7 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
     design = shell.design()
     states = {"none": shell.target, "design": moved}
     loads = {"none": np.zeros((len(moved.positions), 6)), "design": shell.point_load(6.9)}
-    entry = report.Entry(
+    run = report.ShownRun(
         "t",
         "p",
         {"initial": shell},
@@ -273,16 +157,18 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
         {"initial": design},
         {"initial": states},
         "initial",
-        told({"initial": design}),
+        summary({"initial": design}),
+        [],
+        VerdictRecord("initial", True, (), ()),
         [],
         "",
         [],
         0.01,
-        BOUNDS,
+        20.0,
         [],
         [],
     )
-    drawn = report._drawn(entry)
+    drawn = report._drawn(run)
     found = drawn["designs"][0]["states"]["design"]
     assert found["length"] == pytest.approx(1e3 * shell.cables(design).lengths(moved), abs=1e-4)
     assert found["force"] == pytest.approx(shell.cables(design).tension(moved), rel=1e-5)

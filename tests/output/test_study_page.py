@@ -5,29 +5,27 @@ import re
 
 import pytest
 
-from shellform.output.page.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
+from shellform.output.page.study_page import (
+    StudyContent,
+    StudyRow,
+    chosen,
+    rank_correlations,
+    spread,
+    study_page,
+    thumbnail,
+)
 
 
-def sheet(**changes):
-    rows = [
-        {
-            "number": k,
-            "key": f"k{k}",
-            "status": "done",
-            "reason": "",
-            "case.net.spacing": 0.1 + 0.01 * k,
-            "misfit": 1e-3 * k,
-            "cables": 9 - k,
-        }
-        for k in range(5)
-    ]
-    rows[3] |= {
-        "status": "refused",
-        "reason": "</script><script>alert(1)</script>",
-        "misfit": None,
-        "cables": None,
-    }
-    rows[4] |= {"misfit": float("nan")}
+def content(**changes):
+    """Five designs, one refused and one without a number."""
+
+    def row(k, misfit, cables, reason=""):
+        columns = {"case.net.spacing": 0.1 + 0.01 * k, "misfit": misfit, "cables": cables}
+        return StudyRow(k, f"k{k}", not reason, "refused" if reason else "done", reason, columns)
+
+    rows = [row(k, 1e-3 * k, 9 - k) for k in range(5)]
+    rows[3] = row(3, None, None, "</script><script>alert(1)</script>")
+    rows[4] = row(4, float("nan"), 5)
     given = {
         "title": "Weights <b>",
         "rows": rows,
@@ -42,11 +40,11 @@ def sheet(**changes):
         "correlation": {"case.net.spacing": {"misfit": 1.0, "cables": -1.0}},
         "notes": [],
     }
-    return Sheet(**{**given, **changes})
+    return StudyContent(**{**given, **changes})
 
 
 def test_the_page_asks_for_nothing_and_escapes_what_comes_from_elsewhere():
-    page = study_page(sheet())
+    page = study_page(content())
     assert "default-src 'none'" in page
     assert not re.search(r"""(src|href)=["']?(https?:)?//""", page)
     assert "<b>" not in page

@@ -1,7 +1,6 @@
 """A run folder in seconds: the vault with rods twice as far apart, and a design with every third cable left
 out in the optimised one's place."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,8 +8,13 @@ from PIL import Image
 
 from shellform.case.case import load_case
 from shellform.problem.paths import follow
-from shellform.run.folder import keep_design, read_run
-from shellform.run.run import run_case, stage_keys
+from shellform.records.stages import StagesDone, write_stages
+from shellform.records.summary import write_summary
+from shellform.run.designs import write_design
+from shellform.run.folder import read_run
+from shellform.run.keys import stage_keys
+from shellform.run.run import run_case
+from tests.records.made import optimisation
 
 HISTORY = """evaluation,accepted,objective,term.misfit,term.cable_force,constraint.cable_force,constraint.misfit.additional,cables,stage,seconds
 0,1,1.0,0.7,0.3,-0.7,22.5,281,1.0,0.6
@@ -34,22 +38,14 @@ def finish(folder):
     run = read_run(folder)
     start = run.designs["initial"]
     design = replace(start, present=start.present & (np.arange(len(start.present)) % 3 > 0))
-    summary = dict(run.summary)
-    summary["designs"]["optimised"] = keep_design(
+    record = write_design(
         folder, run.shell, "optimised", design, follow(run.shell, design, run.loads), run.loads
     )
     constraints = {"cable_force": -0.5, "misfit.additional": -0.1, "softness.additional": -0.2}
-    counts = {"iterations": 1, "evaluations": 3, "rejected": 1, "equilibria": 9, "factorisations": 20}
-    summary["optimisation"] = {
-        "objective_start": 1.0,
-        "objective_end": 0.4,
-        **counts,
-        "status": "no better design",
-        "constraints": constraints,
-    }
-    (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
+    summary = run.summary.with_design("optimised", record)
+    write_summary(folder, replace(summary, optimisation=optimisation(constraints)))
     (folder / "history.csv").write_text(HISTORY, encoding="utf-8")
-    (folder / "stages.json").write_text(json.dumps(stage_keys(run.case)), encoding="utf-8")
+    write_stages(folder, StagesDone(stage_keys(run.case)))
     shade = np.linspace(0, 255, 64).astype(np.uint8)
     for name in ("deviations", "optimised-design", "net-skew"):
         Image.fromarray(np.dstack([np.tile(shade, (40, 1))] * 3)).save(folder / f"figures/{name}.png")

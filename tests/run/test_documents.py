@@ -8,9 +8,12 @@ import pytest
 
 from shellform.case.case import load_case
 from shellform.errors import InputError
+from shellform.records.progress import Kind
+from shellform.records.stages import STAGES
+from shellform.records.summary import Summary
 from shellform.run.documents import stock_length, write_documents
 from shellform.run.folder import Run
-from shellform.run.run import STAGES, stage_keys
+from shellform.run.keys import stage_keys
 
 ROOT = Path(__file__).parent.parent.parent
 CASE = ROOT / "scripts/scale_model.toml"
@@ -27,12 +30,12 @@ def run(built, vault, shell, tmp_path_factory):
     }
     designs = {"unbraced": shell.unbraced(), "initial": shell.design(), "polished": built.design}
     case = load_case(CASE, ["rod.stock_length=0.8", "rod.kerf=0.002"])
-    return Run(tmp_path_factory.mktemp("run"), case, vault, shell, loads, designs, states, {"designs": {}})
+    return Run(tmp_path_factory.mktemp("run"), case, vault, shell, loads, designs, states, Summary())
 
 
 def test_all_documents_of_the_best_design_are_written_and_splices_are_said(run):
     said = []
-    found = write_documents(run, report=lambda stage, text: said.append(text))
+    found = write_documents(run, report=said.append)
     names = {path.relative_to(run.folder).as_posix() for path in run.folder.rglob("*.*")}
     assert {
         f"drawings/{name}.{kind}"
@@ -49,9 +52,9 @@ def test_all_documents_of_the_best_design_are_written_and_splices_are_said(run):
     with (run.folder / "schedules/cables.csv").open(encoding="utf-8", newline="") as file:
         assert len(list(csv.DictReader(file))) == run.designs["polished"].present.sum()
     long = [k for k, rod in enumerate(run.net.grid.rods) if rod.length > 0.8]
-    assert found["spliced"] == long
-    assert (found["design"], found["stock_length"]) == ("polished", 0.8)
-    assert [text for text in said if "SPLICED" in text and text.startswith("note")]
+    assert found.spliced == tuple(long)
+    assert (found.design, found.stock_length) == ("polished", 0.8)
+    assert [each for each in said if "SPLICED" in each.text and each.kind is Kind.NOTE]
 
 
 def test_a_folder_in_which_nothing_can_be_written_is_named(run, tmp_path):

@@ -191,22 +191,23 @@ def test_pictures_that_could_not_be_made_are_made_by_the_next_run(copy, monkeypa
         raise InputError("VTK lacks a library")
 
     told = []
-    monkeypatch.setattr(run, "_optimise", lambda *_: None)
+    monkeypatch.setattr(run, "_optimise", lambda workspace, parts, summary, keep: run._Ended(parts, summary))
     with monkeypatch.context() as without:
         without.setattr(scene, "require", missing)
-        run_case(load_case(CASE), copy, report=lambda stage, text: told.append(text))
+        run_case(load_case(CASE), copy, report=lambda event: told.append(event.text))
     assert "no pictures: VTK lacks a library" in told
     assert (copy / "states/initial-design.vtp").stat().st_size > 1000
     assert "figures" not in json.loads((copy / "stages.json").read_text(encoding="utf-8"))
-    run_case(load_case(CASE), copy, report=lambda stage, text: told.append(text))
+    run_case(load_case(CASE), copy, report=lambda event: told.append(event.text))
     assert (copy / "figures/deviations.png").is_file()
     assert "figures" in json.loads((copy / "stages.json").read_text(encoding="utf-8"))
 
 
 def test_a_script_runs_a_case_by_the_public_names(tmp_path):
     import shellform as sf
+    from shellform.records.summary import document
 
     folder = str(tmp_path / "run")
     summary = sf.study.run_case(sf.study.load_case(str(CASE), ["net.spacing=0.09"]), folder, until="net")
-    assert summary["net"]["spacing"] == 0.09
-    assert summary == json.loads((tmp_path / "run/summary.json").read_text(encoding="utf-8"))
+    assert summary.net.spacing == 0.09
+    assert document(summary) == json.loads((tmp_path / "run/summary.json").read_text(encoding="utf-8"))

@@ -9,9 +9,11 @@ import pytest
 
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
+from shellform.records.stages import STAGES
+from shellform.records.summary import CableCountRecord, SymmetryRecord
 from shellform.run import checkpoint, documents, optimising
 from shellform.run.folder import read_run
-from shellform.run.run import STAGES, run_case
+from shellform.run.run import run_case
 from tests.stubs import CASE
 
 
@@ -54,18 +56,18 @@ def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, 
         ],
     )
     summary = run_case(case, tmp_path, until="optimise")
-    found = summary["optimisation"]
-    cables = summary["designs"]["polished"]["cables"]
-    assert found["cables_max"] == {"asked": most, "cables": cables, "kept": cables <= most}
+    found = summary.optimisation
+    cables = summary.designs["polished"].cables
+    assert found.cables_max == CableCountRecord(most, cables, cables <= most)
     run = read_run(tmp_path)
     lengths = run.designs["polished"].rest_length[run.designs["polished"].present]
-    assert found["symmetric"] == {"groups": len(set(lengths.round(9))), "kept": True}
+    assert found.symmetric == SymmetryRecord(len(set(lengths.round(9))), True)
     told = documents.write_documents(run)
-    assert told["rest_lengths"] == found["symmetric"]["groups"]
+    assert told.rest_lengths == found.symmetric.groups
     with (tmp_path / "schedules/cables.csv").open(encoding="utf-8") as text:
         rows = list(csv.DictReader(text))
     cut = [float(row["cut length [m]"]) for row in rows]
-    assert told["cut_lengths"] == len(set(cut)) < told["rest_lengths"]
+    assert told.cut_lengths == len(set(cut)) < told.rest_lengths
     assert all(
         0.0 <= float(row["rest length [m]"]) - each <= 0.004 + 1e-6
         for row, each in zip(rows, cut, strict=True)
@@ -75,7 +77,7 @@ def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, 
 
     page = write_report([tmp_path]).read_text(encoding="utf-8")
     assert "Symmetric cables have one length" in page
-    assert f"cut to {told['cut_lengths']} different lengths" in page
+    assert f"cut to {told.cut_lengths} different lengths" in page
     before = listed(tmp_path)
     run_case(
         load_case(file, [f"optimise.cables_max={most}", "optimise.symmetric=true", "optimise.polish=2"]),
@@ -88,10 +90,10 @@ def test_wishes_for_cables_are_kept_and_told_in_summary_schedule_and_page(file, 
 def test_a_number_of_cables_that_cannot_be_reached_is_said(file, tmp_path):
     lines = []
     case = load_case(file, ["optimise.cables_max=1"])
-    summary = run_case(case, tmp_path, until="optimise", report=lambda stage, text: lines.append(text))
-    found = summary["optimisation"]["cables_max"]
-    assert found["kept"] is False
-    assert f"note: {found['cables']} cables are left, not 1: with fewer a limit is broken" in lines
+    summary = run_case(case, tmp_path, until="optimise", report=lambda event: lines.append(event.text))
+    found = summary.optimisation.cables_max
+    assert found.kept is False
+    assert f"{found.cables} cables are left, not 1: with fewer a limit is broken" in lines
 
 
 def test_lengths_that_cannot_be_made_equal_leave_the_design_before_them(file, tmp_path, monkeypatch):
@@ -103,8 +105,8 @@ def test_lengths_that_cannot_be_made_equal_leave_the_design_before_them(file, tm
     monkeypatch.setattr(optimise, "polish", refused)
     case = load_case(file, ["optimise.symmetric=true", "optimise.polish=2"])
     summary = run_case(case, tmp_path, until="optimise")
-    assert summary["optimisation"]["not_polished"] == "the load isn't borne"
-    assert summary["optimisation"]["symmetric"]["kept"] is False
+    assert summary.optimisation.not_polished == "the load isn't borne"
+    assert summary.optimisation.symmetric.kept is False
     assert read_run(tmp_path).best == "optimised"
 
 
@@ -117,19 +119,22 @@ def test_a_stage_that_fails_leaves_the_others_to_be_made_and_is_made_by_the_next
     def failing(*_):
         raise InputError("is full", where=stage)
 
-    monkeypatch.setattr(optimising, "optimise", lambda *_: None)
+    def drawn(workspace, parts, summary, keep):
+        return run._Ended(parts, summary)
+
+    monkeypatch.setattr(optimising, "optimise", lambda workspace, shell, loads, summary: summary)
     with monkeypatch.context() as broken:
-        broken.setattr(run, "_figures", lambda *_: None)
+        broken.setattr(run, "_figures", drawn)
         broken.setattr(run, f"_{stage}", failing)
         with pytest.raises(InputError, match="is full"):
             run_case(load_case(file), tmp_path)
     assert set(listed(tmp_path)) == set(STAGES) - {stage}
-    assert read_run(tmp_path).summary["failed"] == {stage: f"{stage}: is full"}
+    assert read_run(tmp_path).summary.failed == {stage: f"{stage}: is full"}
     assert f"The stage “{stage}” failed" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    monkeypatch.setattr(run, "_figures", lambda *_: None)
+    monkeypatch.setattr(run, "_figures", drawn)
     run_case(load_case(file), tmp_path)
     assert set(listed(tmp_path)) == set(STAGES)
-    assert "failed" not in read_run(tmp_path).summary
+    assert not read_run(tmp_path).summary.failed
 
 
 def test_an_optimisation_broken_off_goes_on_from_its_checkpoint_to_the_same_bytes(file, tmp_path):
@@ -137,8 +142,8 @@ def test_an_optimisation_broken_off_goes_on_from_its_checkpoint_to_the_same_byte
     whole = run_case(case, tmp_path / "whole", until="optimise")
     assert not (tmp_path / "whole" / checkpoint.FILE).exists()
 
-    def stop(stage, text):
-        if text.startswith("evaluation 4/"):
+    def stop(event):
+        if event.text.startswith("evaluation 4/"):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -146,10 +151,10 @@ def test_an_optimisation_broken_off_goes_on_from_its_checkpoint_to_the_same_byte
     assert (tmp_path / "broken" / checkpoint.FILE).is_file()
     lines = []
     again = run_case(
-        case, tmp_path / "broken", until="optimise", report=lambda stage, text: lines.append(text)
+        case, tmp_path / "broken", until="optimise", report=lambda event: lines.append(event.text)
     )
     assert any(line.startswith("going on after evaluation") for line in lines)
-    assert again["optimisation"] == whole["optimisation"]
+    assert again.optimisation == whole.optimisation
     for name in ("optimised.json", "unloaded.json"):
         assert (tmp_path / "broken/designs" / name).read_bytes() == (
             tmp_path / "whole/designs" / name
@@ -159,14 +164,14 @@ def test_an_optimisation_broken_off_goes_on_from_its_checkpoint_to_the_same_byte
 def test_a_fresh_run_takes_no_checkpoint_up(file, tmp_path):
     case = load_case(file, ["optimise.evaluations=8"])
 
-    def stop(stage, text):
-        if text.startswith("evaluation 4/"):
+    def stop(event):
+        if event.text.startswith("evaluation 4/"):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         run_case(case, tmp_path, until="optimise", report=stop)
     lines = []
-    run_case(case, tmp_path, until="optimise", fresh=True, report=lambda stage, text: lines.append(text))
+    run_case(case, tmp_path, until="optimise", fresh=True, report=lambda event: lines.append(event.text))
     assert not any(line.startswith("going on") for line in lines)
 
 

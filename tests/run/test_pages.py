@@ -9,7 +9,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.run.folder import read_run
-from shellform.run.pages import entry, write_report
+from shellform.run.pages import shown_run, write_report
 from tests.run.small_run import begin, finish
 
 ROOT = Path(__file__).parent.parent.parent
@@ -66,40 +66,42 @@ def test_a_design_whose_stage_was_broken_off_is_named_and_left_out(copy):
     summary = json.loads(text_of(copy / "summary.json"))
     del summary["designs"]["optimised"], summary["optimisation"]
     (copy / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
-    told = entry(read_run(copy))
-    assert told.best == "initial"
-    assert "optimised" not in told.designs
-    assert any("“optimised” is not shown" in note for note in told.notes)
+    shown = shown_run(read_run(copy))
+    assert shown.best == "initial"
+    assert "optimised" not in shown.designs
+    assert any("“optimised” is not shown" in note for note in shown.notes)
 
 
 def test_a_case_changed_after_its_designs_is_told(copy):
-    assert not any("before the last change" in note for note in entry(read_run(copy)).notes)
+    assert not any("before the last change" in note for note in shown_run(read_run(copy)).notes)
     settings = text_of(copy / "case.toml")
     (copy / "case.toml").write_text(settings.replace("polish = 20", "polish = 5"), encoding="utf-8")
     assert any(
         "optimised designs were computed before the last change" in note
-        for note in entry(read_run(copy)).notes
+        for note in shown_run(read_run(copy)).notes
     )
     (copy / "case.toml").write_text(settings.replace("radius = 0.001", "radius = 0.0011"), encoding="utf-8")
-    assert any("shown was computed before the last change" in note for note in entry(read_run(copy)).notes)
+    assert any(
+        "shown was computed before the last change" in note for note in shown_run(read_run(copy)).notes
+    )
     (copy / "case.toml").write_text(settings.replace("vault.py", "moved.py"), encoding="utf-8")
-    assert not any("before the last change" in note for note in entry(read_run(copy)).notes), (
+    assert not any("before the last change" in note for note in shown_run(read_run(copy)).notes), (
         "it can't be told without the surface"
     )
 
 
 def test_a_damaged_picture_and_one_too_many_are_named_and_the_rest_is_shown(copy):
     (copy / "figures/net-skew.png").write_bytes(b"no picture")
-    told = entry(read_run(copy))
-    assert [picture.name for picture in told.pictures] == ["deviations", "optimised-design"]
-    assert any("net-skew.png can't be read" in note for note in told.notes)
-    assert any("deviations.png is left out" in note for note in entry(read_run(copy), budget=10).notes)
+    shown = shown_run(read_run(copy))
+    assert [picture.name for picture in shown.pictures] == ["deviations", "optimised-design"]
+    assert any("net-skew.png can't be read" in note for note in shown.notes)
+    assert any("deviations.png is left out" in note for note in shown_run(read_run(copy), budget=10).notes)
 
 
 def test_a_film_is_shown_once(copy):
     for ending in ("gif", "mp4"):
         (copy / f"figures/pour-optimised-design.{ending}").write_bytes(b"film")
-    films = [picture for picture in entry(read_run(copy)).pictures if picture.name.startswith("pour")]
+    films = [picture for picture in shown_run(read_run(copy)).pictures if picture.name.startswith("pour")]
     assert [film.film for film in films] == [True]
 
 
@@ -112,7 +114,9 @@ def test_what_is_no_run_or_has_no_design_is_refused(copy, tmp_path):
     (copy / "summary.json").write_text(json.dumps(newer), encoding="utf-8")
     with pytest.raises(InputError, match="newer shellform"):
         write_report([copy])
-    (copy / "summary.json").write_text(json.dumps({"version": 1}), encoding="utf-8")
+    (copy / "summary.json").write_text(
+        json.dumps({"format": "shellform-summary", "version": 1}), encoding="utf-8"
+    )
     with pytest.raises(InputError, match=r"tells of no design|no designs yet"):
         write_report([copy])
     for file in (copy / "designs").iterdir():

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import pytest
 
@@ -19,7 +20,8 @@ from shellform.run.folder import read_run
 from shellform.study.engine import engine, sweep
 from shellform.study.front import Front
 from shellform.study.jobs import Job, work
-from shellform.study.store import Log, flat, read_table
+from shellform.study.outcome import Outcome, Row, Status, flat
+from shellform.study.store import Log, read_table
 from shellform.study.studies import run_study
 from tests.stubs import ROOT, deadly, quick, study_file
 
@@ -161,7 +163,7 @@ def test_a_design_that_kills_its_workers_is_recorded_and_the_rest_goes_on(tmp_pa
 
 def study_process(file, folder, work):
     code = (
-        "import sys\nfrom tests.study import stubs\nfrom shellform.study.studies import run_study\n"
+        "import sys\nfrom tests import stubs\nfrom shellform.study.studies import run_study\n"
         f"if __name__ == '__main__':\n    run_study({str(file)!r}, {str(folder)!r}, workers=2, work=stubs.{work})\n"
     )
     script = folder.parent / "go.py"
@@ -226,18 +228,18 @@ def test_ctrl_c_stops_a_study_with_130_and_keeps_its_table(tmp_path):
 
 def test_the_log_cuts_off_what_a_kill_left_and_refuses_damage_before_it(tmp_path):
     file = tmp_path / "results.jsonl"
-    row = {"key": "a", "status": "done", "reason": "", "values": {"x": 1}, "seconds": {}, "worker": ""}
+    row = Outcome("a", Status.DONE, values={"x": 1})
     with Log(file) as log:
-        log.add([row, {**row, "key": "b", "values": {"x": 2.5, "y": "ü"}}])
+        log.add([row, Outcome("b", Status.DONE, values={"x": 2.5, "y": "ü"})])
     whole = file.read_bytes()
     for cut in range(len(whole)):
         file.write_bytes(whole[:cut])
         with Log(file) as log:
             assert len(log) == whole[:cut].count(b"\n")
-            log.add([{**row, "key": "c"}])
+            log.add([replace(row, key="c")])
         with Log(file) as log:
             assert "c" in log
-            assert log.get("c")["values"] == {"x": 1}
+            assert log.get("c").values == {"x": 1}
     file.write_bytes(whole)
     with Log(file) as log:
         assert log.kinds == {"x": 2, "y": 3}
@@ -247,7 +249,7 @@ def test_the_log_cuts_off_what_a_kill_left_and_refuses_damage_before_it(tmp_path
 
 
 def test_a_full_disk_leaves_no_part_of_a_row(tmp_path, monkeypatch):
-    row = {"key": "a", "status": "done", "reason": "", "values": {}, "seconds": {}, "worker": ""}
+    row = Outcome("a", Status.DONE)
     with Log(tmp_path / "results.jsonl") as log:
         log.add([row])
         size = (tmp_path / "results.jsonl").stat().st_size
@@ -257,7 +259,7 @@ def test_a_full_disk_leaves_no_part_of_a_row(tmp_path, monkeypatch):
 
         monkeypatch.setattr(os, "fsync", full)
         with pytest.raises(OSError, match="No space"):
-            log.add([{**row, "key": "b"}])
+            log.add([replace(row, key="b")])
         assert "b" not in log
     assert (tmp_path / "results.jsonl").stat().st_size == size
 
@@ -334,8 +336,8 @@ def test_the_front_holds_what_nothing_beats_and_keeps_limits():
         ("none", None, 9, ["none"]),
         ("nan", float("nan"), 9, ["nan"]),
     ]:
-        assert front.add(key, {"status": "done", "a": a, "b": b}) == off
-    assert front.add("failed", {"status": "no result", "a": 0, "b": 9}) == ["failed"]
+        assert front.add(Row(key, Status.DONE, "", {"a": a, "b": b})) == off
+    assert front.add(Row("failed", Status.NO_RESULT, "", {"a": 0, "b": 9})) == ["failed"]
     assert set(front.found) == {"best", "same"}
 
 
@@ -395,7 +397,7 @@ def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(t
     assert linked
     assert all("Optimised" in (tmp_path / "out" / page).read_text() for page in linked)
     kept = read_run(tmp_path / "out/runs" / mine["key"])
-    assert kept.summary["designs"]["optimised"]["cables"] == int(mine["cables"])
+    assert kept.summary.designs["optimised"].cables == int(mine["cables"])
     # A folder that a machine left damaged when it was switched off is done anew.
     damaged = tmp_path / "out/runs" / mine["key"]
     (damaged / "net.npz").write_bytes(b"")
@@ -404,8 +406,8 @@ def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(t
         json.dumps({name: stages[name] for name in ("surface", "net", "initial")})
     )
     outcome = work(Job(mine["key"], kept.case, "optimise", str(damaged)))
-    assert outcome["status"] == "done", outcome["reason"]
-    assert outcome["summary"]["designs"]["optimised"]["cables"] == int(mine["cables"])
+    assert outcome.status is Status.DONE, outcome.reason
+    assert outcome.values["designs.optimised.cables"] == int(mine["cables"])
 
 
 def test_work_turns_whatever_happens_into_a_row(tmp_path, monkeypatch):
@@ -427,8 +429,8 @@ def test_work_turns_whatever_happens_into_a_row(tmp_path, monkeypatch):
     ]:
         monkeypatch.setattr(run, "run_case", raising(error))
         told = work(Job("k", case, "net", str(tmp_path / "r")))
-        assert told["status"] == status
-        assert words in told["reason"]
+        assert told.status == status
+        assert words in told.reason
 
 
 def test_outcomes_come_as_they_are_ready_and_jobs_are_drawn_as_they_are_needed(tmp_path, two):
@@ -458,4 +460,4 @@ def test_workers_can_be_threads_of_one_process_to_try_out_the_engine(tmp_path):
             )
             for each in batch
         ]
-    assert sorted(each["key"] for each in found) == [f"{k:032d}" for k in range(9)]
+    assert sorted(each.key for each in found) == [f"{k:032d}" for k in range(9)]

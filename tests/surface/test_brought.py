@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from shellform.records.progress import unheard
 from shellform.run.first_look import check_file, net_alone
 from tests.surface.brought import BROUGHT
 
@@ -40,8 +41,8 @@ SIZES = {  # m, of each file's shell: from its dimensions in the file's unit and
 def test_every_file_brought_is_read_at_its_true_size_in_one_piece(tmp_path, name):
     brought = BROUGHT[name]
     found = check_file(brought.make(tmp_path), brought.stated, allow_scripts=False)
-    np.testing.assert_allclose(found["size"], SIZES[name], rtol=0.01, atol=1e-9)
-    assert found["holes"] == 0
+    np.testing.assert_allclose(found.surface.size, SIZES[name], rtol=0.01, atol=1e-9)
+    assert found.surface.holes == 0
 
 
 FURTHER = {  # what the net misses, in parts of the spacing, where more than DISTANCE
@@ -62,12 +63,12 @@ def test_every_file_brought_goes_to_a_net_unattended(tmp_path, name):
         angle=brought.angle,
         gap=None,
         allow_scripts=False,
-        report=lambda stage, text: None,
-    )["net"]
+        report=unheard,
+    ).net
     net = json.loads((tmp_path / "run/net.json").read_text(encoding="utf-8"))
-    assert told["crossings"] == len(net["crossings"]) > 60
-    assert told["spacing_error_max"] < SPACING_ERROR
-    assert told["distance_max"] < FURTHER.get(name, DISTANCE) * brought.spacing
+    assert told.crossings == len(net["crossings"]) > 60
+    assert told.spacing_error_max < SPACING_ERROR
+    assert told.distance_max < FURTHER.get(name, DISTANCE) * brought.spacing
     assert not folded_cells(net)
 
 

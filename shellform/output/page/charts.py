@@ -14,7 +14,7 @@ from html import escape
 
 import numpy as np
 
-from shellform.output.page.verdict import number
+from shellform.records.words import number
 
 _WIDTH, _HEIGHT = 460, 270
 _LEFT, _RIGHT, _TOP, _BOTTOM = 52, 12, 12, 40

@@ -14,7 +14,7 @@ import base64
 import json
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -23,11 +23,16 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.output.page import charts, verdict
+from shellform.optimiser.optimum import Step
+from shellform.output.page import charts
+from shellform.output.page.answers import answers
 from shellform.output.page.embed import Picture
 from shellform.output.page.template import filled, part
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.problem.paths import deviations
+from shellform.records import words
+from shellform.records.summary import Summary, VerdictRecord
+from shellform.records.verdict import Check, asked
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 
@@ -40,13 +45,13 @@ _MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 
 
 @dataclass(frozen=True)
-class Entry:
+class ShownRun:
     """One run on the page.
 
     `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which `best` is to
-    be built; `loads` (n, 6), N; the `summary` of the run folder; rows of the `history`; `settings`, the case
-    file's text; `limit`, m, ends the colour scale; `notes` say what is missing or to be known; `files` are
-    those of the run folder.
+    be built; `loads` (n, 6), N; the run's `summary`, and `checks` and `verdict` made from it; the optimiser's
+    `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `force_max`, N, limits the
+    cables; `notes` say what is missing or to be known; `files` are those of the run folder.
     """
 
     title: str
@@ -57,12 +62,14 @@ class Entry:
     designs: Mapping[str, Design]
     states: Mapping[str, Mapping[str, State]]
     best: str
-    summary: Mapping[str, Any]
-    history: Sequence[Mapping[str, str]]
+    summary: Summary
+    checks: Sequence[Check]
+    verdict: VerdictRecord
+    history: Sequence[Step]
     settings: str
     pictures: Sequence[Picture]
     limit: float
-    bounds: verdict.Bounds
+    force_max: float
     notes: Sequence[str]
     files: Sequence[str]
 
@@ -72,87 +79,77 @@ class Entry:
         return self.shells[self.best]
 
 
-def html(entries: Sequence[Entry], versions: Mapping[str, str]) -> str:
+def html(runs: Sequence[ShownRun], versions: Mapping[str, str]) -> str:
     """The page. Raises InputError where there is no run to show."""
-    if not entries:
+    if not runs:
         raise InputError("there is no run to report", where="report", remedy="Name one or more run folders.")
-    runs = [_told(entry, number) for number, entry in enumerate(entries)]
     return filled(
         "page.html",
         {
-            "runs": runs,
-            "differences": _differences(entries),
+            "runs": [_content(run, number) for number, run in enumerate(runs)],
+            "differences": _differences(runs),
             "versions": versions,
             "gradient": ", ".join(f"rgb{colour}" for colour in VIRIDIS),
         },
         generator=GENERATOR,
         style=part("style.css"),
         script="(() => {\n" + "\n".join(part(name) for name in _SCRIPTS) + "\n})();",
-        data={"viridis": VIRIDIS, "runs": [_drawn(entry) for entry in entries]},
-        number=verdict.number,
+        data={"viridis": VIRIDIS, "runs": [_drawn(run) for run in runs]},
+        number=words.number,
     )
 
 
-def _told(entry: Entry, number: int) -> dict[str, Any]:
+def _content(run: ShownRun, number: int) -> dict[str, Any]:
     """What the template writes of a run."""
-    found = verdict.checks(entry.shells, entry.designs, entry.summary, entry.bounds)
-    failed = verdict.failed(found, entry.best)
-    rows = {name: entry.summary.get("designs", {}).get(name, {}) for name in entry.designs}
-    best = rows[entry.best]
-    optimisation = entry.summary.get("optimisation")
+    summary = run.summary
+    rows = [(name, words.design_title(name), summary.designs[name]) for name in run.designs]
+    best = summary.designs[run.best]
+    main = best.loads.get("design")
     return {
         "id": f"run{number}",
-        "title": entry.title,
-        "place": entry.place,
-        "best": entry.best,
-        "best_title": verdict.design_title(entry.best),
-        "finished": optimisation is not None,
-        "failed": failed,
-        "asked": verdict.asked(found, entry.best),
-        "answers": verdict.answers(
-            entry.shell, entry.best, entry.designs[entry.best], entry.states[entry.best], entry.summary
-        ),
-        "designs": [(name, verdict.design_title(name), row) for name, row in rows.items()],
-        "shown_first": sorted(
-            [(name, verdict.design_title(name), row) for name, row in rows.items()],
-            key=lambda each: each[0] != entry.best,
-        ),
-        "loads": [(name, verdict.load_title(name, _factor(rows, name))) for name in entry.loads],
-        "checks": found,
-        "charts": _charts(entry.history),
-        "pictures": [(picture, _caption(picture.name)) for picture in entry.pictures],
+        "title": run.title,
+        "place": run.place,
+        "best": run.best,
+        "best_title": words.design_title(run.best),
+        "finished": summary.optimisation is not None,
+        "failed": [check for check in run.checks if check.name in run.verdict.failed],
+        "asked": asked(run.checks, run.best),
+        "answers": answers(run.shell, run.best, run.designs[run.best], run.states[run.best], summary),
+        "designs": rows,
+        "shown_first": sorted(rows, key=lambda each: each[0] != run.best),
+        "loads": [(name, words.load_title(name, _factor(summary, name))) for name in run.loads],
+        "checks": run.checks,
+        "charts": _charts(run.history),
+        "pictures": [(picture, _caption(picture.name)) for picture in run.pictures],
         "notes": [
-            *entry.notes,
-            *entry.summary.get("net", {}).get("notes", []),
-            *entry.summary.get("surface", {}).get("mended", []),
+            *run.notes,
+            *(() if summary.net is None else summary.net.notes),
+            *(() if summary.surface is None else summary.surface.mended),
         ],
-        "settings": entry.settings,
-        "files": _folders(entry.files),
-        "summary": entry.summary,
-        "optimisation": optimisation,
-        "seconds": dict(
-            sorted(entry.summary.get("seconds", {}).items(), key=lambda each: each[0] == "total")
-        ),
-        "rod": label(entry.shell.rod.resized(entry.designs[entry.best].radius).section),
+        "settings": run.settings,
+        "files": _folders(run.files),
+        "model": {} if summary.model is None else asdict(summary.model),
+        "source": "" if summary.surface is None else summary.surface.source,
+        "optimisation": summary.optimisation,
+        "seconds": dict(sorted(summary.seconds.items(), key=lambda each: each[0] == "total")),
+        "rod": label(run.shell.rod.resized(run.designs[run.best].radius).section),
         "row": best,
-        "limit": 1e3 * entry.limit,
-        "beyond": best.get("loads", {}).get("design", {}).get("deviation_max", 0.0) > _BEYOND * entry.limit,
+        "limit": 1e3 * run.limit,
+        "beyond": main is not None and main.deviation_max > _BEYOND * run.limit,
     }
 
 
-def _factor(rows: Mapping[str, Any], load: str) -> float | None:
-    return next(
-        (row["loads"][load].get("factor") for row in rows.values() if load in row.get("loads", {})), None
-    )
+def _factor(summary: Summary, load: str) -> float | None:
+    return next((row.loads[load].factor for row in summary.designs.values() if load in row.loads), None)
 
 
 def _caption(name: str) -> str:
     """A file's name in words: "utilisation-optimised-design" is "Utilisation: optimised, the design load"."""
     parts = [
-        verdict.TITLES.get(part, verdict.LOADS.get(part, part.replace("_", " "))) for part in name.split("-")
+        words.TITLES.get(part, words.LOADS.get(part, part.replace("_", " "))) for part in name.split("-")
     ]
-    words = [part if k == 0 else part[:1].lower() + part[1:] for k, part in enumerate(parts)]
-    text = words[0] + (": " + ", ".join(words[1:]) if len(words) > 1 else "")
+    said = [part if k == 0 else part[:1].lower() + part[1:] for k, part in enumerate(parts)]
+    text = said[0] + (": " + ", ".join(said[1:]) if len(said) > 1 else "")
     return text[:1].upper() + text[1:]
 
 
@@ -165,41 +162,33 @@ def _folders(files: Sequence[str]) -> dict[str, list[str]]:
     return found
 
 
-def _charts(history: Sequence[Mapping[str, str]]) -> list[charts.Chart]:
+def _charts(history: Sequence[Step]) -> list[charts.Chart]:
     """Objective and terms, constraints, and the number of cables at each accepted design."""
-    rows = [row for row in history if row.get("accepted", "1") == "1"]
-    if not rows:
+    steps = [step for step in history if step.accepted]
+    if not steps:
         return []
-
-    def column(name: str) -> list[float]:
-        try:
-            return [float(row[name]) for row in rows]
-        except (KeyError, TypeError, ValueError):
-            return [float("nan")] * len(rows)
-
-    at = column("evaluation")
-    if not np.isfinite(at).all():
-        return []
-    terms = {"objective": column("objective")}
-    terms |= {name[5:].replace("_", " "): column(name) for name in rows[0] if name.startswith("term.")}
+    at = [float(step.evaluation) for step in steps]
+    terms = {"objective": [step.objective for step in steps]}
+    terms |= {name.replace("_", " "): [step.terms[name] for step in steps] for name in steps[0].terms}
     limits = {
-        verdict.constraint_title(name[11:])[11:]: column(name)
-        for name in rows[0]
-        if name.startswith("constraint.")
+        words.constraint_title(name): [step.constraints[name] for step in steps]
+        for name in steps[0].constraints
     }
     found = [charts.line_chart("Objective and its terms", at, terms)]
     if limits:
         title = "Constraints: value over limit, less 1 (cut at −1.5 and 1)"
         found.append(charts.line_chart(title, at, limits, least=-1.5, most=1.0, limit=0.0, main=False))
-    found.append(charts.line_chart("Cables in tension", at, {"cables": column("cables")}))
+    found.append(
+        charts.line_chart("Cables in tension", at, {"cables": [float(step.cables) for step in steps]})
+    )
     return found
 
 
-def _differences(entries: Sequence[Entry]) -> list[tuple[str, list[str]]]:
+def _differences(runs: Sequence[ShownRun]) -> list[tuple[str, list[str]]]:
     """Settings by name that are not the same in all runs, with each run's value ("–": not set)."""
-    if len(entries) < 2:
+    if len(runs) < 2:
         return []
-    flat = [_flat(tomllib.loads(entry.settings)) for entry in entries]
+    flat = [_flat(tomllib.loads(run.settings)) for run in runs]
     names = list(dict.fromkeys(name for each in flat for name in each))
     rows = [(name, [each.get(name, "–") for each in flat]) for name in names]
     return [(name, values) for name, values in rows if len(set(values)) > 1]
@@ -216,22 +205,21 @@ def _flat(table: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
     return found
 
 
-def _drawn(entry: Entry) -> dict[str, Any]:
+def _drawn(run: ShownRun) -> dict[str, Any]:
     """What the view and the tables are made from: lengths in mm but for positions, which are in m from the
     `middle`; forces in N."""
-    shell, grid = entry.shell, entry.shell.net.grid
+    shell, grid = run.shell, run.shell.net.grid
     place = shell.target.positions
     middle = 0.5 * (place.min(axis=0) + place.max(axis=0))
     joint_of = {int(node): k for k, pair in enumerate(grid.crossing_nodes) for node in pair}
-    vertices, triangles = _light(entry.surface)
-    rows = entry.summary.get("designs", {})
+    vertices, triangles = _light(run.surface)
     return {
-        "title": entry.title,
-        "limit": 1e3 * entry.limit,
+        "title": run.title,
+        "limit": 1e3 * run.limit,
         "radius": shell.rod.radius,
         "spacing": shell.net.spacing,
         "strength": bool(np.isfinite(shell.rod.strength)),
-        "force_max": entry.bounds.force,
+        "force_max": run.force_max,
         "target": _floats(place - middle),
         "supports": shell.net.supports.tolist(),
         "rods": [
@@ -249,19 +237,23 @@ def _drawn(entry: Entry) -> dict[str, Any]:
         },
         "surface": {"vertices": _floats(vertices - middle), "triangles": _bytes(triangles.astype("<u4"))},
         "loads": [
-            {"name": name, "title": verdict.load_title(name, _factor(rows, name)), "points": _marked(load)}
-            for name, load in entry.loads.items()
+            {
+                "name": name,
+                "title": words.load_title(name, _factor(run.summary, name)),
+                "points": _marked(load),
+            }
+            for name, load in run.loads.items()
         ],
-        "designs": [_design(entry, name) for name in entry.designs],
-        "best": list(entry.designs).index(entry.best),
+        "designs": [_design(run, name) for name in run.designs],
+        "best": list(run.designs).index(run.best),
     }
 
 
-def _design(entry: Entry, name: str) -> dict[str, Any]:
-    shell, design = entry.shells[name], entry.designs[name]
+def _design(run: ShownRun, name: str) -> dict[str, Any]:
+    shell, design = run.shells[name], run.designs[name]
     cables = shell.cables(design)
     states = {}
-    for load, state in entry.states[name].items():
+    for load, state in run.states[name].items():
         use = _utilisation(shell, design, state)
         away = deviations(shell, state)
         states[load] = {
@@ -276,7 +268,7 @@ def _design(entry: Entry, name: str) -> dict[str, Any]:
         }
     return {
         "name": name,
-        "title": verdict.design_title(name),
+        "title": words.design_title(name),
         "radius": design.radius,
         "cables": np.flatnonzero(design.present).tolist(),
         "rest": np.round(1e3 * cables.rest_length, 4).tolist(),

@@ -9,6 +9,7 @@ refuses every script but its own and every request.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -28,14 +29,26 @@ _SEGMENTS = 1500  # of a thumbnail
 
 
 @dataclass(frozen=True)
-class Sheet:
-    """What the page tells: rows with number, key, status, reason and `columns`, of which `varied` were given
-    and `goals` are to be small (1) or large (-1); the keys on the `front`, of which `best` have a card; by
-    key, `links` to pages and `pictures` (SVG); counts of `designs` done and failed; rank `correlation`; and
-    `notes`."""
+class StudyRow:
+    """A design in the table: its `number`, `key`, whether it is `done`, `status` and `reason` in words, and
+    its `columns` by name."""
+
+    number: int
+    key: str
+    done: bool
+    status: str
+    reason: str
+    columns: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class StudyContent:
+    """What the page says: `rows` with their columns, of which `varied` were given and `goals` are to be small
+    (1) or large (-1); the keys on the `front`, of which `best` have a card; by key, `links` to pages and
+    `pictures` (SVG); counts of `designs` done and failed; rank `correlation`; and `notes`."""
 
     title: str
-    rows: Sequence[Mapping[str, Any]]
+    rows: Sequence[StudyRow]
     varied: Sequence[str]
     found: Sequence[str]
     goals: Mapping[str, float]
@@ -48,44 +61,38 @@ class Sheet:
     notes: Sequence[str]
 
 
-def study_page(sheet: Sheet) -> str:
+def study_page(study: StudyContent) -> str:
     """The page's text."""
-    names = [*sheet.varied, *sheet.found]
-    front = set(sheet.front)
+    names = [*study.varied, *study.found]
+    front = set(study.front)
     drawn = [
-        [row["number"], int(row["key"] in front), *(_number(row.get(name)) for name in names)]
-        for row in sheet.rows
-        if row["status"] == "done"
+        [row.number, int(row.key in front), *(_number(row.columns.get(name)) for name in names)]
+        for row in study.rows
+        if row.done
     ]
     data = {
         "names": names,
-        "varied": len(sheet.varied),
-        "goals": [name for name in sheet.goals if name in names],
+        "varied": len(study.varied),
+        "goals": [name for name in study.goals if name in names],
         "rows": drawn,
-        "links": {
-            str(row["number"]): sheet.links[row["key"]] for row in sheet.rows if row["key"] in sheet.links
-        },
+        "links": {str(row.number): study.links[row.key] for row in study.rows if row.key in study.links},
     }
-    shown = {row["key"]: row for row in reversed(sheet.rows)}
-    failed: dict[str, int] = {}
-    for row in sheet.rows:
-        if row["status"] != "done":
-            words = f"{row['status']}: {row['reason']}"
-            failed[words] = failed.get(words, 0) + 1
+    shown = {row.key: row for row in reversed(study.rows)}
+    failed = Counter(f"{row.status}: {row.reason}" for row in study.rows if not row.done)
     return filled(
         "study.html",
         {
-            "sheet": sheet,
-            "cards": [shown[key] for key in sheet.best if key in shown],
+            "study": study,
+            "cards": [shown[key] for key in study.best if key in shown],
             "names": names,
-            "failed": sorted(failed.items(), key=lambda each: -each[1])[:20],
+            "failed": failed.most_common(20),
             "shade": _shade,
         },
         generator="shellform study",
         style=part("study.css"),
         script=part("study.js"),
         data=data,
-        number=told,
+        number=number_text,
     )
 
 
@@ -155,8 +162,8 @@ def thumbnail(shell: Gridshell, state: State, limit: float, *, width: int = 240)
     for k, colour in enumerate(_COLOURS):
         lines = points[ends[shade == k]]
         if len(lines):
-            told_lines = "".join(f"M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}" for a, b in lines)
-            paths.append(f'<path stroke="{colour}" d="{told_lines}"/>')
+            path = "".join(f"M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}" for a, b in lines)
+            paths.append(f'<path stroke="{colour}" d="{path}"/>')
     head = f'<svg viewBox="0 0 {width} {height:.0f}" role="img" fill="none" stroke-width="1.6" stroke-linecap="round">'
     return f"{head}<title>{1e3 * float(away.max()):.1f} mm off at most</title>{''.join(paths)}</svg>"
 
@@ -170,7 +177,7 @@ def _slanted(positions: Reals) -> Reals:
     return np.column_stack([across, math.sin(tilt) * along + math.cos(tilt) * z])
 
 
-def told(value: Any) -> str:
+def number_text(value: Any) -> str:
     """A number at four digits; a dash where there is none."""
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "–"

@@ -25,7 +25,7 @@ def part(name: str) -> str:
 
 def filled(
     name: str,
-    told: Mapping[str, Any],
+    content: Mapping[str, Any],
     *,
     generator: str,
     style: str,
@@ -33,7 +33,7 @@ def filled(
     data: Mapping[str, Any],
     number: Callable[..., str],
 ) -> str:
-    """The page `name` with what the template is `told` and the `data` that the script draws; `number` writes
+    """The page `name` with its `content` and the `data` that the script draws; `number` writes
     numbers, in the template as a filter. `generator` is the name in the head by which the page is known
     again."""
     environment = Environment(
@@ -51,4 +51,4 @@ def filled(
         "script_hash": base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
         "data": json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
     }
-    return environment.get_template(name).render({**told, **shared})
+    return environment.get_template(name).render({**content, **shared})

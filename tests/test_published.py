@@ -9,12 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from scripts import published
 from shellform.case.case import load_case
 from shellform.errors import InputError
-from shellform.run import published
+from shellform.optimiser.optimum import Step
+from shellform.records.history import write_history
+from shellform.records.summary import DesignRecord, Summary
 from shellform.run.folder import Run
+from tests.records.made import MODEL, NET, SURFACE, load, optimisation
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 NODES = 1539
 
 
@@ -75,63 +79,59 @@ def made(folder, shell, vault, *, radius=False, cables=119, misfit=3e-4):
     away = {"none": 1.0, "design": 1.0, "additional": 2.0}
 
     def design(count, size, unloaded, snaps=False):
-        return {
-            "cables": count,
-            "rod_radius": 0.0012 if radius else 0.001,
-            "cable_force_sum": 2.0 * count,
-            "loads": {
-                load: {
-                    "deviation_max": 3e-3 * size,
-                    "deviation_mean": 1e-3 * size,
-                    "deviation_rms": (unloaded if load == "none" else size) * scale * np.sqrt(misfit / NODES),
-                    "on_branch": not snaps,
-                }
-                for load, scale in away.items()
+        return DesignRecord(
+            cables=count,
+            rod_radius=0.0012 if radius else 0.001,
+            cable_force_sum=2.0 * count,
+            cable_force_max=2.0,
+            loads={
+                name: load(
+                    name,
+                    deviation_max=3e-3 * size,
+                    deviation_mean=1e-3 * size,
+                    deviation_rms=(unloaded if name == "none" else size) * scale * np.sqrt(misfit / NODES),
+                    on_branch=not snaps,
+                )
+                for name, scale in away.items()
             },
-        }
-
-    summary = {
-        "surface": {"size": [0.9, 0.55, 0.21]},
-        "net": {"rod_radius_max": 0.00143},
-        "model": {"nodes": NODES},
-        "designs": {
-            "unbraced": design(0, 100.0, 5.0, snaps=True),
-            "initial": design(290, 5.0, 1.0),
-            "unloaded": design(280, 6.0, 0.1),
-            "optimised": design(cables, 1.0, 3.0),
-            "polished": design(cables, 0.5, 3.0),
-        },
-        "optimisation": {
-            "objective_end": 0.2,
-            "iterations": 1,
-            "constraints": {"misfit.additional": -0.005, "cable_force": -0.5},
-        },
-    }
-    folder.mkdir(exist_ok=True)
-    terms = ["term.misfit", "term.cable_force", *(["term.rod_radius"] if radius else [])]
-    limits = ["constraint.cable_force", "constraint.misfit.additional"]
-    (folder / "history.csv").write_text(
-        "\n".join(
-            [
-                ",".join(["evaluation", "accepted", "objective", *terms, *limits, "cables"]),
-                ",".join(
-                    [
-                        "0",
-                        "1",
-                        "1.0",
-                        *(["0.6", "0.2", "0.2"] if radius else ["0.7", "0.3"]),
-                        "-0.7",
-                        "23.4",
-                        "290",
-                    ]
-                ),
-                ",".join(["1", "0", "9.0", *(["3.0"] * len(terms)), "9.0", "9.0", "290"]),
-                ",".join(["2", "1", "0.2", *(["0.1"] * len(terms)), "-0.6", "-0.5", str(cables)]),
-            ]
         )
+
+    designs = {
+        "unbraced": design(0, 100.0, 5.0, snaps=True),
+        "initial": design(290, 5.0, 1.0),
+        "unloaded": design(280, 6.0, 0.1),
+        "optimised": design(cables, 1.0, 3.0),
+        "polished": design(cables, 0.5, 3.0),
+    }
+    constraints = {"misfit.additional": -0.005, "cable_force": -0.5}
+    summary = Summary(
+        surface=SURFACE,
+        net=NET,
+        model=MODEL,
+        designs=designs,
+        optimisation=optimisation(constraints, objective_end=0.2),
+    )
+    folder.mkdir(exist_ok=True)
+    shares = (
+        {"misfit": 0.6, "cable_force": 0.2, "rod_radius": 0.2}
+        if radius
+        else {"misfit": 0.7, "cable_force": 0.3}
+    )
+
+    def step(number, accepted, objective, terms, force, rms, count):
+        limits = {"cable_force": force, "misfit.additional": rms}
+        return Step(number, objective, terms, limits, count, 1.0, accepted, 0.1 * number)
+
+    write_history(
+        folder,
+        [
+            step(0, True, 1.0, shares, -0.7, 23.4, 290),
+            step(1, False, 9.0, dict.fromkeys(shares, 3.0), 9.0, 9.0, 290),
+            step(2, True, 0.2, dict.fromkeys(shares, 0.1), -0.6, -0.5, cables),
+        ],
     )
     case = load_case(ROOT / "scripts" / ("scale_model_radius.toml" if radius else "scale_model.toml"))
-    return Run(folder, case, vault, shell, {}, dict.fromkeys(summary["designs"]), {}, summary)
+    return Run(folder, case, vault, shell, {}, dict.fromkeys(designs), {}, summary)
 
 
 def test_what_the_case_files_put_in_is_what_the_paper_puts_in(tmp_path, shell, vault):

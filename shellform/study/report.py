@@ -4,15 +4,25 @@ their own to be linked to.
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from shellform.errors import InputError
-from shellform.output.page.study_page import Sheet, chosen, rank_correlations, spread, study_page, thumbnail
+from shellform.output.page.study_page import (
+    StudyContent,
+    StudyRow,
+    chosen,
+    rank_correlations,
+    spread,
+    study_page,
+    thumbnail,
+)
 from shellform.problem.paths import deviations
 from shellform.run.folder import read_run
 from shellform.run.pages import FILE, write_page
 from shellform.study.front import Front, signed
+from shellform.study.outcome import Row, Status
 from shellform.study.plan import Plan
 from shellform.study.store import read_table
 from shellform.written import write_text
@@ -33,9 +43,10 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
     signs = signed(entry.objective)
     front = Front(signs, entry.limit)
     first: dict[str, int] = {}
-    done = [k for k in range(count) if columns["status"][k] == "done"]
+    done = [k for k in range(count) if columns["status"][k] == Status.DONE]
     for k in done:
-        front.add(columns["key"][k], {"status": "done", **{name: columns[name][k] for name in entry.column}})
+        key = columns["key"][k]
+        front.add(Row(key, Status.DONE, "", {name: columns[name][k] for name in entry.column}))
         first.setdefault(columns["key"][k], k)
     ordered = sorted(front.found, key=lambda key: (front.found[key], key))
     rows = chosen(count, [first[key] for key in ordered])
@@ -52,9 +63,9 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
         notes.append(
             f"Pictures: distance from the target under the design load, from 0 (dark) to {1e3 * limit:.3g} mm (yellow)."
         )
-    sheet = Sheet(
+    content = StudyContent(
         title=entry.title or f"Study of {entry.case}",
-        rows=[{name: values[k] for name, values in columns.items()} for k in rows],
+        rows=[_row(columns, k, [*own, *entry.column]) for k in rows],
         varied=own,
         found=list(entry.column),
         goals=signs,
@@ -69,8 +80,15 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
         ),
         notes=notes,
     )
-    write_text(folder / "study.html", study_page(sheet))
+    write_text(folder / "study.html", study_page(content))
     return folder / "study.html"
+
+
+def _row(columns: Mapping[str, Sequence[Any]], k: int, names: Sequence[str]) -> StudyRow:
+    """A row of the table."""
+    number, key, status, reason = (columns[name][k] for name in ("number", "key", "status", "reason"))
+    values = {name: columns[name][k] for name in names}
+    return StudyRow(number, key, status == Status.DONE, status, reason, values)
 
 
 def _link(folder: Path, key: str) -> str:

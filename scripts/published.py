@@ -8,8 +8,6 @@ paper's surface is not public), or not at all ("none").
 
 from __future__ import annotations
 
-import csv
-import io
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +17,11 @@ from typing import Any
 from shellform.case.case import LoadEntry
 from shellform.errors import InputError
 from shellform.gridshell.loads import pressure
+from shellform.optimiser.optimum import Step
+from shellform.records.history import read_history
+from shellform.records.summary import DesignRecord
 from shellform.run.folder import Run
+from shellform.tables import Table, table_text
 from shellform.written import write_text
 
 STUDIES = ("fixed", "radius")
@@ -91,90 +93,93 @@ def beside(run: Run, *, fixed: Run | None = None) -> list[Line]:
 def quantities(run: Run) -> dict[str, Value]:
     """What the run says, by the keys and in the units of published.toml."""
     summary, steps = run.summary, history(run)
-    if "optimised" not in run.designs or not steps:
+    optimisation, net, surface, model = summary.optimisation, summary.net, summary.surface, summary.model
+    if "optimised" not in run.designs or not steps or not (optimisation and net and surface and model):
         raise InputError(
             "the run isn't finished",
             where=str(run.folder),
             remedy="Run shellform design on it without --until.",
         )
-    designs, start = summary["designs"], steps[0]
+    designs, start = summary.designs, steps[0]
     first, best = designs["initial"], designs["optimised"]
-    nodes = summary["model"]["nodes"]
-    misfits = [nodes * each["loads"]["design"]["deviation_rms"] ** 2 for each in (first, best)]
-    limits = summary["optimisation"]["constraints"]
+    misfits = [model.nodes * each.loads["design"].deviation_rms ** 2 for each in (first, best)]
     # The second term of the objective at the start is its share, and so on.
-    shares = [start["term.misfit"], start["term.cable_force"], start.get("term.rod_radius", 0.0)]
+    shares = [start.terms.get(name, 0.0) for name in ("misfit", "cable_force", "rod_radius")]
     found: dict[str, Value] = {
         **_inputs(run),
-        "length": summary["surface"]["size"][0],
-        "width": summary["surface"]["size"][1],
-        "height": summary["surface"]["size"][2],
-        "radius_max": 1e3 * summary["net"]["rod_radius_max"],
-        "nodes": nodes,
-        "cables_start": first["cables"],
-        "iterations": summary["optimisation"]["iterations"],
+        "length": surface.size[0],
+        "width": surface.size[1],
+        "height": surface.size[2],
+        "radius_max": None if net.rod_radius_max is None else 1e3 * net.rod_radius_max,
+        "nodes": model.nodes,
+        "cables_start": first.cables,
+        "iterations": optimisation.iterations,
         "misfit_weight": shares[0] / misfits[0],
-        "force_weight": shares[1] / first["cable_force_sum"],
-        "radius_weight": shares[2] / first["rod_radius"],
+        "force_weight": shares[1] / first.cable_force_sum,
+        "radius_weight": shares[2] / first.rod_radius,
         "misfit_start": misfits[0],
         "misfit_end": misfits[1],
-        "force_start": first["cable_force_sum"],
-        "force_end": best["cable_force_sum"],
-        "radius_start": 1e3 * first["rod_radius"],
-        "radius_end": 1e3 * best["rod_radius"],
-        "objective_start": start["objective"],
-        "objective_end": summary["optimisation"]["objective_end"],
-        "cables_end": best["cables"],
+        "force_start": first.cable_force_sum,
+        "force_end": best.cable_force_sum,
+        "radius_start": 1e3 * first.rod_radius,
+        "radius_end": 1e3 * best.rod_radius,
+        "objective_start": start.objective,
+        "objective_end": optimisation.objective_end,
+        "cables_end": best.cables,
         "force_largest": run.case.cable.force_max
-        * (1.0 + max(step["constraint.cable_force"] for step in steps)),
-        "c1_start": start["constraint.misfit.additional"],
-        "c1_end": limits["misfit.additional"],
-        "c2_start": start["constraint.cable_force"],
-        "c2_end": limits["cable_force"],
+        * (1.0 + max(step.constraints["cable_force"] for step in steps)),
+        "c1_start": start.constraints["misfit.additional"],
+        "c1_end": optimisation.constraints["misfit.additional"],
+        "c2_start": start.constraints["cable_force"],
+        "c2_end": optimisation.constraints["cable_force"],
     }
     for name, design in designs.items():
-        for load, each in design["loads"].items():
-            for word in ("max", "mean"):
-                found[f"deviation.{name}.{load}.{word}"] = 1e3 * each[f"deviation_{word}"]
+        for load, each in design.loads.items():
+            found[f"deviation.{name}.{load}.max"] = 1e3 * each.deviation_max
+            found[f"deviation.{name}.{load}.mean"] = 1e3 * each.deviation_mean
     return {**found, **_relations(designs, found)}
 
 
-def history(run: Run) -> list[dict[str, float]]:
-    """The accepted designs of history.csv, a dict of its columns each."""
-    with (run.folder / "history.csv").open(encoding="utf-8", newline="") as file:
-        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
-    return [row for row in rows if row["accepted"]]
+def history(run: Run) -> list[Step]:
+    """The accepted designs of history.csv."""
+    return [step for step in read_history(run.folder) if step.accepted]
 
 
-def table(lines: Sequence[Line]) -> str:
-    """The lines as CSV."""
-    text = io.StringIO()
-    writer = csv.writer(text)
-    writer.writerow(["key", "quantity", "unit", "here", "paper", "compare", "source", "note"])
-    for line in lines:
-        here, published = ("" if value is None else value for value in (line.here, line.paper))
-        writer.writerow(
-            [line.key, line.quantity, line.unit, here, published, line.compare, line.source, line.note]
+def table(lines: Sequence[Line]) -> Table:
+    """The lines as a table."""
+    heads = ("key", "quantity", "unit", "here", "paper", "compare", "source", "note")
+    rows = tuple(
+        (
+            line.key,
+            line.quantity,
+            line.unit,
+            *map(_exact, (line.here, line.paper)),
+            line.compare,
+            line.source,
+            line.note,
         )
-    return text.getvalue()
+        for line in lines
+    )
+    return Table("published", heads, rows)
+
+
+def _exact(value: Value) -> str | None:
+    """A number with all its digits."""
+    return None if value is None else str(value)
 
 
 def page(run: Run, lines: Sequence[Line]) -> str:
     """The lines and the run's history as Markdown."""
     rows = [
-        f"| {line.quantity} | {_told(line.here)} | {_told(line.paper, digits=4)} | {line.unit} | {_SAYS[line.compare]} "
+        f"| {line.quantity} | {_number_text(line.here)} | {_number_text(line.paper, digits=4)} | {line.unit} | {_SAYS[line.compare]} "
         f"| {line.source} | {line.note} |"
         for line in lines
     ]
-    columns = [name for name in history(run)[0] if name not in ("accepted", "seconds", "stage")]
-    steps = [
-        "| "
-        + " | ".join(
-            _told(int(step[name]) if name in ("evaluation", "cables") else step[name]) for name in columns
-        )
-        + " |"
-        for step in history(run)
-    ]
+    first = history(run)[0]
+    terms, constraints = list(first.terms), list(first.constraints)
+    names = [*(f"term.{name}" for name in terms), *(f"constraint.{name}" for name in constraints)]
+    columns = ["evaluation", "objective", *names, "cables"]
+    steps = [_line(step, terms, constraints) for step in history(run)]
     return "\n".join(
         [
             f"# {_TITLES[study_of(run)]}",
@@ -197,11 +202,22 @@ def page(run: Run, lines: Sequence[Line]) -> str:
     )
 
 
+def _line(step: Step, terms: Sequence[str], constraints: Sequence[str]) -> str:
+    """An accepted design in the table."""
+    values = [
+        step.objective,
+        *(step.terms[name] for name in terms),
+        *(step.constraints[name] for name in constraints),
+    ]
+    cells = [str(step.evaluation), *(_number_text(value) for value in values), str(step.cables)]
+    return f"| {' | '.join(cells)} |"
+
+
 def write_beside(run: Run, *, fixed: Run | None = None) -> list[Path]:
     """Writes published.md and published.csv into the run's folder; returns them."""
     lines = beside(run, fixed=fixed)
     files = [run.folder / "published.md", run.folder / "published.csv"]
-    for file, text in zip(files, (page(run, lines), table(lines)), strict=True):
+    for file, text in zip(files, (page(run, lines), table_text(table(lines))), strict=True):
         write_text(file, text)
     return files
 
@@ -232,19 +248,19 @@ def _inputs(run: Run) -> dict[str, Value]:
     }
 
 
-def _relations(designs: Mapping[str, Any], values: Mapping[str, Value]) -> dict[str, Value]:
+def _relations(designs: Mapping[str, DesignRecord], values: Mapping[str, Value]) -> dict[str, Value]:
     """What the paper says of its designs that should hold on any shape, "yes" or "no"; left out where a
     design was not made.
     """
 
     def away(name: str, load: str) -> float:
-        return float(designs[name]["loads"][load]["deviation_rms"])
+        return designs[name].loads[load].deviation_rms
 
     braced = [name for name in ("initial", "unloaded") if name in designs]
-    found = {"half_vanish": designs["optimised"]["cables"] < 0.5 * designs["initial"]["cables"]}
+    found = {"half_vanish": designs["optimised"].cables < 0.5 * designs["initial"].cables}
     found["c1_active"] = abs(_number(values["c1_end"])) < _ACTIVE <= abs(_number(values["c2_end"]))
     if "unbraced" in designs:
-        found["unbraced_snaps"] = not designs["unbraced"]["loads"]["design"]["on_branch"]
+        found["unbraced_snaps"] = not designs["unbraced"].loads["design"].on_branch
     if "unloaded" in designs:
         found["unloaded_fits_best"] = all(
             away("unloaded", "none") < away(name, "none") for name in designs if name != "unloaded"
@@ -259,10 +275,11 @@ def _relations(designs: Mapping[str, Any], values: Mapping[str, Value]) -> dict[
 
 def _beyond(run: Run, values: Mapping[str, Value]) -> list[Line]:
     """The polished design, which the paper doesn't have."""
-    if "polished" not in run.summary["designs"]:
+    polished = run.summary.designs.get("polished")
+    if polished is None:
         return []
-    lines = [
-        ("cables_polished", "cables of the polished design", run.summary["designs"]["polished"]["cables"], "")
+    lines: list[tuple[str, str, Value, str]] = [
+        ("cables_polished", "cables of the polished design", polished.cables, "")
     ]
     for load in ("none", "design", "additional"):
         for word, said in (("max", "largest"), ("mean", "mean")):
@@ -288,7 +305,7 @@ def _number(value: Value) -> float:
     return value
 
 
-def _told(value: Value, digits: int = 3) -> str:
+def _number_text(value: Value, digits: int = 3) -> str:
     """Numbers with so many digits, a dash for what is not known."""
     if value is None:
         return "–"

@@ -1,0 +1,103 @@
+"""`shellform analyse`: any structural model solved."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from shellform.cli.terminal import Progress
+from shellform.errors import InputError, NotConverged
+
+
+def analyse(
+    model: Annotated[Path, typer.Argument(help="Model file (JSON).")],
+    load: Annotated[str | None, typer.Option(help="Load case.")] = None,
+    factor: Annotated[float, typer.Option(help="Load factor.")] = 1.0,
+    increments: Annotated[int, typer.Option(help="Equal increments.")] = 1,
+    tolerance: Annotated[float, typer.Option(help="Unbalanced over largest force.")] = 1e-8,
+    output: Annotated[Path | None, typer.Option(help="Result file; left out: standard output.")] = None,
+    method: Annotated[str, typer.Option(help="relaxation or newton.")] = "relaxation",
+    path: Annotated[
+        bool, typer.Option("--path", help="Follow the path through limit points by its length.")
+    ] = False,
+    lead: Annotated[
+        str | None,
+        typer.Option(help="NODE:AXIS:METRES, a free displacement that leads the path (axis x, y or z)."),
+    ] = None,
+    limit: Annotated[int, typer.Option(help="Most factorisations of one relaxation.")] = 1000,
+    modes: Annotated[int, typer.Option(help="How many of the softest modes.")] = 0,
+    critical: Annotated[
+        float | None, typer.Option(help="Seek the critical load factor up to this one.")
+    ] = None,
+    sections: Annotated[
+        Path | None, typer.Option(help="Sections by kind of beam (TOML), for stresses.")
+    ] = None,
+    figures: Annotated[
+        Path | None, typer.Option(help="Folder for pictures of the state and the modes.")
+    ] = None,
+) -> None:
+    """Solve a structural model."""
+    from shellform.records.progress import Event
+    from shellform.structure.answers.analysis import analyse as solve
+    from shellform.structure.answers.result_document import result
+    from shellform.structure.answers.results import read_sections
+    from shellform.structure.model import read_model
+    from shellform.structure.solve.memory import limit_to_free_memory
+
+    report = Progress()
+    try:
+        if figures is None:  # pictures ask the graphics driver for memory on terms of its own
+            limit_to_free_memory()
+        known = read_sections(sections) if sections is not None else None
+        analysis = solve(
+            read_model(model),
+            load=load,
+            factor=factor,
+            increments=increments,
+            tolerance=tolerance,
+            method="path" if path or lead else method,
+            lead=_lead(lead) if lead else None,
+            limit=limit,
+            mode_count=modes,
+            critical_to=critical,
+            progress=lambda reached, spent: report(
+                Event("analysis", f"load factor {reached:.4g}, {spent} factorisations")
+            ),
+        )
+        document = result(analysis, sections=known)
+    finally:
+        report.close()
+    for warning in analysis.warnings:
+        print(f"shellform: note: {warning}", file=sys.stderr)
+    text = json.dumps(document, default=_no_number, allow_nan=False)
+    if output is None:
+        print(text)
+    else:
+        from shellform.written import write_text
+
+        write_text(output, text)
+    if figures is not None:
+        from shellform.output.pictures.model_states import draw_analysis
+
+        for file in draw_analysis(analysis, figures):
+            print(file, file=sys.stderr)
+    if not analysis.converged:
+        raise NotConverged(analysis.message)
+
+
+def _lead(text: str) -> tuple[int, int, float]:
+    try:
+        node, axis, metres = text.split(":")
+        return int(node), "xyz".index(axis), float(metres)
+    except ValueError as error:
+        raise InputError(
+            "must read NODE:AXIS:METRES", where="--lead", value=text, remedy="For example 17:z:-0.05."
+        ) from error
+
+
+def _no_number(value: object) -> Any:
+    raise TypeError(f"can't be written as JSON: {type(value).__name__}")

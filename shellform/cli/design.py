@@ -1,0 +1,51 @@
+"""`shellform design`: the whole job."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shellform.cli.options import Json, Quiet, Scripts
+from shellform.cli.terminal import Progress, tell_designs
+
+
+def design(
+    case: Annotated[Path, typer.Argument(help="Case file (TOML).")],
+    output: Annotated[Path, typer.Option(help="Run folder.")],
+    until: Annotated[
+        str, typer.Option(help="Last stage: surface, net, initial, optimise, figures, documents or report.")
+    ] = "report",
+    fresh: Annotated[bool, typer.Option("--fresh", help="Compute every stage anew.")] = False,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", help="KEY=VALUE in place of an entry.")
+    ] = None,
+    allow_scripts: Scripts = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Run the whole job; run again, it goes on where it stopped."""
+    from shellform.case.case import load_case
+    from shellform.records.summary import document
+    from shellform.run.run import run_case
+
+    report = Progress(quiet=quiet)
+    summary = run_case(
+        load_case(case, settings or ()),
+        output,
+        until=until,
+        fresh=fresh,
+        allow_scripts=allow_scripts,
+        report=report,
+    )
+    report.close()
+    if as_json:
+        print(json.dumps(document(summary), indent=1))
+    elif not quiet:
+        tell_designs(summary)
+        print(
+            f"Everything is in {output}"
+            + (f"; look at {output / 'report.html'} first" if until == "report" else "")
+        )

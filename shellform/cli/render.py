@@ -1,0 +1,60 @@
+"""`shellform render`: maps and films of a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from shellform.cli.options import Quiet
+from shellform.cli.terminal import Progress
+
+
+def render(
+    run: Annotated[Path, typer.Argument(help="Run folder.")],
+    load: Annotated[
+        str | None, typer.Option(help="none, design, additional or another of the case's.")
+    ] = None,
+    design: Annotated[
+        str | None, typer.Option(help="unbraced, initial, unloaded, optimised, rounded or polished.")
+    ] = None,
+    quantity: Annotated[
+        str | None,
+        typer.Option(help="deviation, utilisation, curvature, shear, spring, mode (the softest) or history."),
+    ] = None,
+    limit: Annotated[
+        float | None, typer.Option(help="End of the colour scale, in SI units; shear in rad.")
+    ] = None,
+    view: Annotated[str, typer.Option(help="best, top, front or side.")] = "best",
+    size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels.")] = None,
+    rods: Annotated[
+        float, typer.Option(help="Rods so many times as thick as they are; 0: as thick as can be seen.")
+    ] = 0.0,
+    kind: Annotated[
+        str | None, typer.Option("--format", help="png, svg or pdf; of films gif or mp4 (default: both).")
+    ] = None,
+    transparent: Annotated[bool, typer.Option("--transparent", help="No background.")] = False,
+    film: Annotated[
+        str | None, typer.Option(help="pour: the load coming on; erection: the grid rising from the ground.")
+    ] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Draw maps of a run, or a film."""
+    from shellform.run.figures import draw_designs, wish
+    from shellform.run.folder import read_run
+
+    asked = wish(
+        design=design, load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods, transparent=transparent,
+        kind=kind, film=film,
+    )  # fmt: skip
+    if film is None:
+        files = draw_designs(read_run(run), asked)
+    else:
+        from shellform.run.films import draw_film
+
+        report = Progress(quiet=quiet)
+        files = draw_film(read_run(run), film, asked, report=report)
+        report.close()
+    for file in () if quiet else files:
+        print(file)

@@ -1,0 +1,118 @@
+"""The answers to what a designer asks first, of the design to build: how far off, how many cables, which
+rods, is it safe, what to buy.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.gridshell.catalogue import label
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.records.summary import LoadRecord, Summary
+from shellform.records.verdict import SLACK
+from shellform.records.words import number
+from shellform.structure.elements.sections import mass_per_length
+from shellform.structure.elements.state import State
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a designer asks first: the `question`, the answer in a few `words`, the `detail` that stands behind it, and if it
+    is `good` (None: neither)."""
+
+    question: str
+    words: str
+    detail: str
+    good: bool | None = None
+
+
+def answers(
+    shell: Gridshell, name: str, design: Design, states: Mapping[str, State], summary: Summary
+) -> list[Answer]:
+    """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the
+    design to build."""
+    row = summary.designs.get(name)
+    main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
+    found = [] if main is None else [_how_far(main)]
+    cables = shell.cables(design)
+    pull = cables.tension(states["design"]) if "design" in states else np.zeros(len(cables.ends))
+    found.append(
+        Answer(
+            "How many cables?",
+            f"{len(cables.ends)} of {len(shell.cable_ends)}",
+            f"{number(float(pull.max(initial=0.0)))} N at most in one, {number(float(pull.sum()))} N in all, "
+            "under the design load",
+        )
+    )
+    section = shell.rod.resized(design.radius).section
+    rods = np.array([rod.length for rod in shell.net.grid.rods])
+    stressed = (
+        ""
+        if main is None or not math.isfinite(shell.rod.strength)
+        else f"; at {100 * main.rod_utilisation_max:.0f} % of their strength"
+    )
+    found.append(
+        Answer(
+            "Which rods?",
+            label(section),
+            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}",
+        )
+    )
+    if more is not None:
+        found.append(_is_safe(main, more, math.isfinite(shell.rod.strength)))
+    mass = mass_per_length(section) * float(rods.sum())
+    weight = f" ({number(mass)} kg)" if mass > 0.0 else ""
+    lengths = None if summary.documents is None else summary.documents.cut_lengths
+    cut = "" if lengths is None else f", cut to {lengths} different lengths"
+    found.append(
+        Answer(
+            "What to buy?",
+            f"{number(float(rods.sum()))} m of rod{weight}",
+            f"{len(rods)} rods, {len(shell.net.grid.lattice)} connectors, {len(shell.net.supports)} supports, "
+            f"{len(cables.ends)} cables of {number(float(cables.rest_length.sum()))} m in all{cut}",
+        )
+    )
+    return found
+
+
+def _how_far(main: LoadRecord) -> Answer:
+    return Answer(
+        "How far off is the shell?",
+        f"{_mm(main.deviation_max)} at most",
+        f"{_mm(main.deviation_mean)} in the mean, under the design load",
+        None if main.stable and main.on_branch else False,
+    )
+
+
+def _is_safe(main: LoadRecord | None, more: LoadRecord, strength_known: bool) -> Answer:
+    """Of the additional load."""
+    used = more.rod_utilisation_max
+    known = math.isfinite(used) and strength_known
+    if not more.stable:
+        safe, words = False, "No, it is unstable"
+    elif not more.on_branch:
+        safe, words = False, "No, it snaps through"
+    elif known and used > 1.0 + SLACK:
+        safe, words = False, "No, rods break"
+    else:
+        safe, words = True, "Yes, it stands"
+    rods = f", rods at {100.0 * used:.0f} % of their strength" if known else ""
+    off = f"{_mm(more.deviation_max)} off at most, {_mm(more.deviation_mean)} in the mean{rods}"
+    return Answer(f"Is it safe at {more.factor:.3g} × the load?", words, f"{off}. {_collapse(main)}", safe)
+
+
+def _collapse(row: LoadRecord | None) -> str:
+    """What is known of the load at which the shell loses stability, from the design load's record."""
+    if row is not None and row.critical_factor is not None:
+        return f"Stability ends at {row.critical_factor:.2f} × the design load."
+    if row is not None and row.critical_sought is not None and row.critical_kind is None:
+        return f"Stable up to {row.critical_sought:g} × the design load, the most that was tried."
+    return "At which load it collapses isn't known."
+
+
+def _mm(metres: float) -> str:
+    return f"{number(1e3 * metres, 2)} mm"

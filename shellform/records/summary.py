@@ -1,0 +1,358 @@
+"""summary.json: what a run found, as records, and the one place where the file is read and written.
+
+The keys are those of the fields below, in their order. Keys may be added, never renamed or dropped. Lengths
+in m, forces in N, angles in rad, times in s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+from shellform.errors import Damaged, InputError
+from shellform.records.files import ANEW, plain, read_record, text_of
+from shellform.written import write_text
+
+FILE = "summary.json"
+FORMAT, VERSION = "shellform-summary", 1
+
+
+@dataclass(frozen=True)
+class SurfaceRecord:
+    """The surface: `source` file, `area`, m², extents `size` (3,), m, counts of `triangles` and `holes`, and
+    what was `mended`, a sentence each."""
+
+    source: str
+    area: float
+    size: tuple[float, float, float]
+    triangles: int
+    holes: int = 0
+    mended: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class NetRecord:
+    """The net: its counts, its quality (net/quality.py), what was left out of it (`notes`, a sentence each),
+    the farthest that a rod's outermost fibre may lie from its axis (`rod_radius_max`), the curvature that the
+    rods bear, 1/m, and how much of it the net uses; `angle`, rad, and `offset` in spacings."""
+
+    spacing: float
+    crossings: int
+    rods: int
+    supports: int
+    spacing_v: float
+    distance_max: float
+    distance_mean: float
+    spacing_error_max: float
+    shear_angle_min: float
+    curvature_max: float
+    curvature_out_of_plane_max: float
+    curvature_in_plane_max: float
+    pull_max: float
+    pull_mean: float
+    uncovered_area: float
+    gaussian_curvature: float
+    factorisations: int
+    notes: tuple[str, ...] = ()
+    rod_radius_max: float | None = None
+    curvature_limit: float | None = None
+    curvature_utilisation: float | None = None
+    angle: float | None = None
+    offset: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class ModelRecord:
+    """How large the structural model is; `freedoms` are its degrees of freedom."""
+
+    nodes: int
+    beams: int
+    cables: int
+    freedoms: int
+
+
+@dataclass(frozen=True)
+class StandingRecord:
+    """Of `drawn` imperfect structures `standing` bear the load; so at least the share `at_least` of all do,
+    with `confidence`. Drawn from `seed`."""
+
+    drawn: int
+    standing: int
+    at_least: float
+    confidence: float
+    seed: int
+
+
+@dataclass(frozen=True)
+class LoadRecord:
+    """A design under one load case, `factor` times the design load.
+
+    Deviations are distances between a node and its place on the target, over all nodes. `stable`: in a stable
+    equilibrium; `on_branch`: reached without snapping through; `residual`: unbalanced over largest force.
+    Utilisations are stresses over the flexural strength, of bending alone and with axial force.
+    `critical_factor`: of this load, at which stability ends (None: not up to `critical_sought`), and
+    `critical_error` of it; `stands`: under imperfections.
+    """
+
+    factor: float
+    deviation_max: float
+    deviation_mean: float
+    deviation_rms: float
+    stable: bool
+    rod_utilisation_max: float
+    on_branch: bool = True
+    residual: float | None = None
+    stress_utilisation_max: float | None = None
+    connector_turn_max: float | None = None
+    uplift_max: float | None = None
+    cable_force_max: float | None = None
+    cable_force_min: float | None = None
+    cables_slack: int | None = None
+    critical_sought: float | None = None
+    critical_factor: float | None = field(default=None, metadata={"beside": "critical_sought"})
+    critical_factor_error: float | None = None
+    critical_kind: str | None = field(default=None, metadata={"beside": "critical_sought"})
+    stands: StandingRecord | None = None
+
+
+@dataclass(frozen=True)
+class DesignRecord:
+    """A design: its `cables`, `rod_radius`, tensions under the design load, and its `loads` by name. Of a
+    rounded one the `section`, whether it is `feasible`, `why_not`, and its `objective`; where a critical
+    factor was asked for, whether it is kept."""
+
+    cables: int
+    rod_radius: float
+    cable_force_sum: float
+    cable_force_max: float
+    loads: Mapping[str, LoadRecord]
+    section: str | None = None
+    feasible: bool | None = None
+    why_not: str | None = None
+    objective: float | None = None
+    critical_factor_kept: bool | None = None
+
+
+@dataclass(frozen=True)
+class CableCountRecord:
+    """How many cables were `asked` for at the most, how many there are, and whether the wish is `kept`."""
+
+    asked: int
+    cables: int
+    kept: bool
+
+
+@dataclass(frozen=True)
+class SymmetryRecord:
+    """The `groups` of cables that symmetry makes alike, and whether each has one length."""
+
+    groups: int
+    kept: bool
+
+
+@dataclass(frozen=True)
+class OptimisationRecord:
+    """What came of the optimisation: the objective at start and end, the work that it took, `stiffness_min`,
+    N/m, that the softest mode had to keep, its `status`, a sentence, `constraints` as value over limit less
+    1, whether the optimised design is `feasible`; why it was `not_polished`; wishes for cables."""
+
+    objective_start: float
+    objective_end: float
+    iterations: int
+    evaluations: int
+    equilibria: int
+    factorisations: int
+    status: str
+    constraints: Mapping[str, float]
+    rejected: int = 0
+    factorisations_rejected: int = 0
+    stiffness_min: float | None = None
+    feasible: bool | None = None
+    not_polished: str | None = None
+    cables_max: CableCountRecord | None = None
+    symmetric: SymmetryRecord | None = None
+
+
+@dataclass(frozen=True)
+class SectionRecord:
+    """A section of the catalogue that was tried in rounding; numbers are None where it has no design."""
+
+    section: str
+    rod_radius: float
+    rod_mass: float
+    rounded_up: bool
+    objective: float | None = field(metadata={"beside": "section"})
+    deviation_max: float | None = field(metadata={"beside": "section"})
+    deviation_mean: float | None = field(metadata={"beside": "section"})
+    cables: int | None = field(metadata={"beside": "section"})
+    stress_utilisation_max: float | None = field(metadata={"beside": "section"})
+    feasible: bool
+    why_not: str
+
+
+@dataclass(frozen=True)
+class CauseRecord:
+    """A cause of scatter: its share of the shape's scatter, and of the misfit's variance."""
+
+    shape: float
+    variance: float
+
+
+@dataclass(frozen=True)
+class SampleRecord:
+    """Drawn structures: their `count`, those `lost` without an equilibrium, and the others' misfit, m²."""
+
+    count: int
+    lost: int
+    misfit_mean: float | None = field(default=None, metadata={"beside": "count"})
+    misfit_deviation: float | None = field(default=None, metadata={"beside": "count"})
+
+
+@dataclass(frozen=True)
+class RobustRecord:
+    """What scatter does to a `design`: misfits, m², as sums over all nodes, distances, m, as root mean
+    squares a node; `wander_max`, m: the largest scatter of a node; `causes` by name."""
+
+    design: str
+    misfit: float
+    misfit_mean: float
+    misfit_deviation: float
+    deviation_rms: float
+    deviation_rms_mean: float
+    wander_max: float
+    causes: Mapping[str, CauseRecord]
+    sentences: tuple[str, ...]
+    sample: SampleRecord | None = None
+
+
+@dataclass(frozen=True)
+class DocumentsRecord:
+    """What was drawn for the workshop: the `design`, bars of `stock_length`, m, and the fewest possible, the
+    share that is `waste`, rods that are `spliced`, and to how many lengths cables are cut."""
+
+    design: str
+    stock_length: float
+    bars: int
+    bars_least: int
+    waste: float
+    spliced: tuple[int, ...]
+    notes: tuple[str, ...]
+    rest_lengths: int | None = None
+    cut_lengths: int | None = None
+
+
+@dataclass(frozen=True)
+class VerdictRecord:
+    """Whether the `design` to build `holds`: the checks that `failed`, and those that were asked for and
+    `not_examined`, by name (verdict.py)."""
+
+    design: str
+    holds: bool
+    failed: tuple[str, ...]
+    not_examined: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What a run found so far; a part is None or empty until its stage is done. `seconds` by stage, and why
+    stages `failed`."""
+
+    format: str = FORMAT
+    version: int = VERSION
+    shellform: str | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    surface: SurfaceRecord | None = None
+    net: NetRecord | None = None
+    model: ModelRecord | None = None
+    designs: Mapping[str, DesignRecord] = field(default_factory=dict, metadata={"if_any": True})
+    optimisation: OptimisationRecord | None = None
+    sections: tuple[SectionRecord, ...] | None = None
+    robust: RobustRecord | None = None
+    documents: DocumentsRecord | None = None
+    verdict: VerdictRecord | None = None
+    failed: Mapping[str, str] = field(default_factory=dict, metadata={"if_any": True})
+
+    def with_design(self, name: str, design: DesignRecord) -> Summary:
+        """With this design added, or in place of the one with its name."""
+        return replace(self, designs={**self.designs, name: design})
+
+    def without_designs(self, names: Sequence[str]) -> Summary:
+        """Without these designs, and without what is told of designs made from the optimised one."""
+        kept = {name: design for name, design in self.designs.items() if name not in names}
+        return replace(self, designs=kept, sections=None, robust=None, verdict=None)
+
+    def with_seconds(self, stage: str, spent: float) -> Summary:
+        """With the time of a stage, s."""
+        return replace(self, seconds={**self.seconds, stage: round(spent, 3)})
+
+    def totalled(self) -> Summary:
+        """With the sum of all stages' times."""
+        total = sum(spent for stage, spent in self.seconds.items() if stage != "total")
+        return replace(self, seconds={**self.seconds, "total": round(total, 3)})
+
+
+@dataclass(frozen=True)
+class _Head:
+    """What every version of the file has."""
+
+    format: str
+    version: int
+    shellform: str | None = None
+
+
+def summary_version(folder: Path) -> str:
+    """The version of shellform that wrote a folder's summary; "" where there is no summary.
+
+    Raises InputError for a file of a newer format, and for a damaged one.
+    """
+    path = folder / FILE
+    if not _is_ours(path):
+        return ""
+    head = read_record(path, _Head)
+    if head.format != FORMAT:
+        return ""
+    _refuse_newer(path, head)
+    return head.shellform or "0"
+
+
+def read_summary(folder: Path) -> Summary:
+    """The summary in a run folder; an empty one where there is none.
+
+    Raises InputError for a file of a newer format, and for a damaged one: a key missing or of another type.
+    """
+    path = folder / FILE
+    if not path.is_file():
+        return Summary()
+    head = read_record(path, _Head)
+    if head.format != FORMAT:
+        raise Damaged("is no summary of shellform's", where=str(path), value=head.format, remedy=ANEW)
+    _refuse_newer(path, head)
+    return read_record(path, Summary)
+
+
+def write_summary(folder: Path, summary: Summary) -> None:
+    """Writes summary.json whole or not at all. Raises InputError where it can't be written."""
+    write_text(folder / FILE, text_of(summary))
+
+
+def document(summary: Summary) -> dict[str, Any]:
+    """The summary as its file says it."""
+    found: dict[str, Any] = plain(summary)
+    return found
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file seems to be a summary, be it damaged: the word stands at its beginning."""
+    return path.is_file() and FORMAT.encode() in path.read_bytes()[:200]
+
+
+def _refuse_newer(path: Path, head: _Head) -> None:
+    if head.version > VERSION:
+        raise InputError(
+            "was written by a newer shellform",
+            where=str(path),
+            value=head.version,
+            remedy="Install that version.",
+        )

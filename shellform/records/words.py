@@ -1,0 +1,54 @@
+"""Numbers, load cases and designs in words, for the terminal and the page."""
+
+from __future__ import annotations
+
+import math
+
+LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
+TITLES = {
+    "unbraced": "Unbraced",
+    "initial": "Initial",
+    "unloaded": "Optimised unloaded",
+    "optimised": "Optimised",
+    "rounded": "Rounded",
+    "polished": "Polished",
+}
+_CONSTRAINTS = {
+    "cable_force": "cable forces",
+    "misfit": "misfit",
+    "robust_misfit": "misfit with scatter",
+    "softness": "stiffness of the softest mode",
+    "utilisation": "rods' stress",
+    "connector_turn": "connectors' turning",
+    "slackness": "least pull of a cable",
+    "uplift": "uplift of supports",
+}
+
+
+def load_title(name: str, factor: float | None = None) -> str:
+    """A load case in words."""
+    words = LOADS.get(name, f"“{name}”")
+    return f"{factor:.3g} × the load" if name == "additional" and factor is not None else words
+
+
+def design_title(name: str) -> str:
+    """A design in words."""
+    return TITLES.get(name, name)
+
+
+def constraint_title(name: str) -> str:
+    """A constraint of the optimiser in words: its quantity, and its load case if it has one."""
+    kind, _, load = name.partition(".")
+    words = _CONSTRAINTS.get(kind, kind.replace("_", " "))
+    return f"{words}, {load} load" if load else words
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number for people: so many digits, no exponent where it can be avoided."""
+    if not math.isfinite(value):
+        return "?"
+    if value == 0.0 or 1e-3 <= abs(value) < 1e6:
+        places = 0 if value == 0.0 else max(0, digits - 1 - math.floor(math.log10(abs(value))))
+        text = f"{value:,.{places}f}".replace(",", "\u202f")
+        return text.rstrip("0").rstrip(".") if "." in text else text
+    return f"{value:.{digits}g}"

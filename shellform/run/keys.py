@@ -1,0 +1,53 @@
+"""The keys of a run's stages: what tells whether a stage that is done is still that of the case."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cache
+from pathlib import Path
+
+import shellform
+from shellform.case.build_gridshell import catalogue_bytes
+from shellform.case.case import Case
+from shellform.records.stages import STAGES
+
+_NEEDS = {
+    "surface": ["surface"],
+    "net": ["net", "joint"],
+    "initial": ["rod", "cable", "load", "part"],
+    "optimise": ["optimise", "limits", "robust"],
+    "figures": ["figures", "title"],
+    "documents": ["stock"],
+    "report": [],
+}
+
+
+def stage_keys(case: Case) -> dict[str, str]:
+    """A hash for each stage of all that it depends on; of the surface file that is its name and content,
+    wherever it lies.
+    """
+    entries = case.model_dump(mode="json")
+    file = Path(case.surface.file)
+    entries["surface"]["file"] = file.name
+    stock = catalogue_bytes(case)
+    entries["stock"] = {
+        name: entries["rod"].pop(name) for name in ("stock_length", "kerf")
+    }  # which no design depends on
+    entries["stock"] |= {"adjustment": entries["cable"].pop("adjustment")}
+    status = file.stat()
+    digest = hashlib.sha256(
+        shellform.__version__.encode() + _content(str(file), status.st_size, status.st_mtime_ns)
+    )
+    keys = {}
+    for stage in STAGES:
+        digest.update(stock if stage == "initial" else b"")
+        digest.update(json.dumps({name: entries[name] for name in _NEEDS[stage]}, sort_keys=True).encode())
+        keys[stage] = digest.hexdigest()
+    return keys
+
+
+@cache
+def _content(file: str, size: int, written: int) -> bytes:
+    """A hash of a file as it was when it had this size and time: studies ask for the same ones many times."""
+    return hashlib.sha256(Path(file).read_bytes()).digest()

@@ -1,0 +1,29 @@
+"""A run that is being made: its case, its folder, whom it reports to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from shellform.case.case import Case
+from shellform.records.progress import Event, Kind, Report
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """The `case` of a run that is being made, its `folder`, whom to `report` events to, and the `keys` of its
+    stages."""
+
+    case: Case
+    folder: Path
+    report: Report
+    keys: Mapping[str, str]
+
+    def path(self, name: str) -> Path:
+        """Of a file in the folder."""
+        return self.folder / name
+
+    def say(self, stage: str, text: str, kind: Kind = Kind.PROGRESS) -> None:
+        """Reports an event of a stage."""
+        self.report(Event(stage, text, kind))
