@@ -119,7 +119,7 @@ def net_record(
         supports=len(net.supports),
         spacing_v=net.grid.spacing_v,
         **net.quality.summary(),
-        notes=tuple(net.notes),
+        notes=tuple(note.text for note in net.notes),
         angle=angle,
         offset=offset,
     )

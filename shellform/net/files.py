@@ -12,6 +12,7 @@ from shellform.arrays import read_arrays
 from shellform.errors import InputError
 from shellform.net.grid import Grid, GridRod
 from shellform.net.net import Net
+from shellform.net.notes import NetNote, NoteKind
 from shellform.net.quality import MAPS, Quality
 from shellform.net.refusal import Attempt, Change, Reason
 from shellform.structure.elements.state import State
@@ -65,7 +66,7 @@ def save_net(path: Path, net: Net) -> None:
                     "spacing_v": grid.spacing_v,
                     "gap": grid.gap,
                     "quality": net.quality.summary(),
-                    "notes": net.notes,
+                    "notes": [[note.kind.value, note.text] for note in net.notes],
                     "indices": [rod.index for rod in grid.rods],
                     **({"attempts": [_row(each) for each in net.attempts]} if net.attempts else {}),
                 }
@@ -77,6 +78,14 @@ def save_net(path: Path, net: Net) -> None:
         arrays[f"rod_{name}"] = np.concatenate(pieces)
         arrays[f"rod_{name}_ends"] = np.cumsum([len(piece) for piece in pieces])
     write_arrays(path, **arrays)
+
+
+def _note(saved: str | list[str]) -> NetNote:
+    """A saved note: its kind and text, or as before version 0.3 the text alone."""
+    if isinstance(saved, str):
+        return NetNote(NoteKind.OTHER, saved)
+    kind, text = saved
+    return NetNote(NoteKind(kind), text)
 
 
 def load_net(path: Path) -> Net:
@@ -104,7 +113,8 @@ def load_net(path: Path) -> Net:
         quality = Quality(**meta["quality"], **{name: data[f"map_{name}"] for name in MAPS})
         target = State(data["positions"], data["quaternions"])
         attempts = tuple(_attempt(row) for row in meta.get("attempts", ()))
-        return Net(grid, target, data["supports"], quality, tuple(meta["notes"]), attempts)
+        notes = tuple(map(_note, meta["notes"]))
+        return Net(grid, target, data["supports"], quality, notes, attempts)
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:

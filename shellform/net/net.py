@@ -9,6 +9,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals, indices
 from shellform.net.grid import Grid, crossing_points
+from shellform.net.notes import NetNote
 from shellform.net.quality import Quality
 from shellform.net.refusal import Attempt
 from shellform.structure.elements.state import State
@@ -17,14 +18,14 @@ from shellform.structure.elements.state import State
 @dataclass(frozen=True)
 class Net:
     """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes at the rods'
-    ends; `quality`; `notes`: what was left out or changed, a sentence each; `attempts` at it, the last of which
-    gave it, where the first failed."""
+    ends; `quality`; `notes`: what was left out; `attempts` at it, the last of which gave it, where the first
+    failed."""
 
     grid: Grid
     target: State
     supports: Indices
     quality: Quality
-    notes: tuple[str, ...] = ()
+    notes: tuple[NetNote, ...] = ()
     attempts: tuple[Attempt, ...] = ()
 
     def __post_init__(self) -> None:

@@ -17,6 +17,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
+from shellform.net.notes import NetNote, NoteKind
 from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
@@ -65,7 +66,7 @@ class Trimmed:
     state: State
     supports: Indices
     origin: Indices
-    notes: tuple[str, ...]
+    notes: tuple[NetNote, ...]
 
 
 @dataclass(frozen=True)
@@ -195,7 +196,9 @@ def _where_zero(
     return [float(s) for s in start + share * (stop - start)]
 
 
-def _keep(grid: Grid, pieces: list[_Piece], merge: float) -> tuple[list[tuple[_Piece, list[int]]], list[str]]:
+def _keep(
+    grid: Grid, pieces: list[_Piece], merge: float
+) -> tuple[list[tuple[_Piece, list[int]]], list[NetNote]]:
     """The pieces that remain, each with its joints, and what is to be said about the others."""
     joints = [dict(piece.joints()) for piece in pieces]
     on: dict[int, int] = {}
@@ -232,9 +235,11 @@ def _keep(grid: Grid, pieces: list[_Piece], merge: float) -> tuple[list[tuple[_P
     ]
     notes = []
     if close:
-        notes.append(f"{len(close)} joints nearer to the edge than {merge * grid.scale:.3g} m were left out")
+        near = f"{len(close)} joints nearer to the edge than {merge * grid.scale:.3g} m were left out"
+        notes.append(NetNote(NoteKind.JOINTS, near))
     if len(kept) < len(pieces):
-        notes.append(f"{len(pieces) - len(kept)} rods with fewer than {_FEWEST} joints were left out")
+        few = f"{len(pieces) - len(kept)} rods with fewer than {_FEWEST} joints were left out"
+        notes.append(NetNote(NoteKind.RODS, few))
     return kept, notes
 
 
@@ -254,7 +259,7 @@ def _largest(pieces: list[_Piece], joints: list[dict[int, float]], remaining: se
     return {crossing for crossing, k in numbers.items() if label[k] == largest}
 
 
-def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], notes: list[str]) -> Trimmed:
+def _rebuild(grid: Grid, state: State, kept: list[tuple[_Piece, list[int]]], notes: list[NetNote]) -> Trimmed:
     """The trimmed grid: nodes renumbered, end pieces cut to length."""
     crossings = sorted({c for _, joints in kept for c in joints})
     number = {crossing: k for k, crossing in enumerate(crossings)}

@@ -17,6 +17,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.gridshell.catalogue import label
 from shellform.net.grid import GridRod
+from shellform.net.notes import NoteKind
 from shellform.output.workshop.marks import (
     Box,
     Mark,
@@ -62,9 +63,9 @@ def flat_grid(built: Built) -> Sheet:
         f"{len(grid.lattice)} connectors.",
         *(
             [
-                f"{note[:1].upper()}{note[1:]}: rods cross there without a connector."
+                f"{note.text[:1].upper()}{note.text[1:]}: rods cross there without a connector."
                 for note in built.shell.net.notes
-                if "joints nearer" in note
+                if note.kind is NoteKind.JOINTS
             ]
         ),
     )
