@@ -8,7 +8,7 @@ import shellform as sf
 from shellform import render
 from shellform.errors import InputError
 from shellform.output.pictures import maps
-from shellform.run.designs import utilisation
+from shellform.run.folder import utilisation
 
 
 @pytest.fixture(scope="module")
