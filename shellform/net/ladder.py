@@ -16,6 +16,7 @@ from typing import Any
 
 from shellform.net.chebyshev import Tuning, pull_net
 from shellform.net.net import Net
+from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Progress
 from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
 from shellform.surface.shape.target import Surface, largest_curvature
@@ -113,7 +114,7 @@ def climbed_net(
         given = Attempt(rung.change, turned, shifted, None)
         if not attempts:
             return net, given
-        notes = (*net.notes, *(each.told() for each in (*attempts, given)))
+        notes = (*net.notes, *(NetNote(NoteKind.ATTEMPT, each.told()) for each in (*attempts, given)))
         return dataclasses.replace(net, notes=notes, attempts=(*attempts, given)), given
     assert first is not None
     raise _refused(first, attempts, surface) from first

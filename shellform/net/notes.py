@@ -1,4 +1,4 @@
-"""What was left out of a net, each note of a kind and in words."""
+"""What was left out of a net or tried for it, each note of a kind and in words."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from enum import Enum
 
 
 class NoteKind(Enum):
-    """What was left out: `JOINTS` near the edge, where rods cross without a connector; `RODS` with too few
-    joints. `OTHER`: of a net that was saved without kinds."""
+    """What a note tells: `JOINTS` near the edge, where rods cross without a connector; `RODS` with too few
+    joints; `ATTEMPT`: one that failed before this net was found, or gave it. `OTHER`: of a net saved without kinds."""
 
     JOINTS = "joints"
     RODS = "rods"
+    ATTEMPT = "attempt"
     OTHER = "other"
 
 
