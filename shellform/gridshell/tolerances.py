@@ -1,0 +1,125 @@
+"""What a gridshell as built is off by: standard deviations of lengths, places, stiffnesses, loads and shape.
+
+Every entry is the standard deviation of a normal variable of mean 0 (stiffnesses: of the logarithm). Where a
+standard states a permissible deviation that is meant to hold for nearly all pieces, half of it is taken, so
+that 95 % of the pieces keep it; a cable's permissible deviation is taken whole, since its ends slip too.
+`SOURCES` names where each default is from; `default_tolerances` evaluates them for the real size. A model
+below 2 m is built in the workshop with jigs and callipers, and has defaults of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Final
+
+import numpy as np
+
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Gridshell
+
+SCALE_MODEL_BELOW: Final = 2.0  # m of span
+_LARGEST_SHARE: Final = 0.5  # relative deviations beyond this are no tolerances
+
+SOURCES: Final[Mapping[str, str]] = {
+    "cable_length": "cut length and turnbuckle: EN 1090-2 annex B, length of a cut member, 2 mm + L/5000; scale model: set "
+    "by callipers to 0.1 mm",
+    "cable_stiffness": "EN 12385-10 and VDI 2358 leave the modulus of a strand to tests; 5 % about the maker's mean",
+    "supports": "DIN 18202 table 1 permits 10 mm in plan up to 1 m between points that are set out, two deviations; scale "
+    "model: drilled base plate, 0.1 mm",
+    "marks": "scribed to 1 mm, beside half of what a tape of class II may be off (2004/22/EC: 0.3 mm + 0.2 mm/m); scale "
+    "model: 0.2 mm",
+    "rod_stiffness": "JCSS Probabilistic Model Code part 3.2, modulus of elasticity: coefficient of variation 0.03",
+    "rod_bow": "EN 10219-2 (tubes) and EN 13706-2 (pultruded profiles): bow of 0.2 % of the length, two deviations",
+    "connectors": "couplers of one make scatter by 10 % about their mean stiffness in tests (EN 74-1 asks for its characteristic)",
+    "load_each": "thickness of 50 mm to 10 mm, two deviations (EN 13670, 10.6): 10 % of what a crossing carries",
+    "load_all": "JCSS Probabilistic Model Code part 2.1: concrete's density 0.04, with the mean thickness 0.05 together",
+    "load_uneven": "EN 12812, 8.2.5: concrete is placed unevenly; one half 5 % more and the other 5 % less",
+    "shape": "EN 1993-1-6, 8.7: imperfections in the shape of the softest modes; half of L/1000, what other causes don't hold",
+}
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Standard deviations; 0 leaves a cause out.
+
+    In m: `cable_length` of each cable, `supports` of each coordinate of each support, `marks` of each crossing's
+    place along each rod (its ends included). Relative: `cable_stiffness` of each cable, `rod_stiffness` of each
+    rod (all four constants), `connectors` of each connector, `load_each` of what each crossing carries,
+    `load_all` of the whole load, `load_uneven` of one half of the plan against the other (in either direction
+    of two at right angles). `rod_bow`: rise of each rod's own arc over its length, about either axis. `shape`: amplitude
+    of each of the softest modes over the span.
+    """
+
+    cable_length: float = 0.0
+    cable_stiffness: float = 0.0
+    supports: float = 0.0
+    marks: float = 0.0
+    rod_stiffness: float = 0.0
+    rod_bow: float = 0.0
+    connectors: float = 0.0
+    load_each: float = 0.0
+    load_all: float = 0.0
+    load_uneven: float = 0.0
+    shape: float = 0.0
+
+    def __post_init__(self) -> None:
+        for each in fields(self):
+            value, where = getattr(self, each.name), f"tolerances.{each.name}"
+            if not (value >= 0.0 and np.isfinite(value)):
+                raise InputError("must be finite and not negative", where=where, value=value)
+            if each.name not in ("cable_length", "supports", "marks") and value > _LARGEST_SHARE:
+                raise InputError(
+                    f"is a share and must not exceed {_LARGEST_SHARE:g}",
+                    where=where,
+                    value=value,
+                    remedy="Write 0.1 for 10 %.",
+                )
+
+    def only(self, *names: str) -> Tolerances:
+        """The same with all other causes left out. Raises InputError for an unknown name."""
+        known = [each.name for each in fields(self)]
+        for name in names:
+            if name not in known:
+                raise InputError(
+                    "there is no such cause",
+                    where="tolerances",
+                    value=name,
+                    remedy=f"Known: {', '.join(known)}.",
+                )
+        return Tolerances(**{name: getattr(self, name) for name in names})
+
+
+def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float) -> Tolerances:
+    """The defaults for a shell of that `span`, its longest rod and cable, m (SOURCES)."""
+    for name, value in (("span", span), ("longest_rod", longest_rod)):
+        if not (value > 0.0 and np.isfinite(value)):
+            raise InputError("must be positive and finite", where=name, value=value)
+    model = span < SCALE_MODEL_BELOW
+    return Tolerances(
+        cable_length=1e-4 if model else 2e-3 + longest_cable / 5000.0,
+        cable_stiffness=0.05,
+        supports=1e-4 if model else 5e-3,
+        marks=2e-4 if model else 1e-3 + 0.5 * (0.3e-3 + 0.2e-3 * longest_rod),
+        rod_stiffness=0.03,
+        rod_bow=0.001,
+        connectors=0.1,
+        load_each=0.1,
+        load_all=0.05,
+        load_uneven=0.05,
+        shape=0.0005,
+    )
+
+
+def default_tolerances(shell: Gridshell) -> Tolerances:
+    """The defaults for a gridshell of its size."""
+    return tolerances_of_size(
+        span_of(shell),
+        longest_rod=max(rod.length for rod in shell.net.grid.rods),
+        longest_cable=float(shell.cable_lengths.max(initial=0.0)),
+    )
+
+
+def span_of(shell: Gridshell) -> float:
+    """The longest side, m, of the box round the target, along the axes."""
+    return float(np.ptp(shell.target.positions, axis=0).max())

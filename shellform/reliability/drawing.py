@@ -1,0 +1,213 @@
+"""Structures as built, drawn by chance: from independent normal variables z to elements, supports and loads.
+
+Each cause of error has variables of its own, numbered by what is made (a rod, a crossing, a candidate cable),
+whatever the design: so two designs are drawn with the same errors, and a structure keeps its own while the
+design changes. The variables of structure `number` under `seed` come from a counter-based generator (Philox,
+Salmon et al. 2011) at a counter made of number and cause: the same bits whatever else is drawn, in whichever
+order and on however many threads.
+
+What errors do to the stress-free state. Marks: with errors e_0 .. e_q along a rod, the segment between two
+marks is longer by e_{i+1} - e_i, its elements in proportion; the rod stays straight, so that no frame changes.
+A rod's own arc of rise b L has the curvature k = 8 b / L; clamps are tightened on rods held straight in the
+flat grid, so that connectors keep their frames and the ends of the rod's elements are turned (bent_beams.py).
+A shape v (n, 6) of amplitude 1 imposed without stress: with the unloaded state of the perfect structure moved
+along v, every element keeps its deformations,
+
+    l0' = l0 + l' - l,   H_a' = Q_a'⁻¹ G Q_a H_a,
+
+G the turn of its chord, so that its forces there are those of the perfect structure, turned with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from shellform.arrays import Reals, reals
+from shellform.errors import InputError
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.bent_beams import BentBeams, curved
+from shellform.reliability.members import Members
+from shellform.structure.elements import rotation
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.cable import Cables
+from shellform.structure.elements.parts import Part
+from shellform.structure.elements.state import State, moved
+
+SHAPES = 3  # softest modes in which the shape is off
+_LEAST = 0.2  # of an element's length is left to it by errors of marks
+_LEAST_CABLE = 0.05  # of a cable's rest length
+
+CAUSES = tuple(each.name for each in fields(Tolerances))
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What one structure is off by: `cable_length` (c,) m and `cable_stiffness` (c,) factors of all candidate cables,
+    `supports` (n, 6) m, `beam_length` (m,) m, `beam_stiffness` (m,) factors, `beam_curvature` (m, 2) 1/m about each
+    beam's local y and z axes, `load` (n,) factors, `shape` (k,) m, the amplitudes of the softest modes."""
+
+    cable_length: Reals
+    cable_stiffness: Reals
+    supports: Reals
+    beam_length: Reals
+    beam_stiffness: Reals
+    beam_curvature: Reals
+    load: Reals
+    shape: Reals
+
+
+@dataclass(frozen=True)
+class Imperfections:
+    """Shapes (k, n, 6), the largest translation of each 1, and the unloaded `state` on which they are imposed."""
+
+    state: State
+    shapes: Reals
+
+
+def sizes(members: Members) -> dict[str, int]:
+    """How many variables each cause has."""
+    rods = len(members.rods)
+    return {
+        "cable_length": members.cables,
+        "cable_stiffness": members.cables,
+        "supports": len(members.held),
+        "marks": sum(len(rod.marks) for rod in members.rods),
+        "rod_stiffness": rods,
+        "rod_bow": 2 * rods,
+        "connectors": len(members.connectors),
+        "load_each": members.zones,
+        "load_all": 1,
+        "load_uneven": 2,
+        "shape": SHAPES,
+    }
+
+
+def variables(members: Members, seed: int, number: int) -> dict[str, Reals]:
+    """The standard normal variables of structure `number`, by cause. Raises InputError for negative numbers."""
+    for name, value in (("seed", seed), ("number", number)):
+        if not 0 <= value < 2**63:
+            raise InputError("must be a whole number from 0 on", where=name, value=value)
+    return {
+        name: np.random.Generator(
+            np.random.Philox(key=np.array([seed, 0], np.uint64), counter=[0, 0, cause, number])
+        ).standard_normal(count)
+        for cause, (name, count) in enumerate(sizes(members).items())
+    }
+
+
+def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) -> Errors:
+    """The errors that standard normal variables stand for, linear in them but for stiffnesses, exp(s z)."""
+    t = tolerances
+    supports = np.zeros(6 * len(members.places))
+    supports[members.held] = t.supports * z["supports"]
+    length, stiffness = np.zeros(len(members.beam_length)), np.ones(len(members.beam_length))
+    curvature = np.zeros((len(members.beam_length), 2))
+    stiffness[members.connectors] = np.exp(t.connectors * z["connectors"])
+    first = 0
+    for k, rod in enumerate(members.rods):
+        own = t.marks * z["marks"][first : first + len(rod.marks)]
+        first += len(rod.marks)
+        nominal = members.beam_length[rod.elements]
+        for i, (begin, end) in enumerate(zip(rod.marks[:-1], rod.marks[1:], strict=True)):
+            segment = nominal[begin:end]
+            longer = (own[i + 1] - own[i]) / segment.sum()
+            length[rod.elements[begin:end]] = max(longer, _LEAST - 1.0) * segment
+        stiffness[rod.elements] = np.exp(t.rod_stiffness * z["rod_stiffness"][k])
+        bow = 8.0 * t.rod_bow / float(nominal.sum()) * z["rod_bow"][2 * k : 2 * k + 2]
+        # An element that runs against the rod has its local y axis turned round and goes the other way.
+        curvature[rod.elements] = np.column_stack([np.full(len(nominal), bow[0]), rod.sense * bow[1]])
+    return Errors(
+        t.cable_length * z["cable_length"],
+        np.exp(t.cable_stiffness * z["cable_stiffness"]),
+        supports.reshape(-1, 6),
+        length,
+        stiffness,
+        curvature,
+        _load_factors(members, t, z),
+        t.shape * members.span * z["shape"],
+    )
+
+
+def built_beams(nominal: Beams, errors: Errors, imperfections: Imperfections | None = None) -> Part:
+    """The beams with the errors; straight ones stay `Beams`."""
+    factor = errors.beam_stiffness
+    straight = replace(
+        nominal,
+        axial=nominal.axial * factor,
+        torsion=nominal.torsion * factor,
+        bending_y=nominal.bending_y * factor,
+        bending_z=nominal.bending_z * factor,
+        rest_length=nominal.rest_length + errors.beam_length,
+    )
+    bent: Beams | BentBeams = straight
+    if errors.beam_curvature.any():
+        axes = nominal.frames[:, :, 1:]
+        bent = curved(straight, np.einsum("eij,ej->ei", axes, errors.beam_curvature))
+    return bent if imperfections is None or not errors.shape.any() else _shaped(bent, errors, imperfections)
+
+
+def built_cables(
+    nominal: Cables, present: np.ndarray, errors: Errors, imperfections: Imperfections | None = None
+) -> Cables:
+    """The cables with the errors of those among the candidates that are `present` (c,) flags."""
+    rest = nominal.rest_length + errors.cable_length[present]
+    if imperfections is not None and errors.shape.any():
+        rest = rest + nominal.lengths(_off(errors, imperfections)) - nominal.lengths(imperfections.state)
+    return replace(
+        nominal,
+        rest_length=np.maximum(rest, _LEAST_CABLE * nominal.rest_length),
+        stiffness=nominal.stiffness * errors.cable_stiffness[present],
+    )
+
+
+def built_load(load: Reals, errors: Errors) -> Reals:
+    """The dead load (n, 6) with the errors."""
+    return np.asarray(load * errors.load[:, None])
+
+
+def _load_factors(members: Members, t: Tolerances, z: Mapping[str, Reals]) -> Reals:
+    """Factors (n,): each crossing's own, the whole, and a plane over the plan that makes one half heavier by as
+    much as the other is lighter: its mean size over the crossings is 1."""
+    each = 1.0 + t.load_each * z["load_each"][members.zone]
+    plan = members.places[:, :2] - members.places[:, :2].mean(axis=0)
+    plane = plan / np.maximum(np.abs(plan).mean(axis=0), 1e-300)
+    uneven = 1.0 + t.load_uneven * plane @ z["load_uneven"]
+    return np.asarray(each * uneven * (1.0 + t.load_all * float(z["load_all"][0])))
+
+
+def _off(errors: Errors, imperfections: Imperfections) -> State:
+    step = np.einsum("k,knj->nj", errors.shape, imperfections.shapes)
+    return moved(imperfections.state, step)
+
+
+def _shaped(beams: Beams | BentBeams, errors: Errors, imperfections: Imperfections) -> BentBeams:
+    straight = beams.straight if isinstance(beams, BentBeams) else beams
+    count = len(straight.ends)
+    turns = beams.turns if isinstance(beams, BentBeams) else np.tile(rotation.identity(1)[0], (count, 2, 1))
+    before, after = imperfections.state, _off(errors, imperfections)
+    a, b = straight.ends.T
+    chord, moved_chord = (
+        state.positions[b] - state.positions[a] for state in (before, after)
+    )
+    length, other = np.linalg.norm(chord, axis=1), np.linalg.norm(moved_chord, axis=1)
+    # The turn of the chord, and along it the mean of what the ends spin.
+    step = np.einsum("k,knj->nj", errors.shape, imperfections.shapes)
+    unit = moved_chord / other[:, None]
+    spun = np.einsum("ei,ei->e", unit, 0.5 * (step[a, 3:] + step[b, 3:]))
+    turn = rotation.turned(np.ascontiguousarray(spun[:, None] * unit), _between(chord / length[:, None], unit))
+    ends = []
+    for k, node in enumerate((a, b)):
+        old = rotation.product(before.quaternions[node], np.ascontiguousarray(turns[:, k]))
+        back = after.quaternions[node] * np.array([1.0, -1.0, -1.0, -1.0])
+        ends.append(rotation.product(back, rotation.product(turn, old)))
+    longer = replace(straight, rest_length=reals("rest_length", straight.rest_length + other - length, (None,)))
+    return BentBeams(longer, np.stack(ends, axis=1))
+
+
+def _between(unit: Reals, other: Reals) -> Reals:
+    """Quaternions (m, 4) of the smallest turn from unit vectors (m, 3) to others less than pi away."""
+    found = np.column_stack([1.0 + np.einsum("ei,ei->e", unit, other), np.cross(unit, other)])
+    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))

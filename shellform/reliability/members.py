@@ -1,0 +1,149 @@
+"""Which elements of a structure belong to one rod, one connector, one support, and which load to one crossing:
+what errors of making and building are drawn for.
+
+From a gridshell they are known; in a model file, rods are the chains of beams of the kind "rod" that go on
+straight in the stress-free state, marked where something else touches them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from shellform.arrays import Indices, Reals
+from shellform.gridshell.gridshell import Gridshell
+from shellform.structure.elements.beam import Beams
+from shellform.structure.model import Model
+
+_STRAIGHT_ON = 0.99  # cosine of the angle between two elements of one rod
+
+
+@dataclass(frozen=True)
+class Member:
+    """One rod: its `elements` (k,) among the beams from end to end, each one's `sense` (k,) ±1 along the rod,
+    and `marks` (q,) ascending places 0..k among its nodes that are measured on it, the ends included."""
+
+    elements: Indices
+    sense: Reals
+    marks: Indices
+
+
+@dataclass(frozen=True)
+class Members:
+    """`rods`; `connectors` (j,) among the beams; `cables`, how many candidates; `held` degrees of freedom (h,) of
+    the supports' translations; `zone` (n,) the crossing that each node's load is counted to, of `zones`; `places` (n, 3),
+    m, of the nodes in the target; `beam_length` (m,), m, nominal rest lengths."""
+
+    rods: tuple[Member, ...]
+    connectors: Indices
+    cables: int
+    held: Indices
+    zone: Indices
+    zones: int
+    places: Reals
+    beam_length: Reals
+
+    @property
+    def span(self) -> float:
+        """The longest side, m, of the box round the target."""
+        return float(np.ptp(self.places, axis=0).max())
+
+
+def members_of(shell: Gridshell) -> Members:
+    """Those of a gridshell, all candidate cables counted, whatever design."""
+    grid = shell.net.grid
+    rods, first = [], 0
+    for rod in grid.rods:
+        count = len(rod.nodes) - 1
+        marks = np.unique(np.concatenate([[0], rod.at, [count]])).astype(np.int64)
+        rods.append(Member(first + np.arange(count), np.ones(count), marks))
+        first += count
+    connectors = first + np.arange(len(grid.lattice))
+    held = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
+    middle = grid.flat[grid.crossing_nodes].mean(axis=1)[:, :2]
+    zone = np.asarray(cKDTree(middle).query(grid.flat[:, :2])[1], dtype=np.int64)
+    length = np.concatenate([grid.rod_rest_lengths, np.full(len(grid.lattice), grid.gap)])
+    return Members(
+        tuple(rods),
+        connectors,
+        len(shell.cable_ends),
+        held,
+        zone,
+        len(middle),
+        shell.target.positions,
+        length,
+    )
+
+
+def members_of_model(model: Model) -> Members:
+    """Those of a model file: its cables, its supports' translations, a zone for each node."""
+    network = model.network
+    beams, count = network.beams, len(network.nodes)
+    rod = np.array([kind == "rod" for kind in beams.kinds])[beams.kind]
+    touched = network.fixed.any(axis=1)
+    for ends in (beams.ends[~rod], network.cables.ends):
+        touched[ends.ravel()] = True
+    rods = tuple(
+        Member(elements, sense, _marked(beams, elements, sense, touched))
+        for elements, sense in _chains(beams, np.flatnonzero(rod), count)
+    )
+    held = np.flatnonzero((network.fixed & (np.arange(6) < 3)).ravel())
+    places = network.nodes if model.start is None else model.start.positions
+    return Members(
+        rods,
+        np.flatnonzero(~rod),
+        len(network.cables.ends),
+        held,
+        np.arange(count),
+        count,
+        places,
+        beams.rest_length,
+    )
+
+
+def _chains(beams: Beams, chosen: Indices, count: int) -> list[tuple[Indices, Reals]]:
+    """The chains of the chosen beams, each from the end with the lowest beam's number on, and each beam's sense."""
+    at: list[list[int]] = [[] for _ in range(count)]
+    for element in chosen.tolist():
+        for node in beams.ends[element]:
+            at[node].append(element)
+    axis = beams.frames[:, :, 0]
+
+    def onward(element: int, node: int) -> int | None:
+        """The one beam that goes on straight from the element over its end `node`."""
+        if len(at[node]) != 2:
+            return None
+        other = at[node][0] if at[node][1] == element else at[node][1]
+        turned = (beams.ends[other, 0] == node) != (beams.ends[element, 1] == node)
+        along = float(axis[element] @ axis[other]) * (-1.0 if turned else 1.0)
+        return other if along > _STRAIGHT_ON else None
+
+    done: set[int] = set()
+    found = []
+    for element in chosen.tolist():
+        if element in done:
+            continue
+        begin, node = element, int(beams.ends[element, 0])
+        seen = {begin}
+        while (before := onward(begin, node)) is not None and before not in seen:
+            seen.add(before)
+            begin, node = before, int(beams.ends[before].sum()) - node
+        chain, sense = [begin], [1.0 if beams.ends[begin, 0] == node else -1.0]
+        node = int(beams.ends[begin].sum()) - node
+        while (after := onward(chain[-1], node)) is not None and after != begin:
+            chain.append(after)
+            sense.append(1.0 if beams.ends[after, 0] == node else -1.0)
+            node = int(beams.ends[after].sum()) - node
+        done |= set(chain)
+        found.append((np.array(chain, dtype=np.int64), np.array(sense)))
+    return found
+
+
+def _marked(beams: Beams, elements: Indices, sense: Reals, touched: np.ndarray) -> Indices:
+    first = beams.ends[elements, np.where(sense > 0.0, 0, 1)]
+    last = beams.ends[elements[-1], 1 if sense[-1] > 0.0 else 0]
+    there = touched[np.append(first, last)]
+    there[[0, -1]] = True
+    return np.flatnonzero(there)

@@ -1,0 +1,53 @@
+"""How likely a design stands, from a count of drawn structures.
+
+With s of n drawn structures standing, the probability of standing is at least
+
+    p = Beta⁻¹(1 - c; s, n - s + 1),   0 for s = 0,
+
+with confidence c, whatever it is (Clopper and Pearson 1934, one-sided): the largest p under which so many or more
+standing would come about with a chance of at most 1 - c.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scipy.stats import beta
+
+from shellform.errors import InputError
+
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Standing:
+    """`standing` of `drawn` structures under `seed` stand: the probability is `at_least` and `at_most` so much,
+    each with the `confidence`."""
+
+    drawn: int
+    standing: int
+    at_least: float
+    at_most: float
+    confidence: float
+    seed: int
+
+
+def counted(drawn: int, standing: int, *, seed: int, confidence: float = CONFIDENCE) -> Standing:
+    """The bounds. Raises InputError for impossible counts."""
+    if not 0 <= standing <= drawn or drawn < 1:
+        raise InputError("more stand than were drawn, or none was", where="drawn", value=(drawn, standing))
+    if not 0.0 < confidence < 1.0:
+        raise InputError("must lie between 0 and 1", where="confidence", value=confidence)
+    least = 0.0 if standing == 0 else float(beta.ppf(1.0 - confidence, standing, drawn - standing + 1))
+    most = 1.0 if standing == drawn else float(beta.ppf(confidence, standing + 1, drawn - standing))
+    return Standing(drawn, standing, least, most, confidence, seed)
+
+
+def enough(probability: float, *, confidence: float = CONFIDENCE, fallen: int = 0) -> int:
+    """How many structures must be drawn so that the probability is shown with this many fallen."""
+    if not 0.0 < probability < 1.0:
+        raise InputError("must lie between 0 and 1", where="probability", value=probability)
+    count = fallen + 1
+    while counted(count, count - fallen, seed=0, confidence=confidence).at_least < probability:
+        count += 1
+    return count
