@@ -26,6 +26,7 @@ FLOORS = {
         ["verification", "net"],
         ["gridshell"],
         ["problem"],
+        ["reliability"],
         ["optimiser"],
         ["site", "records"],
         ["output"],

@@ -61,6 +61,4 @@ class BentBeams:
 def curved(straight: Beams, curvature: Reals) -> BentBeams:
     """Beams with their own curvature (m, 3), 1/m, across each one's axis in the stress-free state."""
     half = 0.5 * straight.rest_length[:, None] * curvature
-    return BentBeams(
-        straight, np.stack([rotation.from_vectors(half), rotation.from_vectors(-half)], axis=1)
-    )
+    return BentBeams(straight, np.stack([rotation.from_vectors(half), rotation.from_vectors(-half)], axis=1))

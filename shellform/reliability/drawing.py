@@ -189,21 +189,23 @@ def _shaped(beams: Beams | BentBeams, errors: Errors, imperfections: Imperfectio
     turns = beams.turns if isinstance(beams, BentBeams) else np.tile(rotation.identity(1)[0], (count, 2, 1))
     before, after = imperfections.state, _off(errors, imperfections)
     a, b = straight.ends.T
-    chord, moved_chord = (
-        state.positions[b] - state.positions[a] for state in (before, after)
-    )
+    chord, moved_chord = (state.positions[b] - state.positions[a] for state in (before, after))
     length, other = np.linalg.norm(chord, axis=1), np.linalg.norm(moved_chord, axis=1)
     # The turn of the chord, and along it the mean of what the ends spin.
     step = np.einsum("k,knj->nj", errors.shape, imperfections.shapes)
     unit = moved_chord / other[:, None]
     spun = np.einsum("ei,ei->e", unit, 0.5 * (step[a, 3:] + step[b, 3:]))
-    turn = rotation.turned(np.ascontiguousarray(spun[:, None] * unit), _between(chord / length[:, None], unit))
+    turn = rotation.turned(
+        np.ascontiguousarray(spun[:, None] * unit), _between(chord / length[:, None], unit)
+    )
     ends = []
     for k, node in enumerate((a, b)):
         old = rotation.product(before.quaternions[node], np.ascontiguousarray(turns[:, k]))
         back = after.quaternions[node] * np.array([1.0, -1.0, -1.0, -1.0])
         ends.append(rotation.product(back, rotation.product(turn, old)))
-    longer = replace(straight, rest_length=reals("rest_length", straight.rest_length + other - length, (None,)))
+    longer = replace(
+        straight, rest_length=reals("rest_length", straight.rest_length + other - length, (None,))
+    )
     return BentBeams(longer, np.stack(ends, axis=1))
 
 

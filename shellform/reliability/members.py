@@ -82,7 +82,7 @@ def members_of_model(model: Model) -> Members:
     network = model.network
     beams, count = network.beams, len(network.nodes)
     rod = np.array([kind == "rod" for kind in beams.kinds])[beams.kind]
-    touched = network.fixed.any(axis=1)
+    touched = np.asarray(network.fixed.any(axis=1))
     for ends in (beams.ends[~rod], network.cables.ends):
         touched[ends.ravel()] = True
     rods = tuple(

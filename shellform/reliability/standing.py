@@ -1,10 +1,10 @@
 """Structures as built, each loaded from nothing on its own path: does it stand?
 
 A structure is relaxed without load from where the perfect one rests, and then loaded step by step (loading.py
-has the path of a single structure). The perfect structure's path, solved once, gives each step its start: its
-own motion from one load factor to the next is added to where the drawn structure is. A step counts only where every
-tangent on the way is positive definite and no crossing lands farther than `STRAY` of the span from where it was
-expected; else it is halved, as on any path. So the large steps lead along the same branch as small ones do.
+has the path of a single structure). A step begins along the tangent of the path, whose factor is at hand, and goes on
+by whole steps of Newton's. It counts only where every tangent on the way is positive definite and no node
+lands farther than `STRAY` of the span from where the path's tangent led; else it is halved, as on any path. So
+the large steps lead along the same branch as small ones do.
 
 A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther than
 `FAR` of the span from the perfect structure's; one that loses stability on the way has fallen, whatever it
@@ -13,9 +13,9 @@ would snap to, and how far it came is its load factor.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from queue import SimpleQueue
+from collections.abc import Sequence
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
 
 import numpy as np
 
@@ -34,23 +34,25 @@ from shellform.reliability.drawing import (
     variables,
 )
 from shellform.reliability.members import Members, members_of, members_of_model
+from shellform.reliability.probability import CONFIDENCE, Standing, counted
 from shellform.structure.answers.stability import modes
-from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State, moved
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.model import Model
 from shellform.structure.network import Network, assemble
-from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
-from shellform.structure.solve.factorisation import NotPositiveDefinite
+from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.equilibrium import TOLERANCE, TURN, find_equilibrium
+from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
 from shellform.structure.solve.loading import SMALLEST, apply_load
-from shellform.structure.solve.residual import held
+from shellform.structure.solve.residual import Measure, held
 
 FAR = 0.05  # of the span from the perfect structure
 STRAY = 0.01  # of the span from where a step was expected to end: the state belongs to another branch
 STEP = 0.5  # of the load
-_PATIENCE = 12  # factorisations of one step
-_RELAXING = 40  # of the unloaded state, before it is sought from the target instead
+_PATIENCE = 10  # factorisations of one step
+_RELAXING = 15  # of the unloaded state, before it is sought from the target instead
+_ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
+_FAR_OFF = 5.0  # rad, a step that leads nowhere
 _NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structure's path to the next
 
 
@@ -77,17 +79,6 @@ class Perfect:
     def unloaded(self) -> State:
         """The state without load."""
         return self.states[0]
-
-    def at(self, factor: float) -> State | None:
-        """The state at a factor of the load, between kept ones along the straight line; None beyond the path."""
-        if factor > self.factors[-1]:
-            return None
-        k = int(np.clip(np.searchsorted(self.factors, factor), 1, max(len(self.factors) - 1, 1)))
-        if len(self.factors) == 1:
-            return self.states[0]
-        share = (factor - self.factors[k - 1]) / (self.factors[k] - self.factors[k - 1])
-        before, after = self.states[k - 1], self.states[k]
-        return moved(before, share * _motion(before, after))
 
 
 @dataclass(frozen=True)
@@ -137,6 +128,36 @@ def perfect_model(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
     )
 
 
+@dataclass(frozen=True)
+class Sample:
+    """The `outcomes` of drawn structures, number after number, and what they say of the probability of standing."""
+
+    outcomes: tuple[Outcome, ...]
+    standing: Standing
+
+
+def sample(
+    shell: Gridshell,
+    design: Design,
+    load: Reals,
+    tolerances: Tolerances,
+    *,
+    count: int,
+    seed: int,
+    confidence: float = CONFIDENCE,
+) -> Sample:
+    """`count` drawn structures of a design, each loaded from nothing with the dead `load` (n, 6).
+
+    The same seed gives the same structures whatever the count. Raises InputError for a count below 1, NotConverged
+    where the perfect structure has no unloaded equilibrium.
+    """
+    if count < 1:
+        raise InputError("must be at least 1", where="count", value=count)
+    made = Workshop(perfect(shell, design, load)).drawn(tolerances, seed=seed, numbers=range(count))
+    stand = sum(each.stands for each in made)
+    return Sample(tuple(made), counted(count, stand, seed=seed, confidence=confidence))
+
+
 class Workshop:
     """Builds and loads drawn structures of one perfect structure, as many side by side as there are cores: each
     thread takes an assembly with a factor of its own."""
@@ -148,7 +169,9 @@ class Workshop:
         self._idle: SimpleQueue[Assembly] = SimpleQueue()
         self._idle.put(self._first)
 
-    def load(self, errors: Errors, *, number: int = 0, step: float = STEP, smallest: float = SMALLEST) -> Outcome:
+    def load(
+        self, errors: Errors, *, number: int = 0, step: float = STEP, smallest: float = SMALLEST
+    ) -> Outcome:
         """The structure with the errors, loaded from nothing."""
         own = self._taken()
         try:
@@ -171,7 +194,7 @@ class Workshop:
     def _taken(self) -> Assembly:
         try:
             return self._idle.get_nowait()
-        except Exception:  # noqa: BLE001  queue.Empty
+        except Empty:
             other = assemble(self.nominal.network)
             other.__dict__["chords"] = self._first.chords
             return other
@@ -207,11 +230,13 @@ def _perfect(
     )
 
 
-def _motion(before: State, after: State) -> Reals:
-    """Translations and spins (n, 6) from one state to another."""
-    back = before.quaternions * np.array([1.0, -1.0, -1.0, -1.0])
-    spins = rotation.to_vectors(rotation.product(after.quaternions, back))
-    return np.hstack([after.positions - before.positions, spins])
+@dataclass(frozen=True)
+class _Here:
+    """A state on the stable branch with its balance and its tangent's factor, good until the next one is made."""
+
+    state: State
+    balance: Balance
+    factor: Factor
 
 
 class _Loading:
@@ -228,77 +253,113 @@ class _Loading:
             )
         )
         self.load = built_load(nominal.load, errors)
+        self.measure = Measure(self.assembly)
         self.spent = 0
 
     def outcome(self, step: float, smallest: float) -> Outcome:
         nominal = self.nominal
-        state = self._unloaded()
-        if state is None:
+        here = self._unloaded()
+        if here is None:
             return Outcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent)
         factor, width, good = 0.0, step, 0
         while factor < 1.0:
             goal = 1.0 if factor + width > 1.0 - 1e-12 else factor + width
-            there = self._step(state, factor, goal)
+            there = self._step(here, goal)
             if there is None:
                 width, good = 0.5 * width, 0
                 if width < smallest:
-                    return Outcome(self.number, factor, False, np.inf, state, self.spent)
+                    return Outcome(self.number, factor, False, np.inf, here.state, self.spent)
+                again = self._at(here.state)  # its factor was replaced
+                assert again is not None
+                here = again
                 continue
-            state, factor, good = there, goal, good + 1
+            here, factor, good = there, goal, good + 1
             if good == 2:
                 width, good = min(2.0 * width, step), 0
         far = np.inf
         if nominal.bears:
-            far = float(np.linalg.norm(state.positions - nominal.states[-1].positions, axis=1).max())
+            far = float(np.linalg.norm(here.state.positions - nominal.states[-1].positions, axis=1).max())
         stands = far <= FAR * nominal.members.span
-        return Outcome(self.number, factor, stands, far, state, self.spent)
+        return Outcome(self.number, factor, stands, far, here.state, self.spent)
 
-    def _unloaded(self) -> State | None:
-        """The unloaded state: a first step takes supports and free nodes along with all errors at once."""
-        none = np.zeros_like(self.load)
-        start = self.nominal.unloaded
-        offset = self.errors.supports
-        balance = self.assembly.evaluate(start)
-        pull = -balance.force
+    def _unloaded(self) -> _Here | None:
+        """The unloaded state: supports and free nodes go along with all errors at once, by the perfect structure's
+        tangent, since errors of rods' lengths leave the drawn one indefinite until its nodes have moved."""
+        nominal, none = self.nominal, np.zeros_like(self.load)
+        start, offset = nominal.unloaded, self.errors.supports
+        perfect = self.assembly.with_parts((nominal.network.beams, nominal.network.cables))
+        pull = -self.assembly.evaluate(start, tangent=False).force
         if offset.any():
-            pull = pull - self.assembly.force_along(start, offset)
+            pull -= perfect.force_along(start, offset)
         step = offset.ravel().copy()
         free = self.assembly.free
         try:
             self.spent += 1
-            factor = self.assembly.matrix.factor(held(self.assembly, balance))
-            step[free] = factor.solve(pull.ravel()[free])
-            begin = moved(start, self.assembly.chords.corrected(start, step.reshape(-1, 6)))
-            found = self._found(begin, none, limit=_RELAXING)
-        except NotPositiveDefinite:
-            found = None
+            step[free] = perfect.factor(start).solve(pull.ravel()[free])
+        except NotPositiveDefinite:  # held by the friction of its numbers: below what `held` adds
+            pass
+        begin = moved(start, self.assembly.chords.corrected(start, step.reshape(-1, 6)))
+        found = self._newton(begin, none, limit=_RELAXING, tolerance=_ON_THE_WAY)
         if found is not None:
             return found
-        target = moved(self.nominal.start, offset)
         try:
-            relaxed = find_equilibrium(self.assembly, target, none)
+            relaxed = find_equilibrium(self.assembly, moved(nominal.start, offset), none)
         except NotConverged as error:
             self.spent += error.iterations
             return None
         self.spent += relaxed.factorisations
-        return relaxed.state if relaxed.stable else None
+        return self._newton(relaxed.state, none, limit=2, tolerance=_ON_THE_WAY)
 
-    def _step(self, state: State, factor: float, goal: float) -> State | None:
-        before, after = self.nominal.at(factor), self.nominal.at(goal)
-        begin = state
-        if before is not None and after is not None:
-            begin = moved(state, _motion(before, after))
-        found = self._found(begin, goal * self.load, limit=_PATIENCE)
+    def _step(self, here: _Here, goal: float) -> _Here | None:
+        """From a state on the branch to the load factor `goal`."""
+        load = goal * self.load
+        change = self._solved(here, load)
+        if change is None:
+            return None
+        begin = moved(here.state, self.assembly.chords.corrected(here.state, change))
+        tolerance = TOLERANCE if goal == 1.0 else _ON_THE_WAY
+        found = self._newton(begin, load, limit=_PATIENCE, tolerance=tolerance)
         if found is None:
             return None
-        stray = float(np.abs(found.positions - begin.positions).max())
+        stray = float(np.abs(found.state.positions - begin.positions).max())
         return found if stray <= STRAY * self.nominal.members.span else None
 
-    def _found(self, begin: State, load: Reals, *, limit: int) -> State | None:
+    def _newton(self, begin: State, load: Reals, *, limit: int, tolerance: float) -> _Here | None:
+        """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent positive definite,
+        the last one included; None where one isn't."""
+        own, state, before = self.assembly, begin, np.inf
+        for _ in range(limit):
+            here = self._at(state)
+            if here is None:
+                return None
+            residual = self.measure.residual(here.balance, load)
+            noise = self.measure.rounding(here.balance, state, load) if residual > 0.1 * before else 0.0
+            if residual <= max(tolerance, noise):
+                return here
+            before = residual
+            change = self._solved(here, load)
+            if change is None:
+                return None
+            state = moved(state, own.chords.corrected(state, change))
+        return None
+
+    def _at(self, state: State) -> _Here | None:
+        """The state with its tangent's factor; None where that isn't positive definite."""
+        balance = self.assembly.evaluate(state)
+        self.spent += 1
         try:
-            found: Equilibrium = find_equilibrium(self.assembly, begin, load, limit=limit, on_branch=True)
-        except NotConverged as error:
-            self.spent += error.iterations
+            factor = self.assembly.matrix.factor(held(self.assembly, balance))
+        except NotPositiveDefinite:
             return None
-        self.spent += found.factorisations
-        return found.state if found.stable else None
+        return _Here(state, balance, factor)
+
+    def _solved(self, here: _Here, load: Reals) -> Reals | None:
+        """Newton's step (n, 6), no spin beyond TURN; None where it leads nowhere."""
+        step = np.zeros(6 * self.assembly.count)
+        free = self.assembly.free
+        step[free] = here.factor.solve((load - here.balance.force).ravel()[free])
+        change = step.reshape(-1, 6)
+        spin = float(np.abs(change[:, 3:]).max())
+        if not spin <= _FAR_OFF:
+            return None
+        return change * (TURN / spin) if spin > TURN else change

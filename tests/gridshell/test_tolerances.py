@@ -1,0 +1,54 @@
+"""What a gridshell as built is off by."""
+
+from dataclasses import fields
+
+import pytest
+
+from shellform.errors import InputError
+from shellform.gridshell.tolerances import SOURCES, Tolerances, default_tolerances, tolerances_of_size
+
+
+def test_every_cause_has_a_default_above_zero_and_a_source(shell):
+    found = default_tolerances(shell)
+    for each in fields(Tolerances):
+        assert getattr(found, each.name) > 0.0
+        assert len(SOURCES[each.name]) > 20
+
+
+def test_the_scale_model_is_built_more_closely_than_a_shell_of_eighteen_metres(shell):
+    small, large = default_tolerances(shell), tolerances_of_size(18.0, longest_rod=20.0, longest_cable=2.0)
+    assert (small.cable_length, small.supports, small.marks) == (1e-4, 1e-4, 2e-4)
+    assert large.cable_length == pytest.approx(2.4e-3)
+    assert large.supports == 5e-3
+    assert large.marks == pytest.approx(3.15e-3)
+
+
+def test_a_longer_rod_is_marked_less_closely():
+    found = [tolerances_of_size(10.0, longest_rod=length, longest_cable=1.0).marks for length in (5.0, 30.0)]
+    assert found[1] > found[0]
+
+
+def test_only_leaves_all_other_causes_out():
+    found = Tolerances(cable_length=1e-3, supports=2e-3, load_each=0.1).only("supports")
+    assert found == Tolerances(supports=2e-3)
+
+
+def test_an_unknown_cause_is_refused_with_the_known_ones():
+    with pytest.raises(InputError, match="Known: cable_length"):
+        Tolerances().only("cables")
+
+
+@pytest.mark.parametrize("value", [-1e-3, float("nan"), float("inf")])
+def test_a_tolerance_that_is_negative_or_no_number_is_refused(value):
+    with pytest.raises(InputError, match=r"tolerances\.supports"):
+        Tolerances(supports=value)
+
+
+def test_a_share_given_in_percent_is_refused():
+    with pytest.raises(InputError, match=r"Write 0\.1 for 10 %"):
+        Tolerances(load_each=10.0)
+
+
+def test_a_size_without_extent_is_refused():
+    with pytest.raises(InputError, match="span"):
+        tolerances_of_size(0.0, longest_rod=1.0, longest_cable=1.0)

@@ -1,0 +1,151 @@
+"""Drawn structures: the same whatever else is drawn, loaded as `shellform analyse` loads them, and counted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError
+from shellform.gridshell.tolerances import Tolerances, default_tolerances
+from shellform.reliability import standing
+from shellform.reliability.drawing import CAUSES, built_beams, built_cables, built_load, errors_of, variables
+from shellform.reliability.standing import Workshop, perfect, perfect_model, sample
+from shellform.structure.answers.analysis import analyse
+from shellform.structure.model import Model, read_model, write_model
+
+LARGE = Tolerances(cable_length=3e-4, supports=3e-4, marks=3e-4, load_each=0.1, load_all=0.05, connectors=0.1)
+
+
+def drawn(nominal, tolerances, number, seed=7):
+    return errors_of(nominal.members, tolerances, variables(nominal.members, seed, number))
+
+
+def as_model(nominal, errors):
+    """The drawn structure as a model file's content; shapes and bows have no place there."""
+    network = nominal.network
+    beams = built_beams(network.beams, errors)
+    cables = built_cables(network.cables, nominal.present, errors)
+    other = replace(network, beams=beams, cables=cables, imposed=network.imposed + errors.supports)
+    return Model(other, {"design": built_load(nominal.load, errors)}, nominal.start, ())
+
+
+@pytest.mark.parametrize("share", [1.0, 1.2])
+def test_a_drawn_structure_ends_as_the_analysis_of_its_own_model_says(dome, share):
+    nominal = perfect(dome, dome.design(), share * dome.point_load(4.5, every=2))
+    workshop = Workshop(nominal)
+    reference = analyse(as_model(nominal, drawn(nominal, Tolerances(), 0))).equilibrium.state
+    for number in range(12):
+        errors = drawn(nominal, LARGE, number)
+        found = workshop.load(errors, number=number)
+        told = analyse(as_model(nominal, errors))
+        far = np.linalg.norm(told.equilibrium.state.positions - reference.positions, axis=1).max()
+        stands = told.converged and told.equilibrium.stable and far < 0.05 * nominal.members.span
+        assert found.stands == stands, number
+        if stands:
+            assert found.state.positions == pytest.approx(told.equilibrium.state.positions, abs=1e-8)
+
+
+def test_small_steps_lead_to_the_same_states(nominal):
+    workshop = Workshop(nominal)
+    for number in range(6):
+        errors = drawn(nominal, LARGE, number)
+        large, small = workshop.load(errors), workshop.load(errors, step=1 / 64, smallest=1 / 256)
+        assert large.stands == small.stands
+        if large.stands:
+            assert large.state.positions == pytest.approx(small.state.positions, abs=1e-8)
+
+
+def test_a_structure_has_the_same_bits_whatever_the_count_the_order_and_the_threads(nominal, monkeypatch):
+    tolerances = replace(LARGE, rod_bow=1e-3, shape=5e-4)
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    alone = Workshop(nominal).drawn(tolerances, seed=3, numbers=[4, 2])
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    among = Workshop(nominal).drawn(tolerances, seed=3, numbers=range(6))
+    for one, other in zip(alone, (among[4], among[2]), strict=True):
+        assert (one.number, one.factor, one.far) == (other.number, other.factor, other.far)
+        assert one.state.positions.tobytes() == other.state.positions.tobytes()
+
+
+def test_causes_are_drawn_each_on_its_own_with_mean_zero_and_deviation_one(nominal):
+    z = {name: [] for name in CAUSES}
+    for number in range(40):
+        for name, values in variables(nominal.members, 1, number).items():
+            z[name].append(values)
+    every = [np.concatenate(z[name]) for name in CAUSES]
+    for name, values in zip(CAUSES, every, strict=True):
+        assert abs(values.mean()) < 4.0 / np.sqrt(len(values)), name
+        assert abs(values.std() - 1.0) < 4.0 / np.sqrt(2 * len(values)), name
+    assert len(np.unique(np.concatenate(every))) == sum(map(len, every))
+
+
+def test_two_designs_of_a_shell_are_drawn_with_the_same_errors(dome, nominal):
+    half = replace(dome.design(), present=np.arange(len(dome.cable_ends)) % 2 == 0)
+    other = standing.perfect(dome, half, 0.1 * nominal.load)
+    errors = drawn(nominal, LARGE, 5)
+    one = built_cables(nominal.network.cables, nominal.present, errors)
+    two = built_cables(other.network.cables, other.present, errors)
+    assert one.rest_length[half.present] == pytest.approx(two.rest_length, abs=0.0)
+
+
+def test_without_errors_the_perfect_structure_comes_out(nominal):
+    found = Workshop(nominal).load(drawn(nominal, Tolerances(), 0))
+    assert found.stands
+    assert found.factor == 1.0
+    assert found.far < 1e-9
+
+
+def test_marks_move_crossings_along_the_rod_and_keep_its_elements_in_one_piece(nominal):
+    errors = drawn(nominal, Tolerances(marks=1e-4), 1)
+    z = variables(nominal.members, 7, 1)["marks"]
+    first = 0
+    for rod in nominal.members.rods:
+        own = 1e-4 * z[first : first + len(rod.marks)]
+        first += len(rod.marks)
+        place = np.append(0.0, np.cumsum(errors.beam_length[rod.elements]))
+        assert place[rod.marks] == pytest.approx(own - own[0], abs=1e-15)
+
+
+def test_an_uneven_load_has_the_same_sum_and_one_half_heavier(nominal):
+    errors = drawn(nominal, Tolerances(load_uneven=0.1), 2)
+    assert errors.load.std() > 0.01
+    assert errors.load.mean() == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_model_file_is_drawn_and_loaded_like_the_shell_it_came_from(dome, nominal, tmp_path):
+    file = tmp_path / "model.json"
+    supports = tuple(int(node) for node in dome.net.supports)
+    write_model(file, Model(nominal.network, {"design": nominal.load}, dome.target, supports))
+    model = perfect_model(read_model(file), "design")
+    assert len(model.members.rods) == len(nominal.members.rods)
+    for one, other in zip(model.members.rods, nominal.members.rods, strict=True):
+        assert one.elements.tolist() == other.elements.tolist()
+        assert one.marks.tolist() == other.marks.tolist()
+    assert model.states[-1].positions == pytest.approx(nominal.states[-1].positions, abs=1e-8)
+    assert Workshop(model).drawn(LARGE, seed=0, numbers=[0])[0].stands
+
+
+def test_an_unknown_load_case_of_a_model_is_refused(dome, nominal):
+    model = Model(nominal.network, {"design": nominal.load}, dome.target, ())
+    with pytest.raises(InputError, match="Known: design"):
+        perfect_model(model, "wind")
+
+
+def test_a_model_without_start_is_refused(nominal):
+    with pytest.raises(InputError, match="start"):
+        perfect_model(Model(nominal.network, {"design": nominal.load}, None, ()), "design")
+
+
+def test_a_sample_counts_those_that_stand(dome, nominal):
+    found = sample(dome, dome.design(), nominal.load, default_tolerances(dome), count=8, seed=1)
+    assert found.standing.drawn == len(found.outcomes) == 8
+    assert found.standing.standing == sum(each.stands for each in found.outcomes)
+
+
+def test_no_structure_at_all_is_refused(dome, nominal):
+    with pytest.raises(InputError, match="at least 1"):
+        sample(dome, dome.design(), nominal.load, LARGE, count=0, seed=0)
+
+
+def test_a_negative_seed_is_refused(nominal):
+    with pytest.raises(InputError, match="seed"):
+        variables(nominal.members, -1, 0)
