@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
+from typing import cast
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from shellform.arrays import Flags, Reals, flags
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.bent_beams import BentBeams
 from shellform.reliability.drawing import (
     SHAPES,
     Errors,
@@ -36,6 +38,7 @@ from shellform.reliability.drawing import (
 from shellform.reliability.members import Members, members_of, members_of_model
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
 from shellform.structure.answers.stability import modes
+from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.state import State, moved
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.model import Model
@@ -52,6 +55,7 @@ STEP = 0.5  # of the load
 _PATIENCE = 10  # factorisations of one step
 _RELAXING = 15  # of the unloaded state, before it is sought from the target instead
 _ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
+_PASSES = 2  # of bringing beams to their length
 _FAR_OFF = 5.0  # rad, a step that leads nowhere
 _NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structure's path to the next
 
@@ -299,6 +303,7 @@ class _Loading:
         except NotPositiveDefinite:  # held by the friction of its numbers: below what `held` adds
             pass
         begin = moved(start, self.assembly.chords.corrected(start, step.reshape(-1, 6)))
+        begin = self._to_length(begin)
         found = self._newton(begin, none, limit=_RELAXING, tolerance=_ON_THE_WAY)
         if found is not None:
             return found
@@ -309,6 +314,29 @@ class _Loading:
             return None
         self.spent += relaxed.factorisations
         return self._newton(relaxed.state, none, limit=2, tolerance=_ON_THE_WAY)
+
+    def _to_length(self, state: State) -> State:
+        """The state with its nodes moved so that the beams have the perfect structure's axial strains: rods are so
+        stiff along their axis that what a linear motion leaves would buckle them. The nearest motion in the sense of least
+        squares weighted by EA / l0, as in chords.py."""
+        beams = self.nominal.network.beams
+        built = self.assembly.parts[0]
+        rest = (built.straight if isinstance(built, BentBeams) else cast(Beams, built)).rest_length
+        a, b = beams.ends.T
+        before = self.nominal.unloaded.positions
+        goal = rest / beams.rest_length * np.linalg.norm(before[b] - before[a], axis=1)
+        positions = state.positions.copy()
+        chords = self.assembly.chords
+        for _ in range(_PASSES):
+            along = positions[b] - positions[a]
+            length = np.linalg.norm(along, axis=1)
+            pull = (chords.weight * (goal - length) / length)[:, None] * along
+            right = np.zeros_like(positions)
+            np.add.at(right, b, pull)
+            np.add.at(right, a, -pull)
+            for nodes, group, factor in chords.axes:
+                positions[np.ix_(nodes, group)] += factor.solve(right[np.ix_(nodes, group)])
+        return State(positions, state.quaternions)
 
     def _step(self, here: _Here, goal: float) -> _Here | None:
         """From a state on the branch to the load factor `goal`."""
