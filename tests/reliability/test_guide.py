@@ -1,0 +1,143 @@
+"""Cables counted for what they are worth, and the guide made of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shellform.gridshell.tolerances import default_tolerances
+from shellform.reliability.expected_cables import ExpectedCables
+from shellform.reliability.guide import guide
+from shellform.reliability.standing import perfect
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import at_rest
+
+PLACES = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.1], [0.3, 0.9, 0.2], [0.1, 0.3, 1.1]])
+ENDS = [[0, 1], [1, 2], [2, 3], [0, 3]]
+
+
+@pytest.fixture
+def cables():
+    """One taut by a hair, one slack by as much, one taut and one slack for sure."""
+    length = np.linalg.norm(PLACES[[1, 2, 3, 3]] - PLACES[[0, 1, 2, 0]], axis=1)
+    off = np.array([1e-4, -1e-4, 5e-3, -5e-3])
+    return make_cables(ENDS, rest_length=length - off, stiffness=187.0)
+
+
+def expected(cables):
+    return ExpectedCables(cables, np.full(4, 2e-4))
+
+
+def test_the_expected_tension_is_the_mean_of_the_sharp_one_over_the_errors(cables):
+    state, rng = at_rest(PLACES), np.random.default_rng(0)
+    found = expected(cables).tension(state)
+    stretch = cables.lengths(state) - cables.rest_length
+    z = rng.normal(size=(400_000, 1))
+    mean = (cables.stiffness / cables.rest_length * np.maximum(stretch + 2e-4 * z, 0.0)).mean(axis=0)
+    assert found == pytest.approx(mean, rel=5e-3, abs=1e-4)
+
+
+def test_without_doubt_the_sharp_law_comes_out(cables):
+    state = at_rest(PLACES)
+    sharp, smooth = (
+        cables.evaluate(state, tangent=True),
+        ExpectedCables(cables, np.full(4, 1e-9)).evaluate(state, tangent=True),
+    )
+    assert smooth.energy == pytest.approx(sharp.energy, rel=1e-9, abs=1e-14)
+    assert smooth.force == pytest.approx(sharp.force, rel=1e-9, abs=1e-12)
+    assert smooth.tangent == pytest.approx(sharp.tangent, rel=1e-9, abs=1e-9)
+
+
+def directions():
+    rng = np.random.default_rng(1)
+    return rng.normal(size=(4, 3)), rng.normal(size=(4, 6))
+
+
+def shifted(h, way):
+    return at_rest(PLACES + h * way)
+
+
+def orders(value, derivative):
+    """Orders of the remainder of the first-order Taylor expansion as the step is halved."""
+    steps = 4e-5 * 0.5 ** np.arange(4)
+    left = [np.linalg.norm(value(h) - value(0.0) - h * derivative) for h in steps]
+    return np.log2(np.array(left[:-1]) / np.array(left[1:]))
+
+
+def test_the_forces_are_the_gradient_of_the_energy(cables):
+    way, _ = directions()
+    part = expected(cables)
+    force = part.evaluate(shifted(0.0, way), tangent=False).force
+    slope = (force * way[np.array(ENDS)].reshape(4, 6)).sum()
+    found = orders(lambda h: part.evaluate(shifted(h, way), tangent=False).energy.sum(), slope)
+    assert found == pytest.approx(2.0, abs=0.15)
+
+
+def test_the_tangent_is_the_derivative_of_the_forces(cables):
+    way, _ = directions()
+    part = expected(cables)
+    packed = part.evaluate(shifted(0.0, way), tangent=True).tangent
+    rows, columns = np.tril_indices(6)
+    whole = np.zeros((4, 6, 6))
+    whole[:, rows, columns] = packed
+    whole[:, columns, rows] = packed
+    slope = np.einsum("eij,ej->ei", whole, way[np.array(ENDS)].reshape(4, 6))
+    found = orders(lambda h: part.evaluate(shifted(h, way), tangent=False).force, slope)
+    assert found == pytest.approx(2.0, abs=0.15)
+
+
+def longer(cables, h, rate):
+    return replace(cables, rest_length=cables.rest_length + h * rate)
+
+
+def test_the_derivative_by_the_rest_length_is_that_of_the_forces(cables):
+    rate = np.array([1.0, -0.5, 0.3, 2.0])
+    state = at_rest(PLACES)
+    slope = expected(cables).force_by_rest_length(state) * rate[:, None]
+    found = orders(lambda h: expected(longer(cables, h, rate)).evaluate(state, tangent=False).force, slope)
+    assert found == pytest.approx(2.0, abs=0.15)
+
+
+def quadratic(part, state, mode):
+    packed = part.evaluate(state, tangent=True).tangent
+    rows, columns = np.tril_indices(6)
+    own = mode[np.array(ENDS), :3].reshape(4, 6)
+    return (packed * own[:, rows] * own[:, columns] * np.where(rows == columns, 1.0, 2.0)).sum(axis=1)
+
+
+def test_the_derivative_of_a_modes_stiffness_by_the_places_is_exact(cables):
+    way, mode = directions()
+    part = expected(cables)
+    slope = (part.stiffness_by_dof(shifted(0.0, way), mode) * way[np.array(ENDS)].reshape(4, 6)).sum(axis=1)
+    found = orders(lambda h: quadratic(part, shifted(h, way), mode), slope)
+    assert found == pytest.approx(2.0, abs=0.15)
+
+
+def test_the_derivative_of_a_modes_stiffness_by_the_rest_length_is_exact(cables):
+    rate = np.array([1.0, -0.5, 0.3, 2.0])
+    _, mode = directions()
+    state = at_rest(PLACES)
+    slope = expected(cables).stiffness_by_rest_length(state, mode) * rate
+    found = orders(lambda h: quadratic(expected(longer(cables, h, rate)), state, mode), slope)
+    assert found == pytest.approx(2.0, abs=0.15)
+
+
+def test_a_design_that_rests_on_cables_taut_by_a_hair_is_told_to_be_softer(dome, nominal):
+    tolerances = default_tolerances(dome)
+    before = guide(nominal, tolerances).least
+    # The same shell, half its cables let out until they are taut by a hundredth of a millimetre when loaded.
+    lengths = dome.cable_lengths.copy()
+    cables = nominal.network.cables
+    lengths[nominal.present] = cables.lengths(nominal.states[-1])
+    rest = dome.design().rest_length.copy()
+    half = np.arange(len(rest)) % 2 == 0
+    rest[half] = (lengths - 1e-5)[half]
+    other = perfect(dome, replace(dome.design(), rest_length=rest), 0.5 * nominal.load)
+    assert guide(other, tolerances).least < before
+
+
+def test_the_guide_looks_at_the_whole_path(nominal, dome):
+    found = guide(nominal, default_tolerances(dome))
+    assert len(found.stiffness) == len(found.factors) == len(nominal.states)
+    assert found.least == found.stiffness.min()
+    assert (found.factors[0], found.factors[-1]) == (0.0, 1.0)
