@@ -49,9 +49,15 @@ from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
 from shellform.structure.solve.loading import SMALLEST, apply_load
 from shellform.structure.solve.residual import Measure, held
 
+LIMIT_POINT, BIFURCATION, BORNE, UNLOADED = "limit point", "bifurcation", "none", "no unloaded state"
+_ALIGNED = (
+    0.5  # cosine of the path's tangent and the softest mode, from which on the load itself is at its limit
+)
+
 FAR = 0.05  # of the span from the perfect structure
 STRAY = 0.01  # of the span from where a step was expected to end: the state belongs to another branch
 STEP = 0.5  # of the load
+SOUGHT = 3.0  # load factor up to which a structure's limit is sought
 _PATIENCE = 10  # factorisations of one step
 _RELAXING = 15  # of the unloaded state, before it is sought from the target instead
 _ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
@@ -107,7 +113,7 @@ def perfect(shell: Gridshell, design: Design, load: Reals, *, shapes: int = SHAP
     )
 
 
-def perfect_model(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
+def perfect_of(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
     """The same of a model file and one of its load cases. Raises InputError for an unknown one."""
     if load not in model.loads:
         raise InputError(
@@ -130,6 +136,18 @@ def perfect_model(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
     return _perfect(
         network, members, every, model.loads[load], State(positions, model.start.quaternions), shapes
     )
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Where a stable branch ends: the load `factor` up to which it was followed, the `kind` of what ended it (LIMIT_POINT,
+    BIFURCATION, BORNE where nothing did, UNLOADED where there is no equilibrium even without load), the last `state` on
+    it, and the `factorisations` spent."""
+
+    factor: float
+    kind: str
+    state: State
+    factorisations: int
 
 
 @dataclass(frozen=True)
@@ -179,7 +197,20 @@ class Workshop:
         """The structure with the errors, loaded from nothing."""
         own = self._taken()
         try:
-            return _Loading(self.nominal, own, errors, number).outcome(step, smallest)
+            return Loading(self.nominal, own, errors, number).outcome(step, smallest)
+        finally:
+            self._idle.put(own)
+
+    def limit(self, errors: Errors, *, most: float, step: float = STEP, resolution: float = 1 / 64) -> Limit:
+        """Where the structure with the errors loses stability under its growing load."""
+        own = self._taken()
+        try:
+            loading = Loading(self.nominal, own, errors, 0)
+            here, factor = loading.followed(most, step, resolution)
+            if here is None:
+                return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
+            kind = BORNE if factor >= most else loading.kind(here)
+            return Limit(factor, kind, here.state, loading.spent)
         finally:
             self._idle.put(own)
 
@@ -235,7 +266,7 @@ def _perfect(
 
 
 @dataclass(frozen=True)
-class _Here:
+class Here:
     """A state on the stable branch with its balance and its tangent's factor, good until the next one is made."""
 
     state: State
@@ -243,7 +274,7 @@ class _Here:
     factor: Factor
 
 
-class _Loading:
+class Loading:
     """One structure under way."""
 
     def __init__(self, nominal: Perfect, assembly: Assembly, errors: Errors, number: int) -> None:
@@ -262,31 +293,47 @@ class _Loading:
 
     def outcome(self, step: float, smallest: float) -> Outcome:
         nominal = self.nominal
-        here = self._unloaded()
+        here, factor = self.followed(1.0, step, smallest)
         if here is None:
             return Outcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent)
-        factor, width, good = 0.0, step, 0
-        while factor < 1.0:
-            goal = 1.0 if factor + width > 1.0 - 1e-12 else factor + width
-            there = self._step(here, goal)
-            if there is None:
-                width, good = 0.5 * width, 0
-                if width < smallest:
-                    return Outcome(self.number, factor, False, np.inf, here.state, self.spent)
-                again = self._at(here.state)  # its factor was replaced
-                assert again is not None
-                here = again
-                continue
-            here, factor, good = there, goal, good + 1
-            if good == 2:
-                width, good = min(2.0 * width, step), 0
+        if factor < 1.0:
+            return Outcome(self.number, factor, False, np.inf, here.state, self.spent)
         far = np.inf
         if nominal.bears:
             far = float(np.linalg.norm(here.state.positions - nominal.states[-1].positions, axis=1).max())
         stands = far <= FAR * nominal.members.span
         return Outcome(self.number, factor, stands, far, here.state, self.spent)
 
-    def _unloaded(self) -> _Here | None:
+    def followed(self, most: float, step: float, smallest: float) -> tuple[Here | None, float]:
+        """The last state on the stable branch and its load factor, `most` where the branch goes on; None where there is
+        no unloaded state."""
+        here = self._unloaded()
+        factor, width, good = 0.0, step, 0
+        while here is not None and factor < most:
+            goal = most if factor + width > most - 1e-12 else factor + width
+            there = self._step(here, goal, last=goal == most)
+            if there is None:
+                width, good = 0.5 * width, 0
+                here = self._at(here.state)  # its factor was replaced
+                if width < smallest:
+                    break
+                continue
+            here, factor, good = there, goal, good + 1
+            if good == 2:
+                width, good = min(2.0 * width, step), 0
+        return here, factor
+
+    def kind(self, here: Here) -> str:
+        """What ends the branch just beyond the state: at a limit point the path's tangent turns into the softest
+        mode, at a bifurcation it stays across."""
+        soft = modes(self.assembly, here.state, 1).shapes[0].ravel()[self.assembly.free]
+        factor = self.assembly.factor(here.state)
+        onward = factor.solve(self.load.ravel()[self.assembly.free])
+        mass = self.measure.mass_shape
+        size = np.sqrt(float((mass * soft * soft).sum() * (mass * onward * onward).sum()))
+        return LIMIT_POINT if abs(float((mass * soft * onward).sum())) > _ALIGNED * size else BIFURCATION
+
+    def _unloaded(self) -> Here | None:
         """The unloaded state: supports and free nodes go along with all errors at once, by the perfect structure's
         tangent, since errors of rods' lengths leave the drawn one indefinite until its nodes have moved."""
         nominal, none = self.nominal, np.zeros_like(self.load)
@@ -338,21 +385,21 @@ class _Loading:
                 positions[np.ix_(nodes, group)] += factor.solve(right[np.ix_(nodes, group)])
         return State(positions, state.quaternions)
 
-    def _step(self, here: _Here, goal: float) -> _Here | None:
+    def _step(self, here: Here, goal: float, *, last: bool) -> Here | None:
         """From a state on the branch to the load factor `goal`."""
         load = goal * self.load
         change = self._solved(here, load)
         if change is None:
             return None
         begin = moved(here.state, self.assembly.chords.corrected(here.state, change))
-        tolerance = TOLERANCE if goal == 1.0 else _ON_THE_WAY
+        tolerance = TOLERANCE if last else _ON_THE_WAY
         found = self._newton(begin, load, limit=_PATIENCE, tolerance=tolerance)
         if found is None:
             return None
         stray = float(np.abs(found.state.positions - begin.positions).max())
         return found if stray <= STRAY * self.nominal.members.span else None
 
-    def _newton(self, begin: State, load: Reals, *, limit: int, tolerance: float) -> _Here | None:
+    def _newton(self, begin: State, load: Reals, *, limit: int, tolerance: float) -> Here | None:
         """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent positive definite,
         the last one included; None where one isn't."""
         own, state, before = self.assembly, begin, np.inf
@@ -371,7 +418,7 @@ class _Loading:
             state = moved(state, own.chords.corrected(state, change))
         return None
 
-    def _at(self, state: State) -> _Here | None:
+    def _at(self, state: State) -> Here | None:
         """The state with its tangent's factor; None where that isn't positive definite."""
         balance = self.assembly.evaluate(state)
         self.spent += 1
@@ -379,9 +426,9 @@ class _Loading:
             factor = self.assembly.matrix.factor(held(self.assembly, balance))
         except NotPositiveDefinite:
             return None
-        return _Here(state, balance, factor)
+        return Here(state, balance, factor)
 
-    def _solved(self, here: _Here, load: Reals) -> Reals | None:
+    def _solved(self, here: Here, load: Reals) -> Reals | None:
         """Newton's step (n, 6), no spin beyond TURN; None where it leads nowhere."""
         step = np.zeros(6 * self.assembly.count)
         free = self.assembly.free

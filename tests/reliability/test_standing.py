@@ -9,7 +9,7 @@ from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances, default_tolerances
 from shellform.reliability import standing
 from shellform.reliability.drawing import CAUSES, built_beams, built_cables, built_load, errors_of, variables
-from shellform.reliability.standing import Workshop, perfect, perfect_model, sample
+from shellform.reliability.standing import Workshop, perfect, perfect_of, sample
 from shellform.structure.answers.analysis import analyse
 from shellform.structure.model import Model, read_model, write_model
 
@@ -115,7 +115,7 @@ def test_a_model_file_is_drawn_and_loaded_like_the_shell_it_came_from(dome, nomi
     file = tmp_path / "model.json"
     supports = tuple(int(node) for node in dome.net.supports)
     write_model(file, Model(nominal.network, {"design": nominal.load}, dome.target, supports))
-    model = perfect_model(read_model(file), "design")
+    model = perfect_of(read_model(file), "design")
     assert len(model.members.rods) == len(nominal.members.rods)
     for one, other in zip(model.members.rods, nominal.members.rods, strict=True):
         assert one.elements.tolist() == other.elements.tolist()
@@ -127,12 +127,12 @@ def test_a_model_file_is_drawn_and_loaded_like_the_shell_it_came_from(dome, nomi
 def test_an_unknown_load_case_of_a_model_is_refused(dome, nominal):
     model = Model(nominal.network, {"design": nominal.load}, dome.target, ())
     with pytest.raises(InputError, match="Known: design"):
-        perfect_model(model, "wind")
+        perfect_of(model, "wind")
 
 
 def test_a_model_without_start_is_refused(nominal):
     with pytest.raises(InputError, match="start"):
-        perfect_model(Model(nominal.network, {"design": nominal.load}, None, ()), "design")
+        perfect_of(Model(nominal.network, {"design": nominal.load}, None, ()), "design")
 
 
 def test_a_sample_counts_those_that_stand(dome, nominal):

@@ -1,0 +1,156 @@
+"""How far a design's numbers are off because its rods are cut into straight elements: the same model with each rod
+element halved, solved anew along the documented path.
+
+With q4 and q8 found on the two meshes and an error of order h² (beam.py), Richardson's estimate of the value at
+h = 0 and of the error of each is
+
+    q0 = q8 + (q8 - q4) / 3,   q4 - q0 = 4 (q4 - q8) / 3,   q8 - q0 = (q4 - q8) / 3.
+
+New nodes lie on the cubic through both ends of an element with their directions, turned halfway. A path that
+the finer mesh leaves much earlier has no error of order h²; the estimate then tells the size of it and nothing more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.drawing import errors_of, variables
+from shellform.reliability.members import members_of_model
+from shellform.reliability.standing import SOUGHT, Limit, Workshop, perfect_of
+from shellform.structure.elements import rotation
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.sections import Section
+from shellform.structure.elements.state import State
+from shellform.structure.model import Model
+from shellform.structure.network import Network
+
+_STEP = 0.125  # of the load, towards the critical factor
+_RESOLUTION = 1e-4  # of the load factor
+
+
+@dataclass(frozen=True)
+class Refined:
+    """One number found on the design's mesh and on the one with rod elements halved."""
+
+    coarse: float
+    fine: float
+
+    @property
+    def extrapolated(self) -> float:
+        """Richardson's estimate at h = 0."""
+        return self.fine + (self.fine - self.coarse) / 3.0
+
+    @property
+    def error(self) -> float:
+        """Of the design's mesh: its number less the estimate."""
+        return self.coarse - self.extrapolated
+
+
+@dataclass(frozen=True)
+class MeshError:
+    """`deviation_max` and `deviation_mean`, m, of the design's nodes from the target, `stress`, Pa, the largest
+    bending stress of rods, `critical` the critical load factor; how the path ended on both meshes, `kinds`."""
+
+    deviation_max: Refined
+    deviation_mean: Refined
+    stress: Refined
+    critical: Refined
+    kinds: tuple[str, str]
+
+
+def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float = SOUGHT) -> MeshError:
+    """Of a design under the dead `load` (n, 6); critical factors are sought up to `sought`. Raises NotConverged
+    where there is no unloaded equilibrium."""
+    section = shell.rod.resized(design.radius).section
+    supports = tuple(int(node) for node in shell.net.supports)
+    model = Model(shell.network(design), {"load": load}, shell.target, supports)
+    coarse = _numbers(model, shell.target.positions, section, sought)
+    fine = _numbers(halved(model), shell.target.positions, section, sought)
+    pairs = [Refined(one, other) for one, other in zip(coarse[:4], fine[:4], strict=True)]
+    return MeshError(pairs[0], pairs[1], pairs[2], pairs[3], (coarse[4], fine[4]))
+
+
+def critical_factor(shell: Gridshell, design: Design, load: Reals, *, sought: float = SOUGHT) -> Limit:
+    """The load factor at which a design, loaded from nothing, loses stability, and what ends its path. Raises
+    NotConverged where there is no unloaded equilibrium."""
+    supports = tuple(int(node) for node in shell.net.supports)
+    model = Model(shell.network(design), {"load": load}, shell.target, supports)
+    return _limit(model, sought)[1]
+
+
+def halved(model: Model) -> Model:
+    """The model with each beam of the kind "rod" cut in two; its nodes come first, in their order."""
+    network, start = model.network, model.start
+    beams, count = network.beams, len(network.nodes)
+    rods = np.flatnonzero(np.array([kind == "rod" for kind in beams.kinds])[beams.kind])
+    a, b = beams.ends[rods].T
+    new = count + np.arange(len(rods))
+    nodes = np.vstack([network.nodes, 0.5 * (network.nodes[a] + network.nodes[b])])
+    ends, again = beams.ends.copy(), beams.ends[rods].copy()
+    ends[rods, 1], again[:, 0] = new, new
+    cut = _repeated(beams, rods)
+    rest = cut.rest_length.copy()
+    rest[rods] *= 0.5
+    rest[len(beams.ends) :] *= 0.5
+    finer = replace(cut, ends=np.vstack([ends, again]), rest_length=rest)
+    wider = np.zeros((len(rods), 6))
+    return Model(
+        Network(
+            nodes,
+            finer,
+            network.cables,
+            np.vstack([network.fixed, wider.astype(bool)]),
+            np.vstack([network.imposed, wider]),
+        ),
+        {name: np.vstack([load, wider]) for name, load in model.loads.items()},
+        None if start is None else _between(start, beams, rods),
+        model.supported,
+    )
+
+
+def _repeated(beams: Beams, rods: np.ndarray) -> Beams:
+    """The beams, then those of the rods once more."""
+    every = np.concatenate([np.arange(len(beams.ends)), rods])
+    names = ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length", "frames", "kind")
+    return replace(beams, **{name: getattr(beams, name)[every] for name in names})
+
+
+def _between(start: State, beams: Beams, rods: np.ndarray) -> State:
+    """The state with the rods' middles on the cubic through their ends."""
+    a, b = beams.ends[rods].T
+    one, other = start.positions[a], start.positions[b]
+    length = np.linalg.norm(other - one, axis=1)[:, None]
+    axis = beams.frames[rods][:, :, 0]
+    along = [
+        np.einsum("eij,ej->ei", rotation.matrices(start.quaternions[node]), axis) * length for node in (a, b)
+    ]
+    middle = 0.5 * (one + other) + 0.125 * (along[0] - along[1])
+    first, second = start.quaternions[a], start.quaternions[b]
+    same = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    half = first + same * second
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    return State(np.vstack([start.positions, middle]), np.vstack([start.quaternions, half]))
+
+
+def _limit(model: Model, sought: float) -> tuple[Workshop, Limit]:
+    nominal = perfect_of(model, "load", shapes=0)
+    workshop = Workshop(nominal)
+    members = members_of_model(model)
+    none = errors_of(members, Tolerances(), variables(members, 0, 0))
+    return workshop, workshop.limit(none, most=sought, step=_STEP, resolution=_RESOLUTION)
+
+
+def _numbers(
+    model: Model, target: Reals, section: Section, sought: float
+) -> tuple[float, float, float, float, str]:
+    workshop, limit = _limit(model, sought)
+    state, beams = workshop.nominal.states[-1], model.network.beams
+    away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
+    forces = beams.local_forces(state)[beams.kind == beams.kinds.index("rod")]
+    stress = float(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]).max())
+    return float(away.max()), float(away.mean()), stress, limit.factor, limit.kind
