@@ -1,0 +1,84 @@
+"""How a drawn structure fails: under which load, in which shape, which cables leave it, which error drives it.
+
+Which cause drives a failure is found by taking it away: the same structure is loaded again with one cause's errors
+left out, and what its load factor gains is that cause's part. Gains needn't add up, since causes work together; a
+first-order share about the perfect structure's limit point would add up and be wrong (the collapse starts from
+another path). The cables are those that are slack at the end of the branch and taut in the perfect structure
+under the same load.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.drawing import CAUSES, built_cables, errors_of, variables
+from shellform.reliability.standing import Limit, Outcome, Workshop
+from shellform.structure.answers.stability import modes
+from shellform.structure.elements.state import State
+from shellform.structure.elements.threads import side_by_side
+from shellform.structure.network import assemble
+
+_MOST = 1.5  # load factor up to which a structure without one cause is followed
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Structure `number` fell at the load `factor` by what `kind` tells; `without` has the load factor that it reaches
+    with one cause left out, the most helpful first; `cables` are the numbers of those of the design's cables that
+    have gone slack; `mode` (n, 6), largest translation 1, is the shape in which it gives way from its last `state`."""
+
+    number: int
+    factor: float
+    kind: str
+    without: Mapping[str, float]
+    cables: Indices
+    mode: Reals
+    state: State
+
+    @property
+    def driver(self) -> str:
+        """The cause without which it would bear most."""
+        return next(iter(self.without))
+
+
+def most_likely(outcomes: tuple[Outcome, ...]) -> Outcome | None:
+    """Of the fallen structures the one whose load factor is in the middle; None where all stand."""
+    fallen = sorted((each for each in outcomes if not each.stands), key=lambda each: each.factor)
+    return fallen[len(fallen) // 2] if fallen else None
+
+
+def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: int) -> Failure:
+    """Of one fallen structure. Raises InputError where it has no unloaded state to tell of or bears its load."""
+    nominal = workshop.nominal
+    z = variables(nominal.members, seed, number)
+    errors = errors_of(nominal.members, tolerances, z)
+    end = workshop.limit(errors, most=1.0)
+    if end.factor >= 1.0 or end.factor == 0.0:
+        raise InputError("the structure hasn't fallen under its load", where="number", value=number)
+    active = [cause for cause in CAUSES if getattr(tolerances, cause) > 0.0]
+
+    def left(cause: str) -> Limit:
+        other = {**z, cause: np.zeros_like(z[cause])}
+        return workshop.limit(errors_of(nominal.members, tolerances, other), most=_MOST)
+
+    found = {cause: each.factor for cause, each in zip(active, side_by_side(left, active), strict=True)}
+    assembly = assemble(nominal.network)
+    cables = nominal.network.cables
+    built = built_cables(cables, nominal.present, errors, nominal.imperfections)
+    nearest = int(np.argmin(np.abs(nominal.factors - end.factor)))
+    slack = (built.tension(end.state) <= 0.0) & (cables.tension(nominal.states[nearest]) > 0.0)
+    return Failure(
+        number,
+        end.factor,
+        end.kind,
+        dict(sorted(found.items(), key=lambda each: -each[1])),
+        np.flatnonzero(slack),
+        modes(assembly, end.state, 1).shapes[0],
+        end.state,
+    )

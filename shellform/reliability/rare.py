@@ -1,0 +1,78 @@
+"""How rarely a design falls: subset simulation (subset.py) over the errors of its structures.
+
+The limit state of a structure is the load factor at which it loses its stable branch, less the factor 1 of the load
+that it has to bear. Factors are sought up to `MOST`, found to `RESOLUTION`, and beyond that taken as equal: where the
+better part of all structures bears more, the first level's bound lies among those that don't.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.drawing import CAUSES, errors_of, sizes
+from shellform.reliability.members import Members
+from shellform.reliability.standing import Workshop
+from shellform.reliability.subset import Rare, subset_simulation
+from shellform.structure.elements.threads import side_by_side
+
+MOST = 3.0  # load factor
+RESOLUTION = 1.0 / 256.0
+COUNT = 200  # samples a level: one in a thousand takes three levels, 560 structures
+_STEP = 0.25
+
+
+@dataclass(frozen=True)
+class RareFailure:
+    """`found` by subset simulation; `shares` of each cause in the squared distance of the likeliest failure from the
+    perfect structure, less what as many variables have there by chance (empty where nothing failed)."""
+
+    found: Rare
+    shares: dict[str, float]
+
+
+def rare_failure(
+    workshop: Workshop, tolerances: Tolerances, *, seed: int, count: int = COUNT, most: float = MOST
+) -> RareFailure:
+    """The probability that a structure of the workshop's design doesn't bear its load."""
+    members = workshop.nominal.members
+    names = [name for name in CAUSES if getattr(tolerances, name) > 0.0]
+    counts = sizes(members)
+
+    def one(z: Reals) -> float:
+        errors = errors_of(members, tolerances, _by_cause(members, names, z))
+        return workshop.limit(errors, most=most, step=_STEP, resolution=RESOLUTION).factor - 1.0
+
+    def limit_state(points: Reals) -> list[float]:
+        return side_by_side(one, list(points))
+
+    found = subset_simulation(limit_state, sum(counts[name] for name in names), count=count, seed=seed)
+    return RareFailure(found, _shares(found, names, [counts[name] for name in names]))
+
+
+def _by_cause(members: Members, names: list[str], z: Reals) -> dict[str, Reals]:
+    """The variables of each cause; 0 for those that are left out."""
+    counts, first = sizes(members), 0
+    found = {name: np.zeros(count) for name, count in counts.items()}
+    for name in names:
+        found[name] = z[first : first + counts[name]]
+        first += counts[name]
+    return found
+
+
+def _shares(found: Rare, names: list[str], counts: list[int]) -> dict[str, float]:
+    """From the mean of all failed points, in which what has nothing to do with failing cancels."""
+    if not len(found.failed):
+        return {}
+    mean = found.failed.mean(axis=0)
+    ends = np.cumsum([0, *counts])
+    noise = 1.0 / len(found.failed)
+    sizes_ = [
+        max(float((mean[a:b] ** 2).sum()) - (b - a) * noise, 0.0)
+        for a, b in zip(ends[:-1], ends[1:], strict=True)
+    ]
+    total = sum(sizes_) or 1.0
+    return {name: size / total for name, size in zip(names, sizes_, strict=True)}
