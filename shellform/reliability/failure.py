@@ -18,7 +18,8 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import CAUSES, built_cables, errors_of, variables
-from shellform.reliability.standing import Limit, Outcome, Workshop
+from shellform.reliability.path_of_one import Limit, Outcome
+from shellform.reliability.standing import Workshop
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side

@@ -24,7 +24,7 @@ from shellform.reliability.drawing import (
     variables,
 )
 from shellform.reliability.expected_cables import ExpectedCables
-from shellform.reliability.standing import Perfect
+from shellform.reliability.perfect import Perfect
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
@@ -38,7 +38,7 @@ _LEAST = 1e-6  # m, the smallest deviation that is counted
 
 
 @dataclass(frozen=True)
-class Guide:
+class PathStiffness:
     """The softest mode's `stiffness` (k,), N/m, at the load `factors` (k,) of the path, with cables counted for what
     they are worth; negative where the average structure has fallen."""
 
@@ -51,14 +51,14 @@ class Guide:
         return float(self.stiffness.min())
 
 
-def guide(perfect: Perfect, tolerances: Tolerances, *, seed: int = 0, drawn: int = DRAWN) -> Guide:
+def guide(perfect: Perfect, tolerances: Tolerances, *, seed: int = 0, drawn: int = DRAWN) -> PathStiffness:
     """The guide of a perfect structure's path as far as it goes, at each of its kept states."""
     assembly = assemble(perfect.network)
     deviation = stretch_deviation(perfect, tolerances, assembly, seed=seed, drawn=drawn)
     found = [
         expected_stiffness(assembly, perfect.network.cables, state, deviation) for state in perfect.states
     ]
-    return Guide(perfect.factors, reals("stiffness", found, (len(found),)))
+    return PathStiffness(perfect.factors, reals("stiffness", found, (len(found),)))
 
 
 def expected_stiffness(assembly: Assembly, cables: Cables, state: State, deviation: Reals) -> float:

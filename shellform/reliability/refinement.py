@@ -21,7 +21,9 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import errors_of, variables
 from shellform.reliability.members import members_of_model
-from shellform.reliability.standing import SOUGHT, Limit, Workshop, perfect_of
+from shellform.reliability.path_of_one import SOUGHT, Limit
+from shellform.reliability.perfect import perfect_of
+from shellform.reliability.standing import Workshop
 from shellform.structure.elements import rotation
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.sections import Section

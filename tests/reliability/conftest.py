@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.reliability.standing import perfect
+from shellform.reliability.perfect import perfect
 
 
 @pytest.fixture(scope="session")

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.perfect import perfect
 from shellform.reliability.rare import rare_failure
-from shellform.reliability.standing import Workshop, perfect
+from shellform.reliability.standing import Workshop
 
 ERRORS = Tolerances(supports=3e-4, load_each=0.1, load_all=0.05)
 

@@ -8,8 +8,10 @@ import pytest
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.failure import explained, most_likely
+from shellform.reliability.path_of_one import BORNE, LIMIT_POINT
+from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.refinement import Refined, critical_factor, halved, mesh_error
-from shellform.reliability.standing import BORNE, LIMIT_POINT, Workshop, perfect, perfect_of
+from shellform.reliability.standing import Workshop
 from shellform.structure.model import Model
 
 LARGE = Tolerances(cable_length=3e-4, supports=3e-4, marks=3e-4, load_each=0.1, load_all=0.05, connectors=0.1)

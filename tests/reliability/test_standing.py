@@ -7,9 +7,9 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances, default_tolerances
-from shellform.reliability import standing
 from shellform.reliability.drawing import CAUSES, built_beams, built_cables, built_load, errors_of, variables
-from shellform.reliability.standing import Workshop, perfect, perfect_of, sample
+from shellform.reliability.perfect import perfect, perfect_of
+from shellform.reliability.standing import Workshop, sample
 from shellform.structure.answers.analysis import analyse
 from shellform.structure.model import Model, read_model, write_model
 
@@ -80,7 +80,7 @@ def test_causes_are_drawn_each_on_its_own_with_mean_zero_and_deviation_one(nomin
 
 def test_two_designs_of_a_shell_are_drawn_with_the_same_errors(dome, nominal):
     half = replace(dome.design(), present=np.arange(len(dome.cable_ends)) % 2 == 0)
-    other = standing.perfect(dome, half, 0.1 * nominal.load)
+    other = perfect(dome, half, 0.1 * nominal.load)
     errors = drawn(nominal, LARGE, 5)
     one = built_cables(nominal.network.cables, nominal.present, errors)
     two = built_cables(other.network.cables, other.present, errors)

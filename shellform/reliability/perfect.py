@@ -1,0 +1,112 @@
+"""The perfect structure of a design or a model file and its path under one load, from which drawn structures start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Flags, Reals, flags
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.reliability.drawing import (
+    SHAPES,
+    Imperfections,
+)
+from shellform.reliability.members import Members, members_of, members_of_model
+from shellform.structure.answers.stability import modes
+from shellform.structure.elements.state import State
+from shellform.structure.model import Model
+from shellform.structure.network import Network, assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.loading import apply_load
+
+_NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structure's path to the next
+
+
+@dataclass(frozen=True)
+class Perfect:
+    """The perfect structure under one `load` (n, 6): its `network`, `members`, which of the candidate cables are
+    `present`, its unloaded state and those at `factors` (k,) of the load along its path, as far as that goes (all of it: `bears`);
+    `imperfections` of shape."""
+
+    network: Network
+    members: Members
+    present: Flags
+    load: Reals
+    start: State
+    factors: Reals
+    states: tuple[State, ...]
+    bears: bool
+    imperfections: Imperfections
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "present", flags("present", self.present, (None,)))
+
+    @property
+    def unloaded(self) -> State:
+        """The state without load."""
+        return self.states[0]
+
+
+def perfect(shell: Gridshell, design: Design, load: Reals, *, shapes: int = SHAPES) -> Perfect:
+    """The perfect structure of a design and its path under the dead `load` (n, 6). Raises NotConverged where it
+    has no unloaded equilibrium."""
+    return _perfect(
+        shell.network(design), members_of(shell), np.asarray(design.present), load, shell.target, shapes
+    )
+
+
+def perfect_of(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
+    """The same of a model file and one of its load cases. Raises InputError for an unknown one."""
+    if load not in model.loads:
+        raise InputError(
+            "there is no such load case",
+            where="load",
+            value=load,
+            remedy=f"Known: {', '.join(model.loads)}.",
+        )
+    network, members = model.network, members_of_model(model)
+    if model.start is None:
+        raise InputError(
+            "the model has no start from which its unloaded state could be sought",
+            where="start",
+            remedy="Give the bent state as start.",
+        )
+    positions = model.start.positions.copy()
+    fixed = network.fixed[:, :3]
+    positions[fixed] = (network.nodes + network.imposed[:, :3])[fixed]
+    every = np.ones(len(network.cables.ends), dtype=bool)
+    return _perfect(
+        network, members, every, model.loads[load], State(positions, model.start.quaternions), shapes
+    )
+
+
+def _perfect(
+    network: Network, members: Members, present: np.ndarray, load: Reals, target: State, shapes: int
+) -> Perfect:
+    assembly = assemble(network)
+    none = np.zeros_like(load)
+    unloaded = find_equilibrium(assembly, target, none)
+    kept: list[tuple[float, State]] = [(0.0, unloaded.state)]
+    reached = apply_load(
+        assembly,
+        unloaded.state,
+        none,
+        load,
+        step=_NOMINAL_STEP,
+        stay=True,
+        report=lambda share, found: kept.append((share, found.state)),
+    )
+    soft = modes(assembly, kept[-1][1], shapes).shapes if shapes else np.zeros((0, *load.shape))
+    return Perfect(
+        network,
+        members,
+        present,
+        load,
+        target,
+        np.array([share for share, _ in kept]),
+        tuple(state for _, state in kept),
+        reached.on_branch,
+        Imperfections(unloaded.state, soft),
+    )
