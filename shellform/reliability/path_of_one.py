@@ -42,7 +42,7 @@ _FAR_OFF = 5.0  # rad, a step that leads nowhere
 
 
 @dataclass(frozen=True)
-class Outcome:
+class DrawnOutcome:
     """One drawn structure: the load `factor` up to which its stable branch was followed, whether it `stands`, how
     `far`, m, a node ends from the perfect structure's place (inf where it fell), its last `state` on the branch, and the
     `factorisations` spent."""
@@ -93,18 +93,18 @@ class Loading:
         self.measure = ResidualNorm(self.assembly)
         self.spent = 0
 
-    def outcome(self, step: float, smallest: float) -> Outcome:
+    def outcome(self, step: float, smallest: float) -> DrawnOutcome:
         nominal = self.nominal
         here, factor = self.followed(1.0, step, smallest)
         if here is None:
-            return Outcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent)
+            return DrawnOutcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent)
         if factor < 1.0:
-            return Outcome(self.number, factor, False, np.inf, here.state, self.spent)
+            return DrawnOutcome(self.number, factor, False, np.inf, here.state, self.spent)
         far = np.inf
         if nominal.bears:
             far = float(np.linalg.norm(here.state.positions - nominal.states[-1].positions, axis=1).max())
         stands = far <= FAR * nominal.members.span
-        return Outcome(self.number, factor, stands, far, here.state, self.spent)
+        return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent)
 
     def followed(self, most: float, step: float, smallest: float) -> tuple[Here | None, float]:
         """The last state on the stable branch and its load factor, `most` where the branch goes on; None where there is

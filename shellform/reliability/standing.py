@@ -26,7 +26,7 @@ from shellform.reliability.drawing import (
     errors_of,
     variables,
 )
-from shellform.reliability.path_of_one import BORNE, STEP, UNLOADED, Limit, Loading, Outcome
+from shellform.reliability.path_of_one import BORNE, STEP, UNLOADED, DrawnOutcome, Limit, Loading
 from shellform.reliability.perfect import Perfect, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
 from shellform.structure.elements.threads import side_by_side
@@ -39,7 +39,7 @@ from shellform.structure.solve.loading import SMALLEST
 class DrawnSample:
     """The `outcomes` of drawn structures, number after number, and what they say of the probability of standing."""
 
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[DrawnOutcome, ...]
     standing: Standing
 
 
@@ -78,7 +78,7 @@ class Workshop:
 
     def load(
         self, errors: Errors, *, number: int = 0, step: float = STEP, smallest: float = SMALLEST
-    ) -> Outcome:
+    ) -> DrawnOutcome:
         """The structure with the errors, loaded from nothing."""
         own = self._taken()
         try:
@@ -101,11 +101,11 @@ class Workshop:
 
     def drawn(
         self, tolerances: Tolerances, *, seed: int, numbers: Sequence[int], step: float = STEP
-    ) -> list[Outcome]:
+    ) -> list[DrawnOutcome]:
         """The structures of these numbers under the seed."""
         members = self.nominal.members
 
-        def one(number: int) -> Outcome:
+        def one(number: int) -> DrawnOutcome:
             errors = errors_of(members, tolerances, variables(members, seed, number))
             return self.load(errors, number=number, step=step)
 
