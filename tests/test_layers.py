@@ -45,7 +45,7 @@ FLOORS = {
         ["readers"],
         ["funicular"],
     ],
-    "shellform.structure": [["elements"], ["solve"], ["network"], ["model"], ["answers"]],
+    "shellform.structure": [["elements", "refusals"], ["solve"], ["network"], ["model"], ["answers"]],
     "shellform.output": [["pictures"], ["workshop"], ["exchange"], ["page", "notebook"]],
 }
 # Behind which module each library lies. Of VTK three parts are used for three things that have no line in

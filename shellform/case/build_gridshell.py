@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
+from shellform.case.build_rod import given_section, rod_material
 from shellform.case.case import (
     Case,
     ConcreteEntry,
@@ -20,13 +21,15 @@ from shellform.case.case import (
     SheetEntry,
     StockRodEntry,
 )
+from shellform.case.edge_entries import EdgeBeamEntry
 from shellform.errors import InputError
 from shellform.gridshell import loads
 from shellform.gridshell.catalogue import Catalogue, largest, named, radius_bounds, read_catalogue
+from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
 from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace, max_radius
 from shellform.gridshell.loads import Region
 from shellform.net.net import Net
-from shellform.structure.elements.sections import Material, Rectangle, Round, Section, Tube, isotropic
+from shellform.structure.elements.sections import Material, Rectangle, Round, Tube
 from shellform.surface.shape.target import Surface
 
 
@@ -35,29 +38,34 @@ def gridshell(case: Case, net: Net, surface: Surface) -> tuple[Gridshell, dict[s
     are listed.
     """
     joint = Joint(case.joint.axial, case.joint.torsion, case.joint.bending, case.joint.gap)
-    shell = brace(net, rod_of(case.rod, net), joint, Cable(case.cable.stiffness), below=surface)
+    rod, cable = rod_of(case.rod, net), Cable(case.cable.stiffness)
+    edge = edge_beam(case.edges.beam, rod) if net.edges else None
+    shell = brace(net, rod, joint, cable, below=surface, edge=edge)
     return shell, load_cases(case, shell, surface)
 
 
-def rod_material(entry: OwnRodEntry | StockRodEntry) -> Material:
-    """What the case's rods are made of."""
-    if isinstance(entry, StockRodEntry):
-        return read_catalogue(entry.catalogue).material
-    if entry.shear is not None:
-        return Material(entry.young, entry.shear, entry.density, entry.strength)
-    return isotropic(young=entry.young, poisson=entry.poisson, density=entry.density, strength=entry.strength)
-
-
-def given_section(entry: OwnRodEntry | StockRodEntry) -> Section | None:
-    """The section that the case's rods have whatever the net; None where the net's curvature decides."""
-    if isinstance(entry, StockRodEntry):
-        return None if entry.section is None else named(read_catalogue(entry.catalogue), entry.section)
-    material = rod_material(entry)
+def edge_beam(entry: EdgeBeamEntry, rod: Rod) -> EdgeBeam:
+    """The case's edge beams; what isn't given is as the `rod`. A bundle is of rods as these are."""
+    if entry.catalogue is not None and entry.section is not None:
+        return EdgeBeam(named(read_catalogue(entry.catalogue), entry.section))
+    own = rod.section.material
+    young = own.young if entry.young is None else entry.young
+    shear = own.shear if entry.young is None else young / (2.0 * (1.0 + entry.poisson))
+    material = Material(
+        young,
+        shear,
+        own.density if entry.density is None else entry.density,
+        own.strength if entry.strength is None else entry.strength,
+    )
     if entry.width is not None and entry.height is not None:
-        return Rectangle(entry.width, entry.height, material)
-    if entry.radius is None:
-        return None
-    return Round(entry.radius, material) if entry.wall is None else Tube(entry.radius, entry.wall, material)
+        return EdgeBeam(Rectangle(entry.width, entry.height, material))
+    if entry.radius is not None:
+        return EdgeBeam(
+            Round(entry.radius, material) if entry.wall is None else Tube(entry.radius, entry.wall, material)
+        )
+    # The round rod of a lath's or a tube's area stands for it in a bundle.
+    radius = math.sqrt(rod.section.constants[0] / math.pi)
+    return EdgeBeam(Bundle(radius, 19 if entry.rods is None else entry.rods, entry.composite, material))
 
 
 def rod_of(entry: OwnRodEntry | StockRodEntry, net: Net) -> Rod:
@@ -166,7 +174,8 @@ def _part(entry: Any, shell: Gridshell, surface: Surface) -> Reals:
         return loads.sheet(net, surface, entry.mass, _region(entry))
     if isinstance(entry, JointsWeightEntry):
         return loads.joints(net, entry.mass)
-    return loads.rods(net, shell.rod.section)
+    own = loads.rods(net, shell.rod.section)
+    return own if shell.edge is None or not net.edges else own + weight(net, shell.edge)
 
 
 def _region(entry: ConcreteEntry | SheetEntry) -> Region:
@@ -177,5 +186,9 @@ def _region(entry: ConcreteEntry | SheetEntry) -> Region:
 
 def catalogue_bytes(case: Case) -> bytes:
     """The content of the case's own catalogues, if it has any, for the keys of its stages."""
-    sources = [case.optimise.catalogue, case.rod.catalogue if isinstance(case.rod, StockRodEntry) else None]
+    sources = [
+        case.optimise.catalogue,
+        case.rod.catalogue if isinstance(case.rod, StockRodEntry) else None,
+        case.edges.beam.catalogue,
+    ]
     return b"".join(Path(each).read_bytes() for each in sources if each is not None and Path(each).is_file())

@@ -14,9 +14,10 @@ from shellform.case.build_gridshell import RodLimits
 from shellform.case.case import Case, check_script
 from shellform.case.entries import NetEntry, SurfaceEntry
 from shellform.errors import InputError
+from shellform.net.edges import Edges, Place, stand
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
-from shellform.records.summary import NetRecord, SurfaceRecord
+from shellform.records.summary import EdgeRecord, NetRecord, SurfaceRecord
 from shellform.surface.shape.target import Surface
 
 
@@ -82,13 +83,35 @@ def net_of(
 ) -> tuple[Net, float, tuple[float, float]]:
     """The case's net with its angle, rad, and offset."""
     entry = case.net
-    return oriented_net(
+    net, angle, offset = oriented_net(
         surface,
         net_settings(entry, case.joint.gap),
         angle=entry.angle if entry.angle == "auto" else float(np.deg2rad(entry.angle)),
         offset=entry.offset,
         progress=progress,
     )
+    outline = None if entry.outline is None else np.array(entry.outline)
+    return stand(net, surface, edges_of(case), outline=outline), angle, offset
+
+
+def edges_of(case: Case) -> Edges:
+    """What the case's edges stand on; those that are filled stand on the ground, or are as high as they are."""
+    entry = case.edges
+    places = tuple(
+        Place(
+            each.kind,
+            each.name,
+            each.height,
+            None if each.box is None else np.array(each.box),
+            None if each.curve is None else np.array(each.curve),
+            0.5 * case.net.spacing if each.within is None else each.within,
+            each.opening,
+        )
+        for each in entry.stretch
+    )
+    outer, openings = ("auto" if each == "fill" else each for each in (entry.outer, entry.openings))
+    ground = case.net.ground if entry.ground is None else entry.ground
+    return Edges(places, outer, openings, ground)
 
 
 def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
@@ -108,6 +131,20 @@ def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
     return {name: getattr(entry, name) for name in names} | {"outline": entry.outline, "gap": gap}
 
 
+def edge_records(net: Net) -> tuple[EdgeRecord, ...]:
+    """What the net's edge is, stretch after stretch."""
+    return tuple(
+        EdgeRecord(
+            each.kind,
+            each.name,
+            each.opening,
+            each.length,
+            (float(each.points[:, 2].min()), float(each.points[:, 2].max())),
+        )
+        for each in net.stretches
+    )
+
+
 def net_record(
     net: Net, *, angle: float, offset: tuple[float, float], rods: RodLimits | None = None
 ) -> NetRecord:
@@ -117,6 +154,7 @@ def net_record(
         crossings=len(net.grid.lattice),
         rods=len(net.grid.rods),
         supports=len(net.supports),
+        edges=edge_records(net),
         spacing_v=net.grid.spacing_v,
         **net.quality.summary(),
         notes=tuple(note.text for note in net.notes),

@@ -21,6 +21,7 @@ from shellform.case.build_gridshell import rod_bounds
 from shellform.case.case import Case
 from shellform.case.entries import RobustEntry
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Scatter
 from shellform.net.grid import CONNECTOR
@@ -31,6 +32,7 @@ from shellform.problem.engineering import (
     LeastTension,
     ModalStiffness,
     RodUtilisation,
+    Thrust,
     Uplift,
 )
 from shellform.problem.paths import follow
@@ -40,6 +42,7 @@ from shellform.problem.terms import CableForce, CableForces, Misfit, RmsMisfit, 
 from shellform.problem.variables import FreeRadius, RestLengths, Variable
 from shellform.structure.answers import results
 from shellform.structure.answers.stability import critical_load, modes
+from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
@@ -140,6 +143,8 @@ def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list
         if entry.uplift is not None:
             scale = max(entry.uplift, -float(loads["design"][:, 2].sum()) / len(shell.net.supports))
             found.append(AtMost(entry.uplift, Uplift(name, scale), of=scale + entry.uplift))
+        if entry.thrust is not None:
+            found.append(AtMost(entry.thrust, Thrust(name, entry.thrust)))
     if entry.slack_min is not None:
         longest = case.cable.rest_ratio * case.optimise.rest_length_max
         let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
@@ -185,10 +190,19 @@ def shown(shell: Gridshell, design: Design, state: State, load: Reals) -> dict[s
         "stress_utilisation_max": float(shell.utilisation(design, state).max()),
         "connector_turn_max": float(np.abs(turn).max(initial=0.0)),
         "uplift_max": max(0.0, -float((inner - load)[held, 2].min())),
+        "thrust_max": float(np.hypot(*(inner - load)[held, :2].T).max()),
+        "edge_utilisation_max": edge_utilisation(shell, beams, beams.local_forces(state)),
         "cable_force_max": float(pull.max(initial=0.0)),
         "cable_force_min": float(pull.min()) if len(pull) else 0.0,
         "cables_slack": int((pull <= 0.0).sum()),
     }
+
+
+def edge_utilisation(shell: Gridshell, beams: Beams, forces: Reals) -> float:
+    """Largest stress of the edge beams over their strength; 0 without edge beams."""
+    if shell.edge is None or not shell.net.edges:
+        return 0.0
+    return float(np.nanmax(results.utilisation(beams, forces, {EDGE: shell.edge.section})))
 
 
 def below_factor(factors: Mapping[str, Mapping[str, Any]], wanted: float, names: Sequence[str]) -> list[str]:

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import tomli_w
 from pydantic import (
@@ -15,11 +15,14 @@ from pydantic import (
     Discriminator,
     Field,
     Tag,
+    TypeAdapter,
     ValidationError,
     model_validator,
 )
 
 import shellform
+from shellform.case.build_rod import given_section
+from shellform.case.edge_entries import EdgesEntry
 from shellform.case.entries import (
     CableEntry,
     ConcreteEntry,
@@ -42,6 +45,14 @@ from shellform.case.entries import (
 )
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
+from shellform.gridshell.gridshell import Rod
+from shellform.gridshell.joints import following
+
+_RodEntry = Annotated[
+    Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
+    Discriminator(lambda entry: "stock" if _has(entry, "catalogue") else "own"),
+]
+_ROD: TypeAdapter[OwnRodEntry | StockRodEntry] = TypeAdapter(_RodEntry)
 
 
 class Case(Entry):
@@ -50,10 +61,7 @@ class Case(Entry):
     title: str = ""
     surface: SurfaceEntry
     net: NetEntry
-    rod: Annotated[
-        Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
-        Discriminator(lambda entry: "stock" if _has(entry, "catalogue") else "own"),
-    ]
+    rod: _RodEntry
     joint: JointEntry
     cable: CableEntry
     load: Annotated[
@@ -67,6 +75,7 @@ class Case(Entry):
             Field(discriminator="kind"),
         ],
     ] = Field({}, description="parts of the load cases, by name")
+    edges: EdgesEntry = Field(default_factory=lambda: EdgesEntry.model_validate({}))
     optimise: OptimiseEntry
     limits: LimitsEntry = Field(default_factory=lambda: LimitsEntry.model_validate({}))
     robust: RobustEntry | None = None
@@ -142,11 +151,19 @@ def read_toml(file: Path) -> dict[str, Any]:
 def make_case(data: Mapping[str, Any], file: Path) -> Case:
     """As `load_case`, from the tables of a file that are read already."""
     try:
-        case = Case.model_validate(data)
+        case = Case.model_validate(_with_joint(data, file))
     except ValidationError as error:
         raise refusal(error, Case, file) from error
     place = (file.parent / case.surface.file).resolve()
-    found: dict[str, Any] = {"surface": case.surface.model_copy(update={"file": str(place)})}
+    fill = _fill(case)
+    found: dict[str, Any] = {
+        "surface": case.surface.model_copy(update={"file": str(place)} | ({"fill": fill} if fill else {}))
+    }
+    if case.edges.beam.catalogue is not None and case.edges.beam.section is not None:
+        source = _found_catalogue(case.edges.beam.catalogue, file)
+        named(read_catalogue(source), case.edges.beam.section)
+        beam = case.edges.beam.model_copy(update={"catalogue": source})
+        found["edges"] = case.edges.model_copy(update={"beam": beam})
     if case.optimise.catalogue is not None:
         source = _found_catalogue(case.optimise.catalogue, file)
         read_catalogue(source)
@@ -158,6 +175,38 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
             named(stock, case.rod.section)
         found["rod"] = case.rod.model_copy(update={"catalogue": source})
     return case.model_copy(update=found)
+
+
+def _with_joint(data: Mapping[str, Any], file: Path) -> Mapping[str, Any]:
+    """The tables with what [joint] leaves out as fits the rods. Raises InputError where their size isn't
+    given."""
+    given = data.get("joint", {})
+    missing = [name for name in JointEntry.model_fields if isinstance(given, Mapping) and name not in given]
+    if not missing:
+        return data
+    try:
+        rod = _ROD.validate_python(data.get("rod"))
+    except ValidationError:
+        return data  # what is wrong with the rods is told first
+    if isinstance(rod, StockRodEntry):
+        rod = rod.model_copy(update={"catalogue": _found_catalogue(rod.catalogue, file)})
+    section = given_section(rod)
+    if section is None:
+        raise InputError(
+            f"{', '.join(missing)} can't follow the rods, whose size is left out",
+            where=f"{file}: joint",
+            remedy="Give the rods' size (rod.radius, rod.width and rod.height, or rod.section), or the joint in full.",
+        )
+    fitting = following(Rod(section))
+    return {**data, "joint": {name: getattr(fitting, name) for name in missing} | dict(given)}
+
+
+def _fill(case: Case) -> Literal["holes", "edges", "all"] | None:
+    """What is filled, surface.fill and what [edges] says taken together."""
+    given, edges = case.surface.fill, case.edges
+    holes = edges.openings == "fill" or given in ("holes", "all")
+    outer = edges.outer == "fill" or given in ("edges", "all")
+    return "all" if holes and outer else "holes" if holes else "edges" if outer else None
 
 
 def _found_catalogue(source: str, file: Path) -> str:

@@ -131,7 +131,9 @@ class StockRodEntry(_BoughtEntry):
 
 
 class JointEntry(Entry):
-    """The connection of two crossing rods, a short beam."""
+    """The connection of two crossing rods, a short beam. What is left out follows the rods: table 1 of the paper,
+    scaled; the gap is their depth.
+    """
 
     axial: PositiveFloat = Field(description="EA, N")
     torsion: PositiveFloat = Field(description="GJ, N·m²")
@@ -310,6 +312,7 @@ class LimitsEntry(Entry):
     uplift: NonNegativeFloat | None = Field(
         None, description="force with which a support may have to hold a rod's end down, N"
     )
+    thrust: PositiveFloat | None = Field(None, description="horizontal force that a support may bear, N")
     slack_min: PositiveFloat | None = Field(None, description="least tension of every cable, N")
     slack_loads: list[str] = Field(
         ["none"], description="load cases in which slack_min holds; none: before any load"

@@ -150,11 +150,12 @@ def _turn(a: Reals, b: Reals, c: Reals) -> float:
 def tributary(net: Net, triangles: Reals) -> Reals:
     """The area (n,), m², of triangles (t, 3, 3) on the surface that each node of the net carries.
 
-    A joint's area is at its upper node, a support's at its own; other nodes have none. The sum is the
+    A joint's area is at its upper node, that of a rod's end at its own; other nodes have none. The sum is the
     triangles' area.
     """
-    nodes = np.concatenate([net.grid.crossing_nodes[:, 1], net.supports])
-    place = np.vstack([net.crossings, net.target.positions[net.supports]])
+    ends = net.rod_ends[~np.isin(net.rod_ends, net.grid.crossing_nodes)]
+    nodes = np.concatenate([net.grid.crossing_nodes[:, 1], ends])
+    place = np.vstack([net.crossings, net.target.positions[ends]])
     result = np.zeros(net.node_count)
     result[nodes] = _nearest(triangles, place, _COARSE * net.grid.scale)
     return result

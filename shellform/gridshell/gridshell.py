@@ -12,11 +12,12 @@ from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, reals
 from shellform.errors import InputError
+from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.loads import points
 from shellform.net.grid import ROD, cells, grid_beams
 from shellform.net.net import Net
 from shellform.structure.answers.results import bending_utilisation, utilisation
-from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.sections import Round, Section, isotropic, stiffness, stiffness_by_size
 from shellform.structure.elements.state import State
@@ -147,7 +148,7 @@ class Design:
 @dataclass(frozen=True)
 class Gridshell:
     """A net with its rod, joint and candidate cables: `cable_ends` (c, 2) nodes, `cable_lengths` (c,), m, in
-    the target.
+    the target; `edge`, what its edge beams are, if it has any.
     """
 
     net: Net
@@ -155,7 +156,9 @@ class Gridshell:
     joint: Joint
     cable: Cable
     cable_ends: Indices
+    edge: EdgeBeam | None = None
     cable_lengths: Reals = field(init=False)
+    _edges: Beams | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         place = self.net.target.positions[self.cable_ends]
@@ -163,6 +166,7 @@ class Gridshell:
         object.__setattr__(
             self, "cable_lengths", reals("cable_lengths", lengths, (len(self.cable_ends),), positive=True)
         )
+        object.__setattr__(self, "_edges", edge_beams(self.net, self.edge))
 
     @property
     def target(self) -> State:
@@ -198,8 +202,9 @@ class Gridshell:
         return {ROD: self.rod.resized(radius).section}
 
     def beams(self, radius: float) -> Beams:
-        """Rods of the radius, m, and connectors."""
-        return grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
+        """Rods of the radius, m, and connectors; then the edge beams with their clamps, whatever the radius."""
+        own = grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
+        return own if self._edges is None else joined(own, self._edges)
 
     def beams_by_radius(self, radius: float) -> Beams:
         """Beams whose end forces are the derivative of `beams`' end forces by the radius: they are linear in
@@ -267,11 +272,13 @@ def max_radius(net: Net, rod: Rod) -> float:
     return rod.radius * rod.strength / stress if stress > 0.0 else math.inf
 
 
-def brace(net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface) -> Gridshell:
+def brace(
+    net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface, edge: EdgeBeam | None = None
+) -> Gridshell:
     """The gridshell with a candidate cable on both diagonals of every cell whose corners are all joints.
 
     None ends at a support, since supports are no joints, and none rises above the surface `below` which they
-    have to stay. They join the lower rods. Raises InputError where the joint doesn't fit the net or the rod
+    have to stay. They join the lower rods. `edge` is what the net's edge beams are. Raises InputError where the joint doesn't fit the net or the rod
     doesn't bear its curvature.
     """
     if not math.isclose(joint.gap, net.grid.gap, rel_tol=1e-9):
@@ -299,4 +306,4 @@ def brace(net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface) -> 
     above = np.zeros(len(ends), dtype=bool)
     for share in _SAMPLES:
         above |= finder.foot((1.0 - share) * place[:, 0] + share * place[:, 1]).distance > 0.0
-    return Gridshell(net, rod, joint, cable, ends[~above])
+    return Gridshell(net, rod, joint, cable, ends[~above], edge)

@@ -11,7 +11,7 @@ import numpy as np
 from shellform.arrays import read_arrays
 from shellform.errors import InputError
 from shellform.net.grid import Grid, GridRod
-from shellform.net.net import Net
+from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.quality import MAPS, Quality
 from shellform.net.refusal import Attempt, Change, Reason
@@ -44,6 +44,14 @@ def net_document(net: Net) -> dict[str, Any]:
             for rod in grid.rods
         ],
         "supports": place[net.supports].tolist(),
+        "edges": [
+            {"kind": each.kind, "name": each.name, "opening": each.opening, "points": each.points.tolist()}
+            for each in net.stretches
+        ],
+        "edge_beams": [
+            {"name": line.name, "closed": line.closed, "points": place[line.nodes].tolist()}
+            for line in net.edges
+        ],
     }
 
 
@@ -69,10 +77,19 @@ def save_net(path: Path, net: Net) -> None:
                     "notes": [[note.kind.value, note.text] for note in net.notes],
                     "indices": [rod.index for rod in grid.rods],
                     **({"attempts": [_row(each) for each in net.attempts]} if net.attempts else {}),
+                    "edges": [{"closed": line.closed, "name": line.name} for line in net.edges],
+                    "stretches": [
+                        {"kind": each.kind, "name": each.name, "opening": each.opening, "whole": each.whole}
+                        for each in net.stretches
+                    ],
                 }
             )
         ),
     }
+    for k, line in enumerate(net.edges):
+        arrays[f"edge_{k}_nodes"], arrays[f"edge_{k}_clamps"] = line.nodes, line.clamps
+    for k, stretch in enumerate(net.stretches):
+        arrays[f"stretch_{k}_points"] = stretch.points
     for name in ("nodes", "arc", "crossings", "at"):
         pieces = [getattr(rod, name) for rod in grid.rods]
         arrays[f"rod_{name}"] = np.concatenate(pieces)
@@ -114,7 +131,14 @@ def load_net(path: Path) -> Net:
         target = State(data["positions"], data["quaternions"])
         attempts = tuple(_attempt(row) for row in meta.get("attempts", ()))
         notes = tuple(map(_note, meta["notes"]))
-        return Net(grid, target, data["supports"], quality, notes, attempts)
+        edges = tuple(
+            EdgeLine(data[f"edge_{k}_nodes"], data[f"edge_{k}_clamps"], **each)
+            for k, each in enumerate(meta["edges"])
+        )
+        stretches = tuple(
+            Stretch(points=data[f"stretch_{k}_points"], **each) for k, each in enumerate(meta["stretches"])
+        )
+        return Net(grid, target, data["supports"], quality, notes, attempts, edges, stretches)
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:

@@ -96,9 +96,9 @@ class Grid:
     @property
     def layer(self) -> Reals:
         """Signed distance (n,), m, of each node from the middle between the layers: -gap/2 for u rods, gap/2
-        for v rods.
+        for v rods, 0 for edge beams.
         """
-        level = np.empty(self.node_count)
+        level = np.zeros(self.node_count)
         for rod in self.rods:
             level[rod.nodes] = -0.5 * self.gap if rod.direction == "u" else 0.5 * self.gap
         return level

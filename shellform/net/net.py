@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals, indices
+from shellform.arrays import Indices, Reals, indices, reals
 from shellform.net.grid import Grid, crossing_points
 from shellform.net.notes import NetNote
 from shellform.net.quality import Quality
@@ -16,10 +16,54 @@ from shellform.structure.elements.state import State
 
 
 @dataclass(frozen=True)
+class EdgeLine:
+    """The axis of an edge beam: its `nodes` (k,) in order, `closed` to a ring or from foot to foot; `clamps`
+    (c, 2): pairs of one of its nodes and the rod's end that is clamped to it; its `name`, if it has one."""
+
+    nodes: Indices
+    clamps: Indices
+    closed: bool
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        most = int(np.iinfo(np.int64).max)
+        object.__setattr__(self, "nodes", indices("edge.nodes", self.nodes, (None,), below=most))
+        object.__setattr__(self, "clamps", indices("edge.clamps", self.clamps, (None, 2), below=most))
+
+    @property
+    def ends(self) -> Indices:
+        """Node pairs (m, 2) of its elements."""
+        following = np.roll(self.nodes, -1)
+        pairs = np.column_stack([self.nodes, following])
+        return pairs if self.closed else pairs[:-1]
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A part of the edge of one `kind` (edges.py): its `name` in the case, if it has one; its `points` (k, 3),
+    m, in order; whether it goes round an `opening`, and whether it is the `whole` closed curve."""
+
+    kind: str
+    name: str
+    points: Reals
+    opening: bool
+    whole: bool
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "points", reals("stretch.points", self.points, (None, 3)))
+
+    @property
+    def length(self) -> float:
+        """m."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True)
 class Net:
-    """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes at the rods'
-    ends; `quality`; `notes`: what was left out; `attempts` at it, the last of which gave it, where the first
-    failed."""
+    """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes that are held: the
+    rods' ends, but for those on edge beams and free ones (edges.py), and the edge beams' feet; `quality`;
+    `notes`: what was left out; `attempts` at it, the last of which gave it, where the first failed; `edges`:
+    the edge beams; `stretches`: what the edge is, part after part (none: not asked)."""
 
     grid: Grid
     target: State
@@ -27,6 +71,8 @@ class Net:
     quality: Quality
     notes: tuple[NetNote, ...] = ()
     attempts: tuple[Attempt, ...] = ()
+    edges: tuple[EdgeLine, ...] = ()
+    stretches: tuple[Stretch, ...] = ()
 
     def __post_init__(self) -> None:
         count = self.node_count
@@ -36,6 +82,16 @@ class Net:
     def node_count(self) -> int:
         """How many nodes there are, those of both layers of rods."""
         return self.grid.node_count
+
+    @property
+    def rod_ends(self) -> Indices:
+        """The nodes (2 rods,) at the rods' ends, rod after rod, held or not."""
+        return np.array([rod.nodes[[0, -1]] for rod in self.grid.rods]).ravel()
+
+    @property
+    def lines(self) -> Indices:
+        """Node pairs (m, 2) of the elements of all rods, then of the edge beams: what is drawn."""
+        return np.vstack([self.grid.rod_ends, *(line.ends for line in self.edges)])
 
     @property
     def curvature(self) -> Reals:

@@ -227,6 +227,40 @@ class Uplift(Term):
         return _largest(shell, self.scale, -reaction, dofs, rows, -change[held])
 
 
+@dataclass(frozen=True)
+class Thrust(Term):
+    """The largest horizontal force, N, on a support; `scale`, N, is the size of forces that matter, such as
+    their limit.
+    """
+
+    name = "thrust"
+    load: str
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        if not self.scale > 0.0:
+            raise InputError("must be positive", where="thrust.scale", value=self.scale)
+
+    def measure(self, at: LoadedDesign) -> Measurement:
+        """One value, N; supports may bear a part of the load at once."""
+        shell, design, state = at.shell, at.design, at.state
+        assembly = assemble(shell.network(design))
+        held = 6 * np.asarray(shell.net.supports)[:, None] + np.arange(2)
+        internal = assembly.evaluate(state, tangent=False).force.ravel()
+        push = internal[held] - at.load.ravel()[held]
+        size = np.hypot(push[:, 0], push[:, 1])
+        along = push / np.maximum(size, np.finfo(float).tiny)[:, None]
+        by_dof = reaction_rows(assembly, state, held.ravel()).toarray().reshape(len(held), 2, -1)
+        rows = (along[:, :, None] * by_dof).sum(axis=1)
+        dofs = np.broadcast_to(assembly.free, rows.shape)
+        rate = shell.beams_by_radius(design.radius)
+        change = np.zeros(6 * assembly.count)
+        np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
+        if np.isin(shell.cables(design).ends, shell.net.supports).any():
+            raise InputError("cables that end at supports are not provided for", where="thrust")
+        return _largest(shell, self.scale, size, dofs, rows, (along * change[held]).sum(axis=1))
+
+
 def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, sign: float) -> Measurement:
     """The largest (`sign` 1) or least (-1) of EA (l / l0 - 1), N, of the `chosen` candidate cables, smooth in
     the `unit`, N; 0 where there are none."""

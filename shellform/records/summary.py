@@ -33,6 +33,18 @@ class SurfaceRecord:
 
 
 @dataclass(frozen=True)
+class EdgeRecord:
+    """A stretch of the net's edge: its `kind` (net/edges.py) and `name`, whether it goes round an `opening`, its
+    `length`, m, and lowest and highest level, m."""
+
+    kind: str
+    name: str
+    opening: bool
+    length: float
+    height: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class NetRecord:
     """The net: its counts, its quality (net/quality.py), what was left out of it (`notes`, a sentence each),
     the farthest that a rod's outermost fibre may lie from its axis (`rod_radius_max`), the curvature that the
@@ -61,6 +73,7 @@ class NetRecord:
     curvature_utilisation: float | None = None
     angle: float | None = None
     offset: tuple[float, float] | None = None
+    edges: tuple[EdgeRecord, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -107,6 +120,8 @@ class LoadRecord:
     stress_utilisation_max: float | None = None
     connector_turn_max: float | None = None
     uplift_max: float | None = None
+    thrust_max: float | None = None
+    edge_utilisation_max: float | None = None
     cable_force_max: float | None = None
     cable_force_min: float | None = None
     cables_slack: int | None = None

@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import ROD
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.folder import Run, read_run
@@ -258,13 +260,14 @@ def write_states(
     design: Design,
     states: Mapping[str, State],
 ) -> None:
-    """states/NAME-LOAD.vtp: the loaded geometry with deviations, m, and the rods' end forces."""
+    """states/NAME-LOAD.vtp: the loaded geometry with deviations, m, and the end forces of rods and edge beams."""
     from shellform.output.exchange import vtp
     from shellform.output.pictures import maps
 
     labels = ("N", "Mx_a", "My_a", "Mz_a", "Mx_b", "My_b", "Mz_b")
     for each, state in states.items():
-        forces = shell.beams(design.radius).local_forces(state)[: len(shell.net.grid.rod_ends)]
+        beams = shell.beams(design.radius)
+        forces = beams.local_forces(state)[beams.of_kind(ROD) | beams.of_kind(EDGE)]  # as net.lines
         columns = {label: forces[:, k] for k, label in enumerate(labels)}
         vtp.write_vtp(folder / f"states/{name}-{each}.vtp", maps.panel_of(shell, design, state), columns)
 

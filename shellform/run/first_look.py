@@ -12,10 +12,11 @@ import numpy as np
 from pydantic import ValidationError
 
 import shellform
-from shellform.case.build_gridshell import rod_material
 from shellform.case.build_net import net_record, size_text, surface_of, surface_record
+from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
 from shellform.errors import InputError
+from shellform.net.edges import stand
 from shellform.net.files import net_document, save_net
 from shellform.net.orientation import oriented_net
 from shellform.records import stages
@@ -175,6 +176,7 @@ def net_alone(
     net, found, offset = oriented_net(
         surface, settings, angle=_angle(angle), progress=lambda text: report(Event("net", text))
     )
+    net = stand(net, surface)
     made(folder)
     save_net(folder / "net.npz", net)
     write_text(folder / "net.json", json.dumps(net_document(net)))

@@ -14,8 +14,8 @@ from shellform.records.stages import STAGES
 
 _NEEDS = {
     "surface": ["surface"],
-    "net": ["net", "joint"],
-    "initial": ["rod", "cable", "load", "part"],
+    "net": ["net", "joint", "edges"],
+    "initial": ["rod", "cable", "load", "part", "edge_beam"],
     "optimise": ["optimise", "limits", "robust"],
     "figures": ["figures", "title"],
     "documents": ["stock"],
@@ -35,6 +35,7 @@ def stage_keys(case: Case) -> dict[str, str]:
         name: entries["rod"].pop(name) for name in ("stock_length", "kerf")
     }  # which no design depends on
     entries["stock"] |= {"adjustment": entries["cable"].pop("adjustment")}
+    entries["edge_beam"] = entries["edges"].pop("beam")  # no net depends on its section
     status = file.stat()
     digest = hashlib.sha256(
         shellform.__version__.encode() + _content(str(file), status.st_size, status.st_mtime_ns)

@@ -23,6 +23,7 @@ from shellform.case.build_net import net_of, net_record, size_text, surface_of, 
 from shellform.case.case import Case, check_script, dump_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.joints import doubts as joint_doubts
 from shellform.net.files import load_net, net_document, save_net
 from shellform.net.net import Net
 from shellform.records.progress import Event, Kind, Report, unheard
@@ -202,6 +203,8 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
     parts = replace(parts, shell=shell, loads=loads)
     net = with_rods(_there(summary.net), rod_limits(case.rod, shell.net))
     summary = replace(summary, net=net)
+    for doubt in joint_doubts(shell.joint, shell.rod):
+        workspace.say("initial", doubt.told())
     if keep:
         return _Ended(parts, summary)
     start = shell.design(rest_ratio=case.cable.rest_ratio)

@@ -121,6 +121,14 @@ def erect(
     """
     if not 0.0 < step <= 1.0:
         raise InputError("must lie between 0 and 1", where="erect.step", value=step)
+    if shell.net.edges:
+        raise InputError(
+            "is worked out for shells that stand on the ground all round: edge beams are clamped to the grid "
+            "once it is bent",
+            where="erect",
+            value=f"{len(shell.net.edges)} edge beams",
+            remedy="Fill the edges (edges.outer, edges.openings), or work the lifting out by hand.",
+        )
     nodes = shell.node_count
     none = np.zeros((nodes, 6))
     own, carried, last = (

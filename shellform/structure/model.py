@@ -7,12 +7,10 @@ Every refusal names the field and the element.
 
 from __future__ import annotations
 
-import difflib
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -23,10 +21,13 @@ from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.state import State, from_vectors
 from shellform.structure.network import Network
+from shellform.structure.refusals import check_node, refuse
 from shellform.written import whole
 
+_SKEW, _EXACT = 1e-6, 1e-14  # of axes that are refused, and that are made square
 _HUGE = 1e30  # squares and ratios of such numbers are still finite
 _Three = tuple[float, float, float]
+_Axes = tuple[_Three, _Three, _Three]
 _Six = tuple[float, float, float, float, float, float]
 
 
@@ -39,6 +40,7 @@ class _Beam(msgspec.Struct, forbid_unknown_fields=True, gc=False):
     z_axis: _Three | None = None
     rest_length: float | None = None
     kind: str = "rod"
+    axes: tuple[_Axes, _Axes] | None = None
 
 
 class _Cable(msgspec.Struct, forbid_unknown_fields=True, gc=False):
@@ -108,7 +110,7 @@ def read_model(path: str | Path) -> Model:
         try:
             document = msgspec.json.decode(content, type=_ModelFile)
         except msgspec.ValidationError as error:
-            _refuse(error)
+            refuse(error, _PARTS)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise InputError(f"isn't JSON: {error}") from error
         del content
@@ -123,7 +125,7 @@ def parse_model(data: object) -> Model:
     try:
         return _model(msgspec.convert(data, _ModelFile))
     except msgspec.ValidationError as error:
-        _refuse(error)
+        refuse(error, _PARTS)
 
 
 def write_model(path: str | Path, model: Model) -> None:
@@ -136,7 +138,7 @@ def write_model(path: str | Path, model: Model) -> None:
 
 def _document(model: Model) -> dict[str, Any]:
     network, beams, cables = model.network, model.network.beams, model.network.cables
-    document = {
+    document: dict[str, Any] = {
         "format": "shellform-model",
         "version": 1,
         "nodes": network.nodes.tolist(),
@@ -157,7 +159,7 @@ def _document(model: Model) -> dict[str, Any]:
                 beams.torsion.tolist(),
                 beams.bending_y.tolist(),
                 beams.bending_z.tolist(),
-                beams.frames[:, :, 2].tolist(),
+                beams.frames[:, 0, :, 2].tolist(),
                 beams.rest_length.tolist(),
                 beams.kind.tolist(),
                 strict=True,
@@ -185,6 +187,9 @@ def _document(model: Model) -> dict[str, Any]:
             for name, load in model.loads.items()
         },
     }
+    for beam in np.flatnonzero(beams.built_in).tolist():
+        del document["beams"][beam]["z_axis"]
+        document["beams"][beam]["axes"] = beams.frames[beam].swapaxes(1, 2).tolist()
     if model.start is not None:
         document["start"] = {
             "positions": model.start.positions.tolist(),
@@ -226,9 +231,13 @@ def _model(document: _ModelFile) -> Model:
 def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
     names = ("EA", "GJ", "EIy", "EIz")
     ends = _pairs([each.nodes for each in entries], "beams", len(nodes))
+    own = np.array([each.axes is not None for each in entries], dtype=bool)
+    given = [np.array([getattr(each, name) for each in entries], dtype=float) for name in names]
+    # A beam built into a bent state may add to another one in part only.
+    none = own & (np.array(given).reshape(4, -1) == 0.0)
     stiffness = [
-        _positive(np.array([getattr(each, name) for each in entries], dtype=float), "beams", name)
-        for name in names
+        _positive(np.where(without & ~none.all(axis=0), 1.0, values), "beams", name)
+        for name, values, without in zip(names, given, none, strict=True)
     ]
     undefined = (np.nan, np.nan, np.nan)
     z_axis = np.array(
@@ -240,7 +249,7 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
     _positive(rest, "beams", "rest_length")
     words: dict[str, int] = {"rod": 0}
     kind = np.array([words.setdefault(each.kind, len(words)) for each in entries], dtype=np.int64)
-    return make_beams(
+    made = make_beams(
         nodes,
         ends,
         axial=stiffness[0],
@@ -252,6 +261,43 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
         kind=kind,
         kinds=tuple(words),
     )
+    if not own.any():
+        return made
+    frames = np.array(made.frames)
+    frames[own] = _axes(entries, own)
+    ea, gj, eiy, eiz = (
+        np.where(without, 0.0, values)
+        for without, values in zip(
+            none, (made.axial, made.torsion, made.bending_y, made.bending_z), strict=True
+        )
+    )
+    return replace(made, frames=frames, axial=ea, torsion=gj, bending_y=eiy, bending_z=eiz)
+
+
+def _axes(entries: list[_Beam], own: Flags) -> Reals:
+    """The axes (k, 2, 3, 3) at both ends of the beams that give their own, as columns."""
+    for beam in np.flatnonzero(own).tolist():
+        for name, there, remedy in (
+            ("z_axis", entries[beam].z_axis is not None, "Leave z_axis out: axes say where z is."),
+            ("rest_length", entries[beam].rest_length is None, "Give its length without stress, m."),
+        ):
+            if there:
+                what = "a beam with axes has no z_axis" if name == "z_axis" else "is needed beside axes"
+                raise InputError(what, where=f"beams[{beam}].{name}", remedy=remedy)
+    axes = np.array([each.axes for each in entries if each.axes is not None], dtype=float)
+    off = np.abs(axes @ axes.swapaxes(2, 3) - np.eye(3)).max(axis=(2, 3))
+    wrong = ~((off < _SKEW) & (np.linalg.det(axes) > 0.0)).all(axis=1)
+    if wrong.any():
+        k = int(np.argmax(wrong))
+        raise InputError(
+            "must be three unit vectors at each end, square to one another and right-handed",
+            where=f"beams[{int(np.flatnonzero(own)[k])}].axes",
+            value=axes[k].tolist(),
+        )
+    rough = (off > _EXACT).any(axis=1)
+    left, _, right = np.linalg.svd(axes[rough])
+    axes[rough] = left @ right
+    return np.asarray(axes.swapaxes(2, 3))
 
 
 def _cables(entries: list[_Cable], nodes: Reals) -> Cables:
@@ -282,7 +328,7 @@ def _supports(entries: list[_Support], count: int) -> tuple[Flags, Reals, list[i
     nodes: dict[int, int] = {}
     for k, entry in enumerate(entries):
         where = f"supports[{k}]"
-        _node(entry.node, f"{where}.node", count)
+        check_node(entry.node, f"{where}.node", count)
         if entry.node in nodes:
             raise InputError(
                 "the node has a support already", where=where, value=entry.node, remedy="Join the two."
@@ -300,7 +346,7 @@ def _load(entries: list[_Load], where: str, count: int) -> Reals:
     outside = (nodes < 0) | (nodes >= count)
     if outside.any():
         entry = int(np.argmax(outside))
-        _node(entries[entry].node, f"{where}[{entry}].node", count)
+        check_node(entries[entry].node, f"{where}[{entry}].node", count)
     values = np.hstack(
         [
             _array([each.force or none for each in entries], f"{where}.force", 3),
@@ -352,37 +398,3 @@ def _positive(values: Reals, part: str, name: str) -> Reals:
             element = int(np.argmax(which))
             raise InputError(what, where=f"{part}[{element}].{name}", value=float(values[element]))
     return values
-
-
-def _node(node: int, where: str, count: int) -> None:
-    if not 0 <= node < count:
-        raise InputError(
-            "is out of range", where=where, value=node, remedy=f"Nodes run from 0 to {count - 1}."
-        )
-
-
-def _refuse(error: msgspec.ValidationError) -> NoReturn:
-    """msgspec's finding in our words: `Expected `float`, got `str` - at `$.beams[3].EA``."""
-    said, _, path = str(error).partition(" - at `$")
-    where = path.rstrip("`").removeprefix(".").replace("[...]", "")
-    field = re.search(r"(unknown|required) field `([^`]*)`", said)
-    if field is None:
-        kinds = {
-            "`float`": "a number",
-            "`int`": "a whole number",
-            "`bool`": "true or false",
-            "`str`": "a word",
-            "`object`": "an object",
-        }
-        for name, words in kinds.items():
-            said = said.replace(name, words)
-        raise InputError(
-            said.replace("`", "").lower(), where=where, remedy="See the model file's description."
-        ) from error
-    if field[1] == "required":
-        raise InputError(f"the field {field[2]!r} is missing", where=where) from error
-    part = next(key for key in ("beams", "cables", "supports", "loads", "start", "") if where.startswith(key))
-    known = _PARTS[part].__struct_fields__
-    near = difflib.get_close_matches(field[2], known, n=1)
-    hint = f"Did you mean {near[0]!r}?" if near else f"Known: {', '.join(known)}."
-    raise InputError(f"unknown field {field[2]!r}", where=where, remedy=hint) from error

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shellform.case.build_gridshell import given_section, gridshell, rod_bounds, rod_limits, rod_of
+from shellform.case.build_gridshell import gridshell, rod_bounds, rod_limits, rod_of
+from shellform.case.build_rod import given_section
 from shellform.case.case import dump_case, load_case
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import read_catalogue

@@ -14,6 +14,7 @@ from shellform.problem.engineering import (
     LeastTension,
     ModalStiffness,
     RodUtilisation,
+    Thrust,
     Uplift,
 )
 from shellform.problem.evaluation import Evaluator
@@ -37,7 +38,7 @@ def limited(shell, wet, term):
 
 
 @pytest.mark.parametrize(
-    "name", ["stress", "connectors", "cables", "least tension", "uplift", "modal stiffness"]
+    "name", ["stress", "connectors", "cables", "least tension", "uplift", "thrust", "modal stiffness"]
 )
 def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet, name):
     term = {
@@ -46,6 +47,7 @@ def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet,
         "cables": LargestCableForce("wet", 5.0),
         "least tension": LeastTension("wet", 0.5),
         "uplift": Uplift("wet", 2.0),
+        "thrust": Thrust("wet", 5.0),
         "modal stiffness": ModalStiffness("wet", 1.0),
     }[name]
     evaluator = Evaluator(limited(shell, wet, term), shell.design())
@@ -102,6 +104,8 @@ def test_limits_that_make_no_sense_are_refused(shell, wet):
         ModalStiffness("wet", -1.0)
     with pytest.raises(InputError, match=r"uplift\.scale"):
         Uplift("wet", 0.0)
+    with pytest.raises(InputError, match=r"thrust\.scale"):
+        Thrust("wet", 0.0)
     unknown = dataclasses.replace(shell, rod=sf.Rod.round(young=40e9, radius=0.001))
     state = shell.target
     with pytest.raises(InputError, match="strength"):

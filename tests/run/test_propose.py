@@ -29,3 +29,12 @@ def test_a_case_is_not_overwritten_nor_written_under_another_name_or_to_nowhere(
     with pytest.raises(InputError, match="no such folder"):
         propose_case(DOME, tmp_path / "no" / "mine.toml", {}, allow_scripts=False)
     assert (tmp_path / "mine.toml").read_text() == "mine"
+
+
+def test_a_proposed_case_loads_the_area_and_tells_what_its_edges_stand_on(tmp_path):
+    told = propose_case(DOME, tmp_path / "dome.toml", {}, allow_scripts=False)
+    case = load_case(tmp_path / "dome.toml")
+    assert case.part["concrete"].thickness == 0.05
+    assert {each.name for each in case.load} == {"design", "additional"}
+    assert "on the ground" in told["edges"]
+    assert told["edges"] in (tmp_path / "dome.toml").read_text(encoding="utf-8")

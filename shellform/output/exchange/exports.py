@@ -16,7 +16,9 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.net.grid import crossing_points
+from shellform.net.net import EdgeLine
 from shellform.output.exchange.opensees import opensees_script
+from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import PENS
 from shellform.output.workshop.schedules import Built, cable_crossings, rod_names
 from shellform.surface.shape.target import Surface
@@ -27,6 +29,7 @@ THIN = 0.35  # of the rods' radius: a cable's
 _LAYERS = {
     "rods u": PENS["RODS_U"].colour,
     "rods v": PENS["RODS_V"].colour,
+    "edge beams": PENS["EDGE_BEAMS"].colour,
     "cables": PENS["CABLES"].colour,
     "supports": PENS["SUPPORT_NUMBERS"].colour,
     "crossings": "#404040",
@@ -37,8 +40,8 @@ _LAYERS = {
 def write_exports(
     folder: str | Path, built: Built, target: Surface, loads: Mapping[str, Reals], *, load: str = "design"
 ) -> list[Path]:
-    """Writes gridshell.vtu, .3dm, .glb, .step and gridshell-opensees.py for the geometry under `load`;
-    returns the files.
+    """Writes gridshell.vtu, .3dm, .glb, .step and, but for designs with edge beams, gridshell-opensees.py for the geometry
+    under `load`; returns the files.
 
     `loads` (n, 6) by name. The .step is left out where gmsh can't be loaded (`no_step` says why). Raises
     InputError for an unknown load and where files can't be written.
@@ -48,11 +51,13 @@ def write_exports(
             "is no load case", where="load", value=load, remedy=f"Known: {', '.join(built.states)}."
         )
     place = Path(folder)
-    files = [place / f"gridshell{ending}" for ending in (".vtu", ".3dm", ".glb", "-opensees.py")]
+    files = [place / f"gridshell{ending}" for ending in (".vtu", ".3dm", ".glb")]
     write_vtu(files[0], built)
     write_3dm(files[1], built, target, load=load)
     write_glb(files[2], built, target, load=load)
-    write_script(files[3], built, loads[load], load=load)
+    if not built.shell.beams(built.design.radius).built_in.any():  # which OpenSees' frames can't say
+        files.append(place / "gridshell-opensees.py")
+        write_script(files[-1], built, loads[load], load=load)
     if not no_step():
         files.append(place / "gridshell.step")
         write_step(files[-1], built, load=load)
@@ -105,6 +110,10 @@ def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "d
         )
         for name, rod in zip(rod_names(grid), grid.rods, strict=True)
     ]
+    items += [
+        Item("edge beams", name, state.positions[_path(line)])
+        for name, line in zip(edge_names(shell.net), shell.net.edges, strict=True)
+    ]
     rows = zip(
         ties.ends, ties.rest_length, ties.tension(state), cable_crossings(shell, built.design), strict=True
     )
@@ -133,6 +142,11 @@ def write_glb(path: str | Path, built: Built, target: Surface, *, load: str = "d
     for direction in "uv":
         ways = [state.positions[rod.nodes] for rod in grid.rods if rod.direction == direction]
         solids.append(Solid(f"rods {direction}", *_tubes(ways, radius), _shade(f"rods {direction}")))
+    shell = built.shell
+    if shell.edge is not None and shell.net.edges:
+        ways = [state.positions[_path(line)] for line in shell.net.edges]
+        thick = max(shell.edge.section.fibres)
+        solids.append(Solid("edge beams", *_tubes(ways, thick), _shade("edge beams")))
     ties = built.shell.cables(built.design)
     if len(ties.ends):
         solids.append(
@@ -153,13 +167,14 @@ def write_glb(path: str | Path, built: Built, target: Surface, *, load: str = "d
 
 
 def write_step(path: str | Path, built: Built, *, load: str = "design") -> None:
-    """Curves: a B-spline through the nodes of each rod, in the order of the rods' numbers, then a line for
-    each cable.
+    """Curves: a B-spline through the nodes of each rod, in the order of the rods' numbers, then of each
+    edge beam, then a line for each cable.
     """
     from shellform.surface.occ import write_curves
 
     state = built.states[load]
     curves = [state.positions[rod.nodes] for rod in built.grid.rods]
+    curves += [state.positions[_path(line)] for line in built.shell.net.edges]
     curves += [state.positions[ends] for ends in built.shell.cables(built.design).ends]
     with whole(path, ".step") as partial:
         write_curves(partial, curves)
@@ -179,6 +194,11 @@ def write_script(path: str | Path, built: Built, load_forces: Reals, *, load: st
         case=load,
     )
     write_text(target, text, ".py")
+
+
+def _path(line: EdgeLine) -> Indices:
+    """The edge beam's nodes in order, the first again at the end of a ring."""
+    return np.append(line.nodes, line.nodes[:1]) if line.closed else line.nodes
 
 
 def _shade(layer: str, opacity: float = 1.0) -> tuple[float, float, float, float]:

@@ -138,6 +138,12 @@ def opensees_script(
     nodes, beams, cables = network.nodes, network.beams, network.cables
     bent, loaded = states
     forces = reals("load", load, (len(nodes), 6))
+    if beams.built_in.any():
+        raise InputError(
+            "is built into the bent state, which OpenSees' frames can't say: they are without stress where their nodes are",
+            where=f"beams[{int(np.argmax(beams.built_in))}]",
+            remedy="Check this design with shellform analyse, which reads its model file.",
+        )
     apart = np.linalg.norm(nodes[beams.ends[:, 1]] - nodes[beams.ends[:, 0]], axis=1)
     off = np.abs(beams.rest_length / apart - 1.0) > 1e-6
     if off.any():
@@ -158,7 +164,7 @@ def opensees_script(
         "BEAMS": [
             (a, b, k, *axis)
             for (a, b), k, axis in zip(
-                beams.ends.tolist(), section.ravel().tolist(), beams.frames[:, :, 2].tolist(), strict=True
+                beams.ends.tolist(), section.ravel().tolist(), beams.frames[:, 0, :, 2].tolist(), strict=True
             )
         ],
         "CABLES": [

@@ -72,7 +72,7 @@ def panel_of(
     return Panel(
         f"{title}{seen.note}",
         seen.positions,
-        shell.net.grid.rod_ends,
+        shell.net.lines,
         seen.values,
         cables.ends,
         cables.tension(state),

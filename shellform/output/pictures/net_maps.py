@@ -40,7 +40,7 @@ def panel_of(net: Net, name: str) -> Panel:
     return Panel(
         f"net of {len(net.grid.rods)} rods, {len(net.grid.lattice)} crossings, spacing {net.spacing:g} m",
         net.target.positions,
-        net.grid.rod_ends,
+        net.lines,
         _values(net, name),
         np.zeros((0, 2), dtype=np.int64),
         np.zeros(0),

@@ -18,6 +18,7 @@ from shellform.arrays import Reals
 from shellform.gridshell.catalogue import label
 from shellform.net.grid import GridRod
 from shellform.net.notes import NoteKind
+from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import (
     Box,
     Mark,
@@ -263,9 +264,12 @@ def support_plan(built: Built) -> Sheet:
         points = tuple(_point(p) for p in place[rod.nodes, :2])
         marks.append(Stroke(f"RODS_{rod.direction.upper()}", points))
     ends = {int(rod.nodes[k]): name for name, rod in zip(names, grid.rods, strict=True) for k in (0, -1)}
+    for name, line in zip(edge_names(built.shell.net), built.shell.net.edges, strict=True):
+        path = place[np.append(line.ends[:, 0], line.ends[-1, 1]), :2]
+        marks.append(Stroke("EDGE_BEAMS", tuple(_point(p) for p in path)))
+        ends |= {int(foot): ends.get(int(foot), name) for foot in line.nodes[[0, -1]]}
     supports = built.shell.net.supports
-    middle = place[supports, :2].mean(axis=0)
-    rows = []
+    middle, rows = place[supports, :2].mean(axis=0), []
     height = 0.13 * s
     taken = [box_of(_square(place[node, :2], 0.05 * s)) for node in supports]
     for number, node in enumerate(supports.tolist()):

@@ -26,6 +26,7 @@ class Pen:
 PENS = {
     "RODS_U": Pen("#0072b2", 0.35),
     "RODS_V": Pen("#d55e00", 0.35),
+    "EDGE_BEAMS": Pen("#009e73", 0.7),
     "CROSSINGS": Pen("#000000", 0.18),
     "CROSSING_NUMBERS": Pen("#000000", 0.18),
     "ROD_NAMES": Pen("#000000", 0.25),

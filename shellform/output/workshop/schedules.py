@@ -38,6 +38,7 @@ from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import cut_lengths
 from shellform.net.grid import Grid, crossing_points
+from shellform.output.workshop.edge_schedule import edge_names, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
@@ -300,18 +301,22 @@ def supports(built: Built) -> Table:
         for name, rod in zip(rod_names(grid), grid.rods, strict=True)
         for side, inner, word in ((0, 1, "first"), (-1, -2, "second"))
     }
+    for name, line in zip(edge_names(built.shell.net), built.shell.net.edges, strict=True):
+        for tip, inner, word in ((0, 1, "first"), (-1, -2, "second")):
+            foot, following = (int(node) for node in line.nodes[[tip, inner]])
+            ends.setdefault(foot, (name, word, place[following] - place[foot]))
     assembly = assemble(built.shell.network(built.design))
     pushes = {
         name: -assembly.evaluate(built.states[name], tangent=False).force[:, :3] for name in _in_order(built)
     }
     rows = []
-    for number, node in enumerate(built.shell.net.supports.tolist()):
+    for support, node in enumerate(built.shell.net.supports.tolist()):
         rod, side, along = ends[node]
         x, y, z = place[node].tolist()
         bearing = float(np.arctan2(along[1], along[0]))
         rise = float(np.arctan2(along[2], np.hypot(along[0], along[1])))
         forces = [value for push in pushes.values() for value in push[node].tolist()]
-        rows.append((f"S{number}", rod, side, x, y, z, bearing, rise, *forces))
+        rows.append((f"S{support}", rod, side, x, y, z, bearing, rise, *forces))
     heads = [
         "support",
         "rod",
@@ -325,7 +330,7 @@ def supports(built: Built) -> Table:
     heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
     notes = (
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' "
-        "ends on them.",
+        "ends on them, and at the feet of edge beams (E0, E1, …) those of the beams.",
     )
     return Table("supports", tuple(heads), tuple(rows), notes)
 
@@ -360,9 +365,14 @@ def all_tables(built: Built, cutting: Cutting) -> list[Table]:
     """Every schedule, that of the splices also where there are none, so that none is left from another
     stock.
     """
-    return [
+    tables = [
         rods(built, cutting), bars(built, cutting), splices(built, cutting), marks(built), cables(built), supports(built), survey(built),
     ]  # fmt: skip
+    return (
+        [*tables, edge_table(built.shell, built.design, _told_states(built), rod_names(built.grid))]
+        if built.shell.net.edges
+        else tables
+    )
 
 
 def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
@@ -370,6 +380,11 @@ def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[
     InputError where they can't be written.
     """
     return write_tables(folder, all_tables(built, cutting))
+
+
+def _told_states(built: Built) -> dict[str, State]:
+    """The states by what they are called on site, in order."""
+    return {_stage(name): built.states[name] for name in _in_order(built)}
 
 
 def _in_order(built: Built) -> list[str]:

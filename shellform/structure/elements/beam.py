@@ -20,6 +20,12 @@ triad turns by phi = G (dd, w_a, w_b), and since U doesn't change when everythin
 
 The symmetric tangent that goes with it is the exact Hessian of U (beam_kernels.py).
 
+An element's axes are given at each end, as that end's node sees them when it isn't turned. In an element that
+is straight and without stress between its unturned nodes both are the element's own triad. An element built
+into a bent structure, an edge beam or a lath locked to another, has its stress-free state there instead: with
+the node turned by R in that state, and the element's triad E in it, the axes at that end are R' E
+(`built_in`).
+
 Sign: theta_y and M_y follow the paper's (12), which counts turns about the local y axis negative
 (left-handed); theta_x and theta_z are right-handed.
 """
@@ -35,6 +41,7 @@ from shellform.arrays import Flags, Indices, Reals, indices, reals
 from shellform.errors import InputError
 from shellform.structure.elements.beam_kernels import evaluate, local_by_dof
 from shellform.structure.elements.parts import Evaluation
+from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
 
@@ -47,8 +54,8 @@ class Beams:
     """Beams of a network of `nodes` nodes.
 
     `ends` (m, 2) node numbers; `axial` EA, N; `torsion` GJ, `bending_y` EI_y, `bending_z` EI_z, N·m²;
-    `rest_length`, m; all (m,); `frames` (m, 3, 3) with the local axes x, y, z in the stress-free state as
-    columns; `kind` (m,) index into `kinds`.
+    `rest_length`, m; all (m,); `frames` (m, 2, 3, 3) with the local axes x, y, z in the stress-free state as
+    columns, at each end as seen from its unturned node; `kind` (m,) index into `kinds`.
     """
 
     ends: Indices
@@ -68,8 +75,13 @@ class Beams:
         for name in ("axial", "torsion", "bending_y", "bending_z"):
             put(self, name, reals(f"beams.{name}", getattr(self, name), (count,)))
         put(self, "rest_length", reals("beams.rest_length", self.rest_length, (count,), positive=True))
-        put(self, "frames", reals("beams.frames", self.frames, (count, 3, 3)))
+        put(self, "frames", reals("beams.frames", self.frames, (count, 2, 3, 3)))
         put(self, "kind", indices("beams.kind", self.kind, (count,), below=len(self.kinds)))
+
+    @property
+    def built_in(self) -> Flags:
+        """Which beams (m,) have other axes at one end than at the other: built into a bent state."""
+        return np.asarray((self.frames[:, 0] != self.frames[:, 1]).any(axis=(1, 2)))
 
     def dofs(self) -> Indices:
         """Degrees of freedom (m, 12) of each element in the order of x^e below equation (20)."""
@@ -174,9 +186,52 @@ def make_beams(
         numbers["EIy"],
         numbers["EIz"],
         np.where(np.isnan(rest), length, rest),
-        frames,
+        np.repeat(frames[:, None], 2, axis=1),
         np.zeros(count, dtype=np.int64) if kind is None else np.asarray(kind),
         kinds,
+    )
+
+
+def built_in(
+    state: State,
+    ends: ArrayLike,
+    *,
+    axial: ArrayLike,
+    torsion: ArrayLike,
+    bending_y: ArrayLike,
+    bending_z: ArrayLike,
+    z_axis: ArrayLike,
+    kind: str,
+) -> Beams:
+    """Beams without stress in the `state` of their nodes, clamped to these as they are turned there: what is
+    built into a bent structure. `ends` (m, 2); stiffness as in `make_beams`, where 0 is allowed: the beam adds
+    none of it; `z_axis` (m, 3) any vector in the local x-z plane in that state; all of one `kind`.
+
+    Raises InputError for beams without length and a z axis along the beam.
+    """
+    place, pairs = state.positions, np.asarray(ends, dtype=np.int64).reshape(-1, 2)
+    straight = make_beams(
+        place, pairs, axial=1.0, torsion=1.0, bending_y=1.0, bending_z=1.0, z_axis=z_axis, kinds=(kind,)
+    )
+    turned = matrices(state.quaternions[pairs.ravel()]).reshape(-1, 2, 3, 3)
+    ea, gj, eiy, eiz = (
+        np.broadcast_to(np.asarray(value, dtype=float), (len(pairs),))
+        for value in (axial, torsion, bending_y, bending_z)
+    )
+    frames = turned.swapaxes(2, 3) @ straight.frames
+    return Beams(pairs, ea, gj, eiy, eiz, straight.rest_length, frames, straight.kind, (kind,))
+
+
+def joined(first: Beams, second: Beams) -> Beams:
+    """The beams of both, the `first` before the `second`, kinds of one name being one."""
+    kinds = (*first.kinds, *(each for each in second.kinds if each not in first.kinds))
+    number = np.array([kinds.index(each) for each in second.kinds], dtype=np.int64)
+    names = ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length", "frames")
+    ends, ea, gj, eiy, eiz, rest, frames = (
+        np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
+    )
+    return Beams(
+        ends, ea, gj, eiy, eiz, rest, frames, np.concatenate([first.kind, number[second.kind]]), kinds
     )
 
 

@@ -383,11 +383,11 @@ def _triads(positions, quaternions, frame, a, b, E, A, B, Q):  # type: ignore[no
     matrix(quaternions[a], Q)
     for i in range(3):
         for j in range(3):
-            A[i, j] = Q[i, 0] * frame[0, j] + Q[i, 1] * frame[1, j] + Q[i, 2] * frame[2, j]
+            A[i, j] = Q[i, 0] * frame[0, 0, j] + Q[i, 1] * frame[0, 1, j] + Q[i, 2] * frame[0, 2, j]
     matrix(quaternions[b], Q)
     for i in range(3):
         for j in range(3):
-            B[i, j] = Q[i, 0] * frame[0, j] + Q[i, 1] * frame[1, j] + Q[i, 2] * frame[2, j]
+            B[i, j] = Q[i, 0] * frame[1, 0, j] + Q[i, 1] * frame[1, 1, j] + Q[i, 2] * frame[1, 2, j]
     vx, vy, vz = A[0, 1] + B[0, 1], A[1, 1] + B[1, 1], A[2, 1] + B[2, 1]
     zx = E[1, 0] * vz - E[2, 0] * vy
     zy = E[2, 0] * vx - E[0, 0] * vz

@@ -1,0 +1,28 @@
+"""From the case's [rod] to what its rods are made of and the section that they have."""
+
+from __future__ import annotations
+
+from shellform.case.entries import OwnRodEntry, StockRodEntry
+from shellform.gridshell.catalogue import named, read_catalogue
+from shellform.structure.elements.sections import Material, Rectangle, Round, Section, Tube, isotropic
+
+
+def rod_material(entry: OwnRodEntry | StockRodEntry) -> Material:
+    """What the case's rods are made of."""
+    if isinstance(entry, StockRodEntry):
+        return read_catalogue(entry.catalogue).material
+    if entry.shear is not None:
+        return Material(entry.young, entry.shear, entry.density, entry.strength)
+    return isotropic(young=entry.young, poisson=entry.poisson, density=entry.density, strength=entry.strength)
+
+
+def given_section(entry: OwnRodEntry | StockRodEntry) -> Section | None:
+    """The section that the case's rods have whatever the net; None where the net's curvature decides."""
+    if isinstance(entry, StockRodEntry):
+        return None if entry.section is None else named(read_catalogue(entry.catalogue), entry.section)
+    material = rod_material(entry)
+    if entry.width is not None and entry.height is not None:
+        return Rectangle(entry.width, entry.height, material)
+    if entry.radius is None:
+        return None
+    return Round(entry.radius, material) if entry.wall is None else Tube(entry.radius, entry.wall, material)

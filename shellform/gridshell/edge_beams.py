@@ -1,0 +1,164 @@
+"""Edge beams: what carries the rods' ends along an edge that doesn't stand on the ground.
+
+They follow the lines that the net has for them (net/edges.py) in straight elements, and are made in their final
+curve, so that they are without stress in the target. Each rod's end is clamped to the beam's axis by a short
+beam across half the gap, as stiff as the edge beam itself and without stress in the target too: the rods are
+bent first, then clamped. Where an edge beam has a foot it is pinned.
+
+A bundle of n rods of radius r, packed as close as circles pack round a middle one, has with the distances d
+of their axes from the bundle's
+
+    A = n π r²,   I = n π r⁴/4 + γ Σ π r² d²/2,   J = 2 n π r⁴/4
+
+where γ is how far they act together: 1 as if glued, 0 loose (the efficiency of EN 1995-1-1, annex B; torsion is
+counted loose). A bundle's outermost fibre lies γ d + r from where its stress is 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError
+from shellform.gridshell.loads import GRAVITY
+from shellform.net.net import Net
+from shellform.structure.elements.beam import Beams, built_in, joined
+from shellform.structure.elements.rotation import matrices
+from shellform.structure.elements.sections import Material, Section, mass_per_length, stiffness
+
+EDGE, CLAMP = "edge", "clamp"  # kinds of beams
+_RINGS = 12  # of a bundle, whose rods are counted from the middle: 469 rods
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """A bundle of `count` solid round rods of `radius`, m, of which `composite` (0 to 1) says how far they act
+    together."""
+
+    radius: float
+    count: int
+    composite: float
+    material: Material
+
+    def __post_init__(self) -> None:
+        if not (self.radius > 0.0 and math.isfinite(self.radius)):
+            raise InputError("must be positive and finite", where="edges.beam.radius", value=self.radius)
+        if not 1 <= self.count <= 1 + 3 * _RINGS * (_RINGS + 1):
+            raise InputError("must be between 1 and 469", where="edges.beam.rods", value=self.count)
+        if not 0.0 <= self.composite <= 1.0:
+            raise InputError("must be between 0 and 1", where="edges.beam.composite", value=self.composite)
+
+    @property
+    def _places(self) -> Reals:
+        """Axes (n, 2) of the rods from the bundle's, m."""
+        steps = range(-_RINGS, _RINGS + 1)
+        lattice = [(2.0 * i + j, math.sqrt(3.0) * j) for i in steps for j in steps if abs(i + j) <= _RINGS]
+        lattice.sort(key=lambda place: (round(math.hypot(*place), 9), math.atan2(place[1], place[0])))
+        chosen = self.radius * np.array(lattice[: self.count])
+        return np.asarray(chosen - chosen.mean(axis=0))
+
+    @property
+    def sizes(self) -> tuple[float, ...]:
+        """The rods' radius."""
+        return (self.radius,)
+
+    @property
+    def constants(self) -> tuple[float, float, float, float]:
+        """A, J, I_y, I_z by the formulas above, I the mean of both axes, between which a bundle's is turned."""
+        own, area = 0.25 * math.pi * self.radius**4, math.pi * self.radius**2
+        apart = 0.5 * float((self._places**2).sum())
+        inertia = self.count * own + self.composite * area * apart
+        return self.count * area, 2.0 * self.count * own, inertia, inertia
+
+    @property
+    def constants_by_size(self) -> Reals:
+        """By the rods' radius: A goes with its square, the others with its fourth power."""
+        area, torsion, inertia, _ = self.constants
+        return np.array([[2.0 * area, 4.0 * torsion, 4.0 * inertia, 4.0 * inertia]]) / self.radius
+
+    @property
+    def fibres(self) -> tuple[float, float]:
+        """γ d + r, twice."""
+        outermost = self.composite * float(np.linalg.norm(self._places, axis=1).max()) + self.radius
+        return outermost, outermost
+
+    def bending(self, about_y: Reals, about_z: Reals) -> Reals:
+        """|M| (γ d + r) / I."""
+        return np.asarray(np.hypot(about_y, about_z) * (self.fibres[0] / self.constants[2]))
+
+    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
+        """Along the moment."""
+        moment = np.hypot(about_y, about_z)
+        share = self.fibres[0] / self.constants[2] / np.where(moment > 0.0, moment, 1.0)
+        return np.asarray(about_y * share), np.asarray(about_z * share)
+
+    def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
+        """The stress falls with the radius' cube."""
+        return [np.asarray(-3.0 / self.radius * self.bending(about_y, about_z))]
+
+
+@dataclass(frozen=True)
+class EdgeBeam:
+    """What edge beams are made of: their `section` with its material. Its local z axis stands across the
+    surface."""
+
+    section: Section
+
+    @property
+    def stiffness(self) -> tuple[float, float, float, float]:
+        """EA, N; GJ, EI_y, EI_z, N·m²."""
+        return stiffness(self.section)
+
+
+def edge_beams(net: Net, edge: EdgeBeam | None) -> Beams | None:
+    """The elements of the net's edge beams, then their clamps; None where it has none. Raises InputError where
+    the net has edge beams, but nothing is said of what they are."""
+    if not net.edges:
+        return None
+    if edge is None:
+        raise InputError(
+            "is needed: the net has edges that hang on edge beams",
+            where="edge",
+            remedy="Give an EdgeBeam, or let the net stand otherwise (net.edges).",
+        )
+    axial, torsion, bending_y, bending_z = edge.stiffness
+    turned = matrices(net.target.quaternions)
+    along = np.vstack([line.ends for line in net.edges])
+    upwards = turned[along][..., 2].sum(axis=1)
+    clamps = np.vstack([line.clamps for line in net.edges])
+    reach = net.target.positions[clamps[:, 1]] - net.target.positions[clamps[:, 0]]
+    across = np.eye(3)[np.argmin(np.abs(reach), axis=1)]
+    first, second = (
+        built_in(
+            net.target, ends, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z, z_axis=z, kind=kind
+        )
+        for ends, z, kind in ((along, upwards, EDGE), (clamps, across, CLAMP))
+    )  # fmt: skip
+    return joined(first, second)
+
+
+def lengths(net: Net) -> Reals:
+    """Lengths (k,), m, of the net's edge beams along their axes."""
+    place = net.target.positions
+    return np.array(
+        [float(np.linalg.norm(np.diff(place[line.ends], axis=1), axis=2).sum()) for line in net.edges]
+    )
+
+
+def mass(net: Net, edge: EdgeBeam) -> float:
+    """Mass, kg, of all edge beams; 0 where their density isn't known."""
+    return mass_per_length(edge.section) * float(lengths(net).sum())
+
+
+def weight(net: Net, edge: EdgeBeam) -> Reals:
+    """Load (n, 6), N, of the edge beams' own weight, half an element on each of its nodes."""
+    down = np.zeros((len(net.grid.flat), 6))
+    for line in net.edges:
+        ends: Indices = line.ends
+        size = np.linalg.norm(np.diff(net.target.positions[ends], axis=1)[:, 0], axis=1)
+        half = 0.5 * GRAVITY * mass_per_length(edge.section) * size
+        np.add.at(down[:, 2], ends, -half[:, None])
+    return down

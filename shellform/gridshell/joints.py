@@ -1,0 +1,59 @@
+"""Joints that fit their rods: table 1 of the paper, scaled.
+
+The paper's rods are round, 1 mm in radius and of E = 40 GPa; its joints have EA = 71.5 kN, GJ = 7.38e-4 and
+EI = 7.85e-4 N·m² over a gap of 2 mm, so that the rods lie on each other. With lengths times s and stresses as
+they are, forces grow with s², bending and torsion stiffness with s⁴, as those of the rods do. A joint that
+follows its rods therefore has their EA and EI (the mean of both axes) in the paper's proportions, and a gap of
+their depth across the surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from shellform.gridshell.gridshell import Joint, Rod
+
+_PAPER = Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
+_RODS = Rod.round(young=40e9, radius=0.001)
+_OFF = 4.0  # times what fits: as much as a rod's EI changes where its radius is √2 times as large
+_GAP = 1.5  # the same of the gap
+
+
+def following(rod: Rod) -> Joint:
+    """The joint of table 1 that fits the rods."""
+    axial, _, about_y, about_z = rod.stiffness
+    by_axial = axial / _RODS.stiffness[0]
+    by_bending = 0.5 * (about_y + about_z) / _RODS.stiffness[2]
+    return Joint(
+        _PAPER.axial * by_axial,
+        _PAPER.torsion * by_bending,
+        _PAPER.bending * by_bending,
+        2.0 * rod.section.fibres[1],
+    )
+
+
+@dataclass(frozen=True)
+class JointDoubt:
+    """An entry of the joint, by `name`, that is far from what fits the rods: its `value` and what would be
+    `fitting`, in SI units."""
+
+    name: str
+    value: float
+    fitting: float
+
+    def told(self) -> str:
+        """In a sentence."""
+        return (
+            f"joint.{self.name} is {self.value:.3g}, where {self.fitting:.3g} would fit the rods (table 1 of the paper, scaled): "
+            "it may have been made for other rods; left out, the joint follows them"
+        )
+
+
+def doubts(joint: Joint, rod: Rod) -> tuple[JointDoubt, ...]:
+    """What of the joint doesn't fit its rods: stiffness more than four times off, a gap more than half."""
+    fitting = following(rod)
+    return tuple(
+        JointDoubt(name, getattr(joint, name), getattr(fitting, name))
+        for name, most in (("axial", _OFF), ("torsion", _OFF), ("bending", _OFF), ("gap", _GAP))
+        if not 1.0 / most <= getattr(joint, name) / getattr(fitting, name) <= most
+    )

@@ -1,0 +1,322 @@
+"""What the edge of a net stands on: the ground, walls, edge beams, nothing.
+
+A net's rods end on the curves round the surface and round its openings, or where a level or an outline cuts
+them off. Each stretch of such a curve has a kind:
+
+    ground, wall, abutment   the rods' ends are pinned there, and what they push goes into the ground
+    beam                     an edge beam runs along the stretch; the rods' ends are clamped to it
+    free                     the rods end there, held by nothing
+    pin                      pinned in mid-air, by something that isn't part of the model
+
+`Edges` says which: the first of its stretches that a place lies in decides, and elsewhere the geometry. What
+lies within two hundredths of the surface's larger extent in plan above the ground stands on the ground; what
+is higher has an edge beam, which is carried down along the edge to where the edge stops falling, its foot.
+A beam round an opening is a closed ring.
+
+The beam's axis lies on the edge itself, half a gap from the rods, with a node for each rod's end, one for
+each foot, and others between them where these lie far apart. Those nodes come after the grid's own. In
+the flat grid they lie where they are in the target: an edge beam is made in its final curve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from shellform.arrays import Reals, reals
+from shellform.errors import InputError
+from shellform.net.net import EdgeLine, Net, Stretch
+from shellform.net.rims import End, Rim, ends_of, rim_of
+from shellform.structure.elements.rotation import from_matrices
+from shellform.structure.elements.state import State
+from shellform.surface.shape.locate import Locator
+from shellform.surface.shape.target import Surface
+
+HELD = ("ground", "wall", "abutment", "pin")  # kinds of stretches that hold the rods' ends
+KINDS = (*HELD, "beam", "free")
+_LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
+_LONGEST = 0.5  # of the spacing: edge beams' elements aren't longer
+_CLOSE = 0.05  # of the spacing: ends nearer to each other share a node of the edge beam
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a `kind` of edge is: where all that is given holds. `height`: lowest and highest level, m; `box`: two
+    opposite corners (2, 3), m; `curve`: a plan curve (k, 2), m, no farther than `within`, m; `opening`: on
+    the edge of an opening, or on the outer one."""
+
+    kind: str
+    name: str = ""
+    height: tuple[float, float] | None = None
+    box: Reals | None = None
+    curve: Reals | None = None
+    within: float = 0.0
+    opening: bool | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InputError(
+                "is no kind of edge",
+                where="edges.kind",
+                value=self.kind,
+                remedy=f"Known: {', '.join(KINDS)}.",
+            )
+        for name, shape in (("box", (2, 3)), ("curve", (None, 2))):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, reals(f"edges.{name}", getattr(self, name), shape))
+
+    def holds(self, points: Reals, *, opening: bool) -> np.ndarray:
+        """At which points (k, 3), m, of an edge."""
+        inside = np.full(len(points), self.opening is None or self.opening == opening)
+        if self.height is not None:
+            inside &= (points[:, 2] >= self.height[0]) & (points[:, 2] <= self.height[1])
+        if self.box is not None:
+            inside &= ((points >= self.box.min(axis=0)) & (points <= self.box.max(axis=0))).all(axis=1)
+        if self.curve is not None:
+            inside &= _distance(points[:, :2], self.curve) <= self.within
+        return inside
+
+
+@dataclass(frozen=True)
+class Edges:
+    """`places` with their kinds, the first that holds deciding; elsewhere `outer` edges and edges of
+    `openings` have a kind of `KINDS`, or "auto" the one that the geometry says; `ground`, m, its level (None:
+    the outer edge's lowest point)."""
+
+    places: tuple[Place, ...] = ()
+    outer: str = "auto"
+    openings: str = "auto"
+    ground: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("outer", "openings"):
+            if getattr(self, name) not in (*KINDS, "auto"):
+                raise InputError(
+                    "is no kind of edge",
+                    where=f"edges.{name}",
+                    value=getattr(self, name),
+                    remedy=f"Known: {', '.join(('auto', *KINDS))}.",
+                )
+
+
+def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals | None = None) -> Net:
+    """The net with its edges as they are: rods' ends held where the edge is, edge beams along the others.
+
+    `outline` (k, 2), m: the plan curve at which the net was cut off, if it was. Raises InputError where
+    nothing is left that holds the shell.
+    """
+    ends, loops = ends_of(net, surface, outline)
+    low = _low(surface, edges)
+    for loop in loops:
+        _sort_out(loop, edges, low)
+    builder = _Builder(net, loops)
+    stretches = []
+    for number, loop in enumerate(loops):
+        for first, last in _runs(loop.kinds):
+            if loop.kinds[first] == "beam":
+                builder.beam(loop, first, last, [each for each in ends if each.loop == number])
+        stretches += _stretches(loop)
+    held = [each.node for each in ends if loops[each.loop].kinds[each.vertex] in HELD]
+    if not held and not builder.feet:
+        raise InputError(
+            "nothing holds the shell: no part of its edge stands on the ground or a wall",
+            where="edges",
+            remedy="Give its level in edges.ground, or name what it stands on in [[edges.stretch]].",
+        )
+    kept = set(held)
+    supports = np.array(
+        [node for node in net.supports.tolist() if node in kept] + builder.feet, dtype=np.int64
+    )
+    if not builder.lines:
+        return replace(net, supports=supports, stretches=tuple(stretches))
+    more = np.array(builder.places)
+    grid = replace(net.grid, flat=np.vstack([net.grid.flat, more]))
+    target = State(
+        np.vstack([net.target.positions, more]),
+        np.vstack([net.target.quaternions, _upright(Locator(surface).foot(more).normal)]),
+    )
+    quality = replace(net.quality, pull=np.concatenate([net.quality.pull, np.zeros(len(more))]))
+    return replace(
+        net,
+        grid=grid,
+        target=target,
+        supports=supports,
+        quality=quality,
+        edges=tuple(builder.lines),
+        stretches=tuple(stretches),
+    )
+
+
+def stretches_of(surface: Surface, edges: Edges = Edges()) -> tuple[Stretch, ...]:
+    """What the surface's edges are, before there is a net: a first look."""
+    low, found = _low(surface, edges), list[Stretch]()
+    for number, rim in enumerate(surface.boundary):
+        loop = rim_of(surface.vertices[rim], number > 0)
+        _sort_out(loop, edges, low)
+        found += _stretches(loop)
+    return tuple(found)
+
+
+def _low(surface: Surface, edges: Edges) -> float:
+    """The level, m, up to which an edge stands on the ground."""
+    outer = surface.vertices[surface.boundary[0]]
+    level = float(outer[:, 2].min()) if edges.ground is None else edges.ground
+    return level + _LOW * float(surface.size[:2].max())
+
+
+def _sort_out(loop: Rim, edges: Edges, low: float) -> None:
+    """Gives each point of the loop its kind; edge beams go down to where the edge stops falling."""
+    default = edges.openings if loop.opening else edges.outer
+    count = len(loop.points)
+    decided = np.full(count, -1)
+    for number, place in enumerate(edges.places):
+        decided[(decided < 0) & place.holds(loop.points, opening=loop.opening)] = number
+    auto = (decided < 0) & (default == "auto")
+    standing = loop.points[:, 2] <= low
+    loop.kinds = [
+        edges.places[number].kind
+        if number >= 0
+        else ("ground" if stands else "beam")
+        if default == "auto"
+        else default
+        for number, stands in zip(decided.tolist(), standing.tolist(), strict=True)
+    ]
+    loop.names = [edges.places[number].name if number >= 0 else "" for number in decided.tolist()]
+    loop.found = auto.tolist()
+    if loop.cut:  # its ends only close the curve: held where they are low, no part of a beam
+        for last in (0, count - 1):
+            if loop.kinds[last] == "beam":
+                loop.kinds[last], loop.found[last] = "free", False
+    height = loop.points[:, 2]
+    falling = 1e-6 * float(np.ptp(height))
+    for first, last in _runs(loop.kinds):
+        if loop.kinds[first] != "beam" or last - first + 1 >= count:
+            continue
+        for here, way in (((first - 1) % count, -1), ((last + 1) % count, 1)):
+            while (
+                loop.found[here]
+                and loop.kinds[here] == "ground"
+                and loop.found[(here + way) % count]
+                and height[(here + way) % count] < height[here] - falling
+            ):
+                loop.kinds[here] = "beam"
+                here = (here + way) % count
+
+
+def _runs(kinds: Sequence[str]) -> list[tuple[int, int]]:
+    """First and last place of each run of one kind round a loop; the last may lie past the end, by less than
+    once round."""
+    count = len(kinds)
+    starts = [k for k in range(count) if kinds[k] != kinds[k - 1]]
+    if not starts:
+        return [(0, count - 1)]
+    return [(a, b - 1) for a, b in zip(starts, [*starts[1:], starts[0] + count], strict=True)]
+
+
+def _stretches(loop: Rim) -> list[Stretch]:
+    count = len(loop.points)
+    labels = [f"{kind}\n{name}" for kind, name in zip(loop.kinds, loop.names, strict=True)]
+    found = []
+    for first, last in _runs(labels):
+        whole = last - first + 1 == count
+        at = np.arange(first, last + 2) % count  # up to where the next one begins
+        found.append(Stretch(loop.kinds[first], loop.names[first], loop.points[at], loop.opening, whole))
+    return found
+
+
+class _Builder:
+    """Puts the nodes of edge beams together: `places` of the new nodes, the `lines` and their `feet`."""
+
+    def __init__(self, net: Net, loops: Sequence[Rim]) -> None:
+        self.net, self.loops = net, loops
+        self.places: list[Reals] = []
+        self.lines: list[EdgeLine] = []
+        self.feet: list[int] = []
+
+    def beam(self, loop: Rim, first: int, last: int, ends: Sequence[End]) -> None:
+        """The edge beam along a run of the loop's points with the rods' ends that lie on it."""
+        count, total = len(loop.points), float(loop.along[-1])
+        closed = last - first + 1 == count
+        inside = {k % count for k in range(first, last + 1)}
+        before, after = (first - 1) % count, (last + 1) % count
+        origin = 0.0 if closed else float(loop.along[before])
+        own = sorted(
+            (((each.at - origin) % total, each) for each in ends if each.vertex in inside),
+            key=lambda pair: pair[0],
+        )
+        if not own:
+            return
+        close = _CLOSE * self.net.grid.scale
+        nodes: list[int] = []
+        arcs: list[float] = []
+        links: list[tuple[int, int]] = []
+        for at, each in own:
+            if not nodes or at - arcs[-1] > close:
+                nodes.append(self._new(each.middle))
+                arcs.append(at)
+            links.append((nodes[-1], each.node))
+        if not closed:
+            length = (float(loop.along[after]) - origin) % total or total
+            if loop.kinds[before] in HELD:
+                nodes.insert(0, self._foot(loop.points[before]))
+                arcs.insert(0, 0.0)
+            if loop.kinds[after] in HELD:
+                nodes.append(self._foot(loop.points[after]))
+                arcs.append(length)
+        path = self._filled(loop, nodes, arcs, origin, closed)
+        if len(path) > (2 if closed else 1):
+            self.lines.append(
+                EdgeLine(np.array(path), np.array(links, dtype=np.int64), closed, loop.names[first % count])
+            )
+
+    def _filled(
+        self, loop: Rim, nodes: Sequence[int], arcs: Sequence[float], origin: float, closed: bool
+    ) -> list[int]:
+        """The nodes in order with others on the edge between those that lie far apart."""
+        total = float(loop.along[-1])
+        track = np.vstack([loop.points, loop.points[:1]])
+        stops = [*arcs[1:], arcs[0] + total] if closed else list(arcs[1:])
+        path = []
+        for k, node in enumerate(nodes):
+            path.append(node)
+            if k >= len(stops):
+                break
+            parts = int(np.ceil((stops[k] - arcs[k]) / (_LONGEST * self.net.grid.scale) - 1e-9))
+            for j in range(1, parts):
+                at = (origin + arcs[k] + j / parts * (stops[k] - arcs[k])) % total
+                path.append(self._new(np.array([np.interp(at, loop.along, track[:, i]) for i in range(3)])))
+        return path
+
+    def _new(self, place: Reals) -> int:
+        self.places.append(place)
+        return len(self.net.grid.flat) + len(self.places) - 1
+
+    def _foot(self, place: Reals) -> int:
+        """The foot there; edge beams that meet on the ground have one."""
+        first = len(self.net.grid.flat)
+        for foot in self.feet:
+            if np.array_equal(self.places[foot - first], place):
+                return foot
+        self.feet.append(self._new(place))
+        return self.feet[-1]
+
+
+def _upright(normals: Reals) -> Reals:
+    """Quaternions (k, 4) that turn the z axis onto unit normals (k, 3), as the grid's nodes are turned."""
+    aside = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    x = np.cross(aside, normals)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return from_matrices(np.stack([x, np.cross(normals, x), normals], axis=2))
+
+
+def _distance(points: Reals, curve: Reals) -> Reals:
+    """Distances (k,), m, of plan points from an open plan curve."""
+    best = np.full(len(points), np.inf)
+    for a, b in pairwise(curve):
+        side = b - a
+        share = np.clip((points - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * side, axis=1))
+    return best

@@ -1,0 +1,118 @@
+"""The curves on which a net's rods end: the surface's edges, and where a level or an outline cuts the rods off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.net.net import Net
+from shellform.structure.elements.rotation import matrices
+from shellform.surface.shape.target import Surface
+from shellform.surface.shape.tree import Tree
+
+_OFF = 0.5  # of the spacing: an end farther from the surface's edge was cut off by a level or an outline
+_APART = 2.5  # of the spacing: where a net was cut off, ends farther from one another are on two edges
+
+
+@dataclass
+class Rim:
+    """A closed curve on which rods end: `points` (k, 3), m; whether it goes round an `opening`; whether the net was
+    `cut` off along it, from its first point, which is on the surface's edge, to its last, or goes round; `kinds` and `names`
+    (k,) of its points, and where the geometry decided (`found`); `along` (k + 1,), m, its arc lengths."""
+
+    points: Reals
+    opening: bool
+    cut: bool
+    kinds: list[str]
+    names: list[str]
+    found: list[bool]
+    along: Reals
+
+
+@dataclass(frozen=True)
+class End:
+    """A rod's end: its `node`, the `loop` that it lies on, its arc length `at` on it, m, the `vertex` of the
+    loop that is nearest, and its `middle` (3,) on the edge, m."""
+
+    node: int
+    loop: int
+    at: float
+    vertex: int
+    middle: Reals
+
+
+def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End], list[Rim]]:
+    """The rods' ends on the curves that they lie on: the surface's edges, then the curve along which a level or
+    an outline cut the rods off."""
+    nodes, place = net.rod_ends, net.target.positions
+    upwards = matrices(net.target.quaternions[nodes])[:, :, 2]
+    middle = place[nodes] - net.grid.layer[nodes, None] * upwards
+    curves = [surface.vertices[loop] for loop in surface.boundary]
+    starts = np.cumsum([0, *(len(each) for each in curves)])
+    a = np.vstack(curves)
+    b = np.vstack([np.roll(each, -1, axis=0) for each in curves])
+    piece, closest, away = Tree(np.stack([a, b, b], axis=1)).nearest(middle)
+    cut = np.flatnonzero(away > _OFF * net.grid.scale)
+    loops = [rim_of(points, number > 0) for number, points in enumerate(curves)]
+    found = []
+    order: dict[int, tuple[int, int]] = {}
+    if len(cut):
+        inner = middle[cut, :2] - middle[cut, :2].mean(axis=0)
+        key = np.arctan2(inner[:, 1], inner[:, 0]) if outline is None else _along(middle[cut, :2], outline)
+        for chain in _chains(cut[np.argsort(key, kind="stable")], middle, _APART * net.grid.scale):
+            order |= {int(end): (len(loops), k) for k, end in enumerate(chain, 1)}
+            feet = _reached(middle[chain[[0, -1]]], loops, _APART * net.grid.scale)
+            loops.append(rim_of(np.vstack([feet[:1], middle[chain], feet[1:]]), False, cut=True))
+    for k, node in enumerate(nodes.tolist()):
+        if k in order:
+            number, vertex = order[k]
+            found.append(End(node, number, float(loops[number].along[vertex]), vertex, middle[k]))
+            continue
+        number = int(np.searchsorted(starts, piece[k], side="right")) - 1
+        loop, first = loops[number], int(piece[k] - starts[number])
+        part = float(np.linalg.norm(closest[k] - a[piece[k]]))
+        near = first if 2.0 * part < loop.along[first + 1] - loop.along[first] else first + 1
+        found.append(End(node, number, float(loop.along[first] + part), near % len(loop.points), middle[k]))
+    return found, loops
+
+
+def rim_of(points: Reals, opening: bool, *, cut: bool = False) -> Rim:
+    step = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+    return Rim(points, opening, cut, [], [], [], np.append(0.0, np.cumsum(step)))
+
+
+def _chains(ends: Indices, middle: Reals, apart: float) -> list[Indices]:
+    """The ends, in order round a plan curve, in pieces between gaps wider than `apart`, m."""
+    step = np.linalg.norm(middle[np.roll(ends, -1)] - middle[ends], axis=1)
+    gaps = np.flatnonzero(step > apart)
+    if not len(gaps):
+        return [ends]
+    turned = np.roll(ends, -(int(gaps[0]) + 1))
+    return np.split(turned, np.flatnonzero(np.roll(step, -(int(gaps[0]) + 1))[:-1] > apart) + 1)
+
+
+def _reached(points: Reals, loops: Sequence[Rim], apart: float) -> Reals:
+    """Where the curve along which a net was cut off comes to the surface's edge next to its first and last
+    points (2, 3); the points themselves where that is farther than `apart`, m."""
+    rim = np.vstack([loop.points for loop in loops if not loop.cut])
+    away = np.linalg.norm(points[:, None] - rim, axis=2)
+    near = np.argmin(away, axis=1)
+    return np.where((away[[0, 1], near] < apart)[:, None], rim[near], points)
+
+
+def _along(points: Reals, polygon: Reals) -> Reals:
+    """Arc lengths (k,), m, on a closed plan polygon of the places nearest to points (k, 2)."""
+    best, at = np.full(len(points), np.inf), np.zeros(len(points))
+    passed = 0.0
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
+        side = b - a
+        length = float(np.linalg.norm(side))
+        share = np.clip((points - a) @ side / max(length**2, 1e-300), 0.0, 1.0)
+        away = np.linalg.norm(points - a - share[:, None] * side, axis=1)
+        at = np.where(away < best, passed + share * length, at)
+        best = np.minimum(best, away)
+        passed += length
+    return at

@@ -1,0 +1,62 @@
+"""The schedule of edge beams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from shellform.gridshell.catalogue import label
+from shellform.gridshell.edge_beams import EDGE, lengths
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.net import Net
+from shellform.structure.elements.sections import mass_per_length
+from shellform.structure.elements.state import State
+from shellform.tables import Table, Value
+
+
+def edge_names(net: Net) -> list[str]:
+    """E and the edge beam's number."""
+    return [f"E{k}" for k in range(len(net.edges))]
+
+
+def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], rods: Sequence[str]) -> Table:
+    """The edge beams, a line a node of their axes in the target: where it is, how far along the beam, and which
+    rod's end is clamped to it; the section forces there in each of the `states`. `rods` are the rods' names."""
+    net, beams = shell.net, shell.beams(design.radius)
+    place = shell.target.positions
+    ends = {
+        int(rod.nodes[side]): f"{name} {word}"
+        for name, rod in zip(rods, net.grid.rods, strict=True)
+        for side, word in ((0, "first"), (-1, "second"))
+    }
+    forces = {name: beams.local_forces(state)[beams.of_kind(EDGE)] for name, state in states.items()}
+    rows: list[tuple[Value, ...]] = []
+    before = 0
+    for name, line in zip(edge_names(net), net.edges, strict=True):
+        count = len(line.ends)
+        step = np.linalg.norm(place[line.ends[:, 1]] - place[line.ends[:, 0]], axis=1)
+        at = np.append(0.0, np.cumsum(step))
+        held = {int(node): ends[int(end)] for node, end in line.clamps}
+        for k, node in enumerate(line.nodes.tolist()):
+            own = [each[before + min(k, count - 1)] for each in forces.values()]
+            first = 1 if k < count else 4
+            pushed = [
+                value
+                for each in own
+                for value in (float(each[0]), float(np.hypot(each[first + 1], each[first + 2])))
+            ]
+            rows.append((name, float(at[k]), *place[node].tolist(), held.get(node, ""), *pushed))
+        before += count
+    heads = ["edge beam", "along it [m]", "x [m]", "y [m]", "z [m]", "rod's end clamped there"]
+    for name in forces:
+        heads += [f"{name}: axial force [N]", f"{name}: bending moment [N m]"]
+    edge = shell.edge
+    notes = tuple(
+        f"{name}: {label(edge.section)}, {length:.3f} m{', closed' if line.closed else ''}"
+        + (f", {mass_per_length(edge.section) * length:.3g} kg" if edge.section.material.density else "")
+        + ". It is made in its final curve, and rods are clamped to it once they are bent."
+        for name, line, length in zip(edge_names(net), net.edges, lengths(net), strict=True)
+        if edge is not None
+    )
+    return Table("edge_beams", tuple(heads), tuple(rows), notes)

@@ -1,0 +1,213 @@
+"""Edge beams and what supports bear."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.gridshell.edge_beams import Bundle, EdgeBeam, lengths, mass, weight
+from shellform.gridshell.reactions import reactions, write_reactions
+from shellform.net.edges import stand
+from shellform.output.exchange.opensees import opensees_script
+from shellform.problem.evaluation import Evaluator
+from shellform.problem.paths import follow
+from shellform.structure.answers.sensitivity import reaction_rows
+from shellform.structure.elements.sections import Material, Rectangle, isotropic
+from shellform.structure.elements.state import moved
+from shellform.structure.model import Model, read_model, write_model
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from tests.net.edge_shells import barrel
+
+GFRP = isotropic(young=40e9, density=2000.0, strength=600e6)
+BUNDLE = EdgeBeam(Bundle(0.0012, 19, 0.5, GFRP))
+
+
+@pytest.fixture(scope="module")
+def arches():
+    """A barrel vault whose two arches hang on edge beams, loaded with 1 N on every second crossing."""
+    surface = barrel()
+    net = sf.pull_net(surface, spacing=0.08, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    rod = sf.Rod.round(young=40e9, radius=0.0012, strength=600e6, density=2000.0)
+    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
+    shell = sf.brace(stand(net, surface), rod, joint, sf.Cable(stiffness=187.0), below=surface, edge=BUNDLE)
+    return shell, shell.point_load(1.0, every=2)
+
+
+@pytest.fixture(scope="module")
+def solved(arches):
+    shell, load = arches
+    found = follow(shell, shell.design(), {"none": 0.0 * load, "design": load})
+    return {name: each.equilibrium.state for name, each in found.items()}
+
+
+def test_edge_beams_and_clamps_have_no_stress_in_the_target(arches):
+    shell, _ = arches
+    beams = shell.beams(shell.rod.radius)
+    own = beams.kind >= 2
+    assert [beams.kinds[k] for k in np.unique(beams.kind)] == ["rod", "connector", "edge", "clamp"]
+    np.testing.assert_allclose(beams.local_forces(shell.target)[own], 0.0, atol=1e-6)
+    assert np.abs(beams.local_forces(shell.target)[beams.kind == 0]).max() > 1e-3
+
+
+def test_rods_push_edge_beams_out_and_they_push_back(arches, solved):
+    shell, _ = arches
+    beams = shell.beams(shell.rod.radius)
+    own = beams.kind == beams.kinds.index("edge")
+    assert np.abs(beams.local_forces(solved["none"])[own]).max() > 1e-3
+
+
+def test_reactions_add_up_to_the_load(arches, solved):
+    shell, load = arches
+    found = reactions(shell, shell.design(), solved["design"], load)
+    assert found.total == pytest.approx((0.0, 0.0, -load[:, 2].sum()), abs=1e-5)
+    assert {each.kind for each in found.supports} == {"ground"}
+    assert len(found.supports) == len(shell.net.supports)
+    assert found.thrust == max(each.thrust for each in found.supports)
+    for each in found.supports:
+        assert each.pressure * each.uplift == 0.0
+
+
+def test_reactions_are_written_a_line_a_support_and_load(arches, solved, tmp_path):
+    shell, load = arches
+    found = reactions(shell, shell.design(), solved["design"], load)
+    write_reactions(tmp_path / "reactions.csv", {"design": found, "again": found})
+    lines = (tmp_path / "reactions.csv").read_text().splitlines()
+    assert len(lines) == 1 + 2 * len(found.supports)
+    assert all(len(line.split(",")) == len(lines[0].split(",")) for line in lines)
+
+
+def test_a_model_file_gives_the_design_with_edge_beams_again(arches, solved, tmp_path):
+    shell, load = arches
+    supported = tuple(int(node) for node in shell.net.supports)
+    write_model(
+        tmp_path / "m.json", Model(shell.network(shell.design()), {"design": load}, shell.target, supported)
+    )
+    model = read_model(tmp_path / "m.json")
+    again = find_equilibrium(assemble(model.network), model.start, 0.0 * load).state
+    np.testing.assert_allclose(again.positions, solved["none"].positions, atol=1e-8)
+
+
+def test_gradients_hold_with_edge_beams(arches):
+    shell, load = arches
+    shares = [
+        sf.Share(0.5, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet")), sf.Share(0.2, sf.RodRadius())
+    ]  # fmt: skip
+    problem = sf.Problem(
+        shell,
+        sf.LoadCase("wet", load),
+        shares,
+        [sf.AtMost(0.005, sf.RmsMisfit("wet"))],
+        variables=[sf.RestLengths(), sf.FreeRadius(0.001, 0.0014)],
+    )
+    evaluator = Evaluator(problem, shell.design())
+    states = {name: each.equilibrium.state for name, each in evaluator.begin().items()}
+    point = evaluator.seed(shell.design(), states, 1.0)
+    direction = np.append(np.random.default_rng(2).normal(size=len(point.variables) - 1), 0.5)
+    step = 1e-5
+    designs = [
+        evaluator.blocks.design(point.variables + s * step * direction, point.design.present) for s in (1, -1)
+    ]
+    plus, minus = (evaluator.evaluate(each, states, 1.0) for each in designs)
+    slope = (plus.objective - minus.objective) / (2 * step)
+    assert point.objective_by_variables @ direction == pytest.approx(slope, rel=1e-5)
+    slope = (plus.constraints[0] - minus.constraints[0]) / (2 * step)
+    assert point.constraints_by_variables[0] @ direction == pytest.approx(slope, rel=1e-5)
+
+
+def test_rates_of_reactions_hold_at_feet_of_edge_beams(arches, solved):
+    shell, _ = arches
+    assembly = assemble(shell.network(shell.design()))
+    foot = int(shell.net.edges[0].nodes[0])
+    rows = reaction_rows(assembly, solved["design"], 6 * foot + np.arange(3)).toarray()
+    step = np.zeros(6 * assembly.count)
+    step[assembly.free] = np.random.default_rng(3).normal(size=len(assembly.free))
+    h = 1e-7
+    there = [
+        assembly.evaluate(moved(solved["design"], s * h * step.reshape(-1, 6)), tangent=False).force[foot, :3]
+        for s in (1.0, -1.0)
+    ]
+    slope = (there[0] - there[1]) / (2 * h)
+    np.testing.assert_allclose(rows @ step[assembly.free], slope, rtol=1e-5, atol=1e-6 * np.abs(slope).max())
+
+
+def test_a_net_with_edge_beams_needs_to_know_what_they_are(arches):
+    shell, _ = arches
+    with pytest.raises(InputError, match="hang on edge beams"):
+        replace(shell, edge=None)
+
+
+def test_opensees_refuses_what_it_cannot_say(arches, solved):
+    shell, load = arches
+    with pytest.raises(InputError, match="built into the bent state") as caught:
+        opensees_script(
+            shell.network(shell.design()), [solved["none"], solved["design"]], load, title="t", name="n", case="c"
+        )  # fmt: skip
+    assert "shellform analyse" in caught.value.remedy
+
+
+def test_stiffer_edge_beams_hold_the_shape_better(arches, solved):
+    shell, _ = arches
+    stiff = replace(shell, edge=EdgeBeam(Rectangle(0.02, 0.02, GFRP)))
+    state = find_equilibrium(assemble(stiff.network(stiff.design())), stiff.target, np.zeros((len(shell.net.grid.flat), 6))).state  # fmt: skip
+    off = [
+        np.linalg.norm(each.positions - shell.target.positions, axis=1).max()
+        for each in (solved["none"], state)
+    ]
+    assert off[1] < off[0]
+
+
+def test_edge_beams_weigh_what_they_are_long(arches):
+    shell, _ = arches
+    assert lengths(shell.net) == pytest.approx([0.9, 0.9], rel=2e-3)
+    whole = mass(shell.net, BUNDLE)
+    assert whole == pytest.approx(1.8 * 2000.0 * 19 * np.pi * 0.0012**2, rel=2e-3)
+    assert -weight(shell.net, BUNDLE)[:, 2].sum() == pytest.approx(9.81 * whole, rel=1e-9)
+
+
+def test_a_bundle_of_seven_glued_rods_has_the_second_moment_of_the_textbook():
+    """Six rods 2r round a middle one: I = 7 π r⁴/4 + 12 π r⁴ by Steiner's theorem, Σ y² = ½ Σ d² = 12 r²."""
+    r = 0.003
+    area, torsion, inertia, other = Bundle(r, 7, 1.0, GFRP).constants
+    assert area == pytest.approx(7 * np.pi * r**2)
+    assert inertia == pytest.approx((7 / 4 + 12) * np.pi * r**4)
+    assert other == inertia
+    assert torsion == pytest.approx(7 * np.pi * r**4 / 2)
+    assert Bundle(r, 7, 0.0, GFRP).constants[2] == pytest.approx(7 * np.pi * r**4 / 4)
+    assert Bundle(r, 7, 1.0, GFRP).fibres == (pytest.approx(3 * r), pytest.approx(3 * r))
+
+
+def test_a_loose_bundle_is_stressed_as_its_rods_are_each_with_its_share():
+    r, moment = 0.003, np.array([2.0])
+    loose = Bundle(r, 19, 0.0, GFRP).bending(moment, 0.0 * moment)
+    assert loose == pytest.approx(moment / 19 * r / (np.pi * r**4 / 4))
+
+
+@pytest.mark.parametrize("composite", [0.0, 0.4])
+def test_a_bundle_s_derivatives_are_those_of_its_constants_and_stresses(composite):
+    def made(radius):
+        return Bundle(radius, 7, composite, GFRP)
+
+    r, h, m = 0.003, 1e-8, (np.array([2.0]), np.array([-1.0]))
+    slope = (np.array(made(r + h).constants) - made(r - h).constants) / (2 * h)
+    np.testing.assert_allclose(made(r).constants_by_size[0], slope, rtol=1e-6)
+    slope = (made(r + h).bending(*m) - made(r - h).bending(*m)) / (2 * h)
+    np.testing.assert_allclose(made(r).bending_by_size(*m)[0], slope, rtol=1e-6)
+    by_y, by_z = made(r).bending_by_moment(*m)
+    assert by_y == pytest.approx(
+        (made(r).bending(m[0] + h, m[1]) - made(r).bending(m[0] - h, m[1])) / (2 * h), rel=1e-6
+    )
+    assert by_z == pytest.approx(
+        (made(r).bending(m[0], m[1] + h) - made(r).bending(m[0], m[1] - h)) / (2 * h), rel=1e-6
+    )
+
+
+def test_bundles_that_are_none_are_refused():
+    for radius, count, composite, where in (
+        (0.0, 7, 0.5, "radius"), (0.01, 0, 0.5, "rods"), (0.01, 500, 0.5, "rods"), (0.01, 7, 1.5, "composite"),
+    ):  # fmt: skip
+        with pytest.raises(InputError) as caught:
+            Bundle(radius, count, composite, Material(1e9, 4e8))
+        assert caught.value.where == f"edges.beam.{where}"

@@ -1,0 +1,34 @@
+"""Joints that follow their rods."""
+
+import pytest
+
+import shellform as sf
+from shellform.gridshell.joints import doubts, following
+from shellform.structure.elements.sections import Rectangle, isotropic
+
+
+def test_the_paper_s_rods_have_the_paper_s_joint():
+    joint = following(sf.Rod.round(young=40e9, radius=0.001))
+    assert joint.stiffness == pytest.approx((7.15e4, 7.38e-4, 7.85e-4, 7.85e-4))
+    assert joint.gap == pytest.approx(0.002)
+
+
+def test_table_1_s_full_size_joint_is_that_of_rods_twenty_times_as_thick():
+    """Table 1: EA 2.86e7 N, GJ 118 and EI 125.6 N·m², gap 40 mm; rounded there to three digits."""
+    joint = following(sf.Rod.round(young=40e9, radius=0.02))
+    assert joint.stiffness == pytest.approx((2.86e7, 118.0, 125.6, 125.6), rel=1e-3)
+    assert joint.gap == pytest.approx(0.04)
+
+
+def test_the_gap_of_laths_is_their_height():
+    rod = sf.Rod(Rectangle(0.05, 0.03, isotropic(young=11e9)))
+    assert following(rod).gap == pytest.approx(0.03)
+
+
+def test_a_joint_of_other_rods_is_doubted_entry_by_entry():
+    thick, thin = (sf.Rod.round(young=40e9, radius=radius) for radius in (0.02, 0.01))
+    assert doubts(following(thick), thick) == ()
+    found = doubts(following(thick), thin)
+    assert [each.name for each in found] == ["torsion", "bending", "gap"]
+    assert found[2].fitting == pytest.approx(0.02)
+    assert "joint.gap is 0.04" in found[2].told()

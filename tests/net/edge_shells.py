@@ -1,0 +1,44 @@
+"""Shells whose edges don't all stand on the ground, from formulas."""
+
+import numpy as np
+
+from shellform.surface.shape.target import make_surface
+
+
+def _sheet(place, rows, columns, *, closed=False):
+    """A surface of places (rows * columns, 3) in order; `closed` round the columns."""
+    triangles = []
+    for i in range(rows - 1):
+        for j in range(columns if closed else columns - 1):
+            a, b = i * columns + j, i * columns + (j + 1) % columns
+            triangles += [(a, a + columns, b + columns), (a, b + columns, b)]
+    return make_surface(place, np.array(triangles))
+
+
+def barrel(length=0.8, radius=0.5, half=0.9, raised=0.0):
+    """A barrel vault on two straight lines along x, an arch at either end; `raised` m over z = 0."""
+    x, angle = (
+        each.ravel()
+        for each in np.meshgrid(np.linspace(-length / 2, length / 2, 40), np.linspace(-half, half, 40), indexing="ij")
+    )  # fmt: skip
+    place = np.column_stack([x, radius * np.sin(angle), radius * (np.cos(angle) - np.cos(half)) + raised])
+    return _sheet(place, 40, 40)
+
+
+def oculus(radius=0.6, hole=0.12, rise=0.22):
+    """A paraboloid on a circle with a round opening in the middle."""
+    r, angle = (
+        each.ravel()
+        for each in np.meshgrid(
+            np.linspace(hole, radius, 24), 2.0 * np.pi * np.arange(96) / 96, indexing="ij"
+        )
+    )
+    place = np.column_stack([r * np.cos(angle), r * np.sin(angle), rise * (1.0 - (r / radius) ** 2)])
+    return _sheet(place, 24, 96, closed=True)
+
+
+def sail(size=0.9, rise=0.16):
+    """z = rise (2 - (2x/a)² - (2y/a)²) over a square: it stands on its four corners."""
+    x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(-size / 2, size / 2, 41)], indexing="ij"))
+    z = rise * (2.0 - (2.0 * x / size) ** 2 - (2.0 * y / size) ** 2)
+    return _sheet(np.column_stack([x, y, z]), 41, 41)

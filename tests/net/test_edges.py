@@ -1,0 +1,198 @@
+"""What the edges of nets stand on."""
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.net.edges import Edges, Place, stand
+from shellform.net.files import load_net, net_document, save_net
+from tests.net.edge_shells import barrel, oculus, sail
+
+SPACING = 0.055
+
+
+@pytest.fixture(scope="module")
+def vault_of_two_arches():
+    surface = barrel()
+    return surface, pulled(surface)
+
+
+@pytest.fixture(scope="module")
+def round_opening():
+    surface = oculus()
+    return surface, pulled(surface)
+
+
+def pulled(surface, **settings):
+    return sf.pull_net(surface, spacing=SPACING, gap=0.002, angle=np.deg2rad(45.0), elements=2, **settings)
+
+
+def kinds(net):
+    return sorted(each.kind for each in net.stretches)
+
+
+def test_a_net_on_the_ground_all_round_is_what_it_was(vault, net):
+    found = stand(net, vault)
+    assert found.grid is net.grid
+    assert found.target is net.target
+    assert found.quality is net.quality
+    np.testing.assert_array_equal(found.supports, net.supports)
+    assert found.edges == ()
+    assert [(each.kind, each.whole) for each in found.stretches] == [("ground", True)]
+
+
+def test_arches_hang_on_edge_beams_that_come_down_to_feet_on_the_ground(vault_of_two_arches):
+    surface, net = vault_of_two_arches
+    found = stand(net, surface)
+    assert kinds(found) == ["beam", "beam", "ground", "ground"]
+    assert len(found.edges) == 2
+    for line in found.edges:
+        assert not line.closed
+        place = found.target.positions[line.nodes]
+        np.testing.assert_allclose(place[[0, -1], 2], 0.0, atol=1e-9)
+        np.testing.assert_allclose(np.abs(place[:, 0]), 0.4, atol=2e-4)
+        length = np.linalg.norm(np.diff(place, axis=0), axis=1)
+        assert length.max() <= 0.5 * SPACING * 1.001
+        assert length.sum() == pytest.approx(2 * 0.9 * 0.5, rel=1e-3)
+        assert set(line.nodes[[0, -1]]) <= set(found.supports)
+
+
+def test_nothing_is_held_above_the_ground_unasked(vault_of_two_arches, round_opening):
+    for surface, net in (vault_of_two_arches, round_opening):
+        found = stand(net, surface)
+        low = 0.02 * surface.size[:2].max() + 0.5 * net.grid.gap
+        assert found.target.positions[found.supports, 2].max() <= low
+        assert net.target.positions[net.supports, 2].max() > 5 * low
+
+
+def test_every_rod_s_end_is_held_or_clamped_to_an_edge_beam_by_half_the_gap(
+    vault_of_two_arches, round_opening
+):
+    for surface, net in (vault_of_two_arches, round_opening):
+        found = stand(net, surface)
+        clamps = np.vstack([line.clamps for line in found.edges])
+        own = set(found.rod_ends.tolist())
+        assert own == (set(found.supports.tolist()) & own) | set(clamps[:, 1].tolist())
+        assert not set(found.supports.tolist()) & set(clamps[:, 1].tolist())
+        reach = np.linalg.norm(
+            found.target.positions[clamps[:, 1]] - found.target.positions[clamps[:, 0]], axis=1
+        )
+        assert reach.min() == pytest.approx(0.5 * found.grid.gap, rel=1e-6)
+        assert reach.max() < 0.06 * SPACING
+
+
+def test_the_edge_beam_of_an_opening_is_a_closed_ring(round_opening):
+    surface, net = round_opening
+    found = stand(net, surface)
+    assert kinds(found) == ["beam", "ground"]
+    (line,) = found.edges
+    assert line.closed
+    assert len(line.ends) == len(line.nodes)
+    place = found.target.positions[line.nodes]
+    np.testing.assert_allclose(np.linalg.norm(place[:, :2], axis=1), 0.12, atol=2e-3)
+
+
+def test_a_shell_on_four_points_has_four_arches_that_share_their_feet():
+    surface = sail()
+    found = stand(pulled(surface), surface)
+    assert len(found.edges) == 4
+    feet = {int(node) for line in found.edges for node in line.nodes[[0, -1]]}
+    assert len(feet) == 4
+    np.testing.assert_allclose(np.abs(found.target.positions[sorted(feet), :2]), 0.45, atol=1e-9)
+
+
+def test_the_grid_s_own_nodes_keep_their_numbers_and_places(vault_of_two_arches):
+    surface, net = vault_of_two_arches
+    found = stand(net, surface)
+    count = len(net.grid.flat)
+    np.testing.assert_array_equal(found.grid.flat[:count], net.grid.flat)
+    np.testing.assert_array_equal(found.target.positions[:count], net.target.positions)
+    np.testing.assert_array_equal(found.grid.flat[count:], found.target.positions[count:])
+
+
+def test_free_edges_hold_nothing_and_pins_are_there_where_they_are_asked_for(vault_of_two_arches):
+    surface, net = vault_of_two_arches
+    free = stand(net, surface, Edges((Place("free", box=[[0.3, -9, -9], [9, 9, 9]]),)))
+    assert kinds(free) == ["beam", "free", "ground", "ground"] or kinds(free) == ["beam", "free", "ground"]
+    assert free.target.positions[free.supports, 0].max() < 0.4 - 1e-6 or len(free.edges) == 1
+    pinned = stand(net, surface, Edges(outer="pin"))
+    np.testing.assert_array_equal(pinned.supports, net.supports)
+    assert pinned.edges == ()
+
+
+def test_walls_are_named_by_height_box_and_curve(vault_of_two_arches):
+    surface, net = vault_of_two_arches
+    top = surface.vertices[:, 2].max()
+    for place in (
+        Place("wall", "north", height=(0.5 * top, 2 * top), box=[[0.3, -9, -9], [9, 9, 9]]),
+        Place("wall", "north", curve=[[0.4, -0.2], [0.4, 0.2]], within=0.01),
+    ):
+        found = stand(net, surface, Edges((place,)))
+        walls = [each for each in found.stretches if each.kind == "wall"]
+        assert [each.name for each in walls] == ["north"]
+        on = [node for node in found.supports if found.target.positions[node, 2] > 0.25 * top]
+        assert on
+        assert (found.target.positions[on, 0] > 0.39).all()
+        # The beams beside the wall stand on the ground and on the wall.
+        assert len(found.edges) == 3
+
+
+def test_openings_can_be_told_apart_from_the_outer_edge(round_opening):
+    surface, net = round_opening
+    found = stand(net, surface, Edges(openings="free"))
+    assert kinds(found) == ["free", "ground"]
+    assert found.edges == ()
+    other = stand(net, surface, Edges((Place("pin", opening=True),)))
+    np.testing.assert_array_equal(other.supports, net.supports)
+
+
+def test_the_ground_s_level_can_be_given():
+    surface = barrel(raised=0.5)
+    net = pulled(surface)
+    assert kinds(stand(net, surface)) == ["beam", "beam", "ground", "ground"]
+    with pytest.raises(InputError, match="nothing holds the shell") as caught:
+        stand(net, surface, Edges(ground=0.0))
+    assert "edges.ground" in str(caught.value)
+
+
+def test_a_net_cut_off_by_an_outline_has_its_edge_along_it():
+    surface = barrel(length=1.2)
+    outline = [[-0.35, -9.0], [0.35, -9.0], [0.35, 9.0], [-0.35, 9.0]]
+    net = pulled(surface, outline=outline)
+    found = stand(net, surface, outline=np.array(outline))
+    beams = [line for line in found.edges if len(line.clamps) > 5]
+    assert len(beams) == 2
+    for line in beams:
+        np.testing.assert_allclose(np.abs(found.target.positions[line.clamps[:, 0], 0]), 0.35, atol=5e-3)
+
+
+def test_a_net_with_edge_beams_comes_back_from_its_file(tmp_path, vault_of_two_arches):
+    surface, net = vault_of_two_arches
+    found = stand(
+        net, surface, Edges((Place("wall", "north", height=(0.1, 9.0), box=[[0.3, -9, -9], [9, 9, 9]]),))
+    )
+    save_net(tmp_path / "net.npz", found)
+    again = load_net(tmp_path / "net.npz")
+    for one, other in zip(found.edges, again.edges, strict=True):
+        np.testing.assert_array_equal(one.nodes, other.nodes)
+        np.testing.assert_array_equal(one.clamps, other.clamps)
+        assert (one.closed, one.name) == (other.closed, other.name)
+    for one, other in zip(found.stretches, again.stretches, strict=True):
+        np.testing.assert_array_equal(one.points, other.points)
+        assert (one.kind, one.name, one.opening, one.whole) == (
+            other.kind,
+            other.name,
+            other.opening,
+            other.whole,
+        )
+    document = net_document(found)
+    assert {each["kind"] for each in document["edges"]} == {"ground", "wall", "beam"}
+    assert len(document["edge_beams"]) == len(found.edges)
+
+
+def test_unknown_kinds_are_refused_with_those_known():
+    for make in (lambda: Edges(outer="flying"), lambda: Place("fill")):
+        with pytest.raises(InputError, match="is no kind of edge") as caught:
+            make()
+        assert "beam" in caught.value.remedy
