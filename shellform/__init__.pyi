@@ -18,10 +18,14 @@ from shellform.gridshell.gridshell import Rod as Rod
 from shellform.gridshell.gridshell import brace as brace
 from shellform.gridshell.loads import Region as Region
 from shellform.gridshell.scatter import Scatter as Scatter
+from shellform.net import refusal as refusal
+from shellform.net.chebyshev import NetTuning as NetTuning
 from shellform.net.chebyshev import pull_net as pull_net
 from shellform.net.grid import Grid as Grid
 from shellform.net.grid import GridRod as GridRod
 from shellform.net.net import Net as Net
+from shellform.net.notes import NetNote as NetNote
+from shellform.net.notes import NoteKind as NoteKind
 from shellform.net.quality import Quality as Quality
 from shellform.optimiser import comparison as comparison
 from shellform.optimiser.optimise import optimise as optimise

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from shellform.cli.terminal import Progress
+from shellform.cli.terminal import Spinner
 from shellform.errors import InputError, NotConverged
 
 
@@ -48,7 +48,7 @@ def analyse(
     from shellform.structure.model import read_model
     from shellform.structure.solve.memory import limit_to_free_memory
 
-    report = Progress()
+    report = Spinner()
     try:
         if figures is None:  # pictures ask the graphics driver for memory on terms of its own
             limit_to_free_memory()

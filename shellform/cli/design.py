@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from shellform.cli.options import Json, Quiet, Scripts
-from shellform.cli.terminal import Progress, tell_designs
+from shellform.cli.terminal import Spinner, tell_designs
 
 
 def design(
@@ -31,7 +31,7 @@ def design(
     from shellform.records.summary import document
     from shellform.run.run import run_case
 
-    report = Progress(quiet=quiet)
+    report = Spinner(quiet=quiet)
     summary = run_case(
         load_case(case, settings or ()),
         output,

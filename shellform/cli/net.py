@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from shellform.cli.options import Json, Quiet, Scripts, with_surface_options
-from shellform.cli.terminal import Progress, tell_labelled
+from shellform.cli.terminal import Spinner, tell_labelled
 
 
 @with_surface_options
@@ -37,7 +37,7 @@ def net(
     from shellform.records.summary import document
     from shellform.run.first_look import net_alone
 
-    report = Progress(quiet=quiet)
+    report = Spinner(quiet=quiet)
     summary = net_alone(
         surface,
         output,

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from shellform.cli.options import Quiet
-from shellform.cli.terminal import Progress
+from shellform.cli.terminal import Spinner
 
 
 def render(
@@ -53,7 +53,7 @@ def render(
     else:
         from shellform.run.films import draw_film
 
-        report = Progress(quiet=quiet)
+        report = Spinner(quiet=quiet)
         files = draw_film(read_run(run), film, asked, report=report)
         report.close()
     for file in () if quiet else files:

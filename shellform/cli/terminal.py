@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 _LASTING = (Kind.BEGAN, Kind.NOTE, Kind.KEPT, Kind.DONE)  # which stay as lines
 
 
-class Progress:
+class Spinner:
     """A spinner with the present step on a terminal; what is finished stays as a line, there and elsewhere.
     Nothing if `quiet`.
     """

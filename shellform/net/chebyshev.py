@@ -37,16 +37,13 @@ from shellform.surface.shape.target import Surface
 
 MERGE = 0.2  # of the spacing
 ELEMENTS = 4  # a segment, as in section 4.1
-_MARGINS = (
-    1.5,
-    2.5,
-    4.0,
-)  # spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
+# Spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
+_MARGINS = (1.5, 2.5, 4.0)
 _BEYOND = 1.5  # spacings that the surface goes on past the margin
 
 
 @dataclass(frozen=True)
-class Tuning:
+class NetTuning:
     """Of the pulling: at most `limit` factorisations a density, steps of up to `reach` spacings, down to a
     residual of `tolerance`; and by how many segments rods go on past the lattice's last crossing, `tail`."""
 
@@ -77,7 +74,7 @@ def pull_net(
     merge: float = MERGE,
     ground: float | None = None,
     outline: ArrayLike | None = None,
-    tuning: Tuning | None = None,
+    tuning: NetTuning | None = None,
     progress: Progress | None = None,
 ) -> Net:
     """The Chebyshev net of rods `spacing` m apart along u (`spacing_v` along v), the two layers `gap` m
@@ -96,7 +93,7 @@ def pull_net(
     Stalled where the pull fails.
     """
     steps = (spacing, spacing if spacing_v is None else spacing_v)
-    tuned = tuning or Tuning()
+    tuned = tuning or NetTuning()
     check_settings(surface, steps, gap, elements, merge)
     if not np.isfinite([angle, *offset]).all():
         raise InputError(
@@ -139,12 +136,7 @@ def pull_net(
             bare = error.rods
             continue
         return _net(surface, finder, grid, pulled, trimmed)
-    raise NoNet(
-        Reason.SHORT,
-        f"the net doesn't cover the surface: {bare} rods end short of its edge at {np.rad2deg(angle):.4g}°",
-        where="net.angle",
-        remedy="Try another angle or a smaller spacing; a surface that is curved too much takes no single net.",
-    )
+    raise _short(bare, angle)
 
 
 def check_settings(
@@ -178,6 +170,15 @@ def check_settings(
         raise InputError("must be at least 1", where="net.elements", value=elements)
     if not 0.0 < merge < 0.5:
         raise InputError("must lie between 0 and 0.5", where="net.merge", value=merge)
+
+
+def _short(bare: int, angle: float) -> NoNet:
+    return NoNet(
+        Reason.SHORT,
+        f"the net doesn't cover the surface: {bare} rods end short of its edge at {np.rad2deg(angle):.4g}°",
+        where="net.angle",
+        remedy="Try another angle or a smaller spacing; a surface that is curved too much takes no single net.",
+    )
 
 
 def _densities(given: Sequence[float] | None, start: Start) -> Sequence[float]:

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from shellform.net.chebyshev import Tuning, pull_net
+from shellform.net.chebyshev import NetTuning, pull_net
 from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Progress
@@ -43,27 +43,27 @@ class Rung:
     shear: float = 1.0
     density: tuple[float, ...] = ()
     flat: bool = False
-    tuning: Tuning = field(default_factory=Tuning)
+    tuning: NetTuning = field(default_factory=NetTuning)
 
 
 def _turned(degrees: float, tail: int = 0) -> Rung:
-    return Rung(Change.TURNED, turn=math.radians(degrees), tuning=Tuning(tail=tail))
+    return Rung(Change.TURNED, turn=math.radians(degrees), tuning=NetTuning(tail=tail))
 
 
 LADDER = (
-    Rung(Change.NOTHING, tuning=Tuning()),
-    Rung(Change.LOOSER, frozenset({Reason.STALLED}), tuning=Tuning(tolerance=_SETTLED)),
-    Rung(Change.LONGER, _REACHED, tuning=Tuning(tail=2)),
-    Rung(Change.TIGHTER, frozenset({Reason.OFF}), density=(*FROM_COMPASS, 50.0, 500.0), tuning=Tuning(tolerance=_SETTLED)),
-    Rung(Change.GENTLER, _PULL, density=FROM_FLAT, tuning=Tuning(reach=0.5, tolerance=_SETTLED)),
+    Rung(Change.NOTHING, tuning=NetTuning()),
+    Rung(Change.LOOSER, frozenset({Reason.STALLED}), tuning=NetTuning(tolerance=_SETTLED)),
+    Rung(Change.LONGER, _REACHED, tuning=NetTuning(tail=2)),
+    Rung(Change.TIGHTER, frozenset({Reason.OFF}), density=(*FROM_COMPASS, 50.0, 500.0), tuning=NetTuning(tolerance=_SETTLED)),
+    Rung(Change.GENTLER, _PULL, density=FROM_FLAT, tuning=NetTuning(reach=0.5, tolerance=_SETTLED)),
     Rung(Change.SHEAR, _PULL, shear=5.0),
     _turned(5.0),
     _turned(-5.0),
     _turned(10.0, 2),
     _turned(-10.0, 2),
     Rung(Change.SHIFTED, shift=(0.5, 0.5)),
-    Rung(Change.SHIFTED, shift=(0.5, 0.0), tuning=Tuning(tail=2, tolerance=_SETTLED)),
-    Rung(Change.FLAT, _PULL, density=FROM_FLAT, flat=True, tuning=Tuning(reach=0.5, tolerance=_SETTLED)),
+    Rung(Change.SHIFTED, shift=(0.5, 0.0), tuning=NetTuning(tail=2, tolerance=_SETTLED)),
+    Rung(Change.FLAT, _PULL, density=FROM_FLAT, flat=True, tuning=NetTuning(reach=0.5, tolerance=_SETTLED)),
 )  # fmt: skip
 
 

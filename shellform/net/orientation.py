@@ -20,7 +20,7 @@ import numpy as np
 
 from shellform.compiled import set_num_threads
 from shellform.errors import InputError, ShellformError
-from shellform.net.chebyshev import Method, Tuning, pull_net
+from shellform.net.chebyshev import Method, NetTuning, pull_net
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.pull import SHEAR_STIFFNESS
@@ -171,7 +171,7 @@ def _try(surface: Surface, settings: dict[str, Any], job: Job) -> TriedNet:
     angle, offset, method, tail = job
     changed = {**settings, "angle": angle, "offset": offset, "method": method}
     try:
-        net = pull_net(surface, **changed, tuning=Tuning(tail=tail))
+        net = pull_net(surface, **changed, tuning=NetTuning(tail=tail))
     except ShellformError as error:
         return TriedNet(angle, offset, math.inf, str(error))
     return TriedNet(angle, offset, float(np.round(cost(net), 12)))

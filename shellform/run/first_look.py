@@ -17,8 +17,8 @@ from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
 from shellform.errors import InputError
 from shellform.net.edges import stand
-from shellform.net.files import net_document, save_net
 from shellform.net.orientation import oriented_net
+from shellform.net.saved import net_document, save_net
 from shellform.records import stages
 from shellform.records.files import plain
 from shellform.records.progress import Event, Kind, Report

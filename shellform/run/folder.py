@@ -17,8 +17,8 @@ from shellform.case.case import Case, load_case
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import named
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
-from shellform.net.files import load_net
 from shellform.net.net import Net
+from shellform.net.saved import load_net
 from shellform.records import stages
 from shellform.records.summary import Summary, read_summary, summary_version
 from shellform.structure.elements.state import State

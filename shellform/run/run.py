@@ -24,8 +24,8 @@ from shellform.case.case import Case, check_script, dump_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.joints import doubts as joint_doubts
-from shellform.net.files import load_net, net_document, save_net
 from shellform.net.net import Net
+from shellform.net.saved import load_net, net_document, save_net
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.stages import SHOWING, STAGES, StagesDone, read_stages, write_stages
 from shellform.records.summary import ModelRecord, Summary, read_summary, write_summary

@@ -6,7 +6,7 @@ import time
 from typing import Any
 
 from shellform.study.outcome import Status, Value
-from shellform.study.studies import Progress
+from shellform.study.studies import StudyProgress
 
 _EVERY = 10.0  # seconds between lines
 
@@ -38,7 +38,7 @@ class Live:
         if self._drawn:
             self._drawn.stop()
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: StudyProgress) -> None:
         if progress.dashboard != self._dashboard:
             self._dashboard = progress.dashboard
             self._console.print(f"dashboard: {progress.dashboard}")
@@ -49,7 +49,7 @@ class Live:
             self._console.print(_line(progress))
 
 
-def _line(progress: Progress) -> str:
+def _line(progress: StudyProgress) -> str:
     ready = progress.found + progress.done
     spent = time.perf_counter() - progress.began
     rest = (
@@ -61,7 +61,7 @@ def _line(progress: Progress) -> str:
     return f"study: {ready} of {progress.total} designs{failed}{rest}"
 
 
-def _table(progress: Progress) -> Any:
+def _table(progress: StudyProgress) -> Any:
     from rich.table import Table
 
     table = Table(title=_line(progress), title_justify="left", caption=progress.dashboard or None)

@@ -34,8 +34,8 @@ from shellform.study.engine import Engine, Work, engine, sweep
 from shellform.study.front import Front, signed
 from shellform.study.jobs import Job, disk_is_full, locked, work
 from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
+from shellform.study.page_of_study import write_study_page
 from shellform.study.plan import Plan, changes, length, read_study, resolved
-from shellform.study.report import write_study_page
 from shellform.study.store import Log, designs_of, line_of, picked, write_table
 from shellform.written import write_text
 
@@ -45,7 +45,7 @@ _SHORT = 32  # hexadecimal digits of a key: 128 bits
 
 
 @dataclass
-class Progress:
+class StudyProgress:
     """How far a study is, as it goes on; `rows` are the latest with the columns asked for."""
 
     total: int = 0
@@ -59,7 +59,7 @@ class Progress:
 
 Batch = Callable[[], Iterable[Mapping[str, Value]]]
 """Gives the entries of a batch of designs, the same each time."""
-Show = Callable[[Progress], None]
+Show = Callable[[StudyProgress], None]
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class _Studying:
     folder: Path
     log: Log
     front: Front
-    progress: Progress
+    progress: StudyProgress
     show: Show
     allow_scripts: bool
 
@@ -125,7 +125,7 @@ def run_study(
     try:
         with locked(place / "lock", wait=False), Log(place / "results.jsonl") as log:
             front = Front(signed(plan.study.objective), plan.study.limit)
-            study = _Studying(plan, place, log, front, Progress(total=length(plan)), show, allow_scripts)
+            study = _Studying(plan, place, log, front, StudyProgress(total=length(plan)), show, allow_scripts)
             _tidy(study)
             _go(study, work, workers, scheduler)
             return _finish(study)

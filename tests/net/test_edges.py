@@ -6,7 +6,7 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError
 from shellform.net.edges import Edges, Place, stand
-from shellform.net.files import load_net, net_document, save_net
+from shellform.net.saved import load_net, net_document, save_net
 from tests.net.edge_shells import barrel, oculus, sail
 
 SPACING = 0.055

@@ -10,11 +10,11 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
-from shellform.net.files import load_net, save_net
 from shellform.net.ladder import LADDER, Rung, _changed, _vain, climbed_net
 from shellform.net.orientation import oriented_net
 from shellform.net.pull import _watched
 from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
+from shellform.net.saved import load_net, save_net
 from shellform.surface.shape.target import make_surface
 from tests.net.test_settings import ball, bowl
 

@@ -8,8 +8,8 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError
 from shellform.net.compass import _corner
-from shellform.net.files import load_net, net_document, save_net
 from shellform.net.grid import neighbours
+from shellform.net.saved import load_net, net_document, save_net
 
 
 class Sphere:

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 
-from shellform.net.files import load_net, save_net
 from shellform.net.notes import NetNote, NoteKind
+from shellform.net.saved import load_net, save_net
 
 
 def test_notes_keep_their_kind_in_a_file_and_older_files_have_none(net, tmp_path):

@@ -11,9 +11,9 @@ from PIL import Image
 import shellform as sf
 from shellform.errors import InputError
 from shellform.output.page import report
-from shellform.output.page.answers import answers
 from shellform.output.page.charts import line_chart
 from shellform.output.page.embed import embed
+from shellform.output.page.first_answers import answers
 from shellform.records.summary import VerdictRecord
 from shellform.records.words import number
 from shellform.structure.elements.state import State

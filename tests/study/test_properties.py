@@ -6,10 +6,10 @@ from hypothesis import strategies as st
 
 from shellform.case.case import dump_case, load_case
 from shellform.gridshell.grouping import cut_lengths
-from shellform.net.files import load_net, save_net
 from shellform.net.grid import lattice_grid
 from shellform.net.net import Net
 from shellform.net.quality import Quality
+from shellform.net.saved import load_net, save_net
 from shellform.structure.elements.state import from_vectors
 from tests.stubs import study_file
 

@@ -25,8 +25,8 @@ from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.optimiser.optimum import Step
 from shellform.output.page import charts
-from shellform.output.page.answers import answers
 from shellform.output.page.embed import Picture
+from shellform.output.page.first_answers import answers
 from shellform.output.page.template import filled, part
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.problem.paths import deviations
