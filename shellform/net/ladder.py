@@ -104,7 +104,7 @@ def climbed_net(
             )
         except (NoNet, Stalled) as error:
             attempts.append(Attempt(rung.change, turned, shifted, error.reason))
-            progress(attempts[-1].told())
+            progress(attempts[-1].sentence())
             reasons.add(error.reason)
             first = first or error
             spent += error.iterations if isinstance(error, Stalled) else 0
@@ -114,7 +114,7 @@ def climbed_net(
         given = Attempt(rung.change, turned, shifted, None)
         if not attempts:
             return net, given
-        notes = (*net.notes, *(NetNote(NoteKind.ATTEMPT, each.told()) for each in (*attempts, given)))
+        notes = (*net.notes, *(NetNote(NoteKind.ATTEMPT, each.sentence()) for each in (*attempts, given)))
         return dataclasses.replace(net, notes=notes, attempts=(*attempts, given)), given
     assert first is not None
     raise _refused(first, attempts, surface) from first

@@ -70,7 +70,7 @@ class Attempt:
     offset: tuple[float, float]
     reason: Reason | None
 
-    def told(self) -> str:
+    def sentence(self) -> str:
         """In words, for people."""
         where = f" at {math.degrees(self.angle):.4g}°"
         shift = f", offset {self.offset[0]:g}, {self.offset[1]:g}" if self.offset != (0.0, 0.0) else ""

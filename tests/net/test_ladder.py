@@ -11,6 +11,7 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.net.ladder import LADDER, Rung, _changed, _vain, climbed_net
+from shellform.net.notes import NetNote, NoteKind
 from shellform.net.orientation import oriented_net
 from shellform.net.pull import _watched
 from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
@@ -57,8 +58,8 @@ def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tm
     ]
     assert angle == math.pi / 4
     assert net.quality.distance_max < 0.05 * net.spacing
-    assert net.notes[-2:] == tuple(each.told() for each in net.attempts)
-    assert net.attempts[0].told() in said
+    assert net.notes[-2:] == tuple(NetNote(NoteKind.ATTEMPT, each.sentence()) for each in net.attempts)
+    assert net.attempts[0].sentence() in said
     save_net(tmp_path / "net.npz", net)
     assert load_net(tmp_path / "net.npz").attempts == net.attempts
     again, _ = climbed_net(umbrella, SETTINGS, angle=math.pi / 4)

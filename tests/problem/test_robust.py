@@ -116,7 +116,7 @@ def test_the_predicted_scatter_is_that_of_a_quick_sample(shell, loaded):
     )  # two standard errors
     assert sum(each[0] for each in told.causes.values()) == pytest.approx(1.0)
     assert sum(each[1] for each in told.causes.values()) == pytest.approx(1.0)
-    assert (told.wander**2).sum() == pytest.approx(told.linear)
+    assert (told.node_deviation**2).sum() == pytest.approx(told.linear)
     assert "comes from" in told.sentences()[1]
     again = sample(shell, design, state, load, scatter, count=2, seed=1)
     np.testing.assert_array_equal(again.misfits, drawn.misfits[:2])
