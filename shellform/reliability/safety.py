@@ -1,0 +1,193 @@
+"""What is asked of a design as built, and whether it holds: drawn structures on their own paths, and the perfect
+one with rod elements halved.
+
+Load cases that are shares of a larger one lie on its path: each drawn structure is loaded once, with the largest, and
+stands under a smaller one where its branch goes on beyond it. So the same structures are judged under the design load
+and under the additional one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import InputError
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.drawing import errors_of, variables
+from shellform.reliability.members import members_of_model
+from shellform.reliability.path_of_one import Limit
+from shellform.reliability.perfect import perfect, perfect_of
+from shellform.reliability.probability import CONFIDENCE, Standing, counted
+from shellform.reliability.refinement import halved
+from shellform.reliability.standing import Workshop
+from shellform.structure.model import Model
+
+_SAME = 1e-9  # relative
+_STEP = 0.25  # of the load, towards the critical factor
+_RESOLUTION = 1 / 256  # of the load, to which a critical factor is found
+
+
+@dataclass(frozen=True)
+class Safety:
+    """What is asked of a design with these `tolerances`.
+
+    - `probability_design`: share of structures that stand under the design load.
+    - `probability_additional`: the same under every other load; None: no less than of the initial design, but never
+      more than under the design load.
+    - `critical_factor`: of the perfect structure under the design load, on the mesh with rod elements halved; None: any.
+    - `stiffness`: share of the start's softest mode that a search keeps at first.
+    - `drawn`, `seed`: structures with which a finished design is judged.
+    - `tried`, `enlarged`: structures with which a search judges, under a seed of their own, their errors larger by this
+      factor (trial_structures.py).
+    """
+
+    tolerances: Tolerances
+    probability_design: float = 0.99
+    probability_additional: float | None = None
+    critical_factor: float | None = 1.25
+    stiffness: float = 0.5
+    drawn: int = 60
+    seed: int = 1
+    tried: int = 12
+    enlarged: float = 1.5
+
+    def __post_init__(self) -> None:
+        for name in ("probability_design", "probability_additional"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 <= value < 1.0:
+                raise InputError("must be at least 0 and below 1", where=f"safety.{name}", value=value)
+        if self.critical_factor is not None and not self.critical_factor >= 1.0:
+            raise InputError("must be at least 1", where="safety.critical_factor", value=self.critical_factor)
+        for name in ("drawn", "tried"):
+            if getattr(self, name) < 1:
+                raise InputError("must be at least 1", where=f"safety.{name}", value=getattr(self, name))
+        if not (self.stiffness > 0.0 and np.isfinite(self.stiffness)):
+            raise InputError("must be positive and finite", where="safety.stiffness", value=self.stiffness)
+        if not (1.0 <= self.enlarged <= 3.0):
+            raise InputError("must lie between 1 and 3", where="safety.enlarged", value=self.enlarged)
+
+    def required(self, load: str, design_load: str, initial: float | None) -> float:
+        """The share of structures asked for under a load, the initial design's share under it being `initial`
+        (None: not known)."""
+        if load == design_load:
+            return self.probability_design
+        if self.probability_additional is not None:
+            return self.probability_additional
+        return self.probability_design if initial is None else min(initial, self.probability_design)
+
+
+@dataclass(frozen=True)
+class UnderLoad:
+    """What was found under one load: its `standing`, the share that was `required`, and the numbers of the drawn
+    structures that have `fallen`."""
+
+    standing: Standing
+    required: float
+    fallen: tuple[int, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether as many stand as are required."""
+        return len(self.fallen) <= allowed(self.required, self.standing.drawn)
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """What was found of a design: by load case, and the `critical` end of the perfect structure's path under the design load on
+    the halved mesh, followed up to `sought` (None: no factor is asked for); `failed` says what isn't held, a sentence
+    each."""
+
+    loads: Mapping[str, UnderLoad]
+    critical: Limit | None
+    failed: tuple[str, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether all holds that is asked for."""
+        return not self.failed
+
+
+def allowed(probability: float, drawn: int) -> int:
+    """How many of the drawn structures may fall."""
+    return int(np.floor((1.0 - probability) * drawn + 1e-6))
+
+
+def judge(
+    shell: Gridshell,
+    design: Design,
+    loads: Mapping[str, Reals],
+    safety: Safety,
+    *,
+    initial: Judgement | None = None,
+    design_load: str = "design",
+) -> Judgement:
+    """The design judged under the dead `loads` (n, 6), those that are zero left out; `initial` is the initial design's
+    judgement. Raises InputError where there is no design load, NotConverged where the perfect structure has no unloaded
+    equilibrium."""
+    if design_load not in loads or not loads[design_load].any():
+        raise InputError("there is no design load to judge a design under", where="loads", value=design_load)
+    found: dict[str, UnderLoad] = {}
+    failed = []
+    for largest, shares in paths(loads).items():
+        workshop = Workshop(perfect(shell, design, loads[largest]))
+        outcomes = workshop.drawn(safety.tolerances, seed=safety.seed, numbers=range(safety.drawn))
+        for name, share in shares.items():
+            fallen = tuple(
+                each.number
+                for each in outcomes
+                if (not each.stands if share == 1.0 else each.factor < share * (1.0 - _SAME))
+            )
+            standing = counted(
+                safety.drawn, safety.drawn - len(fallen), seed=safety.seed, confidence=CONFIDENCE
+            )
+            before = None
+            if initial is not None and name in initial.loads:
+                before = initial.loads[name].standing.standing / initial.loads[name].standing.drawn
+            found[name] = UnderLoad(standing, safety.required(name, design_load, before), fallen)
+    for name in loads:
+        if name in found and not found[name].holds:
+            own = found[name]
+            failed.append(
+                f"under the load {name!r} {own.standing.standing} of {own.standing.drawn} drawn structures stand, and "
+                f"{own.standing.drawn - allowed(own.required, own.standing.drawn)} are required"
+            )
+    critical = None
+    if safety.critical_factor is not None:
+        critical = critical_on_halved(shell, design, loads[design_load], safety.critical_factor)
+        if critical.factor < safety.critical_factor * (1.0 - _SAME):
+            failed.append(
+                f"the critical factor is {critical.factor:.3f} with rod elements halved, and "
+                f"{safety.critical_factor:g} is required"
+            )
+    return Judgement({name: found[name] for name in loads if name in found}, critical, tuple(failed))
+
+
+def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: float) -> Limit:
+    """The end of the perfect structure's path on the mesh with rod elements halved, followed up to the factor `sought`;
+    0 where the finer mesh has no unloaded equilibrium."""
+    supports = tuple(int(node) for node in shell.net.supports)
+    model = halved(Model(shell.network(design), {"load": load}, shell.target, supports))
+    nominal = perfect_of(model, "load", shapes=0)
+    members = members_of_model(model)
+    none = errors_of(members, Tolerances(), variables(members, 0, 0))
+    return Workshop(nominal).limit(none, most=sought, step=_STEP, resolution=_RESOLUTION)
+
+
+def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:
+    """The loads that paths are followed for, and for each the load cases that lie on its path with their shares of
+    it, itself included; loads of zero are left out."""
+    size = {name: float(np.linalg.norm(load)) for name, load in loads.items()}
+    found: dict[str, dict[str, float]] = {}
+    for name in sorted((name for name in loads if size[name] > 0.0), key=lambda name: -size[name]):
+        for largest, shares in found.items():
+            share = float(np.vdot(loads[name], loads[largest])) / size[largest] ** 2
+            if np.linalg.norm(loads[name] - share * loads[largest]) <= _SAME * size[name]:
+                shares[name] = share
+                break
+        else:
+            found[name] = {name: 1.0}
+    return found
