@@ -28,6 +28,7 @@ from shellform.net.notes import NetNote as NetNote
 from shellform.net.notes import NoteKind as NoteKind
 from shellform.net.quality import Quality as Quality
 from shellform.optimiser import comparison as comparison
+from shellform.optimiser.moving_asymptotes import MovingAsymptotes as MovingAsymptotes
 from shellform.optimiser.optimise import optimise as optimise
 from shellform.optimiser.optimise import polish as polish
 from shellform.optimiser.optimum import Checkpoint as Checkpoint

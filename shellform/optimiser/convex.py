@@ -29,11 +29,12 @@ def minimise(
     constraints: int,
     evaluations: int,
     tolerance: float = 1e-4,
+    caution: float = 1.0,
 ) -> tuple[Reals, str]:
     """NLopt's MMA from `start` (s,) within bounds: the best point and the reason for the stop.
 
     `evaluate(x)` returns the objective, its gradient (s,), the `constraints` values g <= 0 and their
-    gradients (k, s).
+    gradients (k, s). `caution`: the curvature with which its approximations begin (rho in Svanberg 2002), over NLopt's own.
     """
     if ((start < lower) | (start > upper)).any():
         raise InputError(
@@ -70,6 +71,8 @@ def minimise(
     optimizer.set_upper_bounds(upper)
     optimizer.set_maxeval(evaluations)
     optimizer.set_ftol_rel(tolerance)
+    if caution != 1.0:
+        optimizer.set_param("rho_init", caution)
     best = np.array(optimizer.optimize(start))
     return best, _REASONS.get(optimizer.last_optimize_result(), "stopped")
 

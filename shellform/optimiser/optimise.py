@@ -35,6 +35,7 @@ import numpy as np
 from shellform.arrays import Indices
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
+from shellform.optimiser.moving_asymptotes import MovingAsymptotes, minimise_directly
 from shellform.optimiser.optimum import Checkpoint, Optimum
 from shellform.optimiser.phases import run
 from shellform.optimiser.search_state import Iterate, Keep, Models, Search, Watch, finish, record, resumed
@@ -53,13 +54,14 @@ def optimise(
     problem: Problem,
     start: Design,
     *,
-    solver: SequentialConvex | None = None,
+    solver: SequentialConvex | MovingAsymptotes | None = None,
     evaluations: int = 100,
     progress: Watch | None = None,
     keep: Keep | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
-    """The best design found from `start` within a number of design `evaluations`.
+    """The best design found from `start` within a number of design `evaluations`; with MovingAsymptotes by the paper's
+    own method (moving_asymptotes.py).
 
     `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes
     on from there to the same result.
@@ -68,8 +70,19 @@ def optimise(
     """
     solver = solver or SequentialConvex()
     with dense_on_one():
+        if isinstance(solver, MovingAsymptotes):
+            return minimise_directly(
+                problem,
+                start,
+                solver,
+                evaluations=evaluations,
+                progress=progress,
+                keep=keep,
+                resume=resume,
+            )
+        share = solver.stiffness
         search, it = begin(
-            problem, start, solver, lambda softest: solver.stiffness * softest, evaluations, progress, keep
+            problem, start, solver, lambda softest: share * softest, evaluations, progress, keep
         )
         if resume is not None:
             search, it = resumed(search, resume)
