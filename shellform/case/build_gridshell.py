@@ -40,8 +40,14 @@ def gridshell(case: Case, net: Net, surface: Surface) -> tuple[Gridshell, dict[s
     joint = Joint(case.joint.axial, case.joint.torsion, case.joint.bending, case.joint.gap)
     rod, cable = rod_of(case.rod, net), Cable(case.cable.stiffness)
     edge = edge_beam(case.edges.beam, rod) if net.edges else None
-    shell = brace(net, rod, joint, cable, below=surface, edge=edge)
+    shell = brace(net, rod, joint, cable, below=surface, edge=edge, edge_cells=has_edge_cells(case))
     return shell, load_cases(case, shell, surface)
+
+
+def has_edge_cells(case: Case) -> bool:
+    """Whether cells at the edge have candidates; the paper's do."""
+    asked = case.cable.edge_cells
+    return case.optimise.method == "paper" if asked is None else asked
 
 
 def edge_beam(entry: EdgeBeamEntry, rod: Rod) -> EdgeBeam:

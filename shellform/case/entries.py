@@ -149,6 +149,10 @@ class CableEntry(Entry):
         0.99, gt=0.0, lt=1.0, description="initial rest length over length in the target"
     )
     force_max: PositiveFloat = Field(description="largest allowed tension, N (constraint 5)")
+    edge_cells: bool | None = Field(
+        None,
+        description="candidates in cells at the edge with three joints too; left out: with optimise.method paper",
+    )
     without: bool = Field(
         True, description="also load the grid without cables, to compare with (paper, section 4.1)"
     )
@@ -231,6 +235,11 @@ class JointsWeightEntry(Entry):
 class OptimiseEntry(Entry):
     """Objective (2), bounds (3, 4) and constraint (6)."""
 
+    method: Literal["convex", "paper"] = Field(
+        "convex",
+        description="convex: models in the cables' tensions, thinned and polished; paper: moving asymptotes directly "
+        "in the rest lengths and the radius, nothing else",
+    )
     misfit: float = Field(
         0.7, ge=0.0, le=1.0, description="share of the misfit in the start value of the objective"
     )

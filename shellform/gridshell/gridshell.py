@@ -14,7 +14,7 @@ from shellform.arrays import Flags, Indices, Reals, reals
 from shellform.errors import InputError
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.loads import points
-from shellform.net.grid import ROD, cells, grid_beams
+from shellform.net.grid import ROD, cells, edge_diagonals, grid_beams
 from shellform.net.net import Net
 from shellform.structure.answers.results import bending_utilisation, utilisation
 from shellform.structure.elements.beam import Beams, joined
@@ -273,9 +273,17 @@ def max_radius(net: Net, rod: Rod) -> float:
 
 
 def brace(
-    net: Net, rod: Rod, joint: Joint, cable: Cable, *, below: Surface, edge: EdgeBeam | None = None
+    net: Net,
+    rod: Rod,
+    joint: Joint,
+    cable: Cable,
+    *,
+    below: Surface,
+    edge: EdgeBeam | None = None,
+    edge_cells: bool = False,
 ) -> Gridshell:
-    """The gridshell with a candidate cable on both diagonals of every cell whose corners are all joints.
+    """The gridshell with a candidate cable on both diagonals of every cell whose corners are all joints, and with
+    `edge_cells` behind them on the one of every cell at the edge that has three.
 
     None ends at a support, since supports are no joints, and none rises above the surface `below` which they
     have to stay. They join the lower rods. `edge` is what the net's edge beams are. Raises InputError where the joint doesn't fit the net or the rod
@@ -300,7 +308,10 @@ def brace(
             "surface.",
         )
     corners = cells(net.grid)
-    ends = net.grid.crossing_nodes[:, 0][np.vstack([corners[:, [0, 2]], corners[:, [1, 3]]])]
+    pairs = [corners[:, [0, 2]], corners[:, [1, 3]]]
+    if edge_cells:
+        pairs.append(edge_diagonals(net.grid))
+    ends = net.grid.crossing_nodes[:, 0][np.vstack(pairs)]
     place = net.target.positions[ends]
     finder = Locator(below)
     above = np.zeros(len(ends), dtype=bool)

@@ -207,3 +207,18 @@ def cells(grid: Grid) -> Indices:
         ],
         dtype=np.int64,
     ).reshape(-1, 4)
+
+
+def edge_diagonals(grid: Grid) -> Indices:
+    """Crossings (q, 2) at the ends of the one diagonal that a cell of three crossings has; its fourth corner lies
+    beyond the edge."""
+    number = {(int(i), int(j)): k for k, (i, j) in enumerate(grid.lattice)}
+    corners = ((0, 0), (1, 0), (1, 1), (0, 1))
+    places = sorted({(i - a, j - b) for i, j in number for a, b in corners})
+    found = []
+    for i, j in places:
+        here = [number.get((i + a, j + b)) for a, b in corners]
+        if here.count(None) == 1:
+            gone = here.index(None)
+            found.append([here[(gone + 1) % 4], here[(gone + 3) % 4]])
+    return np.array(found, dtype=np.int64).reshape(-1, 2)

@@ -19,6 +19,7 @@ from shellform.errors import NotConverged
 from shellform.gridshell.catalogue import Catalogue, label, neighbours, rounded_up
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import ROD
+from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.optimise import optimise
 from shellform.optimiser.optimum import Optimum
 from shellform.optimiser.solver import SequentialConvex
@@ -80,13 +81,14 @@ def tried(
     evaluations: int,
     beside: int,
     most_cables: int | None = None,
+    solver: MovingAsymptotes | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[CandidateSection]:
     """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness,
     each with its cables optimised.
 
     `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section. Raises InputError where no section that the net allows is stiff enough.
+    section; `solver`, another method than `optimise` has by default, which keeps no stiffness and no number of cables. Raises InputError where no section that the net allows is stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}
@@ -98,7 +100,12 @@ def tried(
         name = label(other.rod.section)
         progress(f"cables for rods {name}")
         optimum, why = _optimised(
-            problem_of(other), [design, _whole(start, design)], best.stiffness, evaluations, most_cables
+            problem_of(other),
+            [design, _whole(start, design)],
+            best.stiffness,
+            evaluations,
+            most_cables,
+            solver,
         )
         found.append(_candidate(name, other, optimum, why, weights, best.problem, other.rod.section == up))
     return found
@@ -136,7 +143,12 @@ def _whole(start: Design, design: Design) -> Design:
 
 
 def _optimised(
-    problem: Problem, starts: Sequence[Design], least: float, evaluations: int, most_cables: int | None
+    problem: Problem,
+    starts: Sequence[Design],
+    least: float,
+    evaluations: int,
+    most_cables: int | None,
+    solver: MovingAsymptotes | None,
 ) -> tuple[Optimum | None, str]:
     """The best design from the first of the starts that leads to a feasible one, or the last found; and why
     it isn't feasible.
@@ -144,8 +156,13 @@ def _optimised(
     optimum, why = None, ""
     for start in starts:
         try:
-            solver = SequentialConvex(stiffness=_share(problem, start, least), most_cables=most_cables)
-            found = optimise(problem, start, solver=solver, evaluations=evaluations)
+            found = optimise(
+                problem,
+                start,
+                solver=solver
+                or SequentialConvex(stiffness=_share(problem, start, least), most_cables=most_cables),
+                evaluations=evaluations,
+            )
         except NotConverged as error:
             why = why or error.what
             continue

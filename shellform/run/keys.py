@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 import shellform
-from shellform.case.build_gridshell import catalogue_bytes
+from shellform.case.build_gridshell import catalogue_bytes, has_edge_cells
 from shellform.case.case import Case
 from shellform.records.stages import STAGES
 
@@ -34,6 +34,7 @@ def stage_keys(case: Case) -> dict[str, str]:
     entries["stock"] = {
         name: entries["rod"].pop(name) for name in ("stock_length", "kerf")
     }  # which no design depends on
+    entries["cable"]["edge_cells"] = has_edge_cells(case)
     entries["stock"] |= {"adjustment": entries["cable"].pop("adjustment")}
     entries["edge_beam"] = entries["edges"].pop("beam")  # no net depends on its section
     status = file.stat()

@@ -12,9 +12,11 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.case.build_gridshell import rounding_catalogue
 from shellform.case.build_problem import below_factor, case_problem, critical_factors
+from shellform.case.entries import OptimiseEntry
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import symmetric_groups
+from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.optimum import Optimum, Step
 from shellform.optimiser.rounding import CandidateSection
 from shellform.optimiser.solver import SequentialConvex
@@ -58,7 +60,7 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
         rounded, summary = _rounded(workspace, best, start, loads, summary)
         built |= {} if rounded is None else {"rounded": rounded}
     not_polished = None
-    if entry.polish:
+    if entry.polish and entry.method != "paper":
         last = list(built.values())[-1]
         polished, not_polished = _polished(workspace, last, groups, loads)
         if polished is not None:
@@ -118,12 +120,19 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
     return optimiser.optimise(
         problem,
         start,
-        solver=SequentialConvex(stiffness=entry.stiffness_min, most_cables=entry.cables_max),
+        solver=_solver(entry),
         evaluations=entry.evaluations,
         progress=watch,
         keep=lambda checkpoint: save_checkpoint(workspace.folder, key, checkpoint),
         resume=checkpoint,
     )
+
+
+def _solver(entry: OptimiseEntry) -> SequentialConvex | MovingAsymptotes:
+    """That of the case's method, with its settings."""
+    if entry.method == "paper":
+        return MovingAsymptotes()
+    return SequentialConvex(stiffness=entry.stiffness_min, most_cables=entry.cables_max)
 
 
 def _record(best: Optimum, critical_factor_kept: bool) -> OptimisationRecord:
@@ -218,6 +227,7 @@ def _rounded(
         evaluations=entry.rounded,
         beside=entry.neighbours,
         most_cables=entry.cables_max,
+        solver=MovingAsymptotes() if entry.method == "paper" else None,
         progress=lambda text: workspace.say("optimise", text),
     )
     sections = tuple(_section(each) for each in trials)
