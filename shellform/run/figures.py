@@ -189,7 +189,7 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
     files = [figures / f"{_stem(asked, name, each)}{asked.endings[0]}" for name in names for each in loads]
     render.pictures(files, [titled(run, panel) for row in rows for panel in row], look)
     if len(files) > 1:
-        shown = [row for name, row in zip(names, rows, strict=True) if name in _four(run) or asked.design]
+        shown = [row for name, row in zip(names, rows, strict=True) if name in _compared(run) or asked.design]
         page = (
             figures
             / f"{_stem(asked, 'deviations' if asked.quantity == 'deviation' else 'all')}{asked.endings[0]}"
@@ -272,9 +272,9 @@ def write_states(
         vtp.write_vtp(folder / f"states/{name}-{each}.vtp", maps.panel_of(shell, design, state), columns)
 
 
-def _four(run: Run) -> list[str]:
-    """The rows of the sheet: the three designs to compare with, and the one to build."""
-    return ["unbraced", "initial", "unloaded", run.best]
+def _compared(run: Run) -> list[str]:
+    """The rows of the sheet: the four designs of the paper's figures 12 to 14, and the one to build."""
+    return ["unbraced", "initial", "unloaded", "optimised", run.best]
 
 
 def _half(size: tuple[int, int] | None) -> tuple[int, int]:
