@@ -14,6 +14,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scripts import published_standing
+from scripts.published_standing import Stands
 from shellform.case.case import LoadEntry
 from shellform.errors import InputError
 from shellform.gridshell.loads import pressure
@@ -38,12 +40,13 @@ Value = float | str | None
 
 @dataclass(frozen=True)
 class Line:
-    """One `quantity`: its value `here` and in the `paper` (None: not known), both in `unit`; `source`, its
-    place in the paper; `compare`: "equal", "order" or "none"; `note`."""
+    """One `quantity`: its value `here`, with the paper's `method` here, and in the `paper` (None: not known), all in
+    `unit`; `source`, its place in the paper; `compare`: "equal", "order" or "none"; `note`."""
 
     key: str
     quantity: str
     here: Value
+    method: Value
     paper: Value
     unit: str
     source: str
@@ -61,16 +64,20 @@ def study_of(run: Run) -> str:
     return "radius" if run.case.optimise.rod_radius > 0.0 else "fixed"
 
 
-def beside(run: Run, *, fixed: Run | None = None) -> list[Line]:
+def beside(run: Run, *, fixed: Run | None = None, method: Run | None = None) -> list[Line]:
     """The lines of the run's study in the paper's order. The study with a free radius is compared with the
-    `fixed` one too, where given.
+    `fixed` one too, and either with a run of the paper's `method`, where given.
 
-    Raises InputError where the run isn't finished or `fixed` is no run of the fixed radius.
+    Raises InputError where a run isn't finished, `fixed` is no run of the fixed radius, or `method` none of the same
+    study by the paper's method.
     """
     study = study_of(run)
     if fixed is not None and study_of(fixed) != "fixed":
         raise InputError("is no run with a fixed radius", where=str(fixed.folder))
+    if method is not None and (method.case.optimise.method != "paper" or study_of(method) != study):
+        raise InputError(f"is no run of the study {study!r} by the paper's method", where=str(method.folder))
     values = quantities(run)
+    theirs = {} if method is None else quantities(method)
     if fixed is not None and study == "radius":
         values |= _ratios(values, quantities(fixed))
     lines = [
@@ -78,6 +85,7 @@ def beside(run: Run, *, fixed: Run | None = None) -> list[Line]:
             each["key"],
             each["quantity"],
             values.get(each["key"]),
+            theirs.get(each["key"]),
             each.get("value"),
             each.get("unit", ""),
             each["source"],
@@ -147,13 +155,13 @@ def history(run: Run) -> list[Step]:
 
 def table(lines: Sequence[Line]) -> Table:
     """The lines as a table."""
-    heads = ("key", "quantity", "unit", "here", "paper", "compare", "source", "note")
+    heads = ("key", "quantity", "unit", "here", "method", "paper", "compare", "source", "note")
     rows = tuple(
         (
             line.key,
             line.quantity,
             line.unit,
-            *map(_exact, (line.here, line.paper)),
+            *map(_exact, (line.here, line.method, line.paper)),
             line.compare,
             line.source,
             line.note,
@@ -171,7 +179,7 @@ def _exact(value: Value) -> str | None:
 def page(run: Run, lines: Sequence[Line]) -> str:
     """The lines and the run's history as Markdown."""
     rows = [
-        f"| {line.quantity} | {_number_text(line.here)} | {_number_text(line.paper, digits=4)} | {line.unit} | {_SAYS[line.compare]} "
+        f"| {line.quantity} | {_number_text(line.here)} | {_number_text(line.method)} | {_number_text(line.paper, digits=4)} | {line.unit} | {_SAYS[line.compare]} "
         f"| {line.source} | {line.note} |"
         for line in lines
     ]
@@ -187,8 +195,8 @@ def page(run: Run, lines: Sequence[Line]) -> str:
             "= must agree; ~ depends on the shape: orders of magnitude only, the paper's surface not being public; – can't be",
             "compared.",
             "",
-            "| quantity | here | paper | unit | | where in the paper | note |",
-            "| --- | --- | --- | --- | --- | --- | --- |",
+            "| quantity | here | the paper's method here | paper | unit | | where in the paper | note |",
+            "| --- | --- | --- | --- | --- | --- | --- | --- |",
             *rows,
             "",
             "Accepted designs. The paper draws these curves (figures 10 and 11, 15 and 16); its text gives their ends above. Here they",
@@ -213,11 +221,18 @@ def _line(step: Step, terms: Sequence[str], constraints: Sequence[str]) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def write_beside(run: Run, *, fixed: Run | None = None) -> list[Path]:
-    """Writes published.md and published.csv into the run's folder; returns them."""
-    lines = beside(run, fixed=fixed)
-    files = [run.folder / "published.md", run.folder / "published.csv"]
-    for file, text in zip(files, (page(run, lines), table_text(table(lines))), strict=True):
+def write_beside(
+    run: Run, *, fixed: Run | None = None, method: Run | None = None, stands: Sequence[Stands] = ()
+) -> list[Path]:
+    """Writes published.md and published.csv into the run's folder, and with `stands` published_standing.csv; returns
+    them."""
+    lines = beside(run, fixed=fixed, method=method)
+    texts = {"published.md": page(run, lines), "published.csv": table_text(table(lines))}
+    if stands:
+        texts["published.md"] += "\n" + published_standing.page(stands)
+        texts["published_standing.csv"] = table_text(published_standing.table(stands))
+    files = [run.folder / name for name in texts]
+    for file, text in zip(files, texts.values(), strict=True):
         write_text(file, text)
     return files
 
@@ -286,7 +301,7 @@ def _beyond(run: Run, values: Mapping[str, Value]) -> list[Line]:
             key = f"deviation.polished.{load}.{word}"
             lines.append((key, f"{said} deviation, load {load!r}: polished design", values[key], "mm"))
     return [
-        Line(key, quantity, here, None, unit, "–", "none", "past the paper")
+        Line(key, quantity, here, None, None, unit, "–", "none", "past the paper")
         for key, quantity, here, unit in lines
     ]
 

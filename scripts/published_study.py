@@ -3,10 +3,14 @@
     scripts/published_study fixed                   # rods of 2 mm: runs/published_fixed, about 95 s
     # radius free: runs/published_radius, beside runs/published_fixed if it is there
     scripts/published_study radius
-    # of a run that is finished already, which is not computed again
-    scripts/published_study fixed --run runs/mine
+    # of runs that are finished already, which are not computed again
+    scripts/published_study fixed --run runs/mine --method runs/mine_paper
+    # a quick look
+    scripts/published_study fixed --set net.elements=2 --set optimise.evaluations=15 --structures 10
 
-The table is published.md and published.csv in the run's folder. Exit status: 0 done, 2 input refused, 3 no
+Each study is run twice, by default as shellform designs, and by the paper's own method (optimise.method = "paper", in
+runs/published_STUDY_paper). The tables are published.md, published.csv and, with critical factors, drawn structures and
+slack cables of all designs, published_standing.csv, in the first run's folder. Exit status: 0 done, 2 input refused, 3 no
 result.
 """
 
@@ -25,7 +29,7 @@ from shellform.run.run import run_case
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from scripts import published  # noqa: E402
+from scripts import published, published_standing  # noqa: E402
 
 CASES = {"fixed": "scale_model.toml", "radius": "scale_model_radius.toml"}
 
@@ -38,9 +42,22 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--fixed", type=Path, help="the run of the fixed radius with which the free one is compared"
     )
+    parser.add_argument("--method", type=Path, help="folder of a finished run by the paper's method")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", help="of both runs' cases")
+    parser.add_argument("--structures", type=int, default=60, help="drawn for each design and load; 0: none")
+    parser.add_argument("--seed", type=int, default=0, help="of the drawing")
     asked = parser.parse_args(arguments)
     try:
-        for file in write(asked.study, asked.run, asked.output, asked.fixed):
+        for file in write(
+            asked.study,
+            asked.run,
+            asked.output,
+            asked.fixed,
+            asked.method,
+            settings=asked.set,
+            structures=asked.structures,
+            seed=asked.seed,
+        ):
             print(file)
     except InputError as error:
         print(f"published_study: refused: {error}", file=sys.stderr)
@@ -51,18 +68,41 @@ def main(arguments: list[str] | None = None) -> int:
     return 0
 
 
-def write(study: str, done: Path | None, output: Path | None, fixed: Path | None) -> list[Path]:
-    """The table of a finished run, or of one that is made now; its files."""
+def write(
+    study: str,
+    done: Path | None,
+    output: Path | None,
+    fixed: Path | None,
+    method: Path | None,
+    *,
+    settings: list[str],
+    structures: int,
+    seed: int,
+) -> list[Path]:
+    """The tables of a finished run, or of one that is made now, and of the paper's method; their files. A finished run
+    without a finished one by the paper's method stands alone."""
     folder = done or output or ROOT / f"runs/published_{study}"
     if done is None:
-        run_case(load_case(ROOT / "scripts" / CASES[study]), folder, report=tell)
+        case = ROOT / "scripts" / CASES[study]
+        run_case(load_case(case, settings), folder, report=tell)
+        if method is None:
+            method = folder.with_name(f"{folder.name}_paper")
+            run_case(load_case(case, [*settings, "optimise.method=paper"]), method, report=tell)
     run = read_run(folder)
     if published.study_of(run) != study:
         other = published.study_of(run)
         raise InputError(
             f"is a run of the study {other!r}", where=str(folder), remedy=f"Asked for was {study!r}."
         )
-    return published.write_beside(run, fixed=_fixed(fixed) if study == "radius" else None)
+    by_paper = None if method is None else read_run(method)
+    stands = []
+    for each, name in ((by_paper, "paper's"), (run, "default")):
+        if each is not None and each.states:
+            print(f"published_study: what stands, {name} method", flush=True)
+            stands += published_standing.standings(each, name, count=structures, seed=seed)
+    return published.write_beside(
+        run, fixed=_fixed(fixed) if study == "radius" else None, method=by_paper, stands=stands
+    )
 
 
 def tell(event: Event) -> None:

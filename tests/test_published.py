@@ -184,10 +184,10 @@ def test_the_files_hold_every_line_and_every_accepted_design(tmp_path, shell, va
     rows = list(csv.DictReader(io.StringIO(table)))
     assert [row["key"] for row in rows] == [line.key for line in published.beside(run)]
     assert (
-        "| largest deviation, under the design load: optimised design | 3 | 7.4 | mm | ~ | figure 13d |  |"
+        "| largest deviation, under the design load: optimised design | 3 | – | 7.4 | mm | ~ | figure 13d |  |"
         in markdown
     )
-    assert "| the target surface and the openings that carry no load | – | – |  | – |" in markdown
+    assert "| the target surface and the openings that carry no load | – | – | – |  | – |" in markdown
     assert markdown.count("\n| 2 | 0.2 |") == 1
     assert "| 9 | 3 |" not in markdown
 
