@@ -1,9 +1,9 @@
 """Optimising a gridshell by sequential convex programming (operation 3).
 
 Svanberg's method of moving asymptotes (1987, 2002) replaces a problem by a sequence of convex ones that are
-solved exactly. Its own separable approximation knows nothing of how cables work together, and in the rest
-lengths it is kinked where a cable goes slack: on a prestressed gridshell its first trials snap the shell
-through and its later ones hardly move (README, "What was tried"). Here each convex problem is the model in
+solved exactly. Directly in the rest lengths (moving_asymptotes.py) it finds as good a fit with as few cables in
+tension, but knows nothing of what holds the shell up: without its slack cables the design collapses (README, "What was
+tried"). Here each convex problem is the model in
 tensions (step_model.py), exact in first order and with Gauss-Newton curvature; NLopt's MMA solves it within
 a window round the present design (proposal.py), and the trial is then evaluated by its true equilibria
 (trials.py, phases.py):
