@@ -259,7 +259,8 @@ def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) 
                 written = time.perf_counter()
                 cost = written - now
     except KeyboardInterrupt:
-        write_table(study.folder, study.log, study.plan.study.column)
+        with Log(study.log.file) as log:  # read anew: the last lines may be written and not yet entered
+            write_table(study.folder, log, study.plan.study.column)
         raise
 
 
