@@ -8,7 +8,6 @@ import shellform as sf
 from shellform import render
 from shellform.errors import InputError
 from shellform.output.pictures import maps
-from shellform.run.folder import utilisation
 
 
 @pytest.fixture(scope="module")
@@ -22,10 +21,12 @@ def test_each_map_shows_the_number_of_the_summary(shell, braced):
     design, load, state = braced
     panel = {name: maps.panel_of(shell, design, state, load=load, quantity=name) for name in maps.QUANTITIES}
     assert panel["deviation"].deviation.max() == pytest.approx(sf.deviations(shell, state).max())
-    assert panel["utilisation"].deviation.max() == pytest.approx(utilisation(shell, design, state))
+    assert panel["utilisation"].deviation.max() == pytest.approx(
+        shell.bending_utilisation(design, state).max()
+    )
     # of round rods, stress E κ r
     strain = panel["curvature"].deviation.max() * design.radius * shell.rod.young / shell.rod.strength
-    assert strain == pytest.approx(utilisation(shell, design, state))
+    assert strain == pytest.approx(shell.bending_utilisation(design, state).max())
     assert panel["shear"].deviation.max() < 0.25 * np.pi
     assert panel["mode"].deviation.max() == pytest.approx(1.0)
     assert "softest mode" in panel["mode"].title
