@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin
@@ -39,14 +40,17 @@ from shellform.case.entries import (
     PointsEntry,
     RobustEntry,
     RodsWeightEntry,
+    SafetyEntry,
     SheetEntry,
     StockRodEntry,
     SurfaceEntry,
+    TolerancesEntry,
 )
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.gridshell.gridshell import Rod
 from shellform.gridshell.joints import following
+from shellform.gridshell.tolerances import SOURCES, Tolerances
 
 _RodEntry = Annotated[
     Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
@@ -79,6 +83,8 @@ class Case(Entry):
     optimise: OptimiseEntry
     limits: LimitsEntry = Field(default_factory=lambda: LimitsEntry.model_validate({}))
     robust: RobustEntry | None = None
+    tolerances: TolerancesEntry = Field(default_factory=lambda: TolerancesEntry.model_validate({}))
+    safety: SafetyEntry = Field(default_factory=lambda: SafetyEntry.model_validate({}))
     figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=0.010))
 
     @model_validator(mode="after")
@@ -214,9 +220,19 @@ def _found_catalogue(source: str, file: Path) -> str:
     return source if source in shipped_catalogues() else str((file.parent / source).resolve())
 
 
-def dump_case(case: Case) -> str:
-    """The case as TOML, every default filled in."""
-    return tomli_w.dumps(case.model_dump(mode="json", exclude_none=True))
+def dump_case(case: Case, tolerances: Tolerances | None = None) -> str:
+    """The case as TOML, every default filled in; those of `tolerances` that follow the shell's size stand in comments,
+    with their sources."""
+    text = tomli_w.dumps(case.model_dump(mode="json", exclude_none=True))
+    if tolerances is None:
+        return text
+    lines = [
+        f"# {each.name} = {getattr(tolerances, each.name):.6g}  # {SOURCES[each.name]}"
+        for each in fields(Tolerances)
+        if getattr(case.tolerances, each.name) is None
+    ]
+    head = "[tolerances]\n"
+    return text.replace(head, head + "".join(f"{line}\n" for line in lines), 1)
 
 
 def shipped_surfaces() -> Path:

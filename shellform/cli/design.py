@@ -16,7 +16,10 @@ def design(
     case: Annotated[Path, typer.Argument(help="Case file (TOML).")],
     output: Annotated[Path, typer.Option(help="Run folder.")],
     until: Annotated[
-        str, typer.Option(help="Last stage: surface, net, initial, optimise, figures, documents or report.")
+        str,
+        typer.Option(
+            help="Last stage: surface, net, initial, optimise, safety, figures, documents or report."
+        ),
     ] = "report",
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute every stage anew.")] = False,
     settings: Annotated[
@@ -26,7 +29,7 @@ def design(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Run the whole job; run again, it goes on where it stopped."""
+    """Run the whole job; run again, it goes on where it stopped. Status 3 where the design to build doesn't hold."""
     from shellform.case.case import load_case
     from shellform.records.summary import document
     from shellform.run.run import run_case
@@ -49,3 +52,13 @@ def design(
             f"Everything is in {output}"
             + (f"; look at {output / 'report.html'} first" if until == "report" else "")
         )
+    judged = summary.verdict
+    if judged is not None and (judged.failed or (not judged.holds and _examined(until))):
+        raise typer.Exit(3)
+
+
+def _examined(until: str) -> bool:
+    """Whether the stages up to this one examine the designs as built."""
+    from shellform.records.stages import STAGES
+
+    return STAGES.index(until) >= STAGES.index("safety")

@@ -52,11 +52,6 @@ def tell_designs(summary: Summary) -> None:
         over = [f"{name} by {value:.1%}" for name, value in found.constraints.items() if value > 1e-3]
         if over:
             print(f"limits that are not kept: {', '.join(over)}")
-    for name, design in summary.designs.items():
-        if design.critical_factor_kept is False:
-            print(
-                f"the {name} design loses stability before the critical factor asked for (critical_factor in summary.json)"
-            )
     for each in summary.sections or ():
         tried = (
             "no design" if each.objective is None else f"objective {each.objective:.3g}, {each.cables} cables"
@@ -64,17 +59,45 @@ def tell_designs(summary: Summary) -> None:
         print(f"{each.section:>10}  {tried}{'' if each.feasible else ': ' + each.why_not}")
     for sentence in () if summary.robust is None else summary.robust.sentences:
         print(sentence)
+    tell_as_built(summary)
     if summary.verdict is not None:
         tell_verdict(summary.verdict)
 
 
 def tell_verdict(verdict: VerdictRecord) -> None:
     """Whether the design to build holds; each check that fails or could not be made."""
-    print(f"the {verdict.design} design {'holds' if verdict.holds else 'does not hold'}")
-    for name in verdict.failed:
-        print(f"  fails: {name}")
+    from shellform.records.verdict import headline
+
+    print(headline(verdict))
+    for sentence in verdict.failed:
+        print(f"  fails: {sentence}")
     for name in verdict.not_examined:
         print(f"  not examined: {name}")
+
+
+def tell_as_built(summary: Summary) -> None:
+    """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one to build
+    fails first."""
+    from shellform.records.words import critical_words, standing_words
+
+    for name, design in summary.designs.items():
+        for load, row in design.loads.items():
+            parts = []
+            if row.critical_factor is not None and row.critical_kind is not None:
+                off = "" if row.critical_factor_error is None else f" ± {abs(row.critical_factor_error):.3f}"
+                parts.append(f"critical factor {critical_words(row.critical_factor, row.critical_kind)}{off}")
+            if row.stands is not None:
+                own = row.stands
+                parts.append(standing_words(own.drawn, own.standing, own.at_least, own.confidence))
+            if parts:
+                print(f"{name:>10}  {load}: {', '.join(parts)}")
+    found = summary.failure
+    if found is not None:
+        cables = f"; {', '.join(found.cables)} go slack" if found.cables else ""
+        print(
+            f"fails first: structure {found.number} at {found.factor:.2f} of the load “{found.load}” ({found.kind}), "
+            f"driven by {found.driver.replace('_', ' ')}, without which it bears {found.without[found.driver]:.2f}{cables}"
+        )
 
 
 def tell_labelled(lines: Mapping[str, Any]) -> None:

@@ -11,8 +11,8 @@ from shellform.records.files import read_record
 from shellform.written import write_text
 
 FILE = "stages.json"
-STAGES = ("surface", "net", "initial", "optimise", "figures", "documents", "report")
-SHOWING = STAGES[4:]  # which show what was found: none of them needs another
+STAGES = ("surface", "net", "initial", "optimise", "safety", "figures", "documents", "report")
+SHOWING = STAGES[5:]  # which show what was found: none of them needs another
 
 
 @dataclass(frozen=True)

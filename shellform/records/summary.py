@@ -89,13 +89,15 @@ class ModelRecord:
 @dataclass(frozen=True)
 class StandingRecord:
     """Of `drawn` imperfect structures `standing` bear the load; so at least the share `at_least` of all do,
-    with `confidence`. Drawn from `seed`."""
+    with `confidence`. Drawn from `seed`; `lowest`, the load factor that the weakest of them bears (1 where all
+    stand)."""
 
     drawn: int
     standing: int
     at_least: float
     confidence: float
     seed: int
+    lowest: float | None = None
 
 
 @dataclass(frozen=True)
@@ -105,8 +107,10 @@ class LoadRecord:
     Deviations are distances between a node and its place on the target, over all nodes. `stable`: in a stable
     equilibrium; `on_branch`: reached without snapping through; `residual`: unbalanced over largest force.
     Utilisations are stresses over the flexural strength, of bending alone and with axial force.
-    `critical_factor`: of this load, at which stability ends (None: not up to `critical_sought`), and
-    `critical_error` of it; `stands`: under imperfections.
+    `critical_factor`: of this load, at which stability ends, by a point of `critical_kind` ("none": it doesn't up to
+    that factor, the most that was tried), `critical_factor_halved` the same with rod elements halved, and
+    `critical_factor_error` what the coarser mesh is off by, as are `deviation_max_error`, `deviation_mean_error`, m,
+    and `rod_utilisation_error`. `slack`: cables without tension, by name; `stands`: as built.
     """
 
     factor: float
@@ -128,8 +132,28 @@ class LoadRecord:
     critical_sought: float | None = None
     critical_factor: float | None = field(default=None, metadata={"beside": "critical_sought"})
     critical_factor_error: float | None = None
+    critical_factor_halved: float | None = None
     critical_kind: str | None = field(default=None, metadata={"beside": "critical_sought"})
+    deviation_max_error: float | None = None
+    deviation_mean_error: float | None = None
+    rod_utilisation_error: float | None = None
+    slack: tuple[str, ...] | None = None
     stands: StandingRecord | None = None
+
+
+_UNEXAMINED: dict[str, Any] = dict.fromkeys(
+    [
+        "critical_sought",
+        "critical_factor",
+        "critical_factor_error",
+        "critical_factor_halved",
+        "critical_kind",
+        "deviation_max_error",
+        "deviation_mean_error",
+        "rod_utilisation_error",
+        "stands",
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -259,9 +283,25 @@ class DocumentsRecord:
 
 
 @dataclass(frozen=True)
+class FailureRecord:
+    """How the `design` most likely fails under the `load`: structure `number`, of middle load factor among the fallen
+    ones, falls at the load `factor` by what `kind` tells; the `driver` is the cause of error without which it bears
+    most, `without` the factors that it reaches with one cause left out; `cables` go slack on the way."""
+
+    design: str
+    load: str
+    number: int
+    factor: float
+    kind: str
+    driver: str
+    without: Mapping[str, float]
+    cables: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class VerdictRecord:
-    """Whether the `design` to build `holds`: the checks that `failed`, and those that were asked for and
-    `not_examined`, by name (verdict.py)."""
+    """Whether the `design` to build `holds`: what `failed`, a sentence with reason and remedy each, and the checks
+    that were asked for and `not_examined`. It holds where neither is (verdict.py)."""
 
     design: str
     holds: bool
@@ -285,6 +325,7 @@ class Summary:
     optimisation: OptimisationRecord | None = None
     sections: tuple[SectionRecord, ...] | None = None
     robust: RobustRecord | None = None
+    failure: FailureRecord | None = None
     documents: DocumentsRecord | None = None
     verdict: VerdictRecord | None = None
     failed: Mapping[str, str] = field(default_factory=dict, metadata={"if_any": True})
@@ -296,7 +337,19 @@ class Summary:
     def without_designs(self, names: Sequence[str]) -> Summary:
         """Without these designs, and without what is told of designs made from the optimised one."""
         kept = {name: design for name, design in self.designs.items() if name not in names}
-        return replace(self, designs=kept, sections=None, robust=None, verdict=None)
+        return replace(self, designs=kept, sections=None, robust=None, failure=None, verdict=None)
+
+    def unexamined(self) -> Summary:
+        """Without what the stage "safety" finds."""
+        designs = {
+            name: replace(
+                design,
+                loads={each: replace(row, **_UNEXAMINED) for each, row in design.loads.items()},
+                critical_factor_kept=None,
+            )
+            for name, design in self.designs.items()
+        }
+        return replace(self, designs=designs, failure=None)
 
     def with_seconds(self, stage: str, spent: float) -> Summary:
         """With the time of a stage, s."""

@@ -52,3 +52,16 @@ def number(value: float, digits: int = 3) -> str:
         text = f"{value:,.{places}f}".replace(",", "\u202f")
         return text.rstrip("0").rstrip(".") if "." in text else text
     return f"{value:.{digits}g}"
+
+
+def standing_words(drawn: int, standing: int, at_least: float, confidence: float) -> str:
+    """How many structures as built stand."""
+    return (
+        f"{standing} of {drawn} structures as built stand (at least {math.floor(100.0 * at_least):.0f} % "
+        f"with {number(100.0 * confidence)} % confidence)"
+    )
+
+
+def critical_words(factor: float, kind: str) -> str:
+    """Where a path ends."""
+    return f"beyond {factor:.3g} ×" if kind == "none" else f"{factor:.3f} × ({kind})"

@@ -62,7 +62,7 @@ def forget(folder: Path, names: Sequence[str], summary: Summary) -> Summary:
     of them; returns the summary without them.
     """
     for name in names:
-        for part in (f"designs/{name}.npz", f"designs/{name}.json"):
+        for part in (f"designs/{name}.npz", f"designs/{name}.json", f"designs/{name}-drawn.json"):
             (folder / part).unlink(missing_ok=True)
         pictures = [file for file in folder.glob("figures/*") if name in file.stem.split("-")]
         for file in [*folder.glob(f"states/{name}-*.vtp"), *pictures]:
@@ -121,5 +121,11 @@ def _under(shell: Gridshell, design: Design, loaded: Loaded, load: Reals, factor
         on_branch=loaded.on_branch,
         residual=loaded.equilibrium.residual,
         rod_utilisation_max=float(shell.bending_utilisation(design, state).max()),
+        slack=slack_names(shell.cables(design).tension(state)),
         **shown(shell, design, state, load),
     )
+
+
+def slack_names(tension: Reals) -> tuple[str, ...]:
+    """The names, as in the schedules, of those of a design's cables that pull with nothing."""
+    return tuple(f"C{k}" for k in np.flatnonzero(tension <= 0.0))

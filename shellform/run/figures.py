@@ -10,6 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from shellform.arrays import read_arrays
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
@@ -20,6 +23,8 @@ from shellform.run.folder import Run, read_run
 from shellform.structure.elements.state import State
 from shellform.written import folder as made
 
+FAILURE = "states/failure.npz"  # of the stage "safety"
+_AMPLITUDE = 0.05  # of the shell's size, at which the failing mode is drawn
 _LOADS = {"none": "no load", "design": "design load", "additional": "additional load"}
 
 
@@ -121,9 +126,35 @@ def draw_everything(run: Run, *, report: Report = unheard) -> bool:
         for view in ("top", "front", "side"):
             draw_designs(run, Wish(run.best, "design", view=view), report=report)
         draw_net(run.net, run.folder / "figures")
+        draw_failure(run)
     if (run.folder / history.FILE).is_file():
         draw_histories(run)
     return drawn
+
+
+def draw_failure(run: Run) -> list[Path]:
+    """The shape in which the design to build most likely fails, its last stable state moved along the mode in which it
+    gives way; nothing where none of its structures falls."""
+    from shellform.output.pictures import maps, render
+
+    file, told = run.folder / "figures/failure.png", run.summary.failure
+    if told is None or not (run.folder / FAILURE).is_file():
+        file.unlink(missing_ok=True)
+        return []
+    data = read_arrays(run.folder / FAILURE)
+    place, shift = data["positions"], data["mode"][:, :3]
+    size = float(np.ptp(place, axis=0).max())
+    upright = 1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0  # it sinks
+    panel = maps.panel_of(
+        run.shell_of(told.design),
+        run.designs[told.design],
+        State(place + _AMPLITUDE * size * upright * shift, data["quaternions"]),
+        load=run.loads[told.load],
+        title=f"{told.design} design, structure {told.number} as it fails at {told.factor:.2f} of {_LOADS.get(told.load, told.load)}",
+    )
+    made(file.parent)
+    render.pictures([file], [titled(run, panel)], look_of(run, Wish(), [panel]))
+    return [file]
 
 
 def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:

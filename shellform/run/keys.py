@@ -9,6 +9,7 @@ from pathlib import Path
 
 import shellform
 from shellform.case.build_gridshell import catalogue_bytes, has_edge_cells
+from shellform.case.build_safety import SEARCHED
 from shellform.case.case import Case
 from shellform.records.stages import STAGES
 
@@ -16,7 +17,8 @@ _NEEDS = {
     "surface": ["surface"],
     "net": ["net", "joint", "edges"],
     "initial": ["rod", "cable", "load", "part", "edge_beam"],
-    "optimise": ["optimise", "limits", "robust"],
+    "optimise": ["optimise", "limits", "robust", "tolerances", "safety"],
+    "safety": ["told"],
     "figures": ["figures", "title"],
     "documents": ["stock"],
     "report": [],
@@ -37,6 +39,11 @@ def stage_keys(case: Case) -> dict[str, str]:
     entries["cable"]["edge_cells"] = has_edge_cells(case)
     entries["stock"] |= {"adjustment": entries["cable"].pop("adjustment")}
     entries["edge_beam"] = entries["edges"].pop("beam")  # no net depends on its section
+    told = {
+        name: entries["safety"].pop(name) for name in ("drawn", "compared", "confidence")
+    }  # on which no search depends, but for how many it draws itself
+    entries["told"] = told
+    entries["safety"] |= {"searched": min(told["drawn"], SEARCHED)}
     status = file.stat()
     digest = hashlib.sha256(
         shellform.__version__.encode() + _content(str(file), status.st_size, status.st_mtime_ns)

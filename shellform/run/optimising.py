@@ -1,5 +1,5 @@
-"""The stage "optimise" of a run: the optimised design, rounded to sections that can be bought, polished, and
-its limits examined.
+"""The stage "optimise" of a run: the optimised design, rounded to sections that can be bought, and
+polished.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.case.build_gridshell import rounding_catalogue
-from shellform.case.build_problem import below_factor, case_problem, critical_factors
+from shellform.case.build_problem import case_problem
 from shellform.case.entries import OptimiseEntry
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
@@ -72,8 +72,6 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
             summary = summary.with_design("polished", replace(summary.designs["polished"], section=section))
     name, final = list(built.items())[-1]
     cable_count, symmetry = _wishes(workspace, final.design, groups)
-    for each, found in built.items():
-        summary = _examined(workspace, each, found, loads, summary)
     if workspace.case.robust is not None:
         workspace.say("optimise", "what scatter does to the shape")
         scattered = robustness(
@@ -85,7 +83,7 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
         unloaded = _without_loads(workspace, shell, start, loads["none"])
         reached = followed(shell, unloaded, loads)
         summary = keep(workspace, shell, "unloaded", unloaded, reached, loads, summary)
-    record = _record(best, summary.designs["optimised"].critical_factor_kept is not False)
+    record = _record(best)
     record = replace(record, not_polished=not_polished, cables_max=cable_count, symmetric=symmetry)
     drop_checkpoint(workspace.folder)
     return replace(summary, optimisation=record)
@@ -135,7 +133,7 @@ def _solver(entry: OptimiseEntry) -> SequentialConvex | MovingAsymptotes:
     return SequentialConvex(stiffness=entry.stiffness_min, most_cables=entry.cables_max)
 
 
-def _record(best: Optimum, critical_factor_kept: bool) -> OptimisationRecord:
+def _record(best: Optimum) -> OptimisationRecord:
     """What came of the optimisation."""
 
     return OptimisationRecord(
@@ -150,7 +148,7 @@ def _record(best: Optimum, critical_factor_kept: bool) -> OptimisationRecord:
         rejected=best.rejected,
         factorisations_rejected=best.wasted,
         stiffness_min=best.stiffness,
-        feasible=max(best.constraints.values(), default=-1.0) <= FEASIBLE and critical_factor_kept,
+        feasible=max(best.constraints.values(), default=-1.0) <= FEASIBLE,
     )
 
 
@@ -268,16 +266,3 @@ def _section(trial: CandidateSection) -> SectionRecord:
         feasible=not trial.why,
         why_not=trial.why,
     )
-
-
-def _examined(
-    workspace: Workspace, name: str, found: Optimum, loads: Mapping[str, Reals], summary: Summary
-) -> Summary:
-    """The summary with how far each load of a design could grow."""
-    workspace.say("optimise", f"critical load factors of the {name} design")
-    limits, record = workspace.case.limits, summary.designs[name]
-    wanted = limits.critical_factor
-    factors = critical_factors(found.problem.shell, found.design, found.states["none"], loads, wanted=wanted)
-    rows = {each: replace(row, **factors.get(each, {})) for each, row in record.loads.items()}
-    kept = None if wanted is None else not below_factor(factors, wanted, limits.critical_loads)
-    return summary.with_design(name, replace(record, loads=rows, critical_factor_kept=kept))

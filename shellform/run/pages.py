@@ -16,9 +16,9 @@ from shellform.output.page.report import GENERATOR, ShownRun, html
 from shellform.records.history import read_history
 from shellform.records.progress import Event, Report, unheard
 from shellform.records.stages import read_stages
-from shellform.records.summary import VerdictRecord
-from shellform.records.verdict import Bounds, Check, checks, verdict
+from shellform.records.verdict import verdict
 from shellform.run.folder import DESIGNS, Run, read_run
+from shellform.run.judged import broken_off, run_checks
 from shellform.run.keys import stage_keys
 from shellform.written import write_text
 
@@ -57,25 +57,6 @@ def write_page(runs: Sequence[Run], file: Path) -> Path:
     return file
 
 
-def run_checks(run: Run) -> list[Check]:
-    """Every check of the run's designs."""
-    limits = run.case.limits
-    bounds = Bounds(
-        force=run.case.cable.force_max,
-        misfit=run.case.optimise.misfit_rms_additional,
-        stress=limits.utilisation,
-        turn=limits.connector_turn,
-        uplift=limits.uplift,
-        critical=limits.critical_factor,
-    )
-    return checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
-
-
-def judged(run: Run) -> VerdictRecord:
-    """The verdict on the run's design to build."""
-    return verdict(run_checks(run), run.best)
-
-
 def shown_run(run: Run, budget: int = _BUDGET) -> ShownRun:
     """A run as the page takes it, with at most `budget` bytes of pictures."""
     pictures, left = embed(_pictures(run), budget=budget)
@@ -91,7 +72,7 @@ def shown_run(run: Run, budget: int = _BUDGET) -> ShownRun:
         best=run.best,
         summary=run.summary,
         checks=found,
-        verdict=verdict(found, run.best),
+        verdict=broken_off(verdict(found, run.best), run.summary.failed),
         history=read_history(run.folder),
         settings=(run.folder / "case.toml").read_text(encoding="utf-8"),
         pictures=pictures,

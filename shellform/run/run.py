@@ -1,6 +1,6 @@
 """The whole job of one case, stage by stage, in a run folder (contracts/run-folder.md).
 
-surface -> net -> initial -> optimise -> figures -> documents -> report. Each stage leaves its result in the
+surface -> net -> initial -> optimise -> safety -> figures -> documents -> report. Each stage leaves its result in the
 folder and a key in `stages.json`: a hash of the entries it depends on, the surface file's bytes, the
 package's version and the stage before. Run again, a stage whose key is unchanged is loaded instead of
 computed. Stages hand on what they made, and the summary with what they add to it.
@@ -24,6 +24,7 @@ from shellform.case.case import Case, check_script, dump_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.joints import doubts as joint_doubts
+from shellform.gridshell.tolerances import default_tolerances
 from shellform.net.net import Net
 from shellform.net.saved import load_net, net_document, save_net
 from shellform.records.progress import Event, Kind, Report, unheard
@@ -33,9 +34,10 @@ from shellform.run import designs
 from shellform.run.checkpoint import drop_checkpoint
 from shellform.run.figures import draw_everything
 from shellform.run.folder import load_surface, read_run, refuse_overwriting, save_surface
+from shellform.run.judged import judged
 from shellform.run.keys import stage_keys
 from shellform.run.log import logged
-from shellform.run.pages import FILE, judged, write_page
+from shellform.run.pages import FILE, write_page
 from shellform.run.workspace import Workspace
 from shellform.surface.shape.target import Surface
 from shellform.written import folder as made_folder
@@ -132,6 +134,8 @@ def _stages(
         except Exception as error:
             workspace.say(stage, f"ended: {error}", Kind.FAILED)
             if stage not in SHOWING:
+                if isinstance(error, NotConverged):
+                    _broken_off(workspace, stage, str(error))
                 raise
             failures.append(error)
             kind = Kind.FAILED
@@ -152,6 +156,19 @@ def _stages(
     return summary
 
 
+def _broken_off(workspace: Workspace, stage: str, why: str) -> None:
+    """A stage that ended without a result: what was found before it is judged, and shown on the page."""
+    summary = read_summary(workspace.folder)
+    summary = replace(summary, failed={**summary.failed, stage: why})
+    write_summary(workspace.folder, summary)
+    if not summary.designs:
+        return
+    run = read_run(workspace.folder)
+    run = replace(run, summary=replace(summary, verdict=judged(run)))
+    write_summary(workspace.folder, run.summary)
+    write_page([run], workspace.path(FILE))
+
+
 def _steps() -> dict[str, Callable[[Workspace, Parts, Summary, bool], _Ended]]:
     """What each stage does, by its name."""
     return {
@@ -159,6 +176,7 @@ def _steps() -> dict[str, Callable[[Workspace, Parts, Summary, bool], _Ended]]:
         "net": _net,
         "initial": _initial,
         "optimise": _optimise,
+        "safety": _safety,
         "figures": _figures,
         "documents": _documents,
         "report": _report,
@@ -173,6 +191,8 @@ def _outdated(summary: Summary, stage: str) -> Summary:
         summary = replace(
             summary.without_designs(("unloaded", "optimised", "rounded", "polished")), optimisation=None
         )
+    if STAGES.index(stage) <= STAGES.index("safety"):
+        summary = replace(summary.unexamined(), verdict=None)
     return summary
 
 
@@ -201,6 +221,7 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
     case = workspace.case
     shell, loads = gridshell(case, _there(parts.net), _there(parts.surface))
     parts = replace(parts, shell=shell, loads=loads)
+    write_text(workspace.path("case.toml"), dump_case(case, default_tolerances(shell)))
     net = with_rods(_there(summary.net), rod_limits(case.rod, shell.net))
     summary = replace(summary, net=net)
     for doubt in joint_doubts(shell.joint, shell.rod):
@@ -239,6 +260,15 @@ def _optimise(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) 
     summary = optimise(workspace, _there(parts.shell), _there(parts.loads), summary)
     write_summary(workspace.folder, summary)
     return _Ended(parts, replace(summary, verdict=judged(read_run(workspace.folder))))
+
+
+def _safety(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
+    if keep:
+        return _Ended(parts, summary)
+    from shellform.run.safety import examine
+
+    write_summary(workspace.folder, summary)
+    return _Ended(parts, examine(workspace))
 
 
 def _figures(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:

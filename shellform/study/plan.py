@@ -94,8 +94,8 @@ class Study(_Entry):
 
     title: str = ""
     case: str = Field(description="case file, beside or below the study file")
-    until: Literal["surface", "net", "initial", "optimise", "figures", "documents", "report"] = Field(
-        "optimise", description="last stage of each design"
+    until: Literal["surface", "net", "initial", "optimise", "safety", "figures", "documents", "report"] = (
+        Field("safety", description="last stage of each design; optimise: not examined as built")
     )
     keep: Literal["all", "best", "none"] = Field("best", description="run folders that stay")
     method: Literal["grid", "random", "latin", "sobol", "search"] = Field(
@@ -111,7 +111,7 @@ class Study(_Entry):
     )
     function: dict[str, str | float] = Field({}, description="entries that follow from others")
     column: dict[str, str] = Field(
-        _COLUMNS, description="name = path in summary.json; designs.best is the last one made"
+        _COLUMNS, description="name = path in summary.json; designs.best is the one to build"
     )
     objective: dict[str, Literal["min", "max"]] = Field({}, description="columns to be small or large")
     limit: dict[str, float] = Field({}, description="largest value of a column in a usable design")

@@ -162,7 +162,8 @@ def _outcome(line: bytes) -> Outcome | None:
 
 def picked(values: Mapping[str, Value], columns: Mapping[str, str]) -> dict[str, Value | None]:
     """The columns that were asked for, of an outcome's values; None where a design has no such number."""
-    best = next((name for name in _BUILT if f"designs.{name}.cables" in values), "initial")
+    judged = values.get("verdict.design")
+    best = next((name for name in (judged, *_BUILT) if f"designs.{name}.cables" in values), "initial")
     return {
         name: values.get(path.replace("designs.best.", f"designs.{best}.")) for name, path in columns.items()
     }

@@ -12,9 +12,9 @@ import numpy as np
 
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.records.check import SLACK, Cell
 from shellform.records.summary import LoadRecord, Summary
-from shellform.records.verdict import SLACK
-from shellform.records.words import number
+from shellform.records.words import critical_words, number
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 
@@ -31,10 +31,16 @@ class Answer:
 
 
 def answers(
-    shell: Gridshell, name: str, design: Design, states: Mapping[str, State], summary: Summary
+    shell: Gridshell,
+    name: str,
+    design: Design,
+    states: Mapping[str, State],
+    summary: Summary,
+    *,
+    as_built: Cell | None = None,
 ) -> list[Answer]:
     """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the
-    design to build."""
+    design to build, whose check `as_built` says how many drawn structures stand under the additional load."""
     row = summary.designs.get(name)
     main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
     found = [] if main is None else [_how_far(main)]
@@ -63,7 +69,7 @@ def answers(
         )
     )
     if more is not None:
-        found.append(_is_safe(main, more, math.isfinite(shell.rod.strength)))
+        found.append(_is_safe(main, more, as_built, math.isfinite(shell.rod.strength)))
     mass = mass_per_length(section) * float(rods.sum())
     weight = f" ({number(mass)} kg)" if mass > 0.0 else ""
     lengths = None if summary.documents is None else summary.documents.cut_lengths
@@ -88,30 +94,38 @@ def _how_far(main: LoadRecord) -> Answer:
     )
 
 
-def _is_safe(main: LoadRecord | None, more: LoadRecord, strength_known: bool) -> Answer:
-    """Of the additional load."""
+def _is_safe(
+    main: LoadRecord | None, more: LoadRecord, as_built: Cell | None, strength_known: bool
+) -> Answer:
+    """Of the additional load: from the drawn structures, where the perfect one stands at all."""
     used = more.rod_utilisation_max
     known = math.isfinite(used) and strength_known
+    safe: bool | None
     if not more.stable:
         safe, words = False, "No, it is unstable"
     elif not more.on_branch:
         safe, words = False, "No, it snaps through"
     elif known and used > 1.0 + SLACK:
         safe, words = False, "No, rods break"
+    elif as_built is None or more.stands is None:
+        safe, words = None, "Not examined as built"
     else:
-        safe, words = True, "Yes, it stands"
+        safe, words = as_built.holds, as_built.found
     rods = f", rods at {100.0 * used:.0f} % of their strength" if known else ""
     off = f"{_mm(more.deviation_max)} off at most, {_mm(more.deviation_mean)} in the mean{rods}"
-    return Answer(f"Is it safe at {more.factor:.3g} × the load?", words, f"{off}. {_collapse(main)}", safe)
+    return Answer(
+        f"Is it safe at {more.factor:.3g} × the load?", words, f"As planned {off}. {_collapse(main)}", safe
+    )
 
 
 def _collapse(row: LoadRecord | None) -> str:
-    """What is known of the load at which the shell loses stability, from the design load's record."""
-    if row is not None and row.critical_factor is not None:
-        return f"Stability ends at {row.critical_factor:.2f} × the design load."
-    if row is not None and row.critical_sought is not None and row.critical_kind is None:
-        return f"Stable up to {row.critical_sought:g} × the design load, the most that was tried."
-    return "At which load it collapses isn't known."
+    """What is known of the load at which the perfect shell loses stability, from the design load's record."""
+    if row is None or row.critical_factor is None or row.critical_kind is None:
+        return "At which load it collapses isn't known."
+    if row.critical_kind == "none":
+        return f"Stable up to {row.critical_factor:.3g} × the design load, the most that was tried."
+    off = "" if row.critical_factor_error is None else f", off by {abs(row.critical_factor_error):.3f}"
+    return f"The perfect shell's stability ends at {critical_words(row.critical_factor, row.critical_kind)}{off}."
 
 
 def _mm(metres: float) -> str:

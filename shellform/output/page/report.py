@@ -31,8 +31,9 @@ from shellform.output.page.template import filled, part
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.problem.paths import deviations
 from shellform.records import words
+from shellform.records.check import Cell, Check
 from shellform.records.summary import Summary, VerdictRecord
-from shellform.records.verdict import Check, asked
+from shellform.records.verdict import asked, headline
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 
@@ -112,9 +113,20 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "best": run.best,
         "best_title": words.design_title(run.best),
         "finished": summary.optimisation is not None,
-        "failed": [check for check in run.checks if check.name in run.verdict.failed],
+        "verdict": run.verdict,
+        "headline": headline(run.verdict),
+        "kind": "bad" if run.verdict.failed else "good" if run.verdict.holds else "open",
         "asked": asked(run.checks, run.best),
-        "answers": answers(run.shell, run.best, run.designs[run.best], run.states[run.best], summary),
+        "answers": answers(
+            run.shell,
+            run.best,
+            run.designs[run.best],
+            run.states[run.best],
+            summary,
+            as_built=_as_built(run, "additional"),
+        ),
+        "failure": summary.failure,
+        "failure_load": "" if summary.failure is None else words.load_title(summary.failure.load),
         "designs": rows,
         "shown_first": sorted(rows, key=lambda each: each[0] != run.best),
         "loads": [(name, words.load_title(name, _factor(summary, name))) for name in run.loads],
@@ -137,6 +149,12 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "limit": 1e3 * run.limit,
         "beyond": main is not None and main.deviation_max > _BEYOND * run.limit,
     }
+
+
+def _as_built(run: ShownRun, load: str) -> Cell | None:
+    """How many drawn structures of the design to build stand, as its check says."""
+    title = f"As built under {words.load_title(load, _factor(run.summary, load))}"
+    return next((check.cells.get(run.best) for check in run.checks if check.name == title), None)
 
 
 def _factor(summary: Summary, load: str) -> float | None:

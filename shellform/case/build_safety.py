@@ -1,0 +1,48 @@
+"""From a case's tables [tolerances] and [safety], and the limit on critical factors, to what is asked of a design as
+built."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+from shellform.case.case import Case
+from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.tolerances import Tolerances, default_tolerances
+from shellform.reliability.safety import Safety
+
+SEARCHED = 60  # structures at the most with which a search judges its designs
+
+
+def case_tolerances(case: Case, shell: Gridshell) -> Tolerances:
+    """The case's tolerances, those left out by the shell's size. Raises InputError for a value that is none."""
+    given = {each.name: getattr(case.tolerances, each.name) for each in fields(Tolerances)}
+    return replace(
+        default_tolerances(shell), **{name: value for name, value in given.items() if value is not None}
+    )
+
+
+def case_safety(case: Case, shell: Gridshell) -> Safety | None:
+    """What a search has to keep; None where nothing is required. It draws under a seed of its own, so that the sample
+    that is told is a fresh one."""
+    entry = case.safety
+    if not entry.required:
+        return None
+    return Safety(
+        tolerances=case_tolerances(case, shell),
+        probability_design=entry.probability_design,
+        probability_additional=entry.probability_additional,
+        critical_factor=critical_factors_asked(case).get("design"),
+        drawn=min(entry.drawn, SEARCHED),
+        seed=entry.seed + 1,
+    )
+
+
+def critical_factors_asked(case: Case) -> dict[str, float]:
+    """The least critical factor by load case: the larger one where both [safety] and [limits] ask for it."""
+    found: dict[str, float] = {}
+    if case.safety.required and case.safety.critical_factor is not None:
+        found["design"] = case.safety.critical_factor
+    if case.limits.critical_factor is not None:
+        for name in case.limits.critical_loads:
+            found[name] = max(found.get(name, 0.0), case.limits.critical_factor)
+    return found

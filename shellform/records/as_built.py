@@ -1,0 +1,107 @@
+"""Checks of the structure as built: how many drawn ones stand, and up to which factor the perfect one does.
+
+How many drawn structures may fall is counted: of 200 with 0.99 asked for, two. Of a smaller sample nothing is concluded
+but that a design fails which would fail even if all structures not drawn yet stood. A critical factor has to be kept
+with rod elements halved too.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from shellform.records.check import UNASKED, UNKNOWN, Cell, Check
+from shellform.records.remedies import RodsOf
+from shellform.records.summary import DesignRecord
+from shellform.records.words import critical_words, load_title, standing_words
+from shellform.reliability.safety import allowed
+
+EQUAL = 1e-3  # relative: critical factors that count as equal
+
+
+@dataclass(frozen=True)
+class AsBuilt:
+    """The share of drawn structures that must stand under the `design` load, and under every `other` one (None: no less
+    than of the initial design, and never more than under the design load), of so many `drawn`; only told where it isn't
+    `required`."""
+
+    design: float
+    other: float | None
+    drawn: int
+    required: bool = True
+
+
+def standing_checks(
+    rows: Mapping[str, DesignRecord],
+    rods: Mapping[str, RodsOf],
+    loads: Sequence[str],
+    factors: Mapping[str, float],
+    safety: AsBuilt | None,
+) -> list[Check]:
+    """How many drawn structures stand."""
+    if safety is None:
+        return []
+    found = []
+    for load in loads:
+        share = safety.design
+        if load != "design":
+            share = _initial_share(rows, load, safety) if safety.other is None else safety.other
+        fallen = allowed(share, safety.drawn)
+        cells = {
+            name: _drawn(rows[name], load, rods[name], fallen, safety) if name in rows else UNASKED
+            for name in rods
+        }
+        limit = f"at least {safety.drawn - fallen} of {safety.drawn}" if safety.required else "told only"
+        found.append(Check(f"As built under {load_title(load, factors[load])}", limit, cells))
+    return found
+
+
+def _initial_share(rows: Mapping[str, DesignRecord], load: str, safety: AsBuilt) -> float:
+    """The share of the initial design's structures that stand, not more than is asked for under the design load."""
+    row = rows["initial"].loads.get(load) if "initial" in rows else None
+    if row is None or row.stands is None:
+        return safety.design
+    return min(safety.design, row.stands.standing / row.stands.drawn)
+
+
+def _drawn(design: DesignRecord, load: str, rods: RodsOf, fallen: int, safety: AsBuilt) -> Cell:
+    row = design.loads.get(load)
+    if row is None or row.stands is None:
+        return replace(UNKNOWN, asked=safety.required and row is not None)
+    own = row.stands
+    words = standing_words(own.drawn, own.standing, own.at_least, own.confidence)
+    if own.drawn - own.standing > fallen:
+        lowest = own.lowest or 0.0
+        remedy = rods.stronger(1.0 / lowest if lowest > 0.0 else math.inf)
+        return Cell(words, False, safety.required, remedy, own.standing / own.drawn)
+    enough = own.drawn >= safety.drawn
+    return Cell(words, True if enough else None, safety.required, "", own.standing / own.drawn)
+
+
+def critical_checks(
+    rows: Mapping[str, DesignRecord], rods: Mapping[str, RodsOf], critical: Mapping[str, float]
+) -> list[Check]:
+    """Up to which factor each load's path stays stable, with rod elements halved too."""
+    return [
+        Check(
+            f"Critical factor of {load_title(load)}",
+            f"at least {least:g} ×, with rod elements halved too",
+            {name: _stays(rows[name], load, least, rods[name]) if name in rows else UNKNOWN for name in rods},
+        )
+        for load, least in critical.items()
+    ]
+
+
+def _stays(design: DesignRecord, load: str, least: float, rods: RodsOf) -> Cell:
+    row = design.loads.get(load)
+    if row is None or row.critical_factor is None or row.critical_kind is None:
+        return UNKNOWN
+    coarse, fine = row.critical_factor, row.critical_factor_halved
+    words = critical_words(coarse, row.critical_kind)
+    lower = coarse if fine is None else min(coarse, fine)
+    if fine is not None and row.critical_kind != "none":
+        words += f", {fine:.3f} × with rod elements halved"
+    if lower < least * (1.0 - EQUAL):
+        return Cell(words, False, remedy=rods.stronger(least / lower if lower > 0.0 else math.inf))
+    return Cell(words, None if fine is None else True)

@@ -1,0 +1,272 @@
+"""Every check of a run's designs.
+
+A check compares a number of the summary with its limit, and says nothing where a design was never asked for it. Checks
+of one design count only what was evaluated on it. A computation that ended without a result fails: its residual is no
+number. What holds on the design's own mesh has to hold with rod elements halved too, where that was computed. Numbers
+stand in the units in which people read them: mm, N, %.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from shellform.gridshell.gridshell import Design, Gridshell, max_radius
+from shellform.records.as_built import AsBuilt, critical_checks, standing_checks
+from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, share_of
+from shellform.records.remedies import RodsOf, allow, allow_count
+from shellform.records.summary import DesignRecord, LoadRecord, OptimisationRecord, Summary
+from shellform.records.words import constraint_title, load_title, number
+
+BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made
+_AT_LEAST = ("softness", "slackness")  # of which as much is demanded, not at most
+_SETTLED = 1e-6  # unbalanced over largest force: what an equilibrium that counts as found stays below
+_EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or loosen the limit."
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
+    mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) `stress`
+    over strength, connectors' `turn`, rad, `uplift`, N, of supports under any load, least pull `slack`, N, of cables
+    under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as built (`safety`)."""
+
+    force: float
+    misfit: float
+    stress: float | None = None
+    turn: float | None = None
+    uplift: float | None = None
+    slack: float | None = None
+    slack_loads: tuple[str, ...] = ()
+    critical: Mapping[str, float] = field(default_factory=dict)
+    safety: AsBuilt | None = None
+
+
+def checks(
+    shells: Mapping[str, Gridshell], designs: Mapping[str, Design], summary: Summary, bounds: Bounds
+) -> list[Check]:
+    """Every check of the designs, each on its own shell: standing, as built too, stress, forces, misfit, the
+    optimiser's own constraints, equilibrium."""
+    rows = {name: summary.designs[name] for name in designs if name in summary.designs}
+    loads = list(dict.fromkeys(load for row in rows.values() for load in row.loads))
+    factors = {load: row.loads[load].factor for row in rows.values() for load in row.loads}
+    largest = {name: max_radius(shells[name].net, shells[name].rod) for name in designs}
+    spacing = None if summary.net is None else summary.net.spacing
+    rods = {name: RodsOf(designs[name].radius, largest[name], spacing) for name in designs}
+
+    def under(
+        title: str, limit: str, cell: Callable[[LoadRecord, RodsOf], Cell], chosen: Sequence[str]
+    ) -> list[Check]:
+        return [
+            Check(
+                f"{title} under {load_title(load, factors[load])}",
+                limit,
+                {
+                    name: cell(rows[name].loads[load], rods[name])
+                    if name in rows and load in rows[name].loads
+                    else UNASKED
+                    for name in designs
+                },
+            )
+            for load in chosen
+        ]
+
+    bent = {name: _stressed(designs[name].radius / largest[name], rods[name]) for name in designs}
+    beyond = [load for load in loads if load not in ("none", "design")]
+    misfit = 1e3 * bounds.misfit
+    deviating = [
+        Check(f"{check.name}, root mean square (6)", check.limit, check.cells)
+        for check in under(
+            "Deviation",
+            f"{number(misfit)} mm",
+            lambda row, rods: below(
+                1e3 * row.deviation_rms,
+                misfit,
+                "mm",
+                allow("optimise.misfit_rms_additional", row.deviation_rms, or_else="take thicker rods"),
+            ),
+            beyond,
+        )
+    ]
+    return [
+        *under("Stands", "stable, without snapping through", _stands, loads),
+        *standing_checks(rows, rods, [load for load in loads if load != "none"], factors, bounds.safety),
+        *critical_checks(rows, rods, bounds.critical),
+        *under(
+            "Rods",
+            "stress up to 100 % of the strength",
+            lambda row, rods: _stressed(_stress(row), rods),
+            loads,
+        ),
+        Check("Rods bent into the shape (1)", "up to 100 % of the curvature they bear", bent),
+        *_limited(rows, list(designs), bounds),
+        *deviating,
+        *_of_the_optimiser(summary.optimisation, rows, list(designs)),
+        *under(
+            "In equilibrium",
+            f"unbalanced force up to {_SETTLED:.0e} of the largest",
+            lambda row, rods: _settled(row),
+            loads,
+        ),
+    ]
+
+
+def _stress(row: LoadRecord) -> float:
+    """Of the rods over their strength, on the mesh on which it is larger: q8 = q4 - 3/4 of the error of q4."""
+    error = row.rod_utilisation_error or 0.0
+    return max(row.rod_utilisation_max, row.rod_utilisation_max - 0.75 * error)
+
+
+def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: Bounds) -> list[Check]:
+    """Constraint (5), and what an engineer limits, each at its worst over the load cases."""
+
+    def worst(
+        title: str,
+        unit: str,
+        limit: float,
+        value: Callable[[DesignRecord], float | None],
+        entry: str,
+        size: float,
+    ) -> Check:
+        """`size` is what one of the unit is in the entry that limits it."""
+        cells = {}
+        for name in designs:
+            found = value(rows[name]) if name in rows else None
+            cells[name] = below(found, limit, unit, "" if found is None else allow(entry, found * size))
+        return Check(title, f"{number(limit)} {unit}", cells)
+
+    found = [
+        worst(
+            "Largest cable force under the design load and those beyond it (5)",
+            "N",
+            bounds.force,
+            lambda row: (
+                _largest(each.cable_force_max for load, each in row.loads.items() if load != "none")
+                or row.cable_force_max
+            ),
+            "cable.force_max",
+            1.0,
+        )
+    ]
+    if bounds.stress is not None:
+        found.append(
+            worst(
+                "Rods' stress with axial force under any load",
+                "% of the strength",
+                100.0 * bounds.stress,
+                lambda row: _largest((each.stress_utilisation_max for each in row.loads.values()), 100.0),
+                "limits.utilisation",
+                0.01,
+            )
+        )
+    if bounds.turn is not None:
+        degrees = 180.0 / math.pi
+        found.append(
+            worst(
+                "Connectors' turning under any load",
+                "°",
+                degrees * bounds.turn,
+                lambda row: _largest((each.connector_turn_max for each in row.loads.values()), degrees),
+                "limits.connector_turn",
+                1.0 / degrees,
+            )
+        )
+    if bounds.uplift is not None:
+        found.append(
+            worst(
+                "Uplift of a support under any load",
+                "N",
+                bounds.uplift,
+                lambda row: _largest(each.uplift_max for each in row.loads.values()),
+                "limits.uplift",
+                1.0,
+            )
+        )
+    if bounds.slack is not None:
+        for load in bounds.slack_loads:
+            found.append(_taut(rows, designs, load, bounds.slack))
+    return found
+
+
+def _of_the_optimiser(
+    record: OptimisationRecord | None, rows: Mapping[str, DesignRecord], designs: Sequence[str]
+) -> list[Check]:
+    """The optimiser's own constraints, for the optimised design, and the wishes for cables."""
+    if record is None:
+        return []
+    found = []
+    for name, value in record.constraints.items():
+        cell = replace(_constraint(name, value), remedy=_EVALUATIONS)
+        limit = "at least what is demanded" if name.partition(".")[0] in _AT_LEAST else "up to the limit"
+        cells = {design: cell if design == "optimised" else UNASKED for design in designs}
+        found.append(Check(f"Optimiser: {constraint_title(name)}", limit, cells))
+    if record.cables_max is not None:
+        most = record.cables_max.asked
+        cells = {
+            design: Cell(
+                f"{rows[design].cables}", rows[design].cables <= most, remedy=allow_count(rows[design].cables)
+            )
+            if design in rows and design in BUILT
+            else UNASKED
+            for design in designs
+        }
+        found.append(Check("Number of cables", f"up to {most}, as far as the limits allow", cells))
+    if record.symmetric is not None:
+        kept, groups = record.symmetric.kept, record.symmetric.groups
+        words = f"{groups} lengths" if kept else record.not_polished or "not alike"
+        built = next((name for name in reversed(BUILT) if name in designs), "")
+        cells = {design: Cell(words, kept) if design == built else UNASKED for design in designs}
+        found.append(Check("Symmetric cables have one length", "asked for", cells))
+    return found
+
+
+def _largest(values: Iterable[float | None], scale: float = 1.0) -> float | None:
+    """The largest of those that are known, times the scale."""
+    return max((scale * value for value in values if value is not None), default=None)
+
+
+def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, least: float) -> Check:
+    """The least pull of a cable."""
+    cells = {}
+    for name in designs:
+        row = rows[name].loads.get(load) if name in rows else None
+        pull = None if row is None else row.cable_force_min
+        remedy = allow("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
+        cells[name] = (
+            UNKNOWN
+            if pull is None
+            else Cell(f"{number(pull)} N", pull >= least * (1.0 - SLACK), remedy=remedy)
+        )
+    return Check(f"Least pull of a cable under {load_title(load)}", f"at least {number(least)} N", cells)
+
+
+def _stands(row: LoadRecord, rods: RodsOf) -> Cell:
+    if row.stable and row.on_branch:
+        return Cell("stands", True)
+    factor = row.critical_factor
+    remedy = rods.stronger(1.0 / factor if factor else math.inf)
+    return Cell("snapped through" if row.stable else "unstable", False, remedy=remedy)
+
+
+def _settled(row: LoadRecord) -> Cell:
+    return UNASKED if row.residual is None else Cell(f"{row.residual:.0e}", bool(row.residual <= _SETTLED))
+
+
+def _constraint(name: str, value: float) -> Cell:
+    """From value / limit - 1 <= 0. A misfit counts by its square, a softness is 1 - (stiffness / least)², a
+    slackness 1 - pull / least, and an uplift is offset, so that its share tells nothing."""
+    if not math.isfinite(value):
+        return Cell("not known", False)
+    kind, holds = name.partition(".")[0], value <= SLACK
+    if kind in _AT_LEAST:
+        ratio = math.sqrt(max(1.0 - value, 0.0)) if kind == "softness" else 1.0 - value
+        return Cell(f"{ratio:.2f} ×", holds)
+    if kind == "uplift":
+        return Cell("within" if holds else "beyond", holds)
+    share = math.sqrt(max(1.0 + value, 0.0)) if kind == "misfit" else 1.0 + value
+    return Cell(f"{100.0 * share:.0f} %", holds)
+
+
+def _stressed(value: float, rods: RodsOf) -> Cell:
+    return share_of(value, rods.thinner(1.0 / value) if value > 0.0 else "")

@@ -1,0 +1,55 @@
+"""designs/NAME-drawn.json: what came of the structures drawn of a design, one after the other, so that sampling goes on
+where it stopped and isn't done again for a design that is still the same."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from shellform.errors import Damaged
+from shellform.records.files import read_record, text_of
+from shellform.written import write_text
+
+
+@dataclass(frozen=True)
+class DrawnPath:
+    """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, and which of them
+    `stand`."""
+
+    factors: tuple[float, ...] = ()
+    stand: tuple[bool, ...] = ()
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """The `paths` of a design's structures by load; `key` is of all that they depend on."""
+
+    key: str
+    paths: Mapping[str, DrawnPath] = field(default_factory=dict)
+
+    def also(self, load: str, path: DrawnPath) -> Drawn:
+        """With this path in place of the load's."""
+        return replace(self, paths={**self.paths, load: path})
+
+
+def read_drawn(folder: Path, name: str, key: str) -> Drawn:
+    """What was drawn of a design so far; nothing where there is none, or of another design of the name, or where the
+    file is damaged: it is drawn anew."""
+    path = _file(folder, name)
+    if not path.is_file():
+        return Drawn(key)
+    try:
+        found = read_record(path, Drawn)
+    except Damaged:
+        return Drawn(key)
+    return found if found.key == key else Drawn(key)
+
+
+def write_drawn(folder: Path, name: str, drawn: Drawn) -> None:
+    """Writes it whole or not at all. Raises InputError where it can't be written."""
+    write_text(_file(folder, name), text_of(drawn))
+
+
+def _file(folder: Path, name: str) -> Path:
+    return folder / f"designs/{name}-drawn.json"

@@ -1,0 +1,74 @@
+"""What to do where a check doesn't hold, each with a number.
+
+Rods: the load that a shell of slender rods bears grows about with the square of their radius (1.3 times the load with
+1.0 mm and 1.8 times with 1.2 mm on the scale model), their stress in a given shape with the radius itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from shellform.records.words import number
+
+_CLOSER = 0.8  # of the spacing, where rods may not become thicker
+_MOST = 100.0  # times the load: what lacks so much isn't mended by thicker rods
+
+
+@dataclass(frozen=True)
+class RodsOf:
+    """The rods of a design: their `radius`, the `largest` that the net allows by equation (1), and its `spacing`, m
+    (None: not known)."""
+
+    radius: float
+    largest: float
+    spacing: float | None
+
+    def stronger(self, times: float) -> str:
+        """To bear so many times what they bear."""
+        if not 1.0 < times < _MOST:
+            return self._closer()
+        wanted = self.radius * math.sqrt(times)
+        if wanted <= self.largest:
+            return f"Take rods of at least {_up(1e3 * wanted)} mm radius (rod.radius = {_up(wanted)}), or let it be free (optimise.rod_radius = 0.1)."
+        return (
+            f"Rods of {_up(1e3 * wanted)} mm radius would do, and the net's curvature allows {number(1e3 * self.largest)} mm (1). "
+            + self._closer()
+        )
+
+    def thinner(self, times: float) -> str:
+        """To have that part of their stress."""
+        wanted = self.radius * times
+        return f"Take rods of at most {_down(1e3 * wanted)} mm radius (rod.radius = {_down(wanted)})."
+
+    def _closer(self) -> str:
+        if self.spacing is None:
+            return "Choose a closer grid (net.spacing)."
+        return f"Choose a closer grid (net.spacing = {number(_CLOSER * self.spacing)})."
+
+
+def allow(entry: str, value: float, *, or_else: str = "") -> str:
+    """To let a limit be what was found."""
+    tail = f", or {or_else}" if or_else else ""
+    return f"Allow {entry} = {_up(value)}{tail}."
+
+
+def allow_count(cables: int) -> str:
+    """To let so many cables be."""
+    return f"Allow optimise.cables_max = {cables}."
+
+
+def _up(value: float) -> str:
+    """To two digits, to the safe side."""
+    size = _digit(value)
+    return f"{math.ceil(value / size - 1e-9) * size:.3g}"
+
+
+def _down(value: float) -> str:
+    size = _digit(value)
+    return f"{math.floor(value / size + 1e-9) * size:.3g}"
+
+
+def _digit(value: float) -> float:
+    """What the second digit of a number counts."""
+    return 10.0 ** (math.floor(math.log10(value)) - 1) if value > 0.0 else 1.0

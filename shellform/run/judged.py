@@ -1,0 +1,51 @@
+"""The checks of a run, and the verdict on its design to build."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from shellform.case.build_safety import critical_factors_asked
+from shellform.records.as_built import AsBuilt
+from shellform.records.check import Check
+from shellform.records.checks import Bounds, checks
+from shellform.records.stages import SHOWING
+from shellform.records.summary import VerdictRecord
+from shellform.records.verdict import to_build, verdict
+from shellform.run.folder import Run
+
+
+def run_checks(run: Run) -> list[Check]:
+    """Every check of the run's designs."""
+    limits, safety = run.case.limits, run.case.safety
+    bounds = Bounds(
+        force=run.case.cable.force_max,
+        misfit=run.case.optimise.misfit_rms_additional,
+        stress=limits.utilisation,
+        turn=limits.connector_turn,
+        uplift=limits.uplift,
+        slack=limits.slack_min,
+        slack_loads=tuple(limits.slack_loads),
+        critical=critical_factors_asked(run.case),
+        safety=AsBuilt(
+            safety.probability_design, safety.probability_additional, safety.drawn, safety.required
+        ),
+    )
+    return checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
+
+
+def judged(run: Run) -> VerdictRecord:
+    """The verdict on the run's design to build."""
+    found = run_checks(run)
+    record = verdict(found, to_build(found, list(run.designs)))
+    return broken_off(record, run.summary.failed)
+
+
+def broken_off(record: VerdictRecord, failed: Mapping[str, str]) -> VerdictRecord:
+    """The verdict where a stage ended without a result: that is what fails first."""
+    ended = tuple(
+        f"The stage “{stage}” ended without a result: {why}"
+        for stage, why in failed.items()
+        if stage not in SHOWING
+    )
+    return replace(record, holds=False, failed=(*ended, *record.failed)) if ended else record

@@ -1,0 +1,241 @@
+"""The stage "safety": every design examined as it will be built.
+
+For every load case the critical factor of the perfect structure, on the design's mesh and with rod elements halved, and
+how many of its structures as built stand. Load cases that are shares of a larger one lie on its path, and are judged on
+it. Designs to compare with are drawn a few times (`safety.compared`); of those that may be built, from the last one on,
+each that isn't known to fail is drawn in full until one holds. Of the one to build the most likely failure is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.case.build_safety import case_tolerances, critical_factors_asked
+from shellform.case.case import Case
+from shellform.errors import NotConverged
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
+from shellform.records.as_built import EQUAL
+from shellform.records.checks import BUILT
+from shellform.records.drawn import DrawnPath
+from shellform.records.progress import Event, Kind
+from shellform.records.summary import FailureRecord, StandingRecord, Summary, write_summary
+from shellform.records.verdict import failed, open_checks, to_build
+from shellform.reliability.failure import explained
+from shellform.reliability.path_of_one import SOUGHT
+from shellform.reliability.perfect import perfect
+from shellform.reliability.probability import counted
+from shellform.reliability.refinement import mesh_error
+from shellform.reliability.safety import paths
+from shellform.reliability.standing import Workshop
+from shellform.run.figures import FAILURE
+from shellform.run.folder import Run, read_run
+from shellform.run.judged import judged, run_checks
+from shellform.run.sampling import Clock, drawn_of
+from shellform.run.workspace import Workspace
+from shellform.written import write_arrays
+
+_BEYOND = 1.5  # times the factor asked for, up to which a path is followed at least
+_SAME = 1e-9  # relative
+
+
+@dataclass(frozen=True)
+class _Examined:
+    """One design under examination."""
+
+    name: str
+    shell: Gridshell
+    design: Design
+    loads: Mapping[str, Reals]
+    tolerances: Tolerances
+
+
+def examine(workspace: Workspace) -> Summary:
+    """Examines the run's designs and returns its summary with what was found and the verdict. Raises InputError as the
+    run folder's readers."""
+    run = read_run(workspace.folder)
+    entry = workspace.case.safety
+    every = [_of_run(run, name) for name in run.designs]
+    summary = run.summary.unexamined()
+    for each in every:
+        workspace.say("safety", f"critical factors of the {each.name} design", Kind.BEGAN)
+        summary = _critical(workspace.case, each, summary)
+    write_summary(workspace.folder, summary)
+    sampled = [each for each in every if each.name != "unbraced"]
+    routes = len(paths(run.loads))
+    clock = Clock(routes * (entry.compared * len(sampled) + entry.drawn - entry.compared))
+    for each in sampled:
+        summary = _stand(workspace, each, entry.compared, summary, clock)
+    built = {each.name: each for each in sampled if each.name in BUILT}
+    for name in reversed(list(built) or ["initial"]):
+        now = replace(run, summary=summary)
+        if failed(run_checks(now), name):
+            continue
+        summary = _stand(workspace, built.get(name) or _of_run(run, name), entry.drawn, summary, clock)
+        found = run_checks(replace(run, summary=summary))
+        if not failed(found, name) and not open_checks(found, name):
+            break
+    best = to_build(run_checks(replace(run, summary=summary)), list(run.designs))
+    chosen = _of_run(run, best)
+    if best != "unbraced":
+        summary = _stand(workspace, chosen, entry.drawn, summary, clock)
+        summary = replace(summary, failure=_failure(workspace, chosen, entry.drawn))
+    return replace(summary, verdict=judged(replace(run, summary=summary)))
+
+
+def _of_run(run: Run, name: str) -> _Examined:
+    shell = run.shell_of(name)
+    return _Examined(name, shell, run.designs[name], run.loads, case_tolerances(run.case, shell))
+
+
+def _critical(case: Case, each: _Examined, summary: Summary) -> Summary:
+    """With the critical factors of a design, and what its numbers are off by the mesh."""
+    record, asked = summary.designs[each.name], critical_factors_asked(case)
+    rows = dict(record.loads)
+    for largest, shares in paths(each.loads).items():
+        followed = "design" if "design" in shares else largest
+        for name, found in _ends(each, followed, shares, asked).items():
+            rows[name] = replace(rows[name], **found)
+    kept = all(
+        (rows[name].critical_factor or 0.0) >= least * (1.0 - EQUAL)
+        for name, least in asked.items()
+        if name in rows
+    )
+    record = replace(record, loads=rows, critical_factor_kept=kept if asked else None)
+    return summary.with_design(each.name, record)
+
+
+def _ends(
+    each: _Examined, followed: str, shares: Mapping[str, float], asked: Mapping[str, float]
+) -> dict[str, dict[str, Any]]:
+    """The fields of the loads' records that the path of one of them tells, whose `shares` of the largest are given."""
+    sought = max(SOUGHT, _BEYOND * max((asked.get(name, 0.0) for name in shares), default=0.0))
+    try:
+        error = mesh_error(each.shell, each.design, each.loads[followed], sought=sought)
+    except NotConverged as lost:
+        return {name: {"critical_kind": f"not found: {lost.what}"} for name in shares}
+    found: dict[str, dict[str, Any]] = {}
+    for name, share in shares.items():
+        times = shares[followed] / share
+        found[name] = {
+            "critical_sought": sought * times,
+            "critical_factor": error.critical.coarse * times,
+            "critical_factor_halved": error.critical.fine * times,
+            "critical_factor_error": error.critical.error * times,
+            "critical_kind": error.kinds[0],
+        }
+    found[followed] |= {
+        "deviation_max_error": error.deviation_max.error,
+        "deviation_mean_error": error.deviation_mean.error,
+    }
+    if np.isfinite(each.shell.rod.strength):
+        found[followed]["rod_utilisation_error"] = error.stress.error / each.shell.rod.strength
+    return found
+
+
+def _stand(workspace: Workspace, each: _Examined, count: int, summary: Summary, clock: Clock) -> Summary:
+    """With how many of a design's structures stand under each load; unchanged where as many were drawn before."""
+    rows = dict(summary.designs[each.name].loads)
+    entry = workspace.case.safety
+    for largest, shares in paths(each.loads).items():
+        before = rows[largest].stands
+        if before is not None and before.drawn >= count and before.seed == entry.seed:
+            continue
+        path = _drawn(workspace, each, largest, count, clock)
+        if path is None:
+            continue
+        for name, share in shares.items():
+            rows[name] = replace(rows[name], stands=_standing(path, share, workspace.case))
+    record = replace(summary.designs[each.name], loads=rows)
+    summary = summary.with_design(each.name, record)
+    write_summary(workspace.folder, summary)
+    return summary
+
+
+def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: Clock) -> DrawnPath | None:
+    """The first structures of a design under a load; None, and a note, where the perfect one has no unloaded
+    equilibrium."""
+
+    def tell(done: int) -> None:
+        left = clock.left()
+        workspace.report(
+            Event(
+                "safety",
+                f"{each.name} design as built: structure {done} of {count} under the load “{load}”, {left:.0f} s left at most",
+                fraction=clock.fraction(),
+                seconds_left=left,
+            )
+        )
+
+    try:
+        return drawn_of(
+            workspace.folder,
+            each.name,
+            (each.shell, each.design, each.tolerances),
+            (load, each.loads),
+            count=count,
+            seed=workspace.case.safety.seed,
+            clock=clock,
+            tell=tell,
+        )
+    except NotConverged as error:
+        workspace.say("safety", f"the {each.name} design was not drawn: {error.what}", Kind.NOTE)
+        return None
+
+
+def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
+    """Under a load that is a share of the path's own."""
+    fallen = [factor for factor, stands in zip(path.factors, path.stand, strict=True) if not stands]
+    if share < 1.0:
+        fallen = [factor for factor in fallen if factor < share * (1.0 - _SAME)]
+    drawn = len(path.factors)
+    entry = case.safety
+    found = counted(drawn, drawn - len(fallen), seed=entry.seed, confidence=entry.confidence)
+    lowest = min(fallen, default=share) / share
+    return StandingRecord(drawn, found.standing, found.at_least, entry.confidence, entry.seed, lowest)
+
+
+def _failure(workspace: Workspace, each: _Examined, count: int) -> FailureRecord | None:
+    """How a design most likely fails, under the smallest load under which one of its structures falls by itself; None
+    where none does."""
+    workspace.path(FAILURE).unlink(missing_ok=True)
+    clock = Clock(0)
+    for load in sorted(each.loads, key=lambda name: float(np.linalg.norm(each.loads[name]))):
+        route = next((largest for largest, shares in paths(each.loads).items() if load in shares), None)
+        path = None if route is None else _drawn(workspace, each, route, count, clock)
+        if route is None or path is None:
+            continue
+        share = paths(each.loads)[route][load]
+        fallen = sorted(
+            (factor / share, number)
+            for number, factor in enumerate(path.factors)
+            if 0.0 < factor < min(share, 1.0) * (1.0 - _SAME)
+        )
+        if not fallen:
+            continue
+        _, number = fallen[len(fallen) // 2]
+        workspace.say("safety", f"how structure {number} fails", Kind.BEGAN)
+        workshop = Workshop(perfect(each.shell, each.design, each.loads[route]))
+        found = explained(workshop, each.tolerances, seed=workspace.case.safety.seed, number=number)
+        write_arrays(
+            workspace.path(FAILURE),
+            positions=found.state.positions,
+            quaternions=found.state.quaternions,
+            mode=found.mode,
+        )
+        return FailureRecord(
+            each.name,
+            load,
+            number,
+            found.factor / share,
+            found.kind,
+            found.driver,
+            {cause: factor / share for cause, factor in found.without.items()},
+            tuple(f"C{k}" for k in found.cables),
+        )
+    return None

@@ -1,0 +1,103 @@
+"""Structures of a design drawn and loaded a few at a time, each few kept in the run folder."""
+
+from __future__ import annotations
+
+import hashlib
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+import shellform
+from shellform.arrays import Reals
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
+from shellform.records.drawn import DrawnPath, read_drawn, write_drawn
+from shellform.reliability.perfect import perfect
+from shellform.reliability.standing import Workshop
+
+_AT_ONCE = 10  # structures, before they are kept
+
+
+class Clock:
+    """How long is left of so many structures `planned` at the most, by those that were drawn so far."""
+
+    def __init__(self, planned: int) -> None:
+        self.planned, self.done, self.spent = planned, 0, 0.0
+
+    def kept(self, count: int) -> None:
+        """So many were drawn before."""
+        self.planned = max(self.planned - count, 0)
+
+    def took(self, count: int, seconds: float) -> None:
+        """So many were drawn now."""
+        self.done, self.spent = self.done + count, self.spent + seconds
+        self.planned = max(self.planned, self.done)
+
+    def left(self) -> float:
+        """Seconds."""
+        return self.spent / max(self.done, 1) * (self.planned - self.done)
+
+    def fraction(self) -> float:
+        """Of the structures planned."""
+        return self.done / max(self.planned, 1)
+
+
+def drawn_of(
+    folder: Path,
+    name: str,
+    made: tuple[Gridshell, Design, Tolerances],
+    under: tuple[str, Mapping[str, Reals]],
+    *,
+    count: int,
+    seed: int,
+    clock: Clock,
+    tell: Callable[[int], None],
+) -> DrawnPath:
+    """Structures 0 to `count` of the design `name`, `made` of a shell with tolerances, `under` the load of a name among all;
+    those in the folder are taken from there. Raises NotConverged where the perfect structure has no unloaded equilibrium."""
+    shell, design, tolerances = made
+    load, loads = under
+    key = _key(shell, design, tolerances, loads, seed)
+    kept = read_drawn(folder, name, key)
+    path = kept.paths.get(load, DrawnPath())
+    clock.kept(min(len(path.factors), count))
+    workshop = None
+    while len(path.factors) < count:
+        began = time.perf_counter()
+        if workshop is None:
+            workshop = Workshop(perfect(shell, design, loads[load]))
+        first = len(path.factors)
+        some = workshop.drawn(tolerances, seed=seed, numbers=range(first, min(first + _AT_ONCE, count)))
+        path = DrawnPath(
+            (*path.factors, *(each.factor for each in some)), (*path.stand, *(each.stands for each in some))
+        )
+        kept = kept.also(load, path)
+        write_drawn(folder, name, kept)
+        clock.took(len(some), time.perf_counter() - began)
+        tell(len(path.factors))
+    return DrawnPath(path.factors[:count], path.stand[:count])
+
+
+def _key(
+    shell: Gridshell, design: Design, tolerances: Tolerances, loads: Mapping[str, Reals], seed: int
+) -> str:
+    """Of all that a design's structures depend on."""
+    network = shell.network(design)
+    digest = hashlib.sha256(f"{shellform.__version__} {seed} {asdict(tolerances)}".encode())
+    for array in (
+        shell.target.positions,
+        network.beams.axial,
+        network.beams.bending_y,
+        network.beams.bending_z,
+        network.beams.torsion,
+        network.beams.rest_length,
+        network.cables.ends,
+        network.cables.rest_length,
+        network.cables.stiffness,
+        *loads.values(),
+    ):
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
