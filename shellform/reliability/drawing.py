@@ -144,7 +144,7 @@ def built_beams(nominal: Beams, errors: Errors, imperfections: Imperfections | N
     )
     bent: Beams | BentBeams = straight
     if errors.beam_curvature.any():
-        axes = nominal.frames[:, :, 1:]
+        axes = nominal.frames[:, 0, :, 1:]
         bent = curved(straight, np.einsum("eij,ej->ei", axes, errors.beam_curvature))
     return bent if imperfections is None or not errors.shape.any() else _shaped(bent, errors, imperfections)
 

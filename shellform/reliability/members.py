@@ -64,7 +64,7 @@ def members_of(shell: Gridshell) -> Members:
     held = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
     middle = grid.flat[grid.crossing_nodes].mean(axis=1)[:, :2]
     zone = np.asarray(cKDTree(middle).query(grid.flat[:, :2])[1], dtype=np.int64)
-    length = np.concatenate([grid.rod_rest_lengths, np.full(len(grid.lattice), grid.gap)])
+    length = shell.beams(shell.rod.radius).rest_length  # edge beams come last, and are made without error
     return Members(
         tuple(rods),
         connectors,
@@ -109,7 +109,7 @@ def _chains(beams: Beams, chosen: Indices, count: int) -> list[tuple[Indices, Re
     for element in chosen.tolist():
         for node in beams.ends[element]:
             at[node].append(element)
-    axis = beams.frames[:, :, 0]
+    axis = beams.frames[:, 0, :, 0]
 
     def onward(element: int, node: int) -> int | None:
         """The one beam that goes on straight from the element over its end `node`."""

@@ -127,7 +127,7 @@ def _between(start: State, beams: Beams, rods: np.ndarray) -> State:
     a, b = beams.ends[rods].T
     one, other = start.positions[a], start.positions[b]
     length = np.linalg.norm(other - one, axis=1)[:, None]
-    axis = beams.frames[rods][:, :, 0]
+    axis = beams.frames[rods][:, 0, :, 0]
     along = [
         np.einsum("eij,ej->ei", rotation.matrices(start.quaternions[node]), axis) * length for node in (a, b)
     ]
