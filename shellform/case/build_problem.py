@@ -99,6 +99,7 @@ def case_problem(
         [LoadCase(name, used[name]) for name in order if name in used],
         variables,
         decisive=_decisive(others, critical),
+        built_under=tuple(name for name in loads if loads[name].any()),
     )
 
 

@@ -38,16 +38,31 @@ from shellform.gridshell.grouping import averaged
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes, minimise_directly
 from shellform.optimiser.optimum import Checkpoint, Optimum
 from shellform.optimiser.phases import run
-from shellform.optimiser.search_state import Iterate, Keep, Models, Search, Watch, finish, record, resumed
+from shellform.optimiser.search_state import (
+    Iterate,
+    Keep,
+    Models,
+    Search,
+    Watch,
+    accepted_design,
+    finish,
+    record,
+    resumed,
+    stiff,
+)
 from shellform.optimiser.solver import POLISHING, SequentialConvex
 from shellform.optimiser.trials import reach, staged
-from shellform.problem.constraints import AtLeast, Constraint
-from shellform.problem.engineering import ModalStiffness
+from shellform.problem.constraints import Constraint
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.problem import Problem
 from shellform.problem.terms import Misfit, Share
+from shellform.reliability.guide import stretch_deviation
+from shellform.reliability.perfect import perfect
+from shellform.reliability.safety import Safety
+from shellform.reliability.trial_structures import AsBuilt, as_built
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.threads import dense_on_one
+from shellform.structure.network import assemble
 
 
 def optimise(
@@ -56,12 +71,14 @@ def optimise(
     *,
     solver: SequentialConvex | MovingAsymptotes | None = None,
     evaluations: int = 100,
+    safety: Safety | None = None,
     progress: Watch | None = None,
     keep: Keep | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
-    """The best design found from `start` within a number of design `evaluations`; with MovingAsymptotes by the paper's
-    own method (moving_asymptotes.py).
+    """The best design found from `start` within a number of design `evaluations`; with `safety` one that stands as
+    built under the problem's loads; with MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever
+    stands.
 
     `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes
     on from there to the same result.
@@ -80,9 +97,13 @@ def optimise(
                 keep=keep,
                 resume=resume,
             )
-        share = solver.stiffness
+        asked, share = None, solver.stiffness
+        if safety is not None:
+            share = max(share, safety.stiffness)
+            built = {name: problem.loads[name] for name in problem.built_under or problem.loads}
+            asked = as_built(problem.shell, start, built, safety, design_load=problem.design_load.name)
         search, it = begin(
-            problem, start, solver, lambda softest: share * softest, evaluations, progress, keep
+            problem, start, solver, lambda softest: share * softest, evaluations, progress, keep, asked
         )
         if resume is not None:
             search, it = resumed(search, resume)
@@ -101,8 +122,9 @@ def polish(
     constraints kept; the solver's `stiffness` is a share of what `best` had to keep.
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
-    shape alone. The misfit never rises: where no better design is found, `best` comes back. Only the cables'
-    lengths are varied, where they are variables of their own.
+    shape alone. The misfit never rises: where no better design is found, `best` comes back; and what was asked of
+    `best` as built is asked of the polished design. Only the cables' lengths are varied, where they are
+    variables of their own.
 
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
     the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
@@ -120,7 +142,13 @@ def polish(
     alike = None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
     with dense_on_one():
         search, it = begin(
-            problem, best.design, solver, lambda _: solver.stiffness * best.stiffness, evaluations, progress
+            problem,
+            best.design,
+            solver,
+            lambda _: solver.stiffness * best.stiffness,
+            evaluations,
+            progress,
+            asked=best.asked,
         )
         search = replace(search, always_guarded=True, groups=alike)
         it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned))
@@ -143,9 +171,11 @@ def begin(
     evaluations: int,
     progress: Watch | None = None,
     keep: Keep | None = None,
+    asked: AsBuilt | None = None,
 ) -> tuple[Search, Iterate]:
     """A search of the problem and its first iterate. `kept` gives the stiffness, N/m, that no mode may fall
-    below under the further loads, from that of the start's softest mode under the design load."""
+    below under the further loads, from that of the start's softest mode under the design load; what is `asked` of
+    designs as built."""
     began = time.perf_counter()
     # Limits on the design load's cable forces are bounds of the model; the others stay constraints.
     bounded = tuple(part for part in problem.constraints if _is_bound(part, problem))
@@ -162,8 +192,8 @@ def begin(
         stage = reach(evaluator, start, state, 0.0, solver.margin)
         states = staged(evaluator, start, state, stage)
     softest = float(modes(evaluator.assembly(start), state, 1).stiffness[0])
-    added = _stiff(inner, kept(softest))
-    evaluator.problem = replace(inner, constraints=[*inner.constraints, *added])
+    evaluator.problem = stiff(inner, kept(softest))
+    stiffness = kept(softest) if len(evaluator.problem.constraints) > len(inner.constraints) else 0.0
     point = evaluator.seed(start, states, stage)
     pull = problem.shell.cables(start).tension(point.states[base])
     mean = float(np.mean(pull)) if len(pull) else 0.0
@@ -175,7 +205,10 @@ def begin(
         evaluations,
         mean if mean > 0.0 else 1.0,  # N: what cables that all are slack may be given
         point.objective,
-        kept(softest) if added else 0.0,
+        inner,
+        softest,
+        asked,
+        _least_tension(problem, start, asked),
         None,
         False,
         progress,
@@ -185,8 +218,9 @@ def begin(
     )
     it = Iterate(
         point,
-        (point,),
+        (accepted_design(search, point),),
         (record(search, point, stage, True),),
+        stiffness,
         stage,
         search.first_window,
         solver.margin,
@@ -207,9 +241,16 @@ def _is_bound(part: Constraint, problem: Problem) -> bool:
     )
 
 
-def _stiff(problem: Problem, least: float) -> list[Constraint]:
-    """The constraints on the softest mode, N/m, under each further load that has none yet."""
-    base = problem.design_load.name
-    own = {part.term.load for part in problem.constraints if part.term.stabilises}
-    further = [name for name in problem.used() if name not in (base, *own) and problem.loads[name].any()]
-    return [AtLeast(least, ModalStiffness(name, least)) for name in further] if least > 0.0 else []
+def _least_tension(problem: Problem, start: Design, asked: AsBuilt | None) -> float:
+    """N, that a cable keeps so that errors of lengths don't leave it slack: so many deviations as the safety asks
+    for of what the median cable is off by, to first order."""
+    if asked is None or asked.trial.safety.margin == 0.0 or not start.present.any():
+        return 0.0
+    shell = problem.shell
+    nominal = perfect(shell, start, problem.design_load.force, shapes=0)
+    assembly = assemble(nominal.network)
+    stretch = stretch_deviation(
+        nominal, asked.trial.safety.tolerances, assembly, seed=asked.trial.safety.seed
+    )
+    cables = nominal.network.cables
+    return asked.trial.safety.margin * float(np.median(cables.stiffness / cables.rest_length * stretch))

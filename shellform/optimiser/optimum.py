@@ -10,6 +10,7 @@ import numpy as np
 
 from shellform.gridshell.gridshell import Design
 from shellform.problem.problem import Problem
+from shellform.reliability.trial_structures import AsBuilt
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import Loaded
 
@@ -46,7 +47,7 @@ class Optimum:
     """The solution: what the optimisation found: the `design` without its slack cables, how it carries each load on the
     documented path (`loaded`, with "none" first), the `history`, a `status` sentence, the work it took, of
     which factorisations in rejected trials were `wasted`, and the `stiffness`, N/m, that the softest mode had
-    to keep under the additional loads."""
+    to keep under the additional loads; what was `asked` of it as built, None: nothing."""
 
     problem: Problem
     design: Design
@@ -62,6 +63,7 @@ class Optimum:
     factorisations: int
     wasted: int
     stiffness: float
+    asked: AsBuilt | None = None
 
     @property
     def states(self) -> dict[str, State]:

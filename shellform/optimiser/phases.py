@@ -13,13 +13,35 @@ import numpy as np
 
 from shellform.arrays import Indices
 from shellform.optimiser.proposal import propose
-from shellform.optimiser.search_state import Iterate, Search, in_tension, merit, noted, tell, violation
+from shellform.optimiser.search_state import (
+    Iterate,
+    Search,
+    accepted_design,
+    merit,
+    noted,
+    restiffened,
+    taut_count,
+    tell,
+    violation,
+)
 from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.thinning import kept_stiffness, removable
-from shellform.optimiser.trials import accepted, attempt, attempt_without, reach, sound, staged, task
+from shellform.optimiser.trials import (
+    accepted,
+    attempt,
+    attempt_without,
+    confirmed,
+    reach,
+    sound,
+    staged,
+    standing,
+    task,
+)
 from shellform.problem.evaluation import Linearisation
 
 _TINY = -1e-300  # a predicted change that isn't one
+_WORTH = 0.05  # of the objective, gained by a turn, for which another is made where thinning is to end with what stands
+_MANY = 1 / 24  # of the taut cables: where smaller batches break limits, the stiffness kept is eased
 
 
 def run(search: Search, it: Iterate) -> Iterate:
@@ -27,13 +49,51 @@ def run(search: Search, it: Iterate) -> Iterate:
     if it.phase == "climb":
         it = replace(_climb(search, it), phase="descend")
     if it.phase == "descend":
-        it = _last_sound(search, _descend(search, it))
+        it = _last_standing(search, _descend(search, it))
         each_cable = any(block.of_each_cable for block in search.problem.variables)
         if it.accepted and search.solver.thin and each_cable:
             it = _ready_to_thin(search, it)
     if it.phase == "thin":
         it = _thin(search, it)
-    return it
+    return _confirmed(search, it)
+
+
+def _confirmed(search: Search, it: Iterate) -> Iterate:
+    """Back to the last accepted design of which a fresh sample agrees that it stands, in steps of 1, 2, 4, ...: the
+    search has chosen its designs by their luck with the structures it tried."""
+    if search.asked is None or not it.accepted:
+        return it
+    back = 0
+    while back < len(it.accepted):
+        own = it.accepted[: len(it.accepted) - back]
+        if confirmed(search, own[-1].built):
+            if back == 0:
+                return it
+            found = _last_sound(search, replace(it, accepted=own))
+            if found.accepted and len(found.accepted) == len(own):
+                return replace(found, status=f"{it.status}; the last design that a fresh sample confirms")
+        back = 2 * back + 1
+    return replace(it, status=f"{it.status}; a fresh sample doesn't confirm that it stands as built")
+
+
+def _last_standing(search: Search, it: Iterate) -> Iterate:
+    """Back to the last accepted design that its documented path leads to and, by bisection, that stands as built."""
+    it = _last_sound(search, it)
+    if search.asked is None or not it.accepted:
+        return it
+    holds, it = standing(search, it, it.accepted[-1].built)
+    if holds:
+        return it
+    stood, fell = -1, len(it.accepted) - 1  # whether the start stands is found out at last
+    while fell - stood > 1:
+        middle = max((stood + fell) // 2, 0)
+        holds, it = standing(search, it, it.accepted[middle].built)
+        stood, fell = (middle, fell) if holds else (stood, middle)
+    back = replace(it, accepted=it.accepted[: stood + 1])
+    found = _last_sound(search, back) if back.accepted else back
+    if not found.accepted:  # none stands: the search goes on with what it has, and whoever judges says so
+        return replace(it, status=f"{it.status}; no design was found that stands as built")
+    return found
 
 
 def _last_sound(search: Search, it: Iterate) -> Iterate:
@@ -41,9 +101,20 @@ def _last_sound(search: Search, it: Iterate) -> Iterate:
     while it.accepted:
         found = sound(search, it.accepted[-1])
         if found is not None:
-            return replace(it, accepted=(*it.accepted[:-1], found), point=found)
+            last = accepted_design(search, found)
+            it = replace(it, accepted=(*it.accepted[:-1], last))
+            return _at(search, it, found)
         it = replace(it, accepted=it.accepted[:-1])
     return it
+
+
+def _at(search: Search, it: Iterate, point: Linearisation) -> Iterate:
+    """At the point, whose design may have other cables than the present one."""
+    if np.array_equal(point.design.present, it.point.design.present):
+        return replace(it, point=point)
+    count = int(point.design.present.sum())
+    every = np.full(count, search.always_guarded)
+    return replace(it, point=point, tensioned=every, needed=np.zeros(count, dtype=bool))
 
 
 def _climb(search: Search, it: Iterate) -> Iterate:
@@ -69,7 +140,7 @@ def _climb(search: Search, it: Iterate) -> Iterate:
             continue
         states = staged(evaluator, trial.design, trial.states[base], stage)
         point = evaluator.seed(trial.design, states, stage)
-        it = replace(it, stage=stage, point=point, accepted=(*it.accepted, point))
+        it = replace(it, stage=stage, point=point, accepted=(*it.accepted, accepted_design(search, point)))
         it = noted(search, it, point, True)
     return replace(it, window=search.first_window, guarded=search.always_guarded, climbing=False)
 
@@ -85,7 +156,8 @@ def _descend(search: Search, it: Iterate) -> Iterate:
         status = _settled(search, it, predicted)
         if status:
             it = replace(it, status=status)
-            turned = it.guarded and it.point.objective > (1.0 - solver.settled) * it.before
+            worth = solver.settled if search.asked is None else _WORTH
+            turned = it.guarded and it.point.objective > (1.0 - worth) * it.before
             # without further loads there are no guards
             if search.always_guarded or turned or len(search.evaluator.problem.used()) == 1:
                 return it
@@ -124,7 +196,7 @@ def _ready_to_thin(search: Search, it: Iterate) -> Iterate:
         guarded=True,
         phase="thin",
         thrifty=solver.thrift * it.point.objective,
-        batch=max(1, in_tension(search, it.point) // solver.batch),
+        batch=max(1, taut_count(search, it.point) // solver.batch),
         needed=np.zeros(len(it.tensioned), dtype=bool),
     )
 
@@ -141,11 +213,15 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     while it.failures < solver.failures and search.left() > 0:
         it = _without_slack(search, it)
         tell(search, it)
-        over = most is not None and in_tension(search, it.point) > most
+        over = most is not None and taut_count(search, it.point) > most
         budget = np.inf if over else it.thrifty
         model = search.models.at(it.point)
         leaving = _leaving(search, it, model)
         if not len(leaving):
+            eased = _eased(search, it)
+            if eased is not None:
+                it = eased
+                continue
             return replace(it, status=f"{it.status}, and every cable that is left is needed for stability")
         tensioned = model.origin[: len(it.tensioned)] > 0.0
         tensioned[leaving] = False
@@ -155,24 +231,48 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         if trial is not None and trial.objective < 2.0 * budget:
             trial, it = _repaired(search, it, trial)
         fits = trial is not None and merit(search, trial) <= budget and violation(search, trial) <= 0.0
-        found = sound(search, trial) if trial is not None and fits else None
+        found = sound(search, accepted_design(search, trial)) if trial is not None and fits else None
+        bound = found is None and trial is not None  # by a limit, not by what stands
+        if found is not None:
+            holds, it = standing(search, it, accepted_design(search, found).built)
+            found, it = (found, it) if holds else (None, replace(it, fell=True))
         if found is None:
             it = noted(search, it, trial or it.point, False)
             alone = len(leaving) == 1
             needed = it.needed.copy()
             needed[leaving] = alone
             it = replace(it, needed=needed, failures=it.failures + alone, batch=max(1, len(leaving) // 3))
+            if it.failures >= solver.failures or (bound and it.batch < _MANY * taut_count(search, it.point)):
+                it = _eased(search, it) or it
             continue
         it = accepted(search, it, found)
-        it = replace(it, failures=0, batch=int(1.3 * it.batch) + 1)
+        it = replace(it, failures=0, batch=int(1.3 * it.batch) + 1, fell=False)
     status = it.status + (
         ", and no further cable can be taken away"
         if it.failures >= solver.failures
         else ", and thinning ended with the last evaluation"
     )
-    if most is not None and in_tension(search, it.point) > most:
+    if most is not None and taut_count(search, it.point) > most:
         status += f"; no design with {most} cables was found that keeps every limit"
     return replace(it, status=status)
+
+
+def _eased(search: Search, it: Iterate) -> Iterate | None:
+    """With less stiffness to keep, where designs stand as built with room to spare: None where one fell since it was
+    last eased, or where it can't be less."""
+    solver = search.solver
+    least = solver.stiffness * search.softest
+    if search.asked is None or it.fell or it.stiffness <= least:
+        return None
+    it = restiffened(search, it, max(solver.softened * it.stiffness, least))
+    return replace(
+        it,
+        window=0.1 * search.tension,
+        failures=0,
+        batch=max(1, taut_count(search, it.point) // solver.batch),
+        needed=np.zeros_like(it.needed),
+        fell=False,
+    )
 
 
 def _without_slack(search: Search, it: Iterate) -> Iterate:
@@ -190,7 +290,7 @@ def _without_slack(search: Search, it: Iterate) -> Iterate:
     return replace(
         it,
         point=point,
-        accepted=(*it.accepted[:-1], point),
+        accepted=(*it.accepted[:-1], accepted_design(search, point)),
         tensioned=it.tensioned[kept],
         needed=it.needed[kept],
     )

@@ -34,7 +34,7 @@ class Task:
     start's mean, N; constraints `bounded` by the design load's tensions; cables (c,) that are `tensioned` and
     keep a least tension; `guards` of cables that may not go slack under the further loads, none where all
     may; whether stability stands in for the objective, `climbing`; `groups` (c,) of cables alike; `excess`
-    (k,) of the constraints over their linear model in a whole window."""
+    (k,) of the constraints over their linear model in a whole window; the `least` tension, N, that cables keep."""
 
     solver: SequentialConvex
     model: StepModel
@@ -46,6 +46,7 @@ class Task:
     climbing: bool
     groups: Indices | None
     excess: Reals
+    least: float
 
 
 def propose(task: Task) -> tuple[Reals, float]:
@@ -170,7 +171,7 @@ def _guarding(task: Task, width: Reals) -> tuple[Reals, Reals]:
     for held in task.guards:
         falls = -(held.tension_by_design @ task.model.parameters_by_y) * width
         scale = np.abs(falls).sum(axis=1)
-        asked = np.minimum((solver.least_tension * task.tension - held.tension) / scale, solver.recovery)
+        asked = np.minimum((task.least - held.tension) / scale, solver.recovery)
         # Where no step within the window lets a cable go slack, there is nothing to guard; of the others the
         # nearest count.
         near = np.argsort(-asked, kind="stable")[: int(np.clip((asked > -1.0).sum(), 0, solver.guards))]
@@ -216,5 +217,5 @@ def _box(task: Task) -> tuple[Reals, Reals]:
     for part in task.bounded:
         upper[:count] = np.minimum(upper[:count], part.upper)
     if count:
-        lower[:count] = np.where(task.tensioned, task.solver.least_tension * task.tension, 0.0)
+        lower[:count] = np.where(task.tensioned, task.least, 0.0)
     return lower, upper

@@ -17,11 +17,13 @@ from shellform.optimiser.guards import Guard, guard
 from shellform.optimiser.optimum import Checkpoint, Optimum, Step
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.step_model import StepModel, step_model
-from shellform.problem.constraints import Constraint, residuals
+from shellform.problem.constraints import AtLeast, Constraint, residuals
+from shellform.problem.engineering import ModalStiffness
 from shellform.problem.evaluation import Evaluator, Linearisation
-from shellform.problem.paths import follow, without_slack
+from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, Problem
 from shellform.problem.terms import Term
+from shellform.reliability.trial_structures import AsBuilt
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import Loaded
 
@@ -36,8 +38,10 @@ class Search:
     """What stays the same in a search of the `problem`: its `solver`; the `evaluator` of the problem that is
     searched, with constraints on stability, and without those that are `bounded` by the design load's
     tensions; the number of design `evaluations`; the start's mean `tension`, N, and its
-    `objective_start`; the `stiffness`, N/m, that the softest modes keep; `groups` (c,) of present cables with
-    one rest length each; whether cables are guarded from the beginning, `always_guarded`; and whom to tell.
+    `objective_start`; the `inner` problem, without constraints on stability; the `softest` mode's stiffness at the start,
+    N/m; `groups` (c,) of present cables with one rest length each; whether cables are guarded from the
+    beginning, `always_guarded`; what is `asked` of designs as built, None where nothing is, and the `least` tension, N, that
+    cables keep for it; and whom to tell.
     """
 
     problem: Problem
@@ -47,7 +51,10 @@ class Search:
     evaluations: int
     tension: float
     objective_start: float
-    stiffness: float
+    inner: Problem
+    softest: float
+    asked: AsBuilt | None
+    least: float
     groups: Indices | None
     always_guarded: bool
     progress: Watch | None
@@ -71,21 +78,39 @@ class Search:
 
 
 @dataclass(frozen=True)
+class Accepted:
+    """An accepted `design`, the candidates (c,) that are `taut` in it under the design load, and by what share it breaks
+    its constraints, its `violation`."""
+
+    design: Design
+    taut: Flags
+    violation: float
+
+    @property
+    def built(self) -> Design:
+        """The design without its slack cables."""
+        return replace(self.design, present=self.taut)
+
+
+@dataclass(frozen=True)
 class Iterate:
     """Where a search stands.
 
-    The `point` and all `accepted` before it, with the `history` of trials. The `phase`; the `stage` of the
+    The `point` and all `accepted` up to it, with the `history` of trials; the `stiffness`, N/m, that the softest modes
+    keep under the further loads. The `phase`; the `stage` of the
     further loads and the `margin` kept from the end of their branch; the `window`, N; whether cables are
     `guarded` under further loads, and stability stands in for the objective, `climbing`; the cables (c,) that
     are `tensioned` and stay so; the constraints' `excess` (k,), 1/N², over their linear models at the last
     trial per square of the window; the `status`. Descending: whether the last trial was `refused`; the objective
     `before` this turn. Thinning: the objective that is still `thrifty`, the size of the next `batch`, single
-    `failures` in a row, cables `needed` (c,).
+    `failures` in a row, cables `needed` (c,). As built: structures that have `fallen`, the last ones first; whether a design
+    `fell` since the last batch went.
     """
 
     point: Linearisation
-    accepted: tuple[Linearisation, ...]
+    accepted: tuple[Accepted, ...]
     history: tuple[Step, ...]
+    stiffness: float
     stage: float
     window: float
     margin: float
@@ -101,6 +126,8 @@ class Iterate:
     batch: int = 0
     failures: int = 0
     needed: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    fallen: tuple[int, ...] = ()
+    fell: bool = False
 
 
 _ARRAYS = ("tensioned", "excess", "needed")
@@ -139,12 +166,37 @@ class Models:
         return self._guards[1]
 
 
+def accepted_design(search: Search, point: Linearisation) -> Accepted:
+    """The point's design, to go back to."""
+    taut = in_tension(search.problem.shell, point.design, point.states[search.base])
+    return Accepted(point.design, taut, violation(search, point))
+
+
+def stiff(problem: Problem, least: float) -> Problem:
+    """The problem with constraints on the softest mode, N/m, under each further load that has none yet."""
+    if least <= 0.0:
+        return problem
+    base = problem.design_load.name
+    own = {part.term.load for part in problem.constraints if part.term.stabilises}
+    further = [name for name in problem.used() if name not in (base, *own) and problem.loads[name].any()]
+    added = [AtLeast(least, ModalStiffness(name, least)) for name in further]
+    return replace(problem, constraints=[*problem.constraints, *added])
+
+
+def restiffened(search: Search, it: Iterate, least: float) -> Iterate:
+    """With another stiffness, N/m, to keep; the window begins anew."""
+    search.evaluator.problem = stiff(search.inner, least)
+    point = search.evaluator.seed(it.point.design, it.point.states, it.stage)
+    excess = np.zeros(len(point.constraints))
+    return replace(it, stiffness=least, point=point, excess=excess, window=search.first_window)
+
+
 def tensions(search: Search, point: Linearisation) -> Reals:
     """Of the present cables (c,) under the design load, N."""
     return search.problem.shell.cables(point.design).tension(point.states[search.base])
 
 
-def in_tension(search: Search, point: Linearisation) -> int:
+def taut_count(search: Search, point: Linearisation) -> int:
     """How many cables pull under the design load."""
     return int((tensions(search, point) > 0.0).sum())
 
@@ -209,6 +261,13 @@ def tell(search: Search, it: Iterate) -> None:
     design = it.point.design
     arrays = {"rest_length": design.rest_length, "present": design.present}
     arrays |= {name: getattr(it, name) for name in _ARRAYS}
+    arrays |= {
+        "accepted rest_length": np.array([each.design.rest_length for each in it.accepted]),
+        "accepted present": np.array([each.design.present for each in it.accepted]),
+        "accepted radius": np.array([each.design.radius for each in it.accepted]),
+        "accepted taut": np.array([each.taut for each in it.accepted]),
+        "accepted violation": np.array([each.violation for each in it.accepted]),
+    }
     for name, state in it.point.states.items():
         arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
     search.keep(Checkpoint(numbers | {"radius": design.radius}, arrays, it.history))
@@ -218,6 +277,7 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
     """Where a search of the same problem, start and settings stood."""
     numbers, arrays = checkpoint.numbers, checkpoint.arrays
     design = Design(arrays["rest_length"], np.array(arrays["present"]), numbers["radius"])
+    search.evaluator.problem = stiff(search.inner, numbers["stiffness"])
     states = {
         name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"])
         for name in search.evaluator.problem.used()
@@ -226,8 +286,19 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
     for name in _COUNTS:
         setattr(search.evaluator, name, numbers[name])
     kept = {name: numbers[name] for name in _NUMBERS} | {name: np.array(arrays[name]) for name in _ARRAYS}
+    kept["fallen"] = tuple(kept["fallen"])
+    before = tuple(
+        Accepted(Design(rest, np.array(present), float(radius)), np.array(taut), float(share))
+        for rest, present, radius, taut, share in zip(
+            *(
+                arrays[f"accepted {name}"]
+                for name in ("rest_length", "present", "radius", "taut", "violation")
+            ),
+            strict=True,
+        )
+    )
     began = search.began - checkpoint.history[-1].seconds
-    return replace(search, began=began), Iterate(point, (point,), tuple(checkpoint.history), **kept)
+    return replace(search, began=began), Iterate(point, before, tuple(checkpoint.history), **kept)
 
 
 def finish(search: Search, it: Iterate) -> Optimum:
@@ -241,8 +312,7 @@ def finish(search: Search, it: Iterate) -> Optimum:
             iterations=evaluator.factorisations,
             remedy="Choose a denser grid, thicker rods, stiffer cables, or more evaluations.",
         )
-    point = it.accepted[-1]
-    design = without_slack(shell, point.design, point.states[search.base])
+    design = without_slack(shell, it.point.design, it.point.states[search.base])
     loaded = follow(shell, design, {"none": none, **problem.loads})
     last = _judged(search, design, loaded)
     return Optimum(
@@ -259,7 +329,8 @@ def finish(search: Search, it: Iterate) -> Optimum:
         evaluator.equilibria,
         evaluator.factorisations,
         evaluator.wasted,
-        search.stiffness,
+        it.stiffness,
+        search.asked,
     )
 
 

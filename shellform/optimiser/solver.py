@@ -60,6 +60,10 @@ class SequentialConvex:
       models solve for every cable in it.
     - `repairs`: steps after each batch.
 
+    Designs as built:
+    - `softened`: of the stiffness, which thinning goes on with where it ended and designs stand, down to
+      `stiffness`.
+
     The step's problem:
     - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA.
     """
@@ -91,6 +95,8 @@ class SequentialConvex:
     failures: int = 6
     idle: float = 0.2
     repairs: int = 2
+
+    softened: float = 0.6
 
     model_evaluations: int = 2000
 

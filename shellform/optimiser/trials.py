@@ -12,10 +12,11 @@ from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.proposal import Task
-from shellform.optimiser.search_state import Iterate, Search, noted, violation
+from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted_design, noted, violation
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch
-from shellform.problem.paths import follow, without_slack
+from shellform.problem.paths import follow
+from shellform.reliability.trial_structures import confirm, stands
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import apply_load
 
@@ -35,6 +36,7 @@ def task(search: Search, it: Iterate, model: StepModel) -> Task:
         it.climbing,
         search.groups,
         it.excess * it.window**2,
+        max(search.least if it.phase == "thin" else 0.0, search.solver.least_tension * search.tension),
     )
 
 
@@ -71,28 +73,48 @@ def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indi
         return None
 
 
-def sound(search: Search, point: Linearisation) -> Linearisation | None:
+def sound(search: Search, before: Accepted) -> Linearisation | None:
     """The same design in the states to which the documented path leads, without its slack cables; None where
     it doesn't bear all loads there or breaks a constraint: of two equilibria side by side, a search from design
     to design may have come to the other one."""
     evaluator, problem = search.evaluator, search.problem
-    design = without_slack(problem.shell, point.design, point.states[search.base])
-    loaded = follow(problem.shell, design, problem.loads, stay=True)
+    loaded = follow(problem.shell, before.built, problem.loads, stay=True)
     evaluator.factorisations += sum(each.factorisations for each in loaded.values())
     if not all(each.on_branch for each in loaded.values()):
         return None
     states = {name: loaded[name].equilibrium.state for name in evaluator.problem.used()}
     try:
-        found = evaluator.seed(point.design, states, 1.0)
+        found = evaluator.seed(before.design, states, 1.0)
     except OffBranch:
         return None
-    return found if violation(search, found) <= max(violation(search, point), 0.0) else None
+    return found if violation(search, found) <= max(before.violation, 0.0) else None
+
+
+def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]:
+    """Whether the design stands as built, and the iterate that knows which structures fell."""
+    if search.asked is None:
+        return True, it
+    found = stands(search.problem.shell, built, search.asked.trial, first=it.fallen)
+    search.evaluator.factorisations += found.factorisations
+    fallen = [number for own in found.fallen.values() for number in own]
+    fallen = list(dict.fromkeys([*fallen, *it.fallen]))
+    return found.stands, replace(it, fallen=tuple(fallen))
+
+
+def confirmed(search: Search, built: Design) -> bool:
+    """Whether a fresh sample agrees that the design stands as built."""
+    assert search.asked is not None
+    found = confirm(search.problem.shell, built, search.asked.confirmed)
+    search.evaluator.factorisations += found.factorisations
+    return found.stands
 
 
 def accepted(search: Search, it: Iterate, trial: Linearisation) -> Iterate:
     """Goes on from `trial`, as near to the whole further loads as its stable branch allows."""
     it = _raised(search, replace(it, point=trial))
-    return noted(search, replace(it, accepted=(*it.accepted, it.point)), it.point, True)
+    return noted(
+        search, replace(it, accepted=(*it.accepted, accepted_design(search, it.point))), it.point, True
+    )
 
 
 def _raised(search: Search, it: Iterate) -> Iterate:

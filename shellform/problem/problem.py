@@ -37,7 +37,8 @@ class Problem:
     the `design_load` and `further` load cases.
 
     `decisive` names the load case at which the stiffness that cables give against buckling is looked at; where
-    it isn't named, the one with the largest forces.
+    it isn't named, the one with the largest forces. `built_under` names those under which the design has to
+    stand as built, where that is asked for; where none is named, all.
     """
 
     shell: Gridshell
@@ -47,12 +48,13 @@ class Problem:
     further: Sequence[LoadCase] = ()
     variables: Sequence[Variable] = (RestLengths(),)
     decisive: str = ""
+    built_under: Sequence[str] = ()
 
     def __post_init__(self) -> None:
         names = [case.name for case in self.load_cases]
         if len(set(names)) < len(names):
             raise InputError("two load cases have the same name", where="problem", value=", ".join(names))
-        for name in sorted({term.load for term in self.terms} | {self.decisive}):
+        for name in sorted({term.load for term in self.terms} | {self.decisive, *self.built_under}):
             if name and name not in names:
                 raise InputError(
                     f"there is no load case {name!r}", where="problem", remedy=f"Known: {', '.join(names)}."

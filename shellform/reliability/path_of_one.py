@@ -26,6 +26,7 @@ from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
 from shellform.structure.solve.residual import ResidualNorm, held
 
 LIMIT_POINT, BIFURCATION, BORNE, UNLOADED = "limit point", "bifurcation", "none", "no unloaded state"
+ENDED = "not looked into"
 _ALIGNED = (
     0.5  # cosine of the path's tangent and the softest mode, from which on the load itself is at its limit
 )

@@ -40,6 +40,8 @@ class Safety:
       more than under the design load.
     - `critical_factor`: of the perfect structure under the design load, on the mesh with rod elements halved; None: any.
     - `stiffness`: share of the start's softest mode that a search keeps at first.
+    - `margin`: least tension that a search leaves to cables under the design load, in deviations of what the median cable
+      is off by.
     - `drawn`, `seed`: structures with which a finished design is judged.
     - `tried`, `enlarged`: structures with which a search judges, under a seed of their own, their errors larger by this
       factor (trial_structures.py).
@@ -50,6 +52,7 @@ class Safety:
     probability_additional: float | None = None
     critical_factor: float | None = 1.25
     stiffness: float = 0.5
+    margin: float = 0.5
     drawn: int = 60
     seed: int = 1
     tried: int = 12

@@ -26,7 +26,7 @@ from shellform.reliability.drawing import (
     errors_of,
     variables,
 )
-from shellform.reliability.path_of_one import BORNE, STEP, UNLOADED, DrawnOutcome, Limit, Loading
+from shellform.reliability.path_of_one import BORNE, ENDED, STEP, UNLOADED, DrawnOutcome, Limit, Loading
 from shellform.reliability.perfect import Perfect, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
 from shellform.structure.elements.threads import side_by_side
@@ -86,15 +86,24 @@ class Workshop:
         finally:
             self._idle.put(own)
 
-    def limit(self, errors: Errors, *, most: float, step: float = STEP, resolution: float = 1 / 64) -> Limit:
-        """Where the structure with the errors loses stability under its growing load."""
+    def limit(
+        self,
+        errors: Errors,
+        *,
+        most: float,
+        step: float = STEP,
+        resolution: float = 1 / 64,
+        tell: bool = True,
+    ) -> Limit:
+        """Where the structure with the errors loses stability under its growing load; what ends its path is looked
+        into only to `tell` it."""
         own = self._taken()
         try:
             loading = Loading(self.nominal, own, errors, 0)
             here, factor = loading.followed(most, step, resolution)
             if here is None:
                 return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
-            kind = BORNE if factor >= most else loading.kind(here)
+            kind = BORNE if factor >= most else (loading.kind(here) if tell else ENDED)
             return Limit(factor, kind, here.state, loading.spent)
         finally:
             self._idle.put(own)

@@ -1,0 +1,206 @@
+"""The judge within a search: few drawn structures, the same for every design, that say much.
+
+They are drawn with all deviations enlarged. If the load that structures bear scatters normally about a mean above the
+one asked for, enlarging by e divides that distance, counted in deviations, by e: with P the normal distribution, a share p
+becomes P(P⁻¹(p) / e), so that what one in a hundred does with errors as they are one in sixteen does with half as much again.
+(Larger errors also lower the mean, which errs on the safe side.) A dozen structures then refuse what else a hundred would be
+needed for. The same numbers are drawn for every design (common random numbers), those that fell before first, and
+no more than it takes to refuse.
+
+The perfect structure's critical factor is asked for beside them, with an allowance for the mesh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from scipy.stats import norm
+
+from shellform.arrays import Reals
+from shellform.errors import NotConverged
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.drawing import Errors, errors_of, variables
+from shellform.reliability.members import Members
+from shellform.reliability.path_of_one import STEP
+from shellform.reliability.perfect import perfect
+from shellform.reliability.safety import Safety, allowed, critical_on_halved, paths
+from shellform.reliability.standing import Workshop
+from shellform.structure.elements.threads import side_by_side
+
+_SEED, _CONFIRMED = (
+    1,
+    100,
+)  # added to the safety's: a search doesn't see the structures that a finished design is judged by
+MOST = 40  # structures by which a search confirms its result
+_AT_ONCE = 4  # structures between two looks at how many have fallen
+_RESOLUTION = 1 / 32  # of the largest load, to which it is known where a structure falls
+_MESH = 1.01  # over the critical factor asked for: what elements of usual length tell too much, twice over
+_SAME = 1e-9  # relative
+
+
+@dataclass(frozen=True)
+class Required:
+    """What a search asks of designs: the `safety`, the dead `loads` (n, 6) under which structures are drawn, the
+    `design_load` among them, and how many of the structures tried may have `fallen` under each."""
+
+    safety: Safety
+    loads: Mapping[str, Reals]
+    design_load: str
+    fallen: Mapping[str, int]
+
+
+@dataclass(frozen=True)
+class AsBuilt:
+    """What is required in each `trial` of a search, and of a fresh sample at its end, `confirmed`."""
+
+    trial: Required
+    confirmed: Required
+
+
+@dataclass(frozen=True)
+class Tried:
+    """Numbers of the structures that have `fallen` under each load as far as it took to say whether the design `stands`,
+    whether the perfect one keeps its `critical` factor, and the `factorisations` spent."""
+
+    fallen: Mapping[str, tuple[int, ...]]
+    critical: bool
+    stands: bool
+    factorisations: int
+
+
+def as_built(
+    shell: Gridshell,
+    start: Design,
+    loads: Mapping[str, Reals],
+    safety: Safety,
+    *,
+    design_load: str = "design",
+) -> AsBuilt:
+    """What is asked of designs that come after `start`, in trials and of a fresh sample under another seed. Raises
+    NotConverged where it has no unloaded equilibrium."""
+    trial = required(shell, start, loads, safety, design_load=design_load)
+    fresh = replace(safety, enlarged=1.0, tried=min(safety.drawn, MOST), seed=safety.seed + _CONFIRMED)
+    if any(trial.fallen[name] > _known(fresh, name, design_load) for name in trial.fallen):
+        return AsBuilt(trial, required(shell, start, loads, fresh, design_load=design_load))
+    known = {name: _known(fresh, name, design_load) for name in trial.fallen}
+    return AsBuilt(trial, Required(fresh, trial.loads, design_load, known))
+
+
+def required(
+    shell: Gridshell,
+    start: Design,
+    loads: Mapping[str, Reals],
+    safety: Safety,
+    *,
+    design_load: str = "design",
+) -> Required:
+    """What is asked of designs that come after `start`: under the design load what the probability says for enlarged
+    errors, or what `start` shows where that is less, for the search would have nowhere to begin; under other loads
+    likewise, by `Safety.required`. Raises NotConverged where it has no unloaded equilibrium."""
+    own = {name: load for name, load in loads.items() if load.any()}
+    every = Required(safety, own, design_load, {name: safety.tried for name in own})
+    shown = tried(shell, start, every, critical=False)
+    fallen = {}
+    for name in own:
+        share = 1.0 - len(shown.fallen[name]) / safety.tried
+        known = _known(safety, name, design_load)
+        by_start = round((1.0 - share) * safety.tried)
+        bound = safety.probability_additional is None or name == design_load
+        fallen[name] = max(known, by_start) if bound else known
+    return Required(safety, own, design_load, fallen)
+
+
+def tried(
+    shell: Gridshell,
+    design: Design,
+    asked: Required,
+    *,
+    first: Sequence[int] = (),
+    critical: bool = True,
+) -> Tried:
+    """The design judged by the search's structures, the numbers `first` before the others. Raises NotConverged where
+    it has no unloaded equilibrium."""
+    safety, spent = asked.safety, 0
+    fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
+    order = [*first, *(number for number in range(safety.tried) if number not in set(first))]
+    larger = _enlarged(safety.tolerances, safety.enlarged)
+    kept = True
+    for largest, shares in paths(asked.loads).items():
+        nominal = perfect(shell, design, asked.loads[largest])
+        workshop = Workshop(nominal)
+        members = nominal.members
+        wanted = 0.0
+        if critical and safety.critical_factor is not None and asked.design_load in shares:
+            wanted = _MESH * safety.critical_factor * shares[asked.design_load]
+
+        def one(
+            number: int, members: Members = members, workshop: Workshop = workshop, wanted: float = wanted
+        ) -> tuple[float, int]:
+            """The share of the largest load that a structure bears; number -1 is the perfect one."""
+            most = 1.0
+            if number < 0:
+                most, errors = wanted, _none(members, safety.seed)
+            else:
+                errors = errors_of(members, larger, variables(members, safety.seed + _SEED, number))
+            found = workshop.limit(errors, most=most, step=STEP, resolution=_RESOLUTION, tell=False)
+            return found.factor, found.factorisations
+
+        queue = [-1, *order] if wanted > 0.0 else order
+        for begin in range(0, len(queue), _AT_ONCE):
+            numbers = queue[begin : begin + _AT_ONCE]
+            for number, (factor, work) in zip(numbers, side_by_side(one, numbers), strict=True):
+                spent += work
+                if number < 0:
+                    kept = factor >= wanted * (1.0 - _SAME)
+                    continue
+                for name, share in shares.items():
+                    if factor < share * (1.0 - _SAME):
+                        fallen[name].append(number)
+            if not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares):
+                return Tried({name: tuple(own) for name, own in fallen.items()}, kept, False, spent)
+    return Tried({name: tuple(own) for name, own in fallen.items()}, kept, True, spent)
+
+
+def stands(shell: Gridshell, design: Design, asked: Required, *, first: Sequence[int] = ()) -> Tried:
+    """As `tried`; a design without unloaded equilibrium doesn't stand."""
+    try:
+        return tried(shell, design, asked, first=first)
+    except NotConverged as error:
+        return Tried({name: () for name in asked.loads}, False, False, error.iterations)
+
+
+def confirm(shell: Gridshell, design: Design, asked: Required) -> Tried:
+    """As `stands`, and with the critical factor kept on the mesh with rod elements halved."""
+    found, factor = stands(shell, design, asked), asked.safety.critical_factor
+    if not found.stands or factor is None:
+        return found
+    end = critical_on_halved(shell, design, asked.loads[asked.design_load], factor)
+    kept = end.factor >= factor * (1.0 - _SAME)
+    return replace(
+        found, critical=kept, stands=kept, factorisations=found.factorisations + end.factorisations
+    )
+
+
+def _known(safety: Safety, name: str, design_load: str) -> int:
+    """How many of the structures tried may fall under a load by the probability that is asked for."""
+    wanted = safety.required(name, design_load, None)
+    return allowed(float(norm.cdf(norm.ppf(wanted) / safety.enlarged)), safety.tried)
+
+
+def _none(members: Members, seed: int) -> Errors:
+    return errors_of(members, Tolerances(), variables(members, seed, 0))
+
+
+def _enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
+    most = 0.5  # the largest share that tolerances take
+    return Tolerances(
+        **{
+            each.name: factor * getattr(tolerances, each.name)
+            if each.name in ("cable_length", "supports", "marks")
+            else float(np.minimum(factor * getattr(tolerances, each.name), most))
+            for each in fields(Tolerances)
+        }
+    )
