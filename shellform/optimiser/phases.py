@@ -232,7 +232,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
             trial, it = _repaired(search, it, trial)
         fits = trial is not None and merit(search, trial) <= budget and violation(search, trial) <= 0.0
         found = sound(search, accepted_design(search, trial)) if trial is not None and fits else None
-        bound = found is None and trial is not None  # by a limit, not by what stands
+        bound = found is None  # by a limit, not by what stands
         if found is not None:
             holds, it = standing(search, it, accepted_design(search, found).built)
             found, it = (found, it) if holds else (None, replace(it, fell=True))
