@@ -18,6 +18,7 @@ from shellform.gridshell.gridshell import Rod as Rod
 from shellform.gridshell.gridshell import brace as brace
 from shellform.gridshell.loads import Region as Region
 from shellform.gridshell.scatter import Scatter as Scatter
+from shellform.gridshell.tolerances import Tolerances as Tolerances
 from shellform.net import refusal as refusal
 from shellform.net.chebyshev import NetTuning as NetTuning
 from shellform.net.chebyshev import pull_net as pull_net
@@ -74,6 +75,9 @@ from shellform.problem.variables import FreeRadius as FreeRadius
 from shellform.problem.variables import Rates as Rates
 from shellform.problem.variables import RestLengths as RestLengths
 from shellform.problem.variables import Variable as Variable
+from shellform.reliability.safety import Judgement as Judgement
+from shellform.reliability.safety import Safety as Safety
+from shellform.reliability.safety import judge as judge
 from shellform.site import calibration as calibration
 from shellform.site import erection as erection
 from shellform.site import retensioning as retensioning

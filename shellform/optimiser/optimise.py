@@ -17,6 +17,12 @@ a window round the present design (proposal.py), and the trial is then evaluated
 - where no better design is found cables are kept taut under the further loads (guards.py), and free again in turns;
 - then cables that the shell can do without are taken away in batches, the others kept taut.
 
+Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures, the same for each
+(trial_structures.py): after the descent, which goes back to the last design that stands; each time cables have been
+taken away, a batch whose design falls too often being refused like any other; and at the end by a fresh sample, for the
+search has chosen its designs by their luck with the first one. Where thinning ends for what stiffness it keeps and not
+for what stands, it goes on with less. There the cables that are left keep a tension that errors don't use up.
+
 The search ends where the model predicts too little improvement in its largest window, where the smallest
 window has no better design, or where the evaluations are used up, and thinning after some single cables in a
 row that can't go; the status says which it was. At the end the cables without tension are taken away and the
@@ -72,12 +78,13 @@ def optimise(
     solver: SequentialConvex | MovingAsymptotes | None = None,
     evaluations: int = 100,
     safety: Safety | None = None,
+    initial: Design | None = None,
     progress: Watch | None = None,
     keep: Keep | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`; with `safety` one that stands as
-    built under the problem's loads; with MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever
+    built under the problem's loads, no less likely than `initial` (None: the start); with MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever
     stands.
 
     `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes
@@ -101,7 +108,9 @@ def optimise(
         if safety is not None:
             share = max(share, safety.stiffness)
             built = {name: problem.loads[name] for name in problem.built_under or problem.loads}
-            asked = as_built(problem.shell, start, built, safety, design_load=problem.design_load.name)
+            asked = as_built(
+                problem.shell, initial or start, built, safety, design_load=problem.design_load.name
+            )
         search, it = begin(
             problem, start, solver, lambda softest: share * softest, evaluations, progress, keep, asked
         )

@@ -27,6 +27,7 @@ from shellform.problem.evaluation import start_weights
 from shellform.problem.paths import deviations, follow
 from shellform.problem.problem import FEASIBLE, Problem
 from shellform.problem.terms import LoadedDesign, measured
+from shellform.reliability.safety import Safety
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.network import assemble
@@ -88,7 +89,9 @@ def tried(
     each with its cables optimised.
 
     `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section; `solver`, another method than `optimise` has by default, which keeps no stiffness and no number of cables. Raises InputError where no section that the net allows is stiff enough.
+    section; `solver`, another method than `optimise` has by default, which keeps no stiffness and no number of cables.
+    What was asked of the optimum as built is asked of each. Raises InputError where no section that the net allows is
+    stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}
@@ -106,6 +109,7 @@ def tried(
             evaluations,
             most_cables,
             solver,
+            None if best.asked is None else best.asked.trial.safety,
         )
         found.append(_candidate(name, other, optimum, why, weights, best.problem, other.rod.section == up))
     return found
@@ -149,6 +153,7 @@ def _optimised(
     evaluations: int,
     most_cables: int | None,
     solver: MovingAsymptotes | None,
+    safety: Safety | None,
 ) -> tuple[Optimum | None, str]:
     """The best design from the first of the starts that leads to a feasible one, or the last found; and why
     it isn't feasible.
@@ -162,6 +167,8 @@ def _optimised(
                 solver=solver
                 or SequentialConvex(stiffness=_share(problem, start, least), most_cables=most_cables),
                 evaluations=evaluations,
+                safety=safety,
+                initial=starts[-1],
             )
         except NotConverged as error:
             why = why or error.what

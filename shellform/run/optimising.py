@@ -12,6 +12,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.case.build_gridshell import rounding_catalogue
 from shellform.case.build_problem import case_problem
+from shellform.case.build_safety import case_safety
 from shellform.case.entries import OptimiseEntry
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
@@ -120,6 +121,7 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
         start,
         solver=_solver(entry),
         evaluations=entry.evaluations,
+        safety=case_safety(workspace.case, shell),
         progress=watch,
         keep=lambda checkpoint: save_checkpoint(workspace.folder, key, checkpoint),
         resume=checkpoint,

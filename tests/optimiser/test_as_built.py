@@ -1,0 +1,116 @@
+"""A search that is asked for designs that stand as built."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.optimiser import trials
+from shellform.reliability.trial_structures import Required, confirm, required, stands, tried
+
+ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
+ASKED = sf.Safety(ROUGH, critical_factor=None, drawn=10, tried=6, seed=5)
+
+
+@pytest.fixture(scope="module")
+def dome():
+    """The vault with wide cells and two elements a segment."""
+    root = Path(__file__).parent.parent.parent
+    surface = sf.cad.build_surface(root / "surfaces/vault.py", size=0.02)
+    net = sf.pull_net(surface, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    rod = sf.Rod.round(young=40e9, radius=0.0012, strength=255e6)
+    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
+    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=surface)
+
+
+@pytest.fixture(scope="module")
+def problem(dome):
+    wet = dome.point_load(4.5, every=2)
+    return sf.Problem(
+        dome,
+        sf.LoadCase("wet", wet),
+        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
+        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+        [sf.LoadCase("wetter", 1.2 * wet)],
+    )
+
+
+@pytest.fixture(scope="module")
+def found(dome, problem):
+    kept = []
+    return sf.optimise(problem, dome.design(), evaluations=30, safety=ASKED, keep=kept.append), kept
+
+
+def test_the_design_found_has_fewer_cables_and_stands_as_a_fresh_sample_says(dome, problem, found):
+    best, _ = found
+    assert best.design.present.sum() < 0.8 * dome.design().present.sum()
+    judged = sf.judge(dome, best.design, problem.loads, replace(ASKED, seed=999), design_load="wet")
+    assert judged.holds, judged.failed
+
+
+def test_a_search_with_safety_resumed_in_thinning_ends_with_the_same_design_to_the_bit(dome, problem, found):
+    whole, kept = found
+    for phase in ("descend", "thin"):
+        place = max(k for k, each in enumerate(kept) if each.numbers["phase"] == phase)
+        again = sf.optimise(problem, dome.design(), evaluations=30, safety=ASKED, resume=kept[place])
+        np.testing.assert_array_equal(again.design.rest_length, whole.design.rest_length)
+        np.testing.assert_array_equal(again.design.present, whole.design.present)
+        assert (again.evaluations, again.status) == (whole.evaluations, whole.status)
+
+
+def test_where_no_accepted_design_stands_the_search_says_so(dome, problem, monkeypatch):
+    def falls(shell, design, asked, *, first=()):
+        found = stands(shell, design, asked, first=first)
+        return replace(found, stands=False)
+
+    monkeypatch.setattr(trials, "stands", falls)
+    best = sf.optimise(
+        problem, dome.design(), evaluations=4, safety=ASKED, solver=sf.SequentialConvex(thin=False)
+    )
+    assert "no design was found that stands as built" in best.status
+
+
+def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(found, monkeypatch):
+    best, _ = found
+    before = best.design
+
+    def only_before(shell, design, asked, *, first=()):
+        own = stands(shell, design, asked, first=first)
+        return replace(own, stands=bool(np.array_equal(design.rest_length, before.rest_length)))
+
+    monkeypatch.setattr(trials, "stands", only_before)
+    monkeypatch.setattr(trials, "confirm", lambda shell, design, asked: only_before(shell, design, asked))
+    polished = sf.polish(best, evaluations=4)
+    np.testing.assert_array_equal(polished.design.rest_length, before.rest_length)
+    assert polished.status == "no design with less misfit was found"
+
+
+def test_structures_that_fell_before_come_first_and_refuse_early(dome, problem):
+    heavy = {"wet": 2.2 * problem.loads["wet"]}
+    asked = Required(ASKED, heavy, "wet", {"wet": 6})
+    every = tried(dome, dome.design(), asked)
+    assert every.fallen["wet"]
+    strict = Required(ASKED, heavy, "wet", {"wet": 0})
+    early = tried(dome, dome.design(), strict, first=every.fallen["wet"][-1:])
+    assert not early.stands
+    assert early.factorisations < every.factorisations
+
+
+def test_no_more_is_asked_of_designs_than_the_start_shows(dome, problem):
+    heavy = {"wet": 1.4 * problem.loads["wet"], "wetter": 2.2 * problem.loads["wet"]}
+    asked = required(dome, dome.design(), heavy, ASKED, design_load="wet")
+    assert asked.fallen["wetter"] > 0
+    assert stands(dome, dome.design(), asked).stands
+    named = required(
+        dome, dome.design(), heavy, replace(ASKED, probability_additional=0.99), design_load="wet"
+    )
+    assert named.fallen["wetter"] == 0
+
+
+def test_a_design_is_confirmed_only_with_its_critical_factor_on_the_halved_mesh(dome, problem):
+    loads = {"wet": problem.loads["wet"]}
+    for factor, holds in ((1.05, True), (5.0, False)):
+        safety = replace(ASKED, critical_factor=factor, tried=1)
+        assert confirm(dome, dome.design(), Required(safety, loads, "wet", {"wet": 1})).stands == holds
