@@ -38,7 +38,7 @@ from shellform.structure.model import Model, write_model  # noqa: E402
 from shellform.structure.network import assemble  # noqa: E402
 from shellform.structure.solve import factorisation, pardiso  # noqa: E402
 from shellform.structure.solve.assembly import Assembly  # noqa: E402
-from shellform.structure.solve.equilibrium import _Walk, find_equilibrium  # noqa: E402
+from shellform.structure.solve.equilibrium import _Relaxation, find_equilibrium  # noqa: E402
 from shellform.structure.solve.residual import ResidualNorm, held  # noqa: E402
 
 HERE = Path(__file__).parent
@@ -82,8 +82,8 @@ def seconds(work: Callable[[], object]) -> float:
     return time.perf_counter() - began
 
 
-def walk(assembly: Assembly, model: Model) -> _Walk:
-    return _Walk(assembly, at_rest(model.network.nodes), model.loads["design"], np.inf)
+def walk(assembly: Assembly, model: Model) -> _Relaxation:
+    return _Relaxation(assembly, at_rest(model.network.nodes), model.loads["design"], np.inf)
 
 
 def iterations(rods: int) -> tuple[list[Row], float, int]:
