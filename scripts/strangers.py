@@ -1,4 +1,5 @@
-"""Makes shells as strangers bring them, and prints what `shellform` makes of each: the corpus of unattended work.
+"""Makes shells as strangers bring them, and prints what `shellform` makes of each: the corpus of unattended
+work.
 
 The forms are classic ones, computed with NumPy alone and written by hand or through trimesh, meshio, rhino3dm
 and (two STEP files) Open CASCADE, in m, mm, cm, in and ft, z up and y up; every file is the same at each run.

@@ -6,7 +6,8 @@
     scripts/study_measure.py table [--rows 100000]    a table of so many rows: written, opened, filtered
     scripts/study_measure.py many [--workers 1000]    so many workers in one process, with designs that sleep: what limits them
 
-Ratios are taken between turns of the same run, since machines are shared: what disturbs one worker's turn disturbs the next turn of two.
+Ratios are taken between turns of the same run, since machines are shared: what disturbs one worker's turn
+disturbs the next turn of two.
 """
 
 from __future__ import annotations
@@ -233,7 +234,8 @@ def table(rows: int) -> None:
 def many(workers: int, seconds: float) -> None:
     """Designs a second that the scheduler, the study's loop and the store can take from so many workers.
 
-    What each worker does for itself several times a second, to look at its memory and its clock, would be done by this process for all.
+    What each worker does for itself several times a second, to look at its memory and its clock, would be
+    done by this process for all.
     """
     import dask
     import distributed  # noqa: F401 (it adds its own settings, before ours)

@@ -3,8 +3,8 @@
     import shellform as sf
     from shellform import cad, render
 
-The public names stand in `__init__.pyi`. Each is loaded when it is first used: `import shellform` itself loads
-no large library.
+The public names stand in `__init__.pyi`. Each is loaded when it is first used: `import shellform` itself
+loads no large library.
 """
 
 from __future__ import annotations

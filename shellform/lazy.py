@@ -19,7 +19,8 @@ from functools import cache
 def homes(package: str) -> dict[str, tuple[str, str]]:
     """Where each public name of the `package` comes from: (module, name there), read from its stub.
 
-    A stub holds `from module import name as name`, the form that exports, and `name = other` for another name.
+    A stub holds `from module import name as name`, the form that exports, and `name = other` for another
+    name.
     """
     found: dict[str, tuple[str, str]] = {}
     for node in ast.parse(pkgutil.get_data(package, "__init__.pyi") or b"").body:

@@ -15,8 +15,8 @@ PACKAGE = Path(__file__).parent.parent / "shellform"
 
 # The floors of each package from the ground up; an import between two of its members points to a lower floor.
 # A module belongs to the longest name here that it starts with. A package that isn't named has no fixed
-# floors inside, and no circle either. The doors to gmsh stand in the middle of the readers: they hand over the same
-# drafts, mended alike, and some readers ask gmsh to mesh what they found.
+# floors inside, and no circle either. The doors to gmsh stand in the middle of the readers: they hand over
+# the same drafts, mended alike, and some readers ask gmsh to mesh what they found.
 FLOORS = {
     "shellform": [
         ["errors", "compiled", "lazy"],

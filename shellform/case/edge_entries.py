@@ -10,8 +10,8 @@ from shellform.case.entries import Entry
 
 
 class EdgeBeamEntry(Entry):
-    """What edge beams are: a bundle of rods, a round one, a tube, a lath, or one from a catalogue. Made in its
-    final curve.
+    """What edge beams are: a bundle of rods, a round one, a tube, a lath, or one from a catalogue. Made in
+    its final curve.
     """
 
     rods: PositiveInt | None = Field(

@@ -47,8 +47,8 @@ Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON and
 
 
 def with_surface_options(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options of a case's table [surface] in the place of its parameter `surface_options`,
-    which gets those that were given, by name.
+    """The command with the options of a case's table [surface] in the place of its parameter
+    `surface_options`, which gets those that were given, by name.
 
     Typer reads a command's options from its signature; so that is where they are put in.
     """

@@ -1,17 +1,17 @@
 """Edge beams: what carries the rods' ends along an edge that doesn't stand on the ground.
 
-They follow the lines that the net has for them (net/edges.py) in straight elements, and are made in their final
-curve, so that they are without stress in the target. Each rod's end is clamped to the beam's axis by a short
-beam across half the gap, as stiff as the edge beam itself and without stress in the target too: the rods are
-bent first, then clamped. Where an edge beam has a foot it is pinned.
+They follow the lines that the net has for them (net/edges.py) in straight elements, and are made in their
+final curve, so that they are without stress in the target. Each rod's end is clamped to the beam's axis by a
+short beam across half the gap, as stiff as the edge beam itself and without stress in the target too: the
+rods are bent first, then clamped. Where an edge beam has a foot it is pinned.
 
 A bundle of n rods of radius r, packed as close as circles pack round a middle one, has with the distances d
 of their axes from the bundle's
 
     A = n π r²,   I = n π r⁴/4 + γ Σ π r² d²/2,   J = 2 n π r⁴/4
 
-where γ is how far they act together: 1 as if glued, 0 loose (the efficiency of EN 1995-1-1, annex B; torsion is
-counted loose). A bundle's outermost fibre lies γ d + r from where its stress is 0.
+where γ is how far they act together: 1 as if glued, 0 loose (the efficiency of EN 1995-1-1, annex B; torsion
+is counted loose). A bundle's outermost fibre lies γ d + r from where its stress is 0.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ _RINGS = 12  # of a bundle, whose rods are counted from the middle: 469 rods
 
 @dataclass(frozen=True)
 class Bundle:
-    """A bundle of `count` solid round rods of `radius`, m, of which `composite` (0 to 1) says how far they act
-    together."""
+    """A bundle of `count` solid round rods of `radius`, m, of which `composite` (0 to 1) says how far they
+    act together."""
 
     radius: float
     count: int
@@ -114,8 +114,8 @@ class EdgeBeam:
 
 
 def edge_beams(net: Net, edge: EdgeBeam | None) -> Beams | None:
-    """The elements of the net's edge beams, then their clamps; None where it has none. Raises InputError where
-    the net has edge beams, but nothing is said of what they are."""
+    """The elements of the net's edge beams, then their clamps; None where it has none. Raises InputError
+    where the net has edge beams, but nothing is said of what they are."""
     if not net.edges:
         return None
     if edge is None:

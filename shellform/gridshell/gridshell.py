@@ -282,12 +282,12 @@ def brace(
     edge: EdgeBeam | None = None,
     edge_cells: bool = False,
 ) -> Gridshell:
-    """The gridshell with a candidate cable on both diagonals of every cell whose corners are all joints, and with
-    `edge_cells` behind them on the one of every cell at the edge that has three.
+    """The gridshell with a candidate cable on both diagonals of every cell whose corners are all joints, and
+    with `edge_cells` behind them on the one of every cell at the edge that has three.
 
     None ends at a support, since supports are no joints, and none rises above the surface `below` which they
-    have to stay. They join the lower rods. `edge` is what the net's edge beams are. Raises InputError where the joint doesn't fit the net or the rod
-    doesn't bear its curvature.
+    have to stay. They join the lower rods. `edge` is what the net's edge beams are. Raises InputError where
+    the joint doesn't fit the net or the rod doesn't bear its curvature.
     """
     if not math.isclose(joint.gap, net.grid.gap, rel_tol=1e-9):
         raise InputError(

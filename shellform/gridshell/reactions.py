@@ -1,5 +1,5 @@
-"""What each support bears under a load: the force of the ground on the shell, split into what presses the foot down,
-what it has to be held down with, and what pushes it sideways.
+"""What each support bears under a load: the force of the ground on the shell, split into what presses the
+foot down, what it has to be held down with, and what pushes it sideways.
 
 A support's reaction is the internal forces of its node less the load that acts on it directly. It is what the
 support pushes the shell with: upwards where the shell rests on it, downwards (uplift) where it holds the
@@ -25,8 +25,8 @@ from shellform.written import write_text
 
 @dataclass(frozen=True)
 class Support:
-    """One support under one load: its number in the net's `supports` and its `node`; the `kind` and `name` of the
-    edge that it belongs to; its `place` (3,), m; the `force` (3,), N, with which it pushes the shell."""
+    """One support under one load: its number in the net's `supports` and its `node`; the `kind` and `name` of
+    the edge that it belongs to; its `place` (3,), m; the `force` (3,), N, with which it pushes the shell."""
 
     number: int
     node: int
@@ -94,8 +94,8 @@ def reactions(shell: Gridshell, design: Design, state: State, load: Reals) -> Re
 
 
 def edge_of(net: Net, nodes: Indices) -> list[tuple[str, str]]:
-    """Kind and name of the held stretch of the edge that is nearest to each of the nodes in the target; where the
-    net doesn't know its edges, the ground."""
+    """Kind and name of the held stretch of the edge that is nearest to each of the nodes in the target; where
+    the net doesn't know its edges, the ground."""
     held = [each for each in net.stretches if each.kind in HELD]
     if not held:
         return [("ground", "")] * len(nodes)

@@ -44,9 +44,9 @@ _CLOSE = 0.05  # of the spacing: ends nearer to each other share a node of the e
 
 @dataclass(frozen=True)
 class Place:
-    """Where a `kind` of edge is: where all that is given holds. `height`: lowest and highest level, m; `box`: two
-    opposite corners (2, 3), m; `curve`: a plan curve (k, 2), m, no farther than `within`, m; `opening`: on
-    the edge of an opening, or on the outer one."""
+    """Where a `kind` of edge is: where all that is given holds. `height`: lowest and highest level, m; `box`:
+    two opposite corners (2, 3), m; `curve`: a plan curve (k, 2), m, no farther than `within`, m; `opening`:
+    on the edge of an opening, or on the outer one."""
 
     kind: str
     name: str = ""

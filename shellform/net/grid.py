@@ -210,8 +210,8 @@ def cells(grid: Grid) -> Indices:
 
 
 def edge_diagonals(grid: Grid) -> Indices:
-    """Crossings (q, 2) at the ends of the one diagonal that a cell of three crossings has; its fourth corner lies
-    beyond the edge."""
+    """Crossings (q, 2) at the ends of the one diagonal that a cell of three crossings has; its fourth corner
+    lies beyond the edge."""
     number = {(int(i), int(j)): k for k, (i, j) in enumerate(grid.lattice)}
     corners = ((0, 0), (1, 0), (1, 1), (0, 1))
     places = sorted({(i - a, j - b) for i, j in number for a, b in corners})

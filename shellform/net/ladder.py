@@ -33,8 +33,8 @@ _REACHED = frozenset({Reason.SHORT, Reason.BROKEN})
 @dataclass(frozen=True)
 class Rung:
     """A change and the reasons it may help `against`: the net turned by `turn`, rad, shifted by `shift`
-    spacings, its shear stiffness times `shear`, its springs of the `density` given, EI/s³, begun `flat`, and its
-    `tuning`."""
+    spacings, its shear stiffness times `shear`, its springs of the `density` given, EI/s³, begun `flat`, and
+    its `tuning`."""
 
     change: Change
     against: frozenset[Reason] = _ANY

@@ -40,8 +40,8 @@ class EdgeLine:
 
 @dataclass(frozen=True)
 class Stretch:
-    """A part of the edge of one `kind` (edges.py): its `name` in the case, if it has one; its `points` (k, 3),
-    m, in order; whether it goes round an `opening`, and whether it is the `whole` closed curve."""
+    """A part of the edge of one `kind` (edges.py): its `name` in the case, if it has one; its `points` (k,
+    3), m, in order; whether it goes round an `opening`, and whether it is the `whole` closed curve."""
 
     kind: str
     name: str
@@ -60,8 +60,8 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Net:
-    """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes that are held: the
-    rods' ends, but for those on edge beams and free ones (edges.py), and the edge beams' feet; `quality`;
+    """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes that are held:
+    the rods' ends, but for those on edge beams and free ones (edges.py), and the edge beams' feet; `quality`;
     `notes`: what was left out; `attempts` at it, the last of which gave it, where the first failed; `edges`:
     the edge beams; `stretches`: what the edge is, part after part (none: not asked)."""
 

@@ -62,8 +62,8 @@ class Change(Enum):
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt at a net: what it changed, its `angle`, rad, and `offset`, spacings, and why it failed; None:
-    it gave the net."""
+    """One attempt at a net: what it changed, its `angle`, rad, and `offset`, spacings, and why it failed;
+    None: it gave the net."""
 
     change: Change
     angle: float

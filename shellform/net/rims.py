@@ -1,4 +1,5 @@
-"""The curves on which a net's rods end: the surface's edges, and where a level or an outline cuts the rods off."""
+"""The curves on which a net's rods end: the surface's edges, and where a level or an outline cuts the rods
+off."""
 
 from __future__ import annotations
 
@@ -19,9 +20,10 @@ _APART = 2.5  # of the spacing: where a net was cut off, ends farther from one a
 
 @dataclass
 class Rim:
-    """A closed curve on which rods end: `points` (k, 3), m; whether it goes round an `opening`; whether the net was
-    `cut` off along it, from its first point, which is on the surface's edge, to its last, or goes round; `kinds` and `names`
-    (k,) of its points, and where the geometry decided (`found`); `along` (k + 1,), m, its arc lengths."""
+    """A closed curve on which rods end: `points` (k, 3), m; whether it goes round an `opening`; whether the
+    net was `cut` off along it, from its first point, which is on the surface's edge, to its last, or goes
+    round; `kinds` and `names` (k,) of its points, and where the geometry decided (`found`); `along` (k + 1,),
+    m, its arc lengths."""
 
     points: Reals
     opening: bool
@@ -45,8 +47,8 @@ class End:
 
 
 def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End], list[Rim]]:
-    """The rods' ends on the curves that they lie on: the surface's edges, then the curve along which a level or
-    an outline cut the rods off."""
+    """The rods' ends on the curves that they lie on: the surface's edges, then the curve along which a level
+    or an outline cut the rods off."""
     nodes, place = net.rod_ends, net.target.positions
     upwards = matrices(net.target.quaternions[nodes])[:, :, 2]
     middle = place[nodes] - net.grid.layer[nodes, None] * upwards

@@ -1,10 +1,10 @@
 """The same design problem for other optimisers: plain functions of its variables, and SciPy's two for smooth
 constrained problems.
 
-What step_model.py does with models in the cables' tensions, SciPy's methods do with values and gradients in the rest
-lengths alone, which tells what the models are worth. SLSQP (Kraft 1988) solves a sequence of quadratic
-problems, each with a line search; trust-constr is an interior point method in a trust region (Byrd, Hribar
-and Nocedal 1999). Both build their curvature from gradients.
+What step_model.py does with models in the cables' tensions, SciPy's methods do with values and gradients in
+the rest lengths alone, which tells what the models are worth. SLSQP (Kraft 1988) solves a sequence of
+quadratic problems, each with a line search; trust-constr is an interior point method in a trust region (Byrd,
+Hribar and Nocedal 1999). Both build their curvature from gradients.
 
 A trial design that leaves the stable branch has no objective. Its `value` is infinite, so that a line search
 or a trust region takes a shorter step; its constraints and derivatives, which must be finite, are those of
@@ -13,10 +13,7 @@ accepted that one isn't told, but it is on the stable branch.
 
 SciPy can't be led to a load by stages: the start must bear all loads.
 
-Measured on a gridshell of 28 candidate cables and 714 degrees of freedom, misfit and cable forces with shares
-of 0.9 and 0.1 (evaluations to the end): optimise 0.4361 (8), SLSQP 0.4360 (119), trust-constr 0.4360
-(79); with cable forces limited and the limit active 0.4461 (7), 0.4588 (90), 0.4457 (26). Where a cable goes
-slack the objective has a kink in its rest length, at which SLSQP stops early.
+Where a cable goes slack the objective has a kink in its rest length, at which SLSQP stops early.
 """
 
 from __future__ import annotations
@@ -38,14 +35,15 @@ from shellform.structure.solve.loading import Loaded
 
 METHODS = ("trust-constr", "SLSQP")
 _KEPT = 12  # points on the branch that are remembered as starts: the last ones and the best
-# SciPy's unit, in the variables: a fifth of the usual prestrain, as the first window of `optimise` is of the tension
+# SciPy's unit, in the variables: a fifth of the usual prestrain, as the first window of `optimise` is of the
+# tension
 _STEP = 2e-3
 _INSIDE = 1e-6  # of the bounds' distance that an interior point starts away from them
 
 
 class Plain:
-    """A problem as plain functions of its variables (s,), values over their unit. `start` (s,); `points`, the designs on the stable branch
-    evaluated last; `history`, all of them."""
+    """A problem as plain functions of its variables (s,), values over their unit. `start` (s,); `points`, the
+    designs on the stable branch evaluated last; `history`, all of them."""
 
     def __init__(self, problem: Problem, start: Design) -> None:
         """Loads the start; raises NotConverged where it doesn't bear all loads."""

@@ -34,7 +34,8 @@ def minimise(
     """NLopt's MMA from `start` (s,) within bounds: the best point and the reason for the stop.
 
     `evaluate(x)` returns the objective, its gradient (s,), the `constraints` values g <= 0 and their
-    gradients (k, s). `caution`: the curvature with which its approximations begin (rho in Svanberg 2002), over NLopt's own.
+    gradients (k, s). `caution`: the curvature with which its approximations begin (rho in Svanberg 2002),
+    over NLopt's own.
     """
     if ((start < lower) | (start > upper)).any():
         raise InputError(

@@ -2,14 +2,11 @@
 
 Where a cable goes slack the tangent loses its stiffness at once. Far from collapse that is a kink like
 others; but a cable that helps to hold the softest mode under an additional load may leave the shell without
-equilibrium, and no derivative tells of it beforehand. Measured on the vault: 121 cables, 114 of them taut
-under 1.2 × the load, the softest mode at 0.84 N/m; a change of all tensions by 0.05 % of their mean made one
-cable go slack there and left 0.59 N/m, one of 0.5 % collapsed, while the derivative of that stiffness
-promised a rise.
+equilibrium, and no derivative tells of it beforehand: that of the mode's stiffness may even promise a rise
+(README, "What was tried").
 
-A guard is the linear model of those tensions under one load: t + (∂t/∂s) Δs, one adjoint solve for each. Kept
-from falling below a floor, they take polishing from no better design at all to 36 % less misfit (the same
-with 80 % of them: 26 %).
+A guard is the linear model of those tensions under one load: t + (∂t/∂s) Δs, one adjoint solve for each, kept
+from falling below a floor.
 """
 
 from __future__ import annotations

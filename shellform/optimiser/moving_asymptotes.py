@@ -1,27 +1,29 @@
-"""The paper's own method (operation 3): the method of moving asymptotes directly in the rest lengths and the radius.
+"""The paper's own method (operation 3): the method of moving asymptotes directly in the rest lengths and the
+radius.
 
 NLopt's MMA (Svanberg 2002) gets the objective (2), the constraints and their derivatives (appendix A) at true
-equilibria, within the bounds (3) and (4). No cables are taken away on the way, no mode is kept stiff: at the end the
-cables that are slack under the design load go, as in the paper, and the design is followed along its documented
-path, whatever it shows there.
+equilibria, within the bounds (3) and (4). No cables are taken away on the way, no mode is kept stiff: at the
+end the cables that are slack under the design load go, as in the paper, and the design is followed along its
+documented path, whatever it shows there.
 
 What the paper leaves open, and how it is done here:
 
-- A trial is evaluated from the states of the nearest design known to be stable (the last ones and the best are
-  remembered), never from a trial that was lost: one snapped shell would lead all later ones astray.
-- A trial that leaves the stable branch is worse than any design: its objective is infinite, so that MMA makes its
-  approximation more conservative, which shortens the step; constraints and derivatives, which must be finite, are
-  those of the nearest stable design.
-- Of a constraint with many values (5) MMA gets the few nearest to their limit, each at its place in the order: they
-  are continuous, and its dual has a variable for each.
-- Further loads that the start doesn't bear are raised in stages. A stage is a run of MMA of its own over a few
-  evaluations, and longer where its best design bears no more; the next one starts from that, with shorter steps.
+- A trial is evaluated from the states of the nearest design known to be stable (the last ones and the best
+  are remembered), never from a trial that was lost: one snapped shell would lead all later ones astray.
+- A trial that leaves the stable branch is worse than any design: its objective is infinite, so that MMA makes
+  its approximation more conservative, which shortens the step; constraints and derivatives, which must be
+  finite, are those of the nearest stable design.
+- Of a constraint with many values (5) MMA gets the few nearest to their limit, each at its place in the
+  order: they are continuous, and its dual has a variable for each.
+- Further loads that the start doesn't bear are raised in stages. A stage is a run of MMA of its own over a
+  few evaluations, and longer where its best design bears no more; the next one starts from that, with shorter
+  steps.
 
-`accepted` in the history means: the best so far, feasible designs by their objective and before all others, which
-stand by their violation. MMA itself doesn't tell which trials it went on from.
+`accepted` in the history means: the best so far, feasible designs by their objective and before all others,
+which stand by their violation. MMA itself doesn't tell which trials it went on from.
 
-NLopt's memory can't be saved. A checkpoint holds what MMA was told since its run began, from which the same run is
-made again without solving anything; so a search that is resumed ends with the same bytes.
+NLopt's memory can't be saved. A checkpoint holds what MMA was told since its run began, from which the same
+run is made again without solving anything; so a search that is resumed ends with the same bytes.
 """
 
 from __future__ import annotations
@@ -59,8 +61,8 @@ class MovingAsymptotes:
     - `rows`: of a constraint with many values, those nearest to their limit that MMA is told.
     - `starts`: stable designs whose states are remembered as starts: the last ones, and the best.
     - `stage`: evaluations at one stage of further loads that the start doesn't bear.
-    - `margin`, `least_margin`: of the whole further load, left between a stage and the end of the stable branch, at
-      first and at last.
+    - `margin`, `least_margin`: of the whole further load, left between a stage and the end of the stable
+      branch, at first and at last.
     """
 
     tolerance: float = 1e-4
@@ -79,8 +81,8 @@ class MovingAsymptotes:
 
 @dataclass(frozen=True)
 class _Told:
-    """What MMA was told of a trial: the `variables` (s,), the `objective` and its `slope` (s,), `rows` (k,) of the
-    constraints and their slopes (k, s)."""
+    """What MMA was told of a trial: the `variables` (s,), the `objective` and its `slope` (s,), `rows` (k,)
+    of the constraints and their slopes (k, s)."""
 
     variables: Reals
     objective: float
@@ -91,10 +93,11 @@ class _Told:
 
 @dataclass
 class _Search:
-    """A search of the `problem` and where it stands, changed in place since NLopt calls back: the `stage` of the
-    further loads and the `margin` before their end; the `best` point of this stage and those to start from, `near`;
-    the `accepted` designs of this stage without their slack cables; what MMA was `told` in its present run, which
-    began with the `caution`, and how much that is `until` the further loads are raised again."""
+    """A search of the `problem` and where it stands, changed in place since NLopt calls back: the `stage` of
+    the further loads and the `margin` before their end; the `best` point of this stage and those to start
+    from, `near`; the `accepted` designs of this stage without their slack cables; what MMA was `told` in its
+    present run, which began with the `caution`, and how much that is `until` the further loads are raised
+    again."""
 
     problem: Problem
     solver: MovingAsymptotes
@@ -149,10 +152,12 @@ def minimise_directly(
     keep: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
-    """The best design that MMA finds from `start` within a number of design `evaluations`, without its slack cables.
+    """The best design that MMA finds from `start` within a number of design `evaluations`, without its slack
+    cables.
 
-    `progress`, `keep` and `resume` as in `optimise`. Raises NotConverged where the start doesn't carry the design
-    load, or no design was found that carries the further ones; InputError where the start lies outside the bounds.
+    `progress`, `keep` and `resume` as in `optimise`. Raises NotConverged where the start doesn't carry the
+    design load, or no design was found that carries the further ones; InputError where the start lies outside
+    the bounds.
     """
     search = _begun(problem, start, solver, evaluations, progress, keep)
     if resume is not None:
@@ -240,8 +245,8 @@ def _tried(search: _Search, x: Reals) -> _Told:
 
 
 def _raise_stage(search: _Search) -> None:
-    """The next stage, from the best design of this one, as near to the whole further loads as that bears; where it
-    bears no more than before, MMA's run goes on."""
+    """The next stage, from the best design of this one, as near to the whole further loads as that bears;
+    where it bears no more than before, MMA's run goes on."""
     evaluator, best, solver = search.evaluator, search.best, search.solver
     state = best.states[search.base]
     stage = reach(evaluator, best.design, state, search.stage, search.margin)
@@ -358,8 +363,8 @@ def _resume(search: _Search, checkpoint: Checkpoint) -> None:
 
 
 def _finished(search: _Search) -> Optimum:
-    """The best design without its slack cables on its documented path; where that doesn't lead it to the design load,
-    the last one before it that it does."""
+    """The best design without its slack cables on its documented path; where that doesn't lead it to the
+    design load, the last one before it that it does."""
     problem, shell, evaluator = search.problem, search.problem.shell, search.evaluator
     if search.stage < 1.0:
         raise NotConverged(

@@ -1,7 +1,7 @@
 """The convex model of one step: the design problem in the cables' tensions, and in what else is varied.
 
-Near an equilibrium under the design load, let the tensions t of all candidate cables and the other variables r
-(the rod radius, a user's own) vary instead of the rest lengths. With the tensions given, cables have no
+Near an equilibrium under the design load, let the tensions t of all candidate cables and the other variables
+r (the rod radius, a user's own) vary instead of the rest lengths. With the tensions given, cables have no
 stiffness of their own; with B = ∂f/∂t (each cable's unit pull on its ends), D = EA/l0 of the taut cables and
 K = K_t + B D B' the tangent, the state answers by
 
@@ -15,8 +15,8 @@ length of
 gives the tension t at length l. In these variables the problem is nearly convex: the sum of tensions is
 linear and a cable dies exactly at t = 0, a bound instead of a kink; a sum of squares q'q, as the misfit d'd,
 is quadratic with the Gauss-Newton matrix (Q X)'(Q X), Q = ∂q/∂x; limits on cable forces are bounds too. X
-itself, a dense matrix of all degrees of freedom, is never kept: its columns are solved for in blocks, of which
-only what the model needs stays.
+itself, a dense matrix of all degrees of freedom, is never kept: its columns are solved for in blocks, of
+which only what the model needs stays.
 
 A cable without tension gets the longest rest length allowed, so that it doesn't quietly help under other
 loads; it can come back. Where no block of variables is the rest lengths of all cables one by one, the model
@@ -59,9 +59,9 @@ class StepModel:
     bounds of the rest lengths. `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,) the
     largest changes of the other values. `length` (c,), m, and `length_by_y` (c, y); `variables_by_y` (s, y)
     of the problem's variables; `parameters_by_y` (c or c + 1, y) of the present rest lengths and, where it
-    moves, the radius; `constraints_by_y` (k, y). `quadratics`: of each term of the objective, None where it has none. `pull` (f, y), the
-    forces on the free degrees of freedom by y, and `middle` (c, y), the changes of tension that make K's
-    answer to them K_t's.
+    moves, the radius; `constraints_by_y` (k, y). `quadratics`: of each term of the objective, None where it
+    has none. `pull` (f, y), the forces on the free degrees of freedom by y, and `middle` (c, y), the changes
+    of tension that make K's answer to them K_t's.
     """
 
     evaluator: Evaluator

@@ -117,8 +117,8 @@ class LargestCableForce(Term):
 
 @dataclass(frozen=True)
 class LeastTension(Term):
-    """The least cable tension, N, of the present cables; `scale`, N, is the size of tensions that matter, such
-    as the limit that it is to keep.
+    """The least cable tension, N, of the present cables; `scale`, N, is the size of tensions that matter,
+    such as the limit that it is to keep.
 
     It is told up to ln(number) / 10 of `scale` too low. Cables longer than `let_out` times their length
     in the target don't count: those which the optimiser has done without (tensions.py).
@@ -134,8 +134,8 @@ class LeastTension(Term):
             raise InputError("must be positive", where="least_tension.scale", value=self.scale)
 
     def measure(self, at: LoadedDesign) -> Measurement:
-        """One value, N, twice `scale` where there are no cables. A slack cable counts with the tension that it would
-        have if it could push, which tells how slack it is.
+        """One value, N, twice `scale` where there are no cables. A slack cable counts with the tension that
+        it would have if it could push, which tells how slack it is.
         """
         design, lengths = at.design, at.shell.cable_lengths
         chosen = np.flatnonzero(design.present & (design.rest_length <= self.let_out * lengths))

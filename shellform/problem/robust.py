@@ -7,12 +7,12 @@ K X = -F, the misfit q = |d + X z + ...|² has, to second order,
     E q = d'd + tr(X'X) + sum of d'x_kk,                             var q = 4 |X'd|² + 2 |X'X|² (Frobenius).
 
 The third term of the mean is the curvature of the equilibria; with y = K⁻¹ d it is -(sum of T(y, x_k, x_k) +
-2 y' dF_k/dx x_k + y'F_kk), T being the third derivative of the energy (third_derivatives.py). The variance is the one of
-linear equilibria: that is a Gauss-Newton approximation. `Spread.mean` has all three terms. On the vault at 3
-N a crossing, supports 0.075 mm off and all else in proportion, 150 samples gave a deviation of 8.4e-5 m²
-where 8.4e-5 were predicted; with twice that scatter 2.7e-4 instead of 1.9e-4: a stiff grid on supports that
-give way is far from linear, and the predicted deviation is then too small (the mean 1.71e-3 instead of
-1.69e-3).
+2 y' dF_k/dx x_k + y'F_kk), T being the third derivative of the energy (third_derivatives.py). The variance is
+the one of linear equilibria: that is a Gauss-Newton approximation. `Spread.mean` has all three terms. On the
+vault at 3 N a crossing, supports 0.075 mm off and all else in proportion, 150 samples gave a deviation of
+8.4e-5 m² where 8.4e-5 were predicted; with twice that scatter 2.7e-4 instead of 1.9e-4: a stiff grid on
+supports that give way is far from linear, and the predicted deviation is then too small (the mean 1.71e-3
+instead of 1.69e-3).
 
 What an optimiser needs is `measure`, and as a term `RobustMisfit`: the Gauss-Newton value d'd + tr(X'X) + k
 sqrt(var q), without the curvature, and its derivative by the rest lengths and the radius. That derivative is

@@ -1,8 +1,9 @@
 """What is varied: blocks of design variables, side by side in one vector.
 
-A block says its size and bounds, reads its values off a design, puts values into one, and says what its change
-does to the model: the rates of the cables' rest lengths and of the rods' radius, on which the parts' forces
-and stiffness depend. The optimiser's own variables are values over a `unit`, so that one step suits them all.
+A block says its size and bounds, reads its values off a design, puts values into one, and says what its
+change does to the model: the rates of the cables' rest lengths and of the rods' radius, on which the parts'
+forces and stiffness depend. The optimiser's own variables are values over a `unit`, so that one step suits
+them all.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
 """Beams that are not straight, or not in line with their nodes, when they are free of stress.
 
-A beam's end triads are A = Q_a F and B = Q_b F, Q the rotations of its nodes and F its frame. Turned ends, A =
-Q_a H_a F and B = Q_b H_b F with constant rotations H, shift the state that is free of stress: an element of
+A beam's end triads are A = Q_a F and B = Q_b F, Q the rotations of its nodes and F its frame. Turned ends, A
+= Q_a H_a F and B = Q_b H_b F with constant rotations H, shift the state that is free of stress: an element of
 length l with its own curvature k (a vector across the axis, 1/m, in the axes of the stress-free state) has
 
     H_a = R(k l / 2),   H_b = R(-k l / 2),
 
-since its ends are turned by -k l / 2 and k l / 2 against the chord when nothing bends it. H multiplies from the right
-and spins from the left, so that forces and tangents with respect to the nodes' spins are those of the
-straight beam at its turned ends: the same kernel serves, every element with ends of its own.
+since its ends are turned by -k l / 2 and k l / 2 against the chord when nothing bends it. H multiplies from
+the right and spins from the left, so that forces and tangents with respect to the nodes' spins are those of
+the straight beam at its turned ends: the same kernel serves, every element with ends of its own.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from shellform.structure.elements.state import State
 
 @dataclass(frozen=True)
 class BentBeams:
-    """`straight` beams whose ends are turned by the unit quaternions `turns` (m, 2, 4) before their nodes turn
-    them."""
+    """`straight` beams whose ends are turned by the unit quaternions `turns` (m, 2, 4) before their nodes
+    turn them."""
 
     straight: Beams
     turns: Reals

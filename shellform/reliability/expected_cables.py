@@ -1,14 +1,16 @@
 """Cables counted for what they are worth when their length isn't known exactly: the expected law.
 
 A cable of length l, rest length l0 and stiffness EA whose stretch m = l - l0 is off by a normal variable of
-deviation s has, on average over that, with k = EA / l0, u = m / s, the normal distribution P and its density p,
+deviation s has, on average over that, with k = EA / l0, u = m / s, the normal distribution P and its density
+p,
 
     energy    E = k ((m² + s²) P(u) + m s p(u)) / 2
     tension   N = dE/dl = k (m P(u) + s p(u))
     slope     dN/dl = k P(u),     d²N/dl² = k p(u) / s.
 
-There is no kink at l = l0: a cable that is taut by a hair gives half its stiffness, and as s -> 0 the sharp law
-of cable.py comes back. By the rest length, at fixed s: dN/dl0 = -N / l0 - k P, d(k P)/dl0 = -k P / l0 - k p / s.
+There is no kink at l = l0: a cable that is taut by a hair gives half its stiffness, and as s -> 0 the sharp
+law of cable.py comes back. By the rest length, at fixed s: dN/dl0 = -N / l0 - k P, d(k P)/dl0 = -k P / l0 - k
+p / s.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""How a drawn structure fails: under which load, in which shape, which cables leave it, which error drives it.
+"""How a drawn structure fails: under which load, in which shape, which cables leave it, which error drives
+it.
 
-Which cause drives a failure is found by taking it away: the same structure is loaded again with one cause's errors
-left out, and what its load factor gains is that cause's part. Gains needn't add up, since causes work together; a
-first-order share about the perfect structure's limit point would add up and be wrong (the collapse starts from
-another path). The cables are those that are slack at the end of the branch and taut in the perfect structure
-under the same load.
+Which cause drives a failure is found by taking it away: the same structure is loaded again with one cause's
+errors left out, and what its load factor gains is that cause's part. Gains needn't add up, since causes work
+together; a first-order share about the perfect structure's limit point would add up and be wrong (the
+collapse starts from another path). The cables are those that are slack at the end of the branch and taut in
+the perfect structure under the same load.
 """
 
 from __future__ import annotations
@@ -30,9 +31,10 @@ _MOST = 1.5  # load factor up to which a structure without one cause is followed
 
 @dataclass(frozen=True)
 class Failure:
-    """Structure `number` fell at the load `factor` by what `kind` tells; `without` has the load factor that it reaches
-    with one cause left out, the most helpful first; `cables` are the numbers of those of the design's cables that
-    have gone slack; `mode` (n, 6), largest translation 1, is the shape in which it gives way from its last `state`."""
+    """Structure `number` fell at the load `factor` by what `kind` tells; `without` has the load factor that
+    it reaches with one cause left out, the most helpful first; `cables` are the numbers of those of the
+    design's cables that have gone slack; `mode` (n, 6), largest translation 1, is the shape in which it gives
+    way from its last `state`."""
 
     number: int
     factor: float

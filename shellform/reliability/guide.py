@@ -1,12 +1,12 @@
-"""A cheap guide to how likely a design stands: the softest mode's stiffness along the whole path, with each cable
-counted for what it is worth under its tolerance (expected_cables.py).
+"""A cheap guide to how likely a design stands: the softest mode's stiffness along the whole path, with each
+cable counted for what it is worth under its tolerance (expected_cables.py).
 
-A perfect structure may count on cables that a length error of a hair leaves slack. At each state of the perfect
-path the tangent is taken with the expected law instead of the sharp one, the deviation of a cable's stretch being
-that of its own length and, to first order, of everything else that is off: for drawn errors the unbalanced
-forces r at the perfect state give dx = K⁻¹ r, and so the change of each cable's stretch. The least of the lowest
-eigenvalues along the path is the guide; below zero, the average structure doesn't stand. It ranks designs and leads a
-search; how likely they stand the sample says.
+A perfect structure may count on cables that a length error of a hair leaves slack. At each state of the
+perfect path the tangent is taken with the expected law instead of the sharp one, the deviation of a cable's
+stretch being that of its own length and, to first order, of everything else that is off: for drawn errors the
+unbalanced forces r at the perfect state give dx = K⁻¹ r, and so the change of each cable's stretch. The least
+of the lowest eigenvalues along the path is the guide; below zero, the average structure doesn't stand. It
+ranks designs and leads a search; how likely they stand the sample says.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ _LEAST = 1e-6  # m, the smallest deviation that is counted
 
 @dataclass(frozen=True)
 class PathStiffness:
-    """The softest mode's `stiffness` (k,), N/m, at the load `factors` (k,) of the path, with cables counted for what
-    they are worth; negative where the average structure has fallen."""
+    """The softest mode's `stiffness` (k,), N/m, at the load `factors` (k,) of the path, with cables counted
+    for what they are worth; negative where the average structure has fallen."""
 
     factors: Reals
     stiffness: Reals
@@ -72,8 +72,8 @@ def expected_stiffness(assembly: Assembly, cables: Cables, state: State, deviati
 def stretch_deviation(
     perfect: Perfect, tolerances: Tolerances, assembly: Assembly, *, seed: int = 0, drawn: int = DRAWN
 ) -> Reals:
-    """Standard deviation (c,), m, of each cable's stretch l - l0 without load, to first order in all errors but the
-    shape's and the load's; where no first order is to be had, that of the cables' own length."""
+    """Standard deviation (c,), m, of each cable's stretch l - l0 without load, to first order in all errors
+    but the shape's and the load's; where no first order is to be had, that of the cables' own length."""
     network, state = perfect.network, perfect.unloaded
     cables, none = network.cables, np.zeros_like(perfect.load)
     own = np.full(len(cables.ends), max(tolerances.cable_length, _LEAST))

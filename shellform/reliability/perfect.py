@@ -1,4 +1,5 @@
-"""The perfect structure of a design or a model file and its path under one load, from which drawn structures start."""
+"""The perfect structure of a design or a model file and its path under one load, from which drawn structures
+start."""
 
 from __future__ import annotations
 
@@ -26,9 +27,9 @@ _NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structu
 
 @dataclass(frozen=True)
 class Perfect:
-    """The perfect structure under one `load` (n, 6): its `network`, `members`, which of the candidate cables are
-    `present`, its unloaded state and those at `factors` (k,) of the load along its path, as far as that goes (all of it: `bears`);
-    `imperfections` of shape."""
+    """The perfect structure under one `load` (n, 6): its `network`, `members`, which of the candidate cables
+    are `present`, its unloaded state and those at `factors` (k,) of the load along its path, as far as that
+    goes (all of it: `bears`); `imperfections` of shape."""
 
     network: Network
     members: Members
@@ -50,8 +51,8 @@ class Perfect:
 
 
 def perfect(shell: Gridshell, design: Design, load: Reals, *, shapes: int = SHAPES) -> Perfect:
-    """The perfect structure of a design and its path under the dead `load` (n, 6). Raises NotConverged where it
-    has no unloaded equilibrium."""
+    """The perfect structure of a design and its path under the dead `load` (n, 6). Raises NotConverged where
+    it has no unloaded equilibrium."""
     return _perfect(
         shell.network(design), members_of(shell), np.asarray(design.present), load, shell.target, shapes
     )

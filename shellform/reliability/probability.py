@@ -4,8 +4,8 @@ With s of n drawn structures standing, the probability of standing is at least
 
     p = Beta⁻¹(1 - c; s, n - s + 1),   0 for s = 0,
 
-with confidence c, whatever it is (Clopper and Pearson 1934, one-sided): the largest p under which so many or more
-standing would come about with a chance of at most 1 - c.
+with confidence c, whatever it is (Clopper and Pearson 1934, one-sided): the largest p under which so many or
+more standing would come about with a chance of at most 1 - c.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ CONFIDENCE = 0.95
 
 @dataclass(frozen=True)
 class Standing:
-    """`standing` of `drawn` structures under `seed` stand: the probability is `at_least` and `at_most` so much,
-    each with the `confidence`."""
+    """`standing` of `drawn` structures under `seed` stand: the probability is `at_least` and `at_most` so
+    much, each with the `confidence`."""
 
     drawn: int
     standing: int

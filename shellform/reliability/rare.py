@@ -1,8 +1,9 @@
 """How rarely a design falls: subset simulation (subset.py) over the errors of its structures.
 
-The limit state of a structure is the load factor at which it loses its stable branch, less the factor 1 of the load
-that it has to bear. Factors are sought up to `MOST`, found to `RESOLUTION`, and beyond that taken as equal: where the
-better part of all structures bears more, the first level's bound lies among those that don't.
+The limit state of a structure is the load factor at which it loses its stable branch, less the factor 1 of
+the load that it has to bear. Factors are sought up to `MOST`, found to `RESOLUTION`, and beyond that taken as
+equal: where the better part of all structures bears more, the first level's bound lies among those that
+don't.
 """
 
 from __future__ import annotations
@@ -29,8 +30,9 @@ _MEDIAN = 0.4549
 
 @dataclass(frozen=True)
 class RareFailure:
-    """`found` by subset simulation; `shares` of each cause in the squared distance of the likeliest failure from the
-    perfect structure, less what as many variables have there by chance (empty where nothing failed)."""
+    """`found` by subset simulation; `shares` of each cause in the squared distance of the likeliest failure
+    from the perfect structure, less what as many variables have there by chance (empty where nothing failed).
+    """
 
     found: Rare
     shares: dict[str, float]
@@ -66,8 +68,9 @@ def _by_cause(members: Members, names: list[str], z: Reals) -> dict[str, Reals]:
 
 
 def _shares(found: Rare, names: list[str], counts: list[int]) -> dict[str, float]:
-    """From the mean of all failed points, in which what has nothing to do with failing nearly cancels; what is left of
-    that is taken from its median, most variables having little to do with it (of a squared normal variable it is 0.4549)."""
+    """From the mean of all failed points, in which what has nothing to do with failing nearly cancels; what
+    is left of that is taken from its median, most variables having little to do with it (of a squared normal
+    variable it is 0.4549)."""
     if not len(found.failed):
         return {}
     squared = found.failed.mean(axis=0) ** 2

@@ -1,15 +1,17 @@
-"""Probabilities of rare failures by subset simulation (Au and Beck 2001, Probabilistic Engineering Mechanics 16, 263).
+"""Probabilities of rare failures by subset simulation (Au and Beck 2001, Probabilistic Engineering Mechanics
+16, 263).
 
 With independent standard normal variables z and a limit state g(z), below zero where the structure fails,
 
     P(g < 0) = P(g < b_1) P(g < b_2 | g < b_1) ... P(g < 0 | g < b_m),
 
 each b_i the quantile of share p_0 of the samples of the level before, so that every factor is about p_0 and a
-probability of 1e-3 takes three levels. Samples of a level come from Markov chains that start in those of the level before
-below its b: a step draws z' = a z + sqrt(1 - a²) e with fresh normal e, which keeps the normal distribution, and is taken if
-g(z') < b (conditional sampling; Papaioannou, Betz, Zwirglmaier and Straub 2015, Probabilistic Engineering Mechanics 41,
-89, whose rule for the step towards a rate of acceptance of 0.44 is used). The coefficient of variation is the
-first-order one of Au and Beck with independent levels, correlations along the chains taken in (their equation 29).
+probability of 1e-3 takes three levels. Samples of a level come from Markov chains that start in those of the
+level before below its b: a step draws z' = a z + sqrt(1 - a²) e with fresh normal e, which keeps the normal
+distribution, and is taken if g(z') < b (conditional sampling; Papaioannou, Betz, Zwirglmaier and Straub 2015,
+Probabilistic Engineering Mechanics 41, 89, whose rule for the step towards a rate of acceptance of 0.44 is
+used). The coefficient of variation is the first-order one of Au and Beck with independent levels,
+correlations along the chains taken in (their equation 29).
 """
 
 from __future__ import annotations
@@ -35,8 +37,9 @@ _ADAPTED = 5  # times a level at which the step is adapted
 
 @dataclass(frozen=True)
 class Rare:
-    """The `probability` of failure, its coefficient of `variation`, `evaluations` of the limit state, the `levels`
-    passed, and the failed points (k, d) of the last one with the one of smallest norm first: the `likeliest`."""
+    """The `probability` of failure, its coefficient of `variation`, `evaluations` of the limit state, the
+    `levels` passed, and the failed points (k, d) of the last one with the one of smallest norm first: the
+    `likeliest`."""
 
     probability: float
     variation: float
@@ -51,8 +54,8 @@ class Rare:
 
 
 def subset_simulation(limit_state: LimitState, size: int, *, count: int, seed: int) -> Rare:
-    """P(g < 0) for `size` standard normal variables with `count` samples a level. Raises InputError for a count
-    that isn't a multiple of ten of at least 20."""
+    """P(g < 0) for `size` standard normal variables with `count` samples a level. Raises InputError for a
+    count that isn't a multiple of ten of at least 20."""
     if count < 20 or count % 10:
         raise InputError("must be a multiple of 10, at least 20", where="count", value=count)
     seeds, length = round(_SHARE * count), round(1.0 / _SHARE)
@@ -114,8 +117,8 @@ def _level(
 
 
 def _square(inside: np.ndarray, chains: np.ndarray, share: float) -> float:
-    """Squared coefficient of variation of a level's share, correlation along the chains included (Au and Beck,
-    equations 25 to 28)."""
+    """Squared coefficient of variation of a level's share, correlation along the chains included (Au and
+    Beck, equations 25 to 28)."""
     number, length = chains.shape
     count = number * length
     held = inside[chains].astype(float)

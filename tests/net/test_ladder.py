@@ -1,5 +1,5 @@
-"""The ladder of attempts: nothing where the first succeeds, the same net each time where it doesn't, and what was
-tried where none helps.
+"""The ladder of attempts: nothing where the first succeeds, the same net each time where it doesn't, and what
+was tried where none helps.
 """
 
 import dataclasses

@@ -1,4 +1,5 @@
-"""The paper's own method: MMA directly in the rest lengths, on a coarse vault and beside a problem of Svanberg's."""
+"""The paper's own method: MMA directly in the rest lengths, on a coarse vault and beside a problem of
+Svanberg's."""
 
 from dataclasses import dataclass
 
@@ -42,8 +43,8 @@ def told(history):
 
 @dataclass(frozen=True)
 class Boxes(Term):
-    """Of five cables, with x = 1000 (1 - rest length over the start's): the weight 0.0624 sum(x) of Svanberg's
-    cantilever of five boxes, or its displacement sum(c / x³)."""
+    """Of five cables, with x = 1000 (1 - rest length over the start's): the weight 0.0624 sum(x) of
+    Svanberg's cantilever of five boxes, or its displacement sum(c / x³)."""
 
     weight: bool
     name = "boxes"
@@ -61,8 +62,8 @@ class Boxes(Term):
 
 def test_svanberg_s_cantilever_of_1987_has_its_optimum_through_the_public_door(coarse):
     """x = (6.016, 5.309, 4.494, 3.502, 2.153), f = 1.340, from x = 5 as printed there. The limit may be
-    broken by a thousandth, and f is flat along it: x is as good as the root of that. Bounds of 1 and 10 as rest
-    lengths."""
+    broken by a thousandth, and f is flat along it: x is as good as the root of that. Bounds of 1 and 10 as
+    rest lengths."""
     start = coarse.design()
     lengths = start.rest_length.copy()
     lengths[:5] *= 1.0 - 5e-3

@@ -79,8 +79,8 @@ def lowest(shell, count=3):
 
 
 def assert_taylor(asked, start):
-    """Value and derivatives of every residual and of the objective along a random direction: what is left over
-    falls with the square of the step."""
+    """Value and derivatives of every residual and of the objective along a random direction: what is left
+    over falls with the square of the step."""
     plain = sf.comparison.Plain(asked, start)
     lower, upper = plain.bounds()
     step = 2e-4 * (upper - lower) * np.random.default_rng(1).normal(size=len(plain.start))

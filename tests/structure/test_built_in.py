@@ -1,4 +1,5 @@
-"""Beams that are without stress in a bent state: edge beams in their final curve, layers locked to each other."""
+"""Beams that are without stress in a bent state: edge beams in their final curve, layers locked to each
+other."""
 
 import numpy as np
 import pytest
@@ -148,8 +149,8 @@ def ring(count, radius=1.5):
 
 
 def test_a_curved_ring_pressed_together_at_two_points_gives_way_as_timoshenko_says():
-    """Strength of Materials II, art. 79: δ = (π/4 - 2/π) P R³ / EI along the load, (2/π - 1/2) P R³ / EI across it, of an
-    inextensible ring; elements are straight, O(h²), and EA is 1e4 EI / R²: 0.2 %."""
+    """Strength of Materials II, art. 79: δ = (π/4 - 2/π) P R³ / EI along the load, (2/π - 1/2) P R³ / EI
+    across it, of an inextensible ring; elements are straight, O(h²), and EA is 1e4 EI / R²: 0.2 %."""
     count, radius, push = 96, 1.5, 0.02
     network, state = curve(ring(count), closed=True)
     quarter = count // 4
@@ -168,8 +169,8 @@ def test_a_curved_ring_pressed_together_at_two_points_gives_way_as_timoshenko_sa
 
 
 def test_a_curved_ring_under_radial_dead_load_shrinks_and_buckles_as_known():
-    """Shrinks by q R² / EA; buckles at 4 EI / R³ where the load keeps its direction (Boresi, J. Appl. Mech. 22 (1955) 95;
-    3 EI / R³ is for water pressure, 4.5 where it stays aimed at the centre)."""
+    """Shrinks by q R² / EA; buckles at 4 EI / R³ where the load keeps its direction (Boresi, J. Appl. Mech.
+    22 (1955) 95; 3 EI / R³ is for water pressure, 4.5 where it stays aimed at the centre)."""
     count, radius = 96, 1.5
     network, state = curve(ring(count), closed=True)
     fixed = np.array(network.fixed)
@@ -192,7 +193,8 @@ def test_a_curved_ring_under_radial_dead_load_shrinks_and_buckles_as_known():
 
 
 def test_the_thrust_of_a_two_hinged_semicircular_arch_is_its_load_over_pi():
-    """Timoshenko and Young, Theory of Structures, art. 9.3: H = P / π under a load at the crown, inextensible."""
+    """Timoshenko and Young, Theory of Structures, art. 9.3: H = P / π under a load at the crown,
+    inextensible."""
     count, radius, push = 129, 2.0, 0.5
     angle = np.pi * np.arange(count) / (count - 1)
     place = radius * np.column_stack([np.cos(angle), 0.0 * angle, np.sin(angle)])
@@ -210,8 +212,8 @@ def test_the_thrust_of_a_two_hinged_semicircular_arch_is_its_load_over_pi():
 
 
 def test_laths_locked_in_a_curve_spring_back_as_two_springs_in_parallel_do():
-    """Bent by κ and locked by blocks that add the stiffness B to theirs, b: let go, b κ' + B (κ' - κ) = 0. The blocks'
-    rest length is the chord, the laths' the arc: 3e-6."""
+    """Bent by κ and locked by blocks that add the stiffness B to theirs, b: let go, b κ' + B (κ' - κ) = 0.
+    The blocks' rest length is the chord, the laths' the arc: 3e-6."""
     count, bent, own, added = 33, 0.8, 3.0, 24.0
     along = np.linspace(0.0, 1.0, count)
     flat = np.column_stack([along, 0.0 * along, 0.0 * along])

@@ -72,8 +72,8 @@ def test_every_solver_solves_and_counts_negative_eigenvalues(backend, monkeypatc
 
 
 def overtaken(monkeypatch, first, second):
-    """What `first` returns where a second thread runs `second` between the setting of CHOLMOD's option and its
-    use, unless a lock keeps it out.
+    """What `first` returns where a second thread runs `second` between the setting of CHOLMOD's option and
+    its use, unless a lock keeps it out.
     """
     real, inside, done = factorisation.cholmod, threading.Event(), threading.Event()
     other = threading.Thread(target=second)

@@ -40,8 +40,8 @@ _LAYERS = {
 def write_exports(
     folder: str | Path, built: Built, target: Surface, loads: Mapping[str, Reals], *, load: str = "design"
 ) -> list[Path]:
-    """Writes gridshell.vtu, .3dm, .glb, .step and, but for designs with edge beams, gridshell-opensees.py for the geometry
-    under `load`; returns the files.
+    """Writes gridshell.vtu, .3dm, .glb, .step and, but for designs with edge beams, gridshell-opensees.py for
+    the geometry under `load`; returns the files.
 
     `loads` (n, 6) by name. The .step is left out where gmsh can't be loaded (`no_step` says why). Raises
     InputError for an unknown load and where files can't be written.

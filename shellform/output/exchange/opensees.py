@@ -1,18 +1,19 @@
 """A script for OpenSeesPy that computes a load case of a network anew: for a second opinion.
 
-The nodes stand where they are free of stress (a gridshell's flat grid), and so do the co-rotational elements on
-them. The displacements and rotations of the unloaded, bent state are given to them in one step: from zero, a
-node's rotation vector is its total rotation, which is what OpenSees' co-rotational transformation takes from
-its first increment. Elements notice what their nodes were given only after a solution: a first analysis, with
-all nodes held but for one degree of freedom, does that (without it the first iteration begins with the cables'
-prestress alone and is lost). Then everything but the supports is let go, equilibrium without load is found from
-there, and the load is applied in increments by full Newton-Raphson, with a line search where that fails.
+The nodes stand where they are free of stress (a gridshell's flat grid), and so do the co-rotational elements
+on them. The displacements and rotations of the unloaded, bent state are given to them in one step: from zero,
+a node's rotation vector is its total rotation, which is what OpenSees' co-rotational transformation takes
+from its first increment. Elements notice what their nodes were given only after a solution: a first analysis,
+with all nodes held but for one degree of freedom, does that (without it the first iteration begins with the
+cables' prestress alone and is lost). Then everything but the supports is let go, equilibrium without load is
+found from there, and the load is applied in increments by full Newton-Raphson, with a line search where that
+fails.
 
 Cables are co-rotational trusses of a material without compression: with the strain e over the distance L of
 their stress-free nodes, N = EA (l - l⁰)/l⁰ = (EA L/l⁰) (e + 1 - l⁰/L) where positive.
 
-OpenSees' frames are linear in their co-rotated frame as ours are, but turn that frame otherwise: both agree as
-elements get shorter.
+OpenSees' frames are linear in their co-rotated frame as ours are, but turn that frame otherwise: both agree
+as elements get shorter.
 """
 
 from __future__ import annotations

@@ -21,8 +21,9 @@ def edge_names(net: Net) -> list[str]:
 
 
 def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], rods: Sequence[str]) -> Table:
-    """The edge beams, a line a node of their axes in the target: where it is, how far along the beam, and which
-    rod's end is clamped to it; the section forces there in each of the `states`. `rods` are the rods' names."""
+    """The edge beams, a line a node of their axes in the target: where it is, how far along the beam, and
+    which rod's end is clamped to it; the section forces there in each of the `states`. `rods` are the rods'
+    names."""
     net, beams = shell.net, shell.beams(design.radius)
     place = shell.target.positions
     ends = {

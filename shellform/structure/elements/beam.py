@@ -204,8 +204,8 @@ def built_in(
     kind: str,
 ) -> Beams:
     """Beams without stress in the `state` of their nodes, clamped to these as they are turned there: what is
-    built into a bent structure. `ends` (m, 2); stiffness as in `make_beams`, where 0 is allowed: the beam adds
-    none of it; `z_axis` (m, 3) any vector in the local x-z plane in that state; all of one `kind`.
+    built into a bent structure. `ends` (m, 2); stiffness as in `make_beams`, where 0 is allowed: the beam
+    adds none of it; `z_axis` (m, 3) any vector in the local x-z plane in that state; all of one `kind`.
 
     Raises InputError for beams without length and a z axis along the beam.
     """

@@ -1,8 +1,8 @@
 """Readers of foreign libraries and of nested formats in a process of their own, so that a crash, a hang or a
 flood of memory in them becomes a message.
 
-The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.7 s), reads, and leaves its arrays in a
-file.
+The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.7 s), reads, and leaves its
+arrays in a file.
 """
 
 from __future__ import annotations

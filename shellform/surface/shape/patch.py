@@ -5,8 +5,8 @@ The patch is a quartic Bézier triangle with Gregory's rational inner points (Wa
 triangular G1 patch from boundary curves"), made of the triangle's three corners and their normals alone:
 
 - an edge is the cubic that leaves both ends in the direction of the chord seen in the tangent plane there;
-  with arms of 2/3 c / (1 + cos a), c the chord and a the angle between it and the tangent, it follows a circle
-  to the sixth power of the angle;
+  with arms of 2/3 c / (1 + cos a), c the chord and a the angle between it and the tangent, it follows a
+  circle to the sixth power of the angle;
 - along an edge the tangent plane is spanned by the edge's derivative W(s) and a quadratic field A(s) between
   the binormals at its two ends, which both neighbours share; the row of control points next to the edge is
   M = (L + L') / 2 + lambda W + mu A with lambda and mu linear in s, found from its two ends.
