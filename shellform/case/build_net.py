@@ -95,7 +95,7 @@ def net_of(
 
 
 def edges_of(case: Case) -> Edges:
-    """What the case's edges stand on; those that are filled stand on the ground, or are as high as they are."""
+    """What the case's edges stand on; filled ones stand on the ground, or are as high as they are."""
     entry = case.edges
     places = tuple(
         Place(

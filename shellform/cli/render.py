@@ -45,7 +45,8 @@ def render(
     from shellform.run.folder import read_run
 
     asked = wish(
-        design=design, load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods, transparent=transparent,
+        design=design, load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods,
+        transparent=transparent,
         kind=kind, film=film,
     )  # fmt: skip
     if film is None:

@@ -67,7 +67,7 @@ class Bundle:
 
     @property
     def constants(self) -> tuple[float, float, float, float]:
-        """A, J, I_y, I_z by the formulas above, I the mean of both axes, between which a bundle's is turned."""
+        """A, J, I_y, I_z by the formulas above, I the mean of both axes: a bundle turns between them."""
         own, area = 0.25 * math.pi * self.radius**4, math.pi * self.radius**2
         apart = 0.5 * float((self._places**2).sum())
         inertia = self.count * own + self.composite * area * apart
@@ -133,7 +133,8 @@ def edge_beams(net: Net, edge: EdgeBeam | None) -> Beams | None:
     across = np.eye(3)[np.argmin(np.abs(reach), axis=1)]
     first, second = (
         built_in(
-            net.target, ends, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z, z_axis=z, kind=kind
+            net.target, ends, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z,
+            z_axis=z, kind=kind
         )
         for ends, z, kind in ((along, upwards, EDGE), (clamps, across, CLAMP))
     )  # fmt: skip

@@ -202,7 +202,7 @@ class Gridshell:
         return {ROD: self.rod.resized(radius).section}
 
     def beams(self, radius: float) -> Beams:
-        """Rods of the radius, m, and connectors; then the edge beams with their clamps, whatever the radius."""
+        """Rods of the radius, m, and connectors; then edge beams and their clamps, whatever the radius."""
         own = grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
         return own if self._edges is None else joined(own, self._edges)
 

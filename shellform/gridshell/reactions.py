@@ -107,7 +107,8 @@ def edge_of(net: Net, nodes: Indices) -> list[tuple[str, str]]:
 def write_reactions(path: Path, found: dict[str, Reactions]) -> None:
     """One line a support and load case as CSV."""
     lines = [
-        "support,node,kind,name,x [m],y [m],z [m],load,Fx [N],Fy [N],Fz [N],pressure [N],uplift [N],thrust [N]"
+        "support,node,kind,name,x [m],y [m],z [m],load,Fx [N],Fy [N],Fz [N],pressure [N],uplift [N],thrust "
+        "[N]"
     ]
     for load, each in found.items():
         for one in each.supports:

@@ -22,20 +22,30 @@ SCALE_MODEL_BELOW: Final = 2.0  # m of span
 _LARGEST_SHARE: Final = 0.5  # relative deviations beyond this are no tolerances
 
 SOURCES: Final[Mapping[str, str]] = {
-    "cable_length": "cut length and turnbuckle: EN 1090-2 annex B, length of a cut member, 2 mm + L/5000; scale model: set "
+    "cable_length": "cut length and turnbuckle: EN 1090-2 annex B, length of a cut member, 2 mm + L/5000; "
+    "scale model: set "
     "by callipers to 0.1 mm",
-    "cable_stiffness": "EN 12385-10 and VDI 2358 leave the modulus of a strand to tests; 5 % about the maker's mean",
-    "supports": "DIN 18202 table 1 permits 10 mm in plan up to 1 m between points that are set out, two deviations; scale "
+    "cable_stiffness": "EN 12385-10 and VDI 2358 leave the modulus of a strand to tests; 5 % about the "
+    "maker's mean",
+    "supports": "DIN 18202 table 1 permits 10 mm in plan up to 1 m between points that are set out, two "
+    "deviations; scale "
     "model: drilled base plate, 0.1 mm",
-    "marks": "scribed to 1 mm, beside half of what a tape of class II may be off (2004/22/EC: 0.3 mm + 0.2 mm/m); scale "
+    "marks": "scribed to 1 mm, beside half of what a tape of class II may be off (2004/22/EC: 0.3 mm + 0.2 "
+    "mm/m); scale "
     "model: 0.2 mm",
-    "rod_stiffness": "JCSS Probabilistic Model Code part 3.2, modulus of elasticity: coefficient of variation 0.03",
-    "rod_bow": "EN 10219-2 (tubes) and EN 13706-2 (pultruded profiles): bow of 0.2 % of the length, two deviations",
-    "connectors": "couplers of one make scatter by 10 % about their mean stiffness in tests (EN 74-1 asks for its characteristic)",
-    "load_each": "thickness of 50 mm to 10 mm, two deviations (EN 13670, 10.6): 10 % of what a crossing carries",
-    "load_all": "JCSS Probabilistic Model Code part 2.1: concrete's density 0.04, with the mean thickness 0.05 together",
+    "rod_stiffness": "JCSS Probabilistic Model Code part 3.2, modulus of elasticity: coefficient of "
+    "variation 0.03",
+    "rod_bow": "EN 10219-2 (tubes) and EN 13706-2 (pultruded profiles): bow of 0.2 % of the length, two "
+    "deviations",
+    "connectors": "couplers of one make scatter by 10 % about their mean stiffness in tests (EN 74-1 asks "
+    "for its characteristic)",
+    "load_each": "thickness of 50 mm to 10 mm, two deviations (EN 13670, 10.6): 10 % of what a crossing "
+    "carries",
+    "load_all": "JCSS Probabilistic Model Code part 2.1: concrete's density 0.04, with the mean thickness "
+    "0.05 together",
     "load_uneven": "EN 12812, 8.2.5: concrete is placed unevenly; one half 5 % more and the other 5 % less",
-    "shape": "EN 1993-1-6, 8.7: imperfections in the shape of the softest modes; half of L/1000, what other causes don't hold",
+    "shape": "EN 1993-1-6, 8.7: imperfections in the shape of the softest modes; half of L/1000, what other "
+    "causes don't hold",
 }
 
 

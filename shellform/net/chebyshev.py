@@ -177,7 +177,8 @@ def _short(bare: int, angle: float) -> NoNet:
         Reason.SHORT,
         f"the net doesn't cover the surface: {bare} rods end short of its edge at {np.rad2deg(angle):.4g}°",
         where="net.angle",
-        remedy="Try another angle or a smaller spacing; a surface that is curved too much takes no single net.",
+        remedy="Try another angle or a smaller spacing; a surface that is curved too much takes no single "
+        "net.",
     )
 
 

@@ -102,7 +102,8 @@ def best_orientation(
                 found.append(trial)
                 said = f"cost {trial.cost:.4g}" if math.isfinite(trial.cost) else "no net"
                 progress(
-                    f"{name} {k}/{len(jobs)}: angle {math.degrees(trial.angle):.1f}°, offset {trial.offset}: {said}"
+                    f"{name} {k}/{len(jobs)}: angle {math.degrees(trial.angle):.1f}°, offset {trial.offset}: "
+                    f"{said}"
                 )
             return found
 

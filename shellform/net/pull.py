@@ -149,11 +149,13 @@ def pull(
             )
         except NotConverged as error:
             raise Stalled(
-                f"The grid could not be pulled onto the surface with springs of density {density:g}: {error.what}",
+                f"The grid could not be pulled onto the surface with springs of density {density:g}: "
+                f"{error.what}",
                 state=error.state,
                 residual=error.residual,
                 iterations=spent + error.iterations,
-                remedy="Try a smaller spacing, another angle, more shear_stiffness, or more steps in spring_density.",
+                remedy="Try a smaller spacing, another angle, more shear_stiffness, or more steps in "
+                "spring_density.",
             ) from error
         state, spent = found.state, spent + found.factorisations
     assert springs is not None

@@ -21,8 +21,8 @@ from shellform.structure.elements.parts import Evaluation
 from shellform.structure.elements.state import State
 
 Distance = Callable[[Reals], tuple[Reals, Reals, Reals]]
-"""From points (k, 3), m, to signed distances (k,), m, their gradients (k, 3) and packed lower Hessians (k, 6),
-1/m."""
+"""From points (k, 3), m, to signed distances (k,), m, their gradients (k, 3) and packed lower Hessians
+(k, 6), 1/m."""
 
 _LOWER = np.tril_indices(3)
 

@@ -36,7 +36,8 @@ def gridshell_png(shell: Gridshell) -> bytes:
     none = np.zeros(len(shell.cable_ends))
     title = f"gridshell of {len(shell.net.grid.rods)} rods, {len(shell.cable_ends)} candidate cables"
     panel = Panel(
-        title, net.positions, net.beams, net.deviation, shell.cable_ends, none, net.supports, net.load_points, net.rod_radius,
+        title, net.positions, net.beams, net.deviation, shell.cable_ends, none, net.supports, net.load_points,
+        net.rod_radius,
         net.quantity, net.unit,
     )  # fmt: skip
     return _png([[panel]], Look(limit=net_maps.limit_of(panel), size=_SIZE))

@@ -269,7 +269,8 @@ def start_weights(problem: Problem, start: Design, reached: Mapping[str, Loaded]
 def not_carried(name: str, loaded: Loaded, remedy: str) -> NotConverged:
     """What to say of an initial design that doesn't bear a load case."""
     return NotConverged(
-        f"The initial design doesn't carry the load case {name!r}: it loses stability at {loaded.share:.2f} of it",
+        f"The initial design doesn't carry the load case {name!r}: it loses stability at {loaded.share:.2f} "
+        f"of it",
         state=loaded.equilibrium.state,
         remedy=remedy,
     )

@@ -68,8 +68,10 @@ class Spread:
     def sentences(self) -> list[str]:
         """Mean and deviation, and the causes by their share of the scatter."""
         result = [
-            f"The misfit is {self.mean:.3g} ± {self.deviation:.2g} m² on average, against {self.nominal:.3g} m² without scatter "
-            f"(Gauss-Newton deviation; {self.curvature:+.2g} m² of the mean from the curvature of the equilibria)."
+            f"The misfit is {self.mean:.3g} ± {self.deviation:.2g} m² on average, against {self.nominal:.3g} "
+            f"m² without scatter "
+            f"(Gauss-Newton deviation; {self.curvature:+.2g} m² of the mean from the curvature of the "
+            f"equilibria)."
         ]
         for name, (spread, _) in sorted(self.causes.items(), key=lambda each: -each[1][0]):
             result.append(f"{100.0 * spread:.1f} % of the scatter of the shape comes from {name}.")

@@ -67,7 +67,7 @@ class ExpectedCables:
         return Evaluation(energy, force, packed if into is None else into)
 
     def force_by_rest_length(self, state: State) -> Reals:
-        """Derivative (c, 6), N/m, of the end forces by the own rest length at fixed geometry and deviation."""
+        """Derivative (c, 6), N/m, of the end forces by the own rest length, geometry and deviation fixed."""
         chord = state.positions[self.cables.ends[:, 1]] - state.positions[self.cables.ends[:, 0]]
         length = np.linalg.norm(chord, axis=1)
         _, tension, slope, _ = self._law(length)

@@ -57,7 +57,7 @@ def most_likely(outcomes: tuple[DrawnOutcome, ...]) -> DrawnOutcome | None:
 
 
 def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: int) -> Failure:
-    """Of one fallen structure. Raises InputError where it has no unloaded state to tell of or bears its load."""
+    """Of one fallen structure. Raises InputError where it has no unloaded state or bears its load."""
     nominal = workshop.nominal
     z = variables(nominal.members, seed, number)
     errors = errors_of(nominal.members, tolerances, z)

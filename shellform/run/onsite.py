@@ -165,8 +165,10 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     size = len(goal)
     lines = [
         *doubts,
-        f"{len(places)} nodes were seen; the grid lies {_mm(step.misfit_before, size)} mm from where it should be (root mean square)",
-        f"{count} cables to turn, {int(np.abs(step.turns).sum())} turns of {1e3 * options.step:g} mm; afterwards {_mm(step.misfit_after, size)} mm are predicted"
+        f"{len(places)} nodes were seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
+        f"should be (root mean square)",
+        f"{count} cables to turn, {int(np.abs(step.turns).sum())} turns of {1e3 * options.step:g} mm; "
+        f"afterwards {_mm(step.misfit_after, size)} mm are predicted"
         if count
         else "no turn is worth taking: what is left is below what the survey can see or the crew can do",
     ]
@@ -272,9 +274,11 @@ def erect(
     return SiteResult(
         [
             f"{len(done.steps)} steps: {', '.join(dict.fromkeys(each.stage for each in done.steps))}",
-            f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the strength, at {worst.share:.2f} of {worst.stage}; "
+            f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the "
+            f"strength, at {worst.share:.2f} of {worst.stage}; "
             f"{1e-6 * last.stress:.0f} MPa in the end",
-            f"largest cable tension {max(each.tension for each in done.steps):.3g} N, largest force on a support {max(each.reaction for each in done.steps):.3g} N",
+            f"largest cable tension {max(each.tension for each in done.steps):.3g} N, largest force on a "
+            f"support {max(each.reaction for each in done.steps):.3g} N",
         ],
         files,
     )
@@ -344,9 +348,11 @@ def _surveyed(
         worst = int(np.argmax(away))
         if away[worst] > 0.5 * shell.net.spacing:
             raise InputError(
-                f"node {nodes[worst]} lies {1e3 * away[worst]:.1f} mm from where it is expected, more than half a spacing",
+                f"node {nodes[worst]} lies {1e3 * away[worst]:.1f} mm from where it is expected, more than "
+                f"half a spacing",
                 where=str(path),
-                remedy="Check the unit, the axes and the numbering; leave the columns node and crossing out to have points laid onto the model.",
+                remedy="Check the unit, the axes and the numbering; leave the columns node and crossing out "
+                "to have points laid onto the model.",
             )
         return nodes, places, []
     points = read_points(path, unit=options.unit)

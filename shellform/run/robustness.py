@@ -49,7 +49,8 @@ class Robustness:
         drawn = len(self.sample.misfits) + self.sample.lost
         return [
             f"{self.sample.lost} of {drawn} structures drawn have no equilibrium on the stable branch: the "
-            "design is too near the end of its path for this scatter. Limit its critical factor, or the robust "
+            "design is too near the end of its path for this scatter. Limit its critical factor, or the "
+            "robust "
             "misfit."
         ]
 

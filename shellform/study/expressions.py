@@ -104,7 +104,8 @@ def _value(node: ast.AST, where: str, entry: Callable[[str], float]) -> Any:
         "isn't arithmetic",
         where=where,
         value=ast.unparse(node),
-        remedy=f"Known are numbers, entries like net.spacing, + - * / // % **, comparisons, a if c else b, pi, {', '.join(_FUNCTIONS)}.",
+        remedy=f"Known are numbers, entries like net.spacing, + - * / // % **, comparisons, a if c else b, "
+        f"pi, {', '.join(_FUNCTIONS)}.",
     )
 
 

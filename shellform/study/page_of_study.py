@@ -61,7 +61,8 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
         notes.append("No run was kept (keep), so that there are no pictures.")
     if pictures:
         notes.append(
-            f"Pictures: distance from the target under the design load, from 0 (dark) to {1e3 * limit:.3g} mm (yellow)."
+            f"Pictures: distance from the target under the design load, from 0 (dark) to {1e3 * limit:.3g} "
+            f"mm (yellow)."
         )
     content = StudyContent(
         title=entry.title or f"Study of {entry.case}",

@@ -35,7 +35,8 @@ def test_a_crash_and_a_hang_of_the_reader_are_counted_and_cost_nobody_anything(t
     child.write_text(
         "import os, sys, time\nprint('ready', flush=True)\n"
         "for line in sys.stdin:\n    number = line.split()[1]\n"
-        "    time.sleep(9) if number == '2' else os._exit(3) if number == '1' else print('read', flush=True)\n"
+        "    time.sleep(9) if number == '2' else os._exit(3) if number == '1' else "
+        "print('read', flush=True)\n"
     )
     monkeypatch.setattr(own, "__file__", str(child))
     monkeypatch.setattr(own, "_LONGEST", 0.2)

@@ -54,7 +54,8 @@ def test_a_net_alone_is_told_in_json_or_not_at_all(tmp_path):
 def test_a_study_is_told_in_json_or_not_at_all(tmp_path):
     file = study_file(
         tmp_path,
-        'until = "net"\n[vary]\nnet.angle = [0.0, 45.0]\n[column]\ncrossings = "net.crossings"\nnone = "net.none"\n',
+        'until = "net"\n[vary]\nnet.angle = [0.0, 45.0]\n[column]\ncrossings = "net.crossings"\n'
+        'none = "net.none"\n',
     )
     arguments = ("study", file, "--output", tmp_path / "out", "--workers", "1")
     quiet = shellform(*arguments, "--quiet")

@@ -143,7 +143,8 @@ def test_opensees_refuses_what_it_cannot_say(arches, solved):
     shell, load = arches
     with pytest.raises(InputError, match="built into the bent state") as caught:
         opensees_script(
-            shell.network(shell.design()), [solved["none"], solved["design"]], load, title="t", name="n", case="c"
+            shell.network(shell.design()), [solved["none"], solved["design"]], load, title="t", name="n",
+            case="c"
         )  # fmt: skip
     assert "shellform analyse" in caught.value.remedy
 
@@ -151,7 +152,8 @@ def test_opensees_refuses_what_it_cannot_say(arches, solved):
 def test_stiffer_edge_beams_hold_the_shape_better(arches, solved):
     shell, _ = arches
     stiff = replace(shell, edge=EdgeBeam(Rectangle(0.02, 0.02, GFRP)))
-    state = find_equilibrium(assemble(stiff.network(stiff.design())), stiff.target, np.zeros((len(shell.net.grid.flat), 6))).state  # fmt: skip
+    unloaded = np.zeros((len(shell.net.grid.flat), 6))
+    state = find_equilibrium(assemble(stiff.network(stiff.design())), stiff.target, unloaded).state
     off = [
         np.linalg.norm(each.positions - shell.target.positions, axis=1).max()
         for each in (solved["none"], state)
@@ -206,7 +208,8 @@ def test_a_bundle_s_derivatives_are_those_of_its_constants_and_stresses(composit
 
 def test_bundles_that_are_none_are_refused():
     for radius, count, composite, where in (
-        (0.0, 7, 0.5, "radius"), (0.01, 0, 0.5, "rods"), (0.01, 500, 0.5, "rods"), (0.01, 7, 1.5, "composite"),
+        (0.0, 7, 0.5, "radius"), (0.01, 0, 0.5, "rods"), (0.01, 500, 0.5, "rods"),
+        (0.01, 7, 1.5, "composite"),
     ):  # fmt: skip
         with pytest.raises(InputError) as caught:
             Bundle(radius, count, composite, Material(1e9, 4e8))

@@ -19,7 +19,8 @@ def barrel(length=0.8, radius=0.5, half=0.9, raised=0.0):
     """A barrel vault on two straight lines along x, an arch at either end; `raised` m over z = 0."""
     x, angle = (
         each.ravel()
-        for each in np.meshgrid(np.linspace(-length / 2, length / 2, 40), np.linspace(-half, half, 40), indexing="ij")
+        for each in np.meshgrid(np.linspace(-length / 2, length / 2, 40), np.linspace(-half, half, 40),
+        indexing="ij")
     )  # fmt: skip
     place = np.column_stack([x, radius * np.sin(angle), radius * (np.cos(angle) - np.cos(half)) + raised])
     return _sheet(place, 40, 40)

@@ -1,4 +1,4 @@
-"""Drawn structures: the same whatever else is drawn, loaded as `shellform analyse` loads them, and counted."""
+"""Drawn structures: the same whatever else is drawn, loaded as `shellform analyse` does, and counted."""
 
 from dataclasses import replace
 

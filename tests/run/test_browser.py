@@ -134,7 +134,8 @@ def test_the_view_draws_the_shell_and_the_summary_stands_on_the_first_screen(vis
         box = page.get_by_text(words).first.bounding_box()
         assert box["y"] + box["height"] < 900
     page.wait_for_function(
-        "[...document.querySelectorAll('.gallery img')].every((each) => each.complete && each.naturalWidth > 0)"
+        "[...document.querySelectorAll('.gallery img')].every((each) => each.complete && each.naturalWidth > "
+        "0)"
     )
     assert page.locator(".gallery img").count() == 3
 

@@ -69,7 +69,10 @@ def test_the_stock_is_the_case_s_or_the_catalogue_s_or_six_metres(tmp_path):
     assert stock_length(load_case(CASE)) == 6.0
     assert stock_length(load_case(CASE, ["rod.stock_length=4.0"])) == 4.0
     catalogue = tmp_path / "mine.toml"
-    text = "stock_length = 5.0\n[material]\nyoung = 40e9\nshear = 4e9\ndensity = 1900\nstrength = 255e6\n[sizes]\nround = [0.002]\n"
+    text = (
+        "stock_length = 5.0\n[material]\nyoung = 40e9\nshear = 4e9\ndensity = 1900\n"
+        "strength = 255e6\n[sizes]\nround = [0.002]\n"
+    )
     catalogue.write_text(text, encoding="utf-8")
     case = CASE.read_text(encoding="utf-8").replace("../surfaces", str(ROOT / "surfaces"))
     before, _, after = case.partition("[rod]")

@@ -27,7 +27,8 @@ CASE = ROOT / "scripts/scale_model.toml"
 def shellform(*arguments, env=None, before=None):
     return subprocess.run(
         [sys.executable, "-m", "shellform", *map(str, arguments)],
-        capture_output=True, text=True, timeout=300, cwd=ROOT, env={**os.environ, **(env or {})}, preexec_fn=before, check=False,
+        capture_output=True, text=True, timeout=300, cwd=ROOT, env={**os.environ, **(env or {})},
+        preexec_fn=before, check=False,
     )  # fmt: skip
 
 

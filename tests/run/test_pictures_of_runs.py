@@ -17,7 +17,8 @@ from shellform.run.folder import read_run
 
 ROOT = Path(__file__).parent.parent.parent
 NOTHING = {
-    "design": None, "load": None, "quantity": None, "limit": None, "view": "best", "size": None, "thickness": 0.0, "transparent": False,
+    "design": None, "load": None, "quantity": None, "limit": None, "view": "best", "size": None,
+    "thickness": 0.0, "transparent": False,
     "kind": None, "film": None,
 }  # fmt: skip
 
@@ -56,7 +57,10 @@ def test_a_quantity_and_a_view_stand_in_the_file_s_name(run, quantity):
 def test_histories_are_drawn_from_the_run_s_file_and_missed_where_nothing_was_optimised(run):
     with pytest.raises(InputError, match=r"history.csv: isn't there: nothing was optimised yet"):
         draw_designs(run, Wish(quantity="history"))
-    text = "evaluation,accepted,objective,term.misfit,constraint.cable_force,cables\n0,1,1.0,1.0,-0.7,293\n1,1,0.6,0.6,0.0,130\n"
+    text = (
+        "evaluation,accepted,objective,term.misfit,constraint.cable_force,cables\n"
+        "0,1,1.0,1.0,-0.7,293\n1,1,0.6,0.6,0.0,130\n"
+    )
     (run.folder / "history.csv").write_text(text, encoding="utf-8")
     assert names(draw_designs(run, Wish(quantity="history", endings=(".pdf",)))) == [
         "objective.pdf",

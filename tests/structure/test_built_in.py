@@ -26,7 +26,8 @@ def some_beams(seed=0):
     rest = from_vectors(place, 0.6 * chance.normal(size=(4, 3)))
     ends = [[0, 1], [1, 2], [2, 3]]
     made = built_in(
-        rest, ends, axial=90.0, torsion=2.0, bending_y=3.0, bending_z=5.0, z_axis=[[0.1, 0.2, 1.0]] * 3, kind="edge"
+        rest, ends, axial=90.0, torsion=2.0, bending_y=3.0, bending_z=5.0, z_axis=[[0.1, 0.2, 1.0]] * 3,
+        kind="edge"
     )  # fmt: skip
     return made, rest
 
@@ -102,7 +103,8 @@ def test_beams_turned_as_a_whole_feel_nothing():
     turn = from_vectors(np.zeros((1, 3)), [[0.4, -1.1, 0.7]])
     rotation = matrices(turn.quaternions)[0]
     turned = State(
-        state.positions @ rotation.T + [1.0, 2.0, 3.0], product(np.repeat(turn.quaternions, 4, axis=0), state.quaternions)
+        state.positions @ rotation.T + [1.0, 2.0, 3.0], product(np.repeat(turn.quaternions, 4, axis=0),
+        state.quaternions)
     )  # fmt: skip
     np.testing.assert_allclose(beams.local_forces(turned), beams.local_forces(state), atol=1e-12)
     expected = beams.evaluate(state, tangent=False).force.reshape(-1, 4, 3) @ rotation.T
@@ -117,13 +119,15 @@ def test_equal_axes_at_both_ends_give_the_beams_of_before_bit_by_bit():
         nodes, [[0, 1]], axial=9.0, torsion=2.0, bending_y=3.0, bending_z=5.0, z_axis=[[0.0, 0.0, 1.0]]
     )
     again = built_in(
-        at_rest(nodes), [[0, 1]], axial=9.0, torsion=2.0, bending_y=3.0, bending_z=5.0, z_axis=[[0.0, 0.0, 1.0]], kind="rod"
+        at_rest(nodes), [[0, 1]], axial=9.0, torsion=2.0, bending_y=3.0, bending_z=5.0,
+        z_axis=[[0.0, 0.0, 1.0]], kind="rod"
     )  # fmt: skip
     assert not again.built_in.any()
     state = disturbed(at_rest(nodes), 0.1)
     for name in ("energy", "force", "tangent"):
         np.testing.assert_array_equal(
-            getattr(straight.evaluate(state, tangent=True), name), getattr(again.evaluate(state, tangent=True), name)
+            getattr(straight.evaluate(state, tangent=True), name),
+            getattr(again.evaluate(state, tangent=True), name)
         )  # fmt: skip
 
 
@@ -135,7 +139,8 @@ def curve(place, *, closed, axial=EA, inertia=EI):
     ]
     state = at_rest(place)
     beams = built_in(
-        state, ends, axial=axial, torsion=GJ, bending_y=inertia, bending_z=inertia, z_axis=np.tile([0.0, 1.0, 0.0], (len(ends), 1)),
+        state, ends, axial=axial, torsion=GJ, bending_y=inertia, bending_z=inertia,
+        z_axis=np.tile([0.0, 1.0, 0.0], (len(ends), 1)),
         kind="edge",
     )  # fmt: skip
     fixed = np.zeros((count, 6), dtype=bool)
@@ -222,7 +227,8 @@ def test_laths_locked_in_a_curve_spring_back_as_two_springs_in_parallel_do():
     curved = np.column_stack([np.sin(bent * along) / bent, 0.0 * along, (np.cos(bent * along) - 1.0) / bent])
     state = from_vectors(curved, np.column_stack([0.0 * along, bent * along, 0.0 * along]))
     blocks = built_in(
-        state, ends, axial=0.0, torsion=0.0, bending_y=added, bending_z=0.0, z_axis=np.tile([0.0, 0.0, 1.0], (count - 1, 1)),
+        state, ends, axial=0.0, torsion=0.0, bending_y=added, bending_z=0.0,
+        z_axis=np.tile([0.0, 0.0, 1.0], (count - 1, 1)),
         kind="lock",
     )  # fmt: skip
     fixed = np.zeros((count, 6), dtype=bool)

@@ -249,7 +249,8 @@ def test_without_free_memory_a_small_model_is_solved_and_a_large_one_ends_with_a
     file.write_text(json.dumps(model), encoding="utf-8")
     code = (
         "import sys; from shellform.structure.solve import memory; memory.free_memory = lambda: 0; "
-        "from shellform.cli.program import main; sys.argv[1:] = ['analyse', sys.argv[1], '--load', 'push']; main()"
+        "from shellform.cli.program import main; sys.argv[1:] = ['analyse', sys.argv[1], '--load', 'push']; "
+        "main()"
     )
     found = subprocess.run(
         [sys.executable, "-c", code, str(file)], capture_output=True, text=True, check=False

@@ -141,7 +141,8 @@ def frame(radius=0.012, connector=50.0, ratio=0.98):
     rod, joint = stiffness(section), (1e6, 40.0, connector, connector)
     values = np.array([joint if k == 4 else rod for k in range(8)])
     beams = make_beams(
-        points, ends, axial=values[:, 0], torsion=values[:, 1], bending_y=values[:, 2], bending_z=values[:, 3],
+        points, ends, axial=values[:, 0], torsion=values[:, 1], bending_y=values[:, 2],
+        bending_z=values[:, 3],
         kind=[int(k == 4) for k in range(8)], kinds=("rod", "connector"),
     )  # fmt: skip
     pairs = np.array([[9, 8], [9, 5]])

@@ -98,7 +98,10 @@ def test_a_study_has_a_row_a_design_and_a_second_call_computes_nothing(tmp_path,
 
 
 def test_equal_designs_are_computed_once_and_new_ones_alone_are_added(tmp_path, on_two):
-    text = 'keep = "all"\ndesigns = [{ net.spacing = 0.1 }, { net.spacing = 0.10 }, { net.spacing = 1e-1, cable.stiffness = 187 }]\n'
+    text = (
+        'keep = "all"\ndesigns = [{ net.spacing = 0.1 }, { net.spacing = 0.10 }, '
+        "{ net.spacing = 1e-1, cable.stiffness = 187 }]\n"
+    )
     run_study(study_file(tmp_path, text), tmp_path / "out", work=quick)
     told = rows(tmp_path / "out")
     assert len(told) == 3
@@ -121,7 +124,8 @@ def test_equal_designs_are_computed_once_and_new_ones_alone_are_added(tmp_path, 
 def test_designs_that_are_refused_have_a_row_with_the_reason(tmp_path, on_two):
     file = study_file(
         tmp_path,
-        "[vary]\nnet.spacing = [0.1, 0.003]\nsurface.dimensions.height = [0.2, 0.1]\nrod.wall = [0.0005, 0.02]\n",
+        "[vary]\nnet.spacing = [0.1, 0.003]\nsurface.dimensions.height = [0.2, 0.1]\n"
+        "rod.wall = [0.0005, 0.02]\n",
     )
     found = run_study(file, tmp_path / "out", work=quick)
     assert (found.designs, found.failed) == (8, 6)
@@ -164,7 +168,8 @@ def test_a_design_that_kills_its_workers_is_recorded_and_the_rest_goes_on(tmp_pa
 def study_process(file, folder, work):
     code = (
         "import sys\nfrom tests import stubs\nfrom shellform.study.studies import run_study\n"
-        f"if __name__ == '__main__':\n    run_study({str(file)!r}, {str(folder)!r}, workers=2, work=stubs.{work})\n"
+        f"if __name__ == '__main__':\n    run_study({str(file)!r}, {str(folder)!r}, workers=2, "
+        f"work=stubs.{work})\n"
     )
     script = folder.parent / "go.py"
     script.write_text(code)
@@ -295,7 +300,10 @@ def test_two_studies_do_not_work_in_one_folder(tmp_path, on_two):
 
 
 def test_columns_that_no_summary_has_are_named(tmp_path, on_two):
-    text = '[vary]\nnet.spacing = [0.10, 0.12]\n[column]\ncables = "designs.best.cables"\nmisspelt = "designs.best.cablez"\n'
+    text = (
+        "[vary]\nnet.spacing = [0.10, 0.12]\n[column]\n"
+        'cables = "designs.best.cables"\nmisspelt = "designs.best.cablez"\n'
+    )
     found = run_study(study_file(tmp_path, text), tmp_path / "out", work=quick)
     assert found.empty == ("misspelt",)
     assert found.page.is_file()
@@ -375,7 +383,8 @@ def test_workers_have_one_thread_each(two):
 
 def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(tmp_path, two, on_two):
     file = study_file(
-        tmp_path, 'keep = "all"\n[vary]\nnet.spacing = [0.12, 0.13]\noptimise.misfit = [0.7, 0.4]\n[function]\n'
+        tmp_path, 'keep = "all"\n[vary]\nnet.spacing = [0.12, 0.13]\noptimise.misfit = [0.7, 0.4]\n'
+        '[function]\n'
         'optimise.cable_force = "1 - optimise.misfit"\n'
     )  # fmt: skip
     run_study(file, tmp_path / "out")

@@ -167,7 +167,8 @@ def test_designs_can_be_listed_and_surfaces_taken_from_a_folder(tmp_path):
             "less than or equal to 1000000",
         ),
         (
-            "[vary]\ncable.stiffness = { low = 1, high = 2, count = 2000 }\ncable.force_max = { low = 1, high = 2, count = 2000 }",
+            "[vary]\ncable.stiffness = { low = 1, high = 2, count = 2000 }\n"
+            "cable.force_max = { low = 1, high = 2, count = 2000 }",
             "designs; up to",
         ),
     ],

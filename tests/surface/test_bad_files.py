@@ -116,7 +116,8 @@ def test_files_of_points_or_curves_alone_hold_no_faces(tmp_path):
     pyvista.ImageData(dimensions=(3, 3, 3)).save(tmp_path / "image.vtk")
     refused(tmp_path / "image.vtk", "no faces")
     (tmp_path / "table.vtk").write_text(
-        "# vtk DataFile Version 3.0\ntable\nASCII\nDATASET TABLE\nROW_DATA 2\nFIELD FieldData 1\na 1 2 float\n1 2\n"
+        "# vtk DataFile Version 3.0\ntable\nASCII\nDATASET TABLE\nROW_DATA 2\nFIELD FieldData 1\n"
+        "a 1 2 float\n1 2\n"
     )
     refused(tmp_path / "table.vtk", "holds no points")
 

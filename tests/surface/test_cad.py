@@ -100,7 +100,8 @@ def test_the_unit_is_the_one_that_the_file_states(tmp_path, name, written, other
 
 def test_a_fresh_process_reads_iges_first_and_prints_nothing():
     # OpenCASCADE takes no target unit before its first IGES file, and writes to standard output past Python.
-    code = f"from shellform.surface import cad; s = cad.import_surface({str(DATA / 'dome_mm.igs')!r}); assert s.size[0] < 1"
+    file = str(DATA / "dome_mm.igs")
+    code = f"from shellform.surface import cad; s = cad.import_surface({file!r}); assert s.size[0] < 1"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False)
     assert (run.returncode, run.stdout, run.stderr) == (0, "", "")
 
@@ -294,7 +295,10 @@ def test_gmsh_is_closed_after_success_and_failure_and_never_taken_from_another()
 
 def test_missing_system_libraries_are_named_in_one_line(tmp_path):
     (tmp_path / "gmsh.py").write_text("raise OSError('libGL.so.1: cannot open shared object file')\n")
-    code = "import shellform.errors as e\ntry:\n    import shellform.surface.cad\nexcept e.InputError as error:\n    print(error)"
+    code = (
+        "import shellform.errors as e\ntry:\n    import shellform.surface.cad\n"
+        "except e.InputError as error:\n    print(error)"
+    )
     path = os.pathsep.join([str(tmp_path), str(ROOT)])
     run = subprocess.run(
         [sys.executable, "-c", code],

@@ -388,7 +388,8 @@ def ply(form, properties, elements=()):
     """A PLY file of the shell: `form` of its numbers, `properties` of vertices and faces with the numbers
     that stand before the corners and after them, `elements` before the faces."""
     order = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}[form]
-    codes = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    codes = {"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4",
+    "float": "f4",
              "double": "f8", "int16": "i2", "uint16": "u2", "float64": "f8"}  # fmt: skip
     place, count, corner, quality = properties
     head = [

@@ -141,7 +141,8 @@ def opensees_script(
     forces = reals("load", load, (len(nodes), 6))
     if beams.built_in.any():
         raise InputError(
-            "is built into the bent state, which OpenSees' frames can't say: they are without stress where their nodes are",
+            "is built into the bent state, which OpenSees' frames can't say: they are without stress where "
+            "their nodes are",
             where=f"beams[{int(np.argmax(beams.built_in))}]",
             remedy="Check this design with shellform analyse, which reads its model file.",
         )

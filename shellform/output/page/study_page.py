@@ -164,7 +164,8 @@ def thumbnail(shell: Gridshell, state: State, limit: float, *, width: int = 240)
         if len(lines):
             path = "".join(f"M{a[0]:.1f} {a[1]:.1f}L{b[0]:.1f} {b[1]:.1f}" for a, b in lines)
             paths.append(f'<path stroke="{colour}" d="{path}"/>')
-    head = f'<svg viewBox="0 0 {width} {height:.0f}" role="img" fill="none" stroke-width="1.6" stroke-linecap="round">'
+    lines = 'fill="none" stroke-width="1.6" stroke-linecap="round"'
+    head = f'<svg viewBox="0 0 {width} {height:.0f}" role="img" {lines}>'
     return f"{head}<title>{1e3 * float(away.max()):.1f} mm off at most</title>{''.join(paths)}</svg>"
 
 

@@ -125,7 +125,8 @@ def _write_mp4(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> No
 
     height, width = (2 * (each // 2) for each in frames[0].shape[:2])  # the codec wants even numbers
     writer = imageio_ffmpeg.write_frames(
-        str(path), (width, height), fps=rate, codec="libx264", quality=None, pix_fmt_out="yuv420p", macro_block_size=2,
+        str(path), (width, height), fps=rate, codec="libx264", quality=None, pix_fmt_out="yuv420p",
+        macro_block_size=2,
         output_params=["-crf", "20", "-preset", "medium", "-movflags", "+faststart", "-threads", "2"],
     )  # fmt: skip
     writer.send(None)

@@ -245,8 +245,10 @@ def _page(page: PaperPage) -> Figure:
     vertical = {"bottom": "baseline", "middle": "center_baseline", "top": "top"}
     for label in page.labels:
         axes.text(
-            *label.place, label.text, fontsize=label.height / _CAPITAL / _INCH * _POINTS, color=label.colour, rotation=label.angle,
-            ha="center" if label.side == "middle" else label.side, va=vertical[label.foot], rotation_mode="anchor",
+            *label.place, label.text, fontsize=label.height / _CAPITAL / _INCH * _POINTS, color=label.colour,
+            rotation=label.angle,
+            ha="center" if label.side == "middle" else label.side, va=vertical[label.foot],
+            rotation_mode="anchor",
             fontweight="bold" if label.bold else "normal",
         )  # fmt: skip
     return figure
@@ -350,7 +352,8 @@ def areas(axes: Axes, corners: Reals, colour: str) -> None:
 def letter(axes: Axes, word: Word, corner: tuple[float, float]) -> None:
     """A word of a drawing whose lower left corner stands at `corner`."""
     axes.text(
-        corner[0] + word.at[0], corner[1] + word.at[1], word.text, fontsize=word.pixels * _POINT, color=word.colour,
+        corner[0] + word.at[0], corner[1] + word.at[1], word.text, fontsize=word.pixels * _POINT,
+        color=word.colour,
         weight="bold" if word.bold else "normal", ha=word.justify, va="baseline",
     )  # fmt: skip
 

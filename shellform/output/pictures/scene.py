@@ -36,7 +36,10 @@ from shellform.output.pictures.panel import (
 from shellform.output.pictures.sheets import Canvas, Drawing
 from shellform.output.pictures.view import Camera
 
-_LIBRARIES = "On Debian and Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri libxrender1; pictures as .svg and .pdf need none of them"
+_LIBRARIES = (
+    "On Debian and Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri libxrender1; "
+    "pictures as .svg and .pdf need none of them"
+)
 try:
     import pyvista as pv
     import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - registers the windows that vtkRenderWindow chooses from

@@ -79,7 +79,8 @@ def write_dxf(path: str | Path, sheet: Sheet) -> Path:
     height = max([mark.height for mark in sheet.marks if isinstance(mark, Span)], default=sheet.lettering)
     style = document.dimstyles.new("SHELLFORM")
     for name, value in {
-        "dimtxt": height, "dimasz": 0.0, "dimtsz": 0.5 * height, "dimexo": 0.3 * height, "dimexe": 0.6 * height, "dimgap": 0.4 * height,
+        "dimtxt": height, "dimasz": 0.0, "dimtsz": 0.5 * height, "dimexo": 0.3 * height,
+        "dimexe": 0.6 * height, "dimgap": 0.4 * height,
         "dimtad": 1, "dimdec": 1, "dimtxsty": "LETTERS", "dimscale": 1.0,
     }.items():  # fmt: skip
         style.set_dxf_attrib(name, value)

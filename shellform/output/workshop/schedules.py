@@ -90,7 +90,8 @@ def rods(built: Built, cutting: Cutting) -> Table:
             places.setdefault(piece.rod, []).append((piece.part, said))
     rows = tuple(
         (
-            name, rod.direction, rod.length, label(section), weight * rod.length if weight else None, len(rod.marks),
+            name, rod.direction, rod.length, label(section), weight * rod.length if weight else None,
+            len(rod.marks),
             " ".join(f"{mark:.4f}" for mark in rod.marks), " ".join(map(str, rod.crossings.tolist())),
             ", ".join(said for _, said in sorted(places[k])), "spliced" if k in cutting.spliced else "",
         )
@@ -191,7 +192,8 @@ def bars(built: Built, cutting: Cutting) -> Table:
             rows.append((f"B{number}", place, names[piece.rod], part, piece.length, at, piece.start, last))
             at += piece.length + cutting.kerf
     heads = (
-        "bar", "piece", "rod", "part", "length [m]", "begins on the bar at [m]", "begins on the rod at [m]", "offcut [m]",
+        "bar", "piece", "rod", "part", "length [m]", "begins on the bar at [m]", "begins on the rod at [m]",
+        "offcut [m]",
     )  # fmt: skip
     return Table("bars", heads, tuple(rows), cutting_notes(cutting, names))
 
@@ -366,7 +368,8 @@ def all_tables(built: Built, cutting: Cutting) -> list[Table]:
     stock.
     """
     tables = [
-        rods(built, cutting), bars(built, cutting), splices(built, cutting), marks(built), cables(built), supports(built), survey(built),
+        rods(built, cutting), bars(built, cutting), splices(built, cutting), marks(built), cables(built),
+        supports(built), survey(built),
     ]  # fmt: skip
     return (
         [*tables, edge_table(built.shell, built.design, _told_states(built), rod_names(built.grid))]

@@ -209,7 +209,8 @@ def _pardiso(
     many = size > _TWO_THREADS_FROM or (phase == _SOLVE and count >= _MANY)
     before = mkl.MKL_Set_Num_Threads_Local(min(2, cores()) if many else 1)
     mkl.PARDISO(
-        _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values), _at(rows), _at(columns), _at(kept),
+        _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values),
+        _at(rows), _at(columns), _at(kept),
         ref(sides), _at(settings), ref(quiet), _at(right), _at(solution), ref(error),
     )  # fmt: skip
     mkl.MKL_Set_Num_Threads_Local(before)

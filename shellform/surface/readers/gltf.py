@@ -225,7 +225,8 @@ class _Scene:
             corners += sum(len(one.points) + one.faces[0].size for one in loaded)
             if corners > 6 * MOST_TRIANGLES:
                 raise InputError(
-                    f"places its meshes {len(placed):,} times, with more than {MOST_TRIANGLES:,} triangles or their corners",
+                    f"places its meshes {len(placed):,} times, with more than {MOST_TRIANGLES:,} triangles "
+                    f"or their corners",
                     where=str(self._file),
                     remedy="Choose one by surface.object (--object), or export the surface alone.",
                 )

@@ -189,7 +189,8 @@ def _one_piece(draft: Draft, piece: int | None, where: str) -> Draft:
         raise InputError(
             f"has {count} separate pieces, of {listed} m²",
             where=where,
-            remedy=f"Choose one (surface.piece): {_choices(draft, label, order[:_PIECES_TOLD])}; or by object or "
+            remedy=f"Choose one (surface.piece): {_choices(draft, label, order[:_PIECES_TOLD])}; or by "
+            f"object or "
             "layer; or join their edges.",
         )
     kept = replace(draft, triangles=draft.triangles[label == order[piece - 1]])

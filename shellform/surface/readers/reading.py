@@ -21,13 +21,17 @@ from shellform.surface.shape.target import Surface, make_surface
 from shellform.surface.units import turned_up, unit_factor
 
 ENDINGS = {
-    ".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep", ".3dm": "3dm",
-    ".stl": "stl", ".obj": "obj", ".ply": "ply", ".off": "off", ".gltf": "gltf", ".glb": "gltf", ".vtk": "vtk", ".vtu": "vtu",
+    ".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep",
+    ".3dm": "3dm",
+    ".stl": "stl", ".obj": "obj", ".ply": "ply", ".off": "off", ".gltf": "gltf", ".glb": "gltf",
+    ".vtk": "vtk", ".vtu": "vtu",
     ".vtp": "vtp", ".msh": "msh", ".json": "compas",
 }  # fmt: skip
 FORMATS = {
-    "step": "STEP", "iges": "IGES", "brep": "OpenCASCADE BREP", "3dm": "Rhino 3DM", "stl": "STL", "obj": "OBJ", "ply": "PLY",
-    "off": "OFF", "gltf": "glTF", "vtk": "VTK", "vtu": "VTU", "vtp": "VTP", "msh": "MSH", "compas": "COMPAS JSON",
+    "step": "STEP", "iges": "IGES", "brep": "OpenCASCADE BREP", "3dm": "Rhino 3DM", "stl": "STL",
+    "obj": "OBJ", "ply": "PLY",
+    "off": "OFF", "gltf": "glTF", "vtk": "VTK", "vtu": "VTU", "vtp": "VTP", "msh": "MSH",
+    "compas": "COMPAS JSON",
 }  # fmt: skip
 MOST_BYTES = 512 * 1024**2
 _HEAD = 65536

@@ -26,7 +26,8 @@ from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, jo
 from shellform.surface.readers.nurbs import Curve, Patch
 
 _METRES = {
-    "Microns": 1e-6, "Millimeters": 1e-3, "Centimeters": 1e-2, "Decimeters": 0.1, "Meters": 1.0, "Kilometers": 1e3,
+    "Microns": 1e-6, "Millimeters": 1e-3, "Centimeters": 1e-2, "Decimeters": 0.1, "Meters": 1.0,
+    "Kilometers": 1e3,
     "Inches": 0.0254, "Feet": 0.3048, "Yards": 0.9144,
 }  # fmt: skip
 _DEEPEST = 16  # blocks within blocks

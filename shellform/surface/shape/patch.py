@@ -163,7 +163,8 @@ def evaluate(C, v, w, J):  # type: ignore[no-untyped-def]
         m = _TIMES[k]
         _add(
             J, C[k], m * u0 * v0 * w0, m * u1 * v0 * w0, m * u0 * v1 * w0, m * u0 * v0 * w1,
-            m * u2 * v0 * w0, m * u0 * v2 * w0, m * u0 * v0 * w2, m * u1 * v1 * w0, m * u1 * v0 * w1, m * u0 * v1 * w1,
+            m * u2 * v0 * w0, m * u0 * v2 * w0, m * u0 * v0 * w2, m * u1 * v1 * w0, m * u1 * v0 * w1,
+            m * u0 * v1 * w1,
         )  # fmt: skip
     for e in range(3):
         x, y, z = power[e, 1], power[(e + 1) % 3, 1], power[(e + 2) % 3, 1]
