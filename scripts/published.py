@@ -40,8 +40,8 @@ Value = float | str | None
 
 @dataclass(frozen=True)
 class Line:
-    """One `quantity`: its value `here`, with the paper's `method` here, and in the `paper` (None: not known), all in
-    `unit`; `source`, its place in the paper; `compare`: "equal", "order" or "none"; `note`."""
+    """One `quantity`: its value `here`, with the paper's `method` here, and in the `paper` (None: not known),
+    all in `unit`; `source`, its place in the paper; `compare`: "equal", "order" or "none"; `note`."""
 
     key: str
     quantity: str
@@ -68,8 +68,8 @@ def beside(run: Run, *, fixed: Run | None = None, method: Run | None = None) -> 
     """The lines of the run's study in the paper's order. The study with a free radius is compared with the
     `fixed` one too, and either with a run of the paper's `method`, where given.
 
-    Raises InputError where a run isn't finished, `fixed` is no run of the fixed radius, or `method` none of the same
-    study by the paper's method.
+    Raises InputError where a run isn't finished, `fixed` is no run of the fixed radius, or `method` none of
+    the same study by the paper's method.
     """
     study = study_of(run)
     if fixed is not None and study_of(fixed) != "fixed":
@@ -224,8 +224,8 @@ def _line(step: Step, terms: Sequence[str], constraints: Sequence[str]) -> str:
 def write_beside(
     run: Run, *, fixed: Run | None = None, method: Run | None = None, stands: Sequence[Stands] = ()
 ) -> list[Path]:
-    """Writes published.md and published.csv into the run's folder, and with `stands` published_standing.csv; returns
-    them."""
+    """Writes published.md and published.csv into the run's folder, and with `stands` published_standing.csv;
+    returns them."""
     lines = beside(run, fixed=fixed, method=method)
     texts = {"published.md": page(run, lines), "published.csv": table_text(table(lines))}
     if stands:

@@ -1,7 +1,8 @@
-"""How well the designs of a published study stand: critical factor, share of drawn structures that stand, slack cables.
+"""How well the designs of a published study stand: critical factor, share of drawn structures that stand,
+slack cables.
 
-The paper says nothing of it; its method and ours are told in the same table. Structures are drawn with the default
-tolerances of the shell's size.
+The paper says nothing of it; its method and ours are told in the same table. Structures are drawn with the
+default tolerances of the shell's size.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ _SOUGHT = 3.0  # load factor up to which paths are followed
 
 @dataclass(frozen=True)
 class Stands:
-    """A design of a `method` under a `load`: its `cables`, those `slack_before` any load and `slack_under` this one; the
-    `critical_factor` and what `ends` its path; of `drawn` structures `stand`, so that the probability lies between
-    `at_least` and `at_most`, each with 95 %. None where it wasn't found, or none was drawn."""
+    """A design of a `method` under a `load`: its `cables`, those `slack_before` any load and `slack_under`
+    this one; the `critical_factor` and what `ends` its path; of `drawn` structures `stand`, so that the
+    probability lies between `at_least` and `at_most`, each with 95 %. None where it wasn't found, or none was
+    drawn."""
 
     method: str
     design: str
@@ -40,7 +42,8 @@ class Stands:
 
 
 def standings(run: Run, method: str, *, count: int, seed: int) -> list[Stands]:
-    """Of the run's designs under the design and the additional load; `count` structures are drawn for each, with 0 none.
+    """Of the run's designs under the design and the additional load; `count` structures are drawn for each,
+    with 0 none.
 
     Of one seed the structures of two runs have the same errors as far as they have the same candidate cables.
     """

@@ -8,10 +8,10 @@
     # a quick look
     scripts/published_study fixed --set net.elements=2 --set optimise.evaluations=15 --structures 10
 
-Each study is run twice, by default as shellform designs, and by the paper's own method (optimise.method = "paper", in
-runs/published_STUDY_paper). The tables are published.md, published.csv and, with critical factors, drawn structures and
-slack cables of all designs, published_standing.csv, in the first run's folder. Exit status: 0 done, 2 input refused, 3 no
-result.
+Each study is run twice, by default as shellform designs, and by the paper's own method (optimise.method =
+"paper", in runs/published_STUDY_paper). The tables are published.md, published.csv and, with critical
+factors, drawn structures and slack cables of all designs, published_standing.csv, in the first run's folder.
+Exit status: 0 done, 2 input refused, 3 no result.
 """
 
 from __future__ import annotations
@@ -79,8 +79,8 @@ def write(
     structures: int,
     seed: int,
 ) -> list[Path]:
-    """The tables of a finished run, or of one that is made now, and of the paper's method; their files. A finished run
-    without a finished one by the paper's method stands alone."""
+    """The tables of a finished run, or of one that is made now, and of the paper's method; their files. A
+    finished run without a finished one by the paper's method stands alone."""
     folder = done or output or ROOT / f"runs/published_{study}"
     if done is None:
         case = ROOT / "scripts" / CASES[study]

@@ -3,9 +3,9 @@
 Every limit holds under every load case, and those that matter before concrete comes also without load. The
 critical load factor F is kept by a load case "critical NAME", F times the load case, that every accepted
 design bears on its stable branch, its softest mode keeping a share of the initial design's stiffness under
-the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is followed by stable states
-again: in the end the paths are followed closely (`critical_factors`), and a design whose path ends before F
-isn't feasible.
+the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is followed by stable
+states again: in the end the paths are followed closely (`critical_factors`), and a design whose path ends
+before F isn't feasible.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""From a case's tables [tolerances] and [safety], and the limit on critical factors, to what is asked of a design as
-built."""
+"""From a case's tables [tolerances] and [safety], and the limit on critical factors, to what is asked of a
+design as built."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ SEARCHED = 60  # structures at the most with which a search judges its designs
 
 
 def case_tolerances(case: Case, shell: Gridshell) -> Tolerances:
-    """The case's tolerances, those left out by the shell's size. Raises InputError for a value that is none."""
+    """The case's tolerances, those left out by the shell's size. Raises InputError for a value that is
+    none.
+    """
     given = {each.name: getattr(case.tolerances, each.name) for each in fields(Tolerances)}
     return replace(
         default_tolerances(shell), **{name: value for name, value in given.items() if value is not None}
@@ -22,8 +24,8 @@ def case_tolerances(case: Case, shell: Gridshell) -> Tolerances:
 
 
 def case_safety(case: Case, shell: Gridshell) -> Safety | None:
-    """What a search has to keep; None where nothing is required. It draws under a seed of its own, so that the sample
-    that is told is a fresh one."""
+    """What a search has to keep; None where nothing is required. It draws under a seed of its own, so that
+    the sample that is told is a fresh one."""
     entry = case.safety
     if not entry.required:
         return None

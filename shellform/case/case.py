@@ -221,8 +221,8 @@ def _found_catalogue(source: str, file: Path) -> str:
 
 
 def dump_case(case: Case, tolerances: Tolerances | None = None) -> str:
-    """The case as TOML, every default filled in; those of `tolerances` that follow the shell's size stand in comments,
-    with their sources."""
+    """The case as TOML, every default filled in; those of `tolerances` that follow the shell's size stand in
+    comments, with their sources."""
     text = tomli_w.dumps(case.model_dump(mode="json", exclude_none=True))
     if tolerances is None:
         return text

@@ -29,7 +29,9 @@ def design(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Run the whole job; run again, it goes on where it stopped. Status 3 where the design to build doesn't hold."""
+    """Run the whole job; run again, it goes on where it stopped. Status 3 where the design to build doesn't
+    hold.
+    """
     from shellform.case.case import load_case
     from shellform.records.summary import document
     from shellform.run.run import run_case

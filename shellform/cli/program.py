@@ -79,7 +79,9 @@ def _options(
 
 
 def main() -> None:
-    """Runs the command line: status 0 done, 2 input refused, 3 no result or a design that doesn't hold, 130 stopped."""
+    """Runs the command line: status 0 done, 2 input refused, 3 no result or a design that doesn't hold, 130
+    stopped.
+    """
     with _ctrl_c() as stopped:
         try:
             status = app(standalone_mode=False)  # typer turns Ctrl-C into a returned status

@@ -76,8 +76,8 @@ def tell_verdict(verdict: VerdictRecord) -> None:
 
 
 def tell_as_built(summary: Summary) -> None:
-    """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one to build
-    fails first."""
+    """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one
+    to build fails first."""
     from shellform.records.words import critical_words, standing_words
 
     for name, design in summary.designs.items():

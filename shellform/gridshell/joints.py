@@ -3,8 +3,8 @@
 The paper's rods are round, 1 mm in radius and of E = 40 GPa; its joints have EA = 71.5 kN, GJ = 7.38e-4 and
 EI = 7.85e-4 N·m² over a gap of 2 mm, so that the rods lie on each other. With lengths times s and stresses as
 they are, forces grow with s², bending and torsion stiffness with s⁴, as those of the rods do. A joint that
-follows its rods therefore has their EA and EI (the mean of both axes) in the paper's proportions, and a gap of
-their depth across the surface.
+follows its rods therefore has their EA and EI (the mean of both axes) in the paper's proportions, and a gap
+of their depth across the surface.
 """
 
 from __future__ import annotations

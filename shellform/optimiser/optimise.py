@@ -1,12 +1,11 @@
 """Optimising a gridshell by sequential convex programming (operation 3).
 
 Svanberg's method of moving asymptotes (1987, 2002) replaces a problem by a sequence of convex ones that are
-solved exactly. Directly in the rest lengths (moving_asymptotes.py) it finds as good a fit with as few cables in
-tension, but knows nothing of what holds the shell up: without its slack cables the design collapses (README, "What was
-tried"). Here each convex problem is the model in
-tensions (step_model.py), exact in first order and with Gauss-Newton curvature; NLopt's MMA solves it within
-a window round the present design (proposal.py), and the trial is then evaluated by its true equilibria
-(trials.py, phases.py):
+solved exactly. Directly in the rest lengths (moving_asymptotes.py) it finds as good a fit with as few cables
+in tension, but knows nothing of what holds the shell up: without its slack cables the design collapses
+(README, "What was tried"). Here each convex problem is the model in tensions (step_model.py), exact in first
+order and with Gauss-Newton curvature; NLopt's MMA solves it within a window round the present design
+(proposal.py), and the trial is then evaluated by its true equilibria (trials.py, phases.py):
 
 - it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
 - a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
@@ -17,11 +16,12 @@ a window round the present design (proposal.py), and the trial is then evaluated
 - where no better design is found cables are kept taut under the further loads (guards.py), and free again in turns;
 - then cables that the shell can do without are taken away in batches, the others kept taut.
 
-Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures, the same for each
-(trial_structures.py): after the descent, which goes back to the last design that stands; each time cables have been
-taken away, a batch whose design falls too often being refused like any other; and at the end by a fresh sample, for the
-search has chosen its designs by their luck with the first one. Where thinning ends for what stiffness it keeps and not
-for what stands, it goes on with less. There the cables that are left keep a tension that errors don't use up.
+Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures,
+the same for each (trial_structures.py): after the descent, which goes back to the last design that stands;
+each time cables have been taken away, a batch whose design falls too often being refused like any other; and
+at the end by a fresh sample, for the search has chosen its designs by their luck with the first one. Where
+thinning ends for what stiffness it keeps and not for what stands, it goes on with less. There the cables that
+are left keep a tension that errors don't use up.
 
 The search ends where the model predicts too little improvement in its largest window, where the smallest
 window has no better design, or where the evaluations are used up, and thinning after some single cables in a
@@ -83,9 +83,9 @@ def optimise(
     keep: Keep | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
-    """The best design found from `start` within a number of design `evaluations`; with `safety` one that stands as
-    built under the problem's loads, no less likely than `initial` (None: the start); with MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever
-    stands.
+    """The best design found from `start` within a number of design `evaluations`; with `safety` one that
+    stands as built under the problem's loads, no less likely than `initial` (None: the start); with
+    MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever stands.
 
     `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes
     on from there to the same result.
@@ -131,9 +131,9 @@ def polish(
     constraints kept; the solver's `stiffness` is a share of what `best` had to keep.
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
-    shape alone. The misfit never rises: where no better design is found, `best` comes back; and what was asked of
-    `best` as built is asked of the polished design. Only the cables' lengths are varied, where they are
-    variables of their own.
+    shape alone. The misfit never rises: where no better design is found, `best` comes back; and what was
+    asked of `best` as built is asked of the polished design. Only the cables' lengths are varied, where they
+    are variables of their own.
 
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
     the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
@@ -183,8 +183,8 @@ def begin(
     asked: AsBuilt | None = None,
 ) -> tuple[Search, Iterate]:
     """A search of the problem and its first iterate. `kept` gives the stiffness, N/m, that no mode may fall
-    below under the further loads, from that of the start's softest mode under the design load; what is `asked` of
-    designs as built."""
+    below under the further loads, from that of the start's softest mode under the design load; what is
+    `asked` of designs as built."""
     began = time.perf_counter()
     # Limits on the design load's cable forces are bounds of the model; the others stay constraints.
     bounded = tuple(part for part in problem.constraints if _is_bound(part, problem))
@@ -251,8 +251,8 @@ def _is_bound(part: Constraint, problem: Problem) -> bool:
 
 
 def _least_tension(problem: Problem, start: Design, asked: AsBuilt | None) -> float:
-    """N, that a cable keeps so that errors of lengths don't leave it slack: so many deviations as the safety asks
-    for of what the median cable is off by, to first order."""
+    """N, that a cable keeps so that errors of lengths don't leave it slack: so many deviations as the safety
+    asks for of what the median cable is off by, to first order."""
     if asked is None or asked.trial.safety.margin == 0.0 or not start.present.any():
         return 0.0
     shell = problem.shell

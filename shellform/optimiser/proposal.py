@@ -34,7 +34,8 @@ class Task:
     start's mean, N; constraints `bounded` by the design load's tensions; cables (c,) that are `tensioned` and
     keep a least tension; `guards` of cables that may not go slack under the further loads, none where all
     may; whether stability stands in for the objective, `climbing`; `groups` (c,) of cables alike; `excess`
-    (k,) of the constraints over their linear model in a whole window; the `least` tension, N, that cables keep."""
+    (k,) of the constraints over their linear model in a whole window; the `least` tension, N, that cables
+    keep."""
 
     solver: SequentialConvex
     model: StepModel

@@ -89,9 +89,9 @@ def tried(
     each with its cables optimised.
 
     `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section; `solver`, another method than `optimise` has by default, which keeps no stiffness and no number of cables.
-    What was asked of the optimum as built is asked of each. Raises InputError where no section that the net allows is
-    stiff enough.
+    section; `solver`, another method than `optimise` has by default, which keeps no stiffness and no number
+    of cables. What was asked of the optimum as built is asked of each. Raises InputError where no section
+    that the net allows is stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}

@@ -37,11 +37,11 @@ _COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 class Search:
     """What stays the same in a search of the `problem`: its `solver`; the `evaluator` of the problem that is
     searched, with constraints on stability, and without those that are `bounded` by the design load's
-    tensions; the number of design `evaluations`; the start's mean `tension`, N, and its
-    `objective_start`; the `inner` problem, without constraints on stability; the `softest` mode's stiffness at the start,
-    N/m; `groups` (c,) of present cables with one rest length each; whether cables are guarded from the
-    beginning, `always_guarded`; what is `asked` of designs as built, None where nothing is, and the `least` tension, N, that
-    cables keep for it; and whom to tell.
+    tensions; the number of design `evaluations`; the start's mean `tension`, N, and its `objective_start`;
+    the `inner` problem, without constraints on stability; the `softest` mode's stiffness at the start, N/m;
+    `groups` (c,) of present cables with one rest length each; whether cables are guarded from the beginning,
+    `always_guarded`; what is `asked` of designs as built, None where nothing is, and the `least` tension, N,
+    that cables keep for it; and whom to tell.
     """
 
     problem: Problem
@@ -79,8 +79,8 @@ class Search:
 
 @dataclass(frozen=True)
 class Accepted:
-    """An accepted `design`, the candidates (c,) that are `taut` in it under the design load, and by what share it breaks
-    its constraints, its `violation`."""
+    """An accepted `design`, the candidates (c,) that are `taut` in it under the design load, and by what
+    share it breaks its constraints, its `violation`."""
 
     design: Design
     taut: Flags
@@ -96,15 +96,15 @@ class Accepted:
 class Iterate:
     """Where a search stands.
 
-    The `point` and all `accepted` up to it, with the `history` of trials; the `stiffness`, N/m, that the softest modes
-    keep under the further loads. The `phase`; the `stage` of the
-    further loads and the `margin` kept from the end of their branch; the `window`, N; whether cables are
-    `guarded` under further loads, and stability stands in for the objective, `climbing`; the cables (c,) that
-    are `tensioned` and stay so; the constraints' `excess` (k,), 1/N², over their linear models at the last
-    trial per square of the window; the `status`. Descending: whether the last trial was `refused`; the objective
-    `before` this turn. Thinning: the objective that is still `thrifty`, the size of the next `batch`, single
-    `failures` in a row, cables `needed` (c,). As built: structures that have `fallen`, the last ones first; whether a design
-    `fell` since the last batch went.
+    The `point` and all `accepted` up to it, with the `history` of trials; the `stiffness`, N/m, that the
+    softest modes keep under the further loads. The `phase`; the `stage` of the further loads and the `margin`
+    kept from the end of their branch; the `window`, N; whether cables are `guarded` under further loads, and
+    stability stands in for the objective, `climbing`; the cables (c,) that are `tensioned` and stay so; the
+    constraints' `excess` (k,), 1/N², over their linear models at the last trial per square of the window; the
+    `status`. Descending: whether the last trial was `refused`; the objective `before` this turn. Thinning:
+    the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables
+    `needed` (c,). As built: structures that have `fallen`, the last ones first; whether a design `fell` since
+    the last batch went.
     """
 
     point: Linearisation

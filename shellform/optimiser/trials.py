@@ -75,8 +75,8 @@ def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indi
 
 def sound(search: Search, before: Accepted) -> Linearisation | None:
     """The same design in the states to which the documented path leads, without its slack cables; None where
-    it doesn't bear all loads there or breaks a constraint: of two equilibria side by side, a search from design
-    to design may have come to the other one."""
+    it doesn't bear all loads there or breaks a constraint: of two equilibria side by side, a search from
+    design to design may have come to the other one."""
     evaluator, problem = search.evaluator, search.problem
     loaded = follow(problem.shell, before.built, problem.loads, stay=True)
     evaluator.factorisations += sum(each.factorisations for each in loaded.values())

@@ -1,5 +1,5 @@
-"""The design problem (equations 2 to 6): what is varied, under which load cases, what is minimised and what is
-kept."""
+"""The design problem (equations 2 to 6): what is varied, under which load cases, what is minimised and what
+is kept."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class Problem:
     """Minimise the sum of `minimise`, subject to `constraints`, over the `variables` of a `shell` that bears
     the `design_load` and `further` load cases.
 
-    `decisive` names the load case at which the stiffness that cables give against buckling is looked at; where
-    it isn't named, the one with the largest forces. `built_under` names those under which the design has to
-    stand as built, where that is asked for; where none is named, all.
+    `decisive` names the load case at which the stiffness that cables give against buckling is looked at;
+    where it isn't named, the one with the largest forces. `built_under` names those under which the design
+    has to stand as built, where that is asked for; where none is named, all.
     """
 
     shell: Gridshell
@@ -88,7 +88,9 @@ class Problem:
         return [name for name in self.loads if name in needed]
 
     def decisive_load(self) -> str:
-        """The name of the load case at which the stiffness that cables give is looked at, one that is used."""
+        """The name of the load case at which the stiffness that cables give is looked at, one that is
+        used.
+        """
         used, loads = self.used(), self.loads
         if self.decisive in used:
             return self.decisive

@@ -1,8 +1,8 @@
 """Checks of the structure as built: how many drawn ones stand, and up to which factor the perfect one does.
 
-How many drawn structures may fall is counted: of 200 with 0.99 asked for, two. Of a smaller sample nothing is concluded
-but that a design fails which would fail even if all structures not drawn yet stood. A critical factor has to be kept
-with rod elements halved too.
+How many drawn structures may fall is counted: of 200 with 0.99 asked for, two. Of a smaller sample nothing is
+concluded but that a design fails which would fail even if all structures not drawn yet stood. A critical
+factor has to be kept with rod elements halved too.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ EQUAL = 1e-3  # relative: critical factors that count as equal
 
 @dataclass(frozen=True)
 class AsBuilt:
-    """The share of drawn structures that must stand under the `design` load, and under every `other` one (None: no less
-    than of the initial design, and never more than under the design load), of so many `drawn`; only told where it isn't
-    `required`."""
+    """The share of drawn structures that must stand under the `design` load, and under every `other` one
+    (None: no less than of the initial design, and never more than under the design load), of so many `drawn`;
+    only told where it isn't `required`."""
 
     design: float
     other: float | None
@@ -58,7 +58,9 @@ def standing_checks(
 
 
 def _initial_share(rows: Mapping[str, DesignRecord], load: str, safety: AsBuilt) -> float:
-    """The share of the initial design's structures that stand, not more than is asked for under the design load."""
+    """The share of the initial design's structures that stand, not more than is asked for under the design
+    load.
+    """
     row = rows["initial"].loads.get(load) if "initial" in rows else None
     if row is None or row.stands is None:
         return safety.design

@@ -1,4 +1,6 @@
-"""One check of a run's designs: a cell by design, each with what was found, whether it holds, and what to do."""
+"""One check of a run's designs: a cell by design, each with what was found, whether it holds, and what to
+do.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,8 @@ SLACK = 1e-3  # of a limit: what the optimiser itself lets pass
 @dataclass(frozen=True)
 class Cell:
     """One check of one design: what it `found`, in words, whether it `holds` (None: that isn't known),
-    whether it was `asked` for at all, the `remedy` where it doesn't hold, and of drawn structures the `share` that stands."""
+    whether it was `asked` for at all, the `remedy` where it doesn't hold, and of drawn structures the `share`
+    that stands."""
 
     found: str
     holds: bool | None

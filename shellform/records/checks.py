@@ -1,9 +1,9 @@
 """Every check of a run's designs.
 
-A check compares a number of the summary with its limit, and says nothing where a design was never asked for it. Checks
-of one design count only what was evaluated on it. A computation that ended without a result fails: its residual is no
-number. What holds on the design's own mesh has to hold with rod elements halved too, where that was computed. Numbers
-stand in the units in which people read them: mm, N, %.
+A check compares a number of the summary with its limit, and says nothing where a design was never asked for
+it. Checks of one design count only what was evaluated on it. A computation that ended without a result fails:
+its residual is no number. What holds on the design's own mesh has to hold with rod elements halved too, where
+that was computed. Numbers stand in the units in which people read them: mm, N, %.
 """
 
 from __future__ import annotations
@@ -29,8 +29,9 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) `stress`
-    over strength, connectors' `turn`, rad, `uplift`, N, of supports under any load, least pull `slack`, N, of cables
-    under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as built (`safety`)."""
+    over strength, connectors' `turn`, rad, `uplift`, N, of supports under any load, least pull `slack`, N, of
+    cables under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as
+    built (`safety`)."""
 
     force: float
     misfit: float
@@ -113,7 +114,9 @@ def checks(
 
 
 def _stress(row: LoadRecord) -> float:
-    """Of the rods over their strength, on the mesh on which it is larger: q8 = q4 - 3/4 of the error of q4."""
+    """Of the rods over their strength, on the mesh on which it is larger: q8 = q4 - 3/4 of the error of
+    q4.
+    """
     error = row.rod_utilisation_error or 0.0
     return max(row.rod_utilisation_max, row.rod_utilisation_max - 0.75 * error)
 

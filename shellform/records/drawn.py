@@ -1,5 +1,5 @@
-"""designs/NAME-drawn.json: what came of the structures drawn of a design, one after the other, so that sampling goes on
-where it stopped and isn't done again for a design that is still the same."""
+"""designs/NAME-drawn.json: what came of the structures drawn of a design, one after the other, so that
+sampling goes on where it stopped and isn't done again for a design that is still the same."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from shellform.written import write_text
 
 @dataclass(frozen=True)
 class DrawnPath:
-    """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, and which of them
-    `stand`."""
+    """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, and which of
+    them `stand`."""
 
     factors: tuple[float, ...] = ()
     stand: tuple[bool, ...] = ()
@@ -34,8 +34,8 @@ class Drawn:
 
 
 def read_drawn(folder: Path, name: str, key: str) -> Drawn:
-    """What was drawn of a design so far; nothing where there is none, or of another design of the name, or where the
-    file is damaged: it is drawn anew."""
+    """What was drawn of a design so far; nothing where there is none, or of another design of the name, or
+    where the file is damaged: it is drawn anew."""
     path = _file(folder, name)
     if not path.is_file():
         return Drawn(key)

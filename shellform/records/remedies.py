@@ -1,7 +1,8 @@
 """What to do where a check doesn't hold, each with a number.
 
-Rods: the load that a shell of slender rods bears grows about with the square of their radius (1.3 times the load with
-1.0 mm and 1.8 times with 1.2 mm on the scale model), their stress in a given shape with the radius itself.
+Rods: the load that a shell of slender rods bears grows about with the square of their radius (1.3 times the
+load with 1.0 mm and 1.8 times with 1.2 mm on the scale model), their stress in a given shape with the radius
+itself.
 """
 
 from __future__ import annotations
@@ -17,8 +18,8 @@ _MOST = 100.0  # times the load: what lacks so much isn't mended by thicker rods
 
 @dataclass(frozen=True)
 class RodsOf:
-    """The rods of a design: their `radius`, the `largest` that the net allows by equation (1), and its `spacing`, m
-    (None: not known)."""
+    """The rods of a design: their `radius`, the `largest` that the net allows by equation (1), and its
+    `spacing`, m (None: not known)."""
 
     radius: float
     largest: float

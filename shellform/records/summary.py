@@ -34,8 +34,8 @@ class SurfaceRecord:
 
 @dataclass(frozen=True)
 class EdgeRecord:
-    """A stretch of the net's edge: its `kind` (net/edges.py) and `name`, whether it goes round an `opening`, its
-    `length`, m, and lowest and highest level, m."""
+    """A stretch of the net's edge: its `kind` (net/edges.py) and `name`, whether it goes round an `opening`,
+    its `length`, m, and lowest and highest level, m."""
 
     kind: str
     name: str
@@ -89,8 +89,8 @@ class ModelRecord:
 @dataclass(frozen=True)
 class StandingRecord:
     """Of `drawn` imperfect structures `standing` bear the load; so at least the share `at_least` of all do,
-    with `confidence`. Drawn from `seed`; `lowest`, the load factor that the weakest of them bears (1 where all
-    stand)."""
+    with `confidence`. Drawn from `seed`; `lowest`, the load factor that the weakest of them bears (1 where
+    all stand)."""
 
     drawn: int
     standing: int
@@ -107,10 +107,11 @@ class LoadRecord:
     Deviations are distances between a node and its place on the target, over all nodes. `stable`: in a stable
     equilibrium; `on_branch`: reached without snapping through; `residual`: unbalanced over largest force.
     Utilisations are stresses over the flexural strength, of bending alone and with axial force.
-    `critical_factor`: of this load, at which stability ends, by a point of `critical_kind` ("none": it doesn't up to
-    that factor, the most that was tried), `critical_factor_halved` the same with rod elements halved, and
-    `critical_factor_error` what the coarser mesh is off by, as are `deviation_max_error`, `deviation_mean_error`, m,
-    and `rod_utilisation_error`. `slack`: cables without tension, by name; `stands`: as built.
+    `critical_factor`: of this load, at which stability ends, by a point of `critical_kind` ("none": it
+    doesn't up to that factor, the most that was tried), `critical_factor_halved` the same with rod elements
+    halved, and `critical_factor_error` what the coarser mesh is off by, as are `deviation_max_error`,
+    `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without tension, by name;
+    `stands`: as built.
     """
 
     factor: float
@@ -284,9 +285,10 @@ class DocumentsRecord:
 
 @dataclass(frozen=True)
 class FailureRecord:
-    """How the `design` most likely fails under the `load`: structure `number`, of middle load factor among the fallen
-    ones, falls at the load `factor` by what `kind` tells; the `driver` is the cause of error without which it bears
-    most, `without` the factors that it reaches with one cause left out; `cables` go slack on the way."""
+    """How the `design` most likely fails under the `load`: structure `number`, of middle load factor among
+    the fallen ones, falls at the load `factor` by what `kind` tells; the `driver` is the cause of error
+    without which it bears most, `without` the factors that it reaches with one cause left out; `cables` go
+    slack on the way."""
 
     design: str
     load: str
@@ -300,8 +302,8 @@ class FailureRecord:
 
 @dataclass(frozen=True)
 class VerdictRecord:
-    """Whether the `design` to build `holds`: what `failed`, a sentence with reason and remedy each, and the checks
-    that were asked for and `not_examined`. It holds where neither is (verdict.py)."""
+    """Whether the `design` to build `holds`: what `failed`, a sentence with reason and remedy each, and the
+    checks that were asked for and `not_examined`. It holds where neither is (verdict.py)."""
 
     design: str
     holds: bool

@@ -1,5 +1,5 @@
-"""Which design is to be built, and the verdict on it: holds, does not hold, or is not examined. Terminal, summary.json and
-page all show the one made here."""
+"""Which design is to be built, and the verdict on it: holds, does not hold, or is not examined. Terminal,
+summary.json and page all show the one made here."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def verdict(found: Sequence[Check], design: str) -> VerdictRecord:
 
 
 def to_build(found: Sequence[Check], designs: Sequence[str]) -> str:
-    """The design to build: of the optimised, rounded and polished ones the last that holds, else the last that lacks
-    only examination. Where none does, the last that fails in nothing in which the one before it holds, and fails nowhere
-    by more. Before any of them is made, the initial one."""
+    """The design to build: of the optimised, rounded and polished ones the last that holds, else the last
+    that lacks only examination. Where none does, the last that fails in nothing in which the one before it
+    holds, and fails nowhere by more. Before any of them is made, the initial one."""
     built = [name for name in BUILT if name in designs]
     for lacking in (False, True):
         for name in reversed(built):

@@ -7,11 +7,11 @@ Salmon et al. 2011) at a counter made of number and cause: the same bits whateve
 order and on however many threads.
 
 What errors do to the stress-free state. Marks: with errors e_0 .. e_q along a rod, the segment between two
-marks is longer by e_{i+1} - e_i, its elements in proportion; the rod stays straight, so that no frame changes.
-A rod's own arc of rise b L has the curvature k = 8 b / L; clamps are tightened on rods held straight in the
-flat grid, so that connectors keep their frames and the ends of the rod's elements are turned (bent_beams.py).
-A shape v (n, 6) of amplitude 1 imposed without stress: with the unloaded state of the perfect structure moved
-along v, every element keeps its deformations,
+marks is longer by e_{i+1} - e_i, its elements in proportion; the rod stays straight, so that no frame
+changes. A rod's own arc of rise b L has the curvature k = 8 b / L; clamps are tightened on rods held straight
+in the flat grid, so that connectors keep their frames and the ends of the rod's elements are turned
+(bent_beams.py). A shape v (n, 6) of amplitude 1 imposed without stress: with the unloaded state of the
+perfect structure moved along v, every element keeps its deformations,
 
     l0' = l0 + l' - l,   H_a' = Q_a'⁻¹ G Q_a H_a,
 
@@ -45,9 +45,10 @@ CAUSES = tuple(each.name for each in fields(Tolerances))
 
 @dataclass(frozen=True)
 class Errors:
-    """What one structure is off by: `cable_length` (c,) m and `cable_stiffness` (c,) factors of all candidate cables,
-    `supports` (n, 6) m, `beam_length` (m,) m, `beam_stiffness` (m,) factors, `beam_curvature` (m, 2) 1/m about each
-    beam's local y and z axes, `load` (n,) factors, `shape` (k,) m, the amplitudes of the softest modes."""
+    """What one structure is off by: `cable_length` (c,) m and `cable_stiffness` (c,) factors of all candidate
+    cables, `supports` (n, 6) m, `beam_length` (m,) m, `beam_stiffness` (m,) factors, `beam_curvature` (m, 2)
+    1/m about each beam's local y and z axes, `load` (n,) factors, `shape` (k,) m, the amplitudes of the
+    softest modes."""
 
     cable_length: Reals
     cable_stiffness: Reals
@@ -61,7 +62,9 @@ class Errors:
 
 @dataclass(frozen=True)
 class Imperfections:
-    """Shapes (k, n, 6), the largest translation of each 1, and the unloaded `state` on which they are imposed."""
+    """Shapes (k, n, 6), the largest translation of each 1, and the unloaded `state` on which they are
+    imposed.
+    """
 
     state: State
     shapes: Reals
@@ -86,7 +89,9 @@ def sizes(members: Members) -> dict[str, int]:
 
 
 def variables(members: Members, seed: int, number: int) -> dict[str, Reals]:
-    """The standard normal variables of structure `number`, by cause. Raises InputError for negative numbers."""
+    """The standard normal variables of structure `number`, by cause. Raises InputError for negative
+    numbers.
+    """
     for name, value in (("seed", seed), ("number", number)):
         if not 0 <= value < 2**63:
             raise InputError("must be a whole number from 0 on", where=name, value=value)
@@ -169,8 +174,8 @@ def built_load(load: Reals, errors: Errors) -> Reals:
 
 
 def _load_factors(members: Members, t: Tolerances, z: Mapping[str, Reals]) -> Reals:
-    """Factors (n,): each crossing's own, the whole, and a plane over the plan that makes one half heavier by as
-    much as the other is lighter: its mean size over the crossings is 1."""
+    """Factors (n,): each crossing's own, the whole, and a plane over the plan that makes one half heavier by
+    as much as the other is lighter: its mean size over the crossings is 1."""
     each = 1.0 + t.load_each * z["load_each"][members.zone]
     plan = members.places[:, :2] - members.places[:, :2].mean(axis=0)
     plane = plan / np.maximum(np.abs(plan).mean(axis=0), 1e-300)

@@ -1,5 +1,5 @@
-"""Which elements of a structure belong to one rod, one connector, one support, and which load to one crossing:
-what errors of making and building are drawn for.
+"""Which elements of a structure belong to one rod, one connector, one support, and which load to one
+crossing: what errors of making and building are drawn for.
 
 From a gridshell they are known; in a model file, rods are the chains of beams of the kind "rod" that go on
 straight in the stress-free state, marked where something else touches them.
@@ -32,9 +32,9 @@ class Member:
 
 @dataclass(frozen=True)
 class Members:
-    """`rods`; `connectors` (j,) among the beams; `cables`, how many candidates; `held` degrees of freedom (h,) of
-    the supports' translations; `zone` (n,) the crossing that each node's load is counted to, of `zones`; `places` (n, 3),
-    m, of the nodes in the target; `beam_length` (m,), m, nominal rest lengths."""
+    """`rods`; `connectors` (j,) among the beams; `cables`, how many candidates; `held` degrees of freedom
+    (h,) of the supports' translations; `zone` (n,) the crossing that each node's load is counted to, of
+    `zones`; `places` (n, 3), m, of the nodes in the target; `beam_length` (m,), m, nominal rest lengths."""
 
     rods: tuple[Member, ...]
     connectors: Indices
@@ -104,7 +104,9 @@ def members_of_model(model: Model) -> Members:
 
 
 def _chains(beams: Beams, chosen: Indices, count: int) -> list[tuple[Indices, Reals]]:
-    """The chains of the chosen beams, each from the end with the lowest beam's number on, and each beam's sense."""
+    """The chains of the chosen beams, each from the end with the lowest beam's number on, and each beam's
+    sense.
+    """
     at: list[list[int]] = [[] for _ in range(count)]
     for element in chosen.tolist():
         for node in beams.ends[element]:

@@ -1,4 +1,6 @@
-"""One drawn structure, relaxed without load and loaded along its stable branch (standing.py has the method)."""
+"""One drawn structure, relaxed without load and loaded along its stable branch (standing.py has the
+method).
+"""
 
 from __future__ import annotations
 
@@ -44,9 +46,9 @@ _FAR_OFF = 5.0  # rad, a step that leads nowhere
 
 @dataclass(frozen=True)
 class DrawnOutcome:
-    """One drawn structure: the load `factor` up to which its stable branch was followed, whether it `stands`, how
-    `far`, m, a node ends from the perfect structure's place (inf where it fell), its last `state` on the branch, and the
-    `factorisations` spent."""
+    """One drawn structure: the load `factor` up to which its stable branch was followed, whether it `stands`,
+    how `far`, m, a node ends from the perfect structure's place (inf where it fell), its last `state` on the
+    branch, and the `factorisations` spent."""
 
     number: int
     factor: float
@@ -58,9 +60,9 @@ class DrawnOutcome:
 
 @dataclass(frozen=True)
 class Limit:
-    """Where a stable branch ends: the load `factor` up to which it was followed, the `kind` of what ended it (LIMIT_POINT,
-    BIFURCATION, BORNE where nothing did, UNLOADED where there is no equilibrium even without load), the last `state` on
-    it, and the `factorisations` spent."""
+    """Where a stable branch ends: the load `factor` up to which it was followed, the `kind` of what ended it
+    (LIMIT_POINT, BIFURCATION, BORNE where nothing did, UNLOADED where there is no equilibrium even without
+    load), the last `state` on it, and the `factorisations` spent."""
 
     factor: float
     kind: str
@@ -70,7 +72,9 @@ class Limit:
 
 @dataclass(frozen=True)
 class Here:
-    """A state on the stable branch with its balance and its tangent's factor, good until the next one is made."""
+    """A state on the stable branch with its balance and its tangent's factor, good until the next one is
+    made.
+    """
 
     state: State
     balance: Balance
@@ -108,8 +112,8 @@ class Loading:
         return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent)
 
     def followed(self, most: float, step: float, smallest: float) -> tuple[Here | None, float]:
-        """The last state on the stable branch and its load factor, `most` where the branch goes on; None where there is
-        no unloaded state."""
+        """The last state on the stable branch and its load factor, `most` where the branch goes on; None
+        where there is no unloaded state."""
         here = self._unloaded()
         factor, width, good = 0.0, step, 0
         while here is not None and factor < most:
@@ -127,8 +131,8 @@ class Loading:
         return here, factor
 
     def kind(self, here: Here) -> str:
-        """What ends the branch just beyond the state: at a limit point the path's tangent turns into the softest
-        mode, at a bifurcation it stays across."""
+        """What ends the branch just beyond the state: at a limit point the path's tangent turns into the
+        softest mode, at a bifurcation it stays across."""
         soft = modes(self.assembly, here.state, 1).shapes[0].ravel()[self.assembly.free]
         factor = self.assembly.factor(here.state)
         onward = factor.solve(self.load.ravel()[self.assembly.free])
@@ -137,8 +141,9 @@ class Loading:
         return LIMIT_POINT if abs(float((mass * soft * onward).sum())) > _ALIGNED * size else BIFURCATION
 
     def _unloaded(self) -> Here | None:
-        """The unloaded state: supports and free nodes go along with all errors at once, by the perfect structure's
-        tangent, since errors of rods' lengths leave the drawn one indefinite until its nodes have moved."""
+        """The unloaded state: supports and free nodes go along with all errors at once, by the perfect
+        structure's tangent, since errors of rods' lengths leave the drawn one indefinite until its nodes have
+        moved."""
         nominal, none = self.nominal, np.zeros_like(self.load)
         start, offset = nominal.unloaded, self.errors.supports
         perfect = self.assembly.with_parts((nominal.network.beams, nominal.network.cables))
@@ -166,9 +171,9 @@ class Loading:
         return self._newton(relaxed.state, none, limit=2, tolerance=_ON_THE_WAY)
 
     def _to_length(self, state: State) -> State:
-        """The state with its nodes moved so that the beams have the perfect structure's axial strains: rods are so
-        stiff along their axis that what a linear motion leaves would buckle them. The nearest motion in the sense of least
-        squares weighted by EA / l0, as in chords.py."""
+        """The state with its nodes moved so that the beams have the perfect structure's axial strains: rods
+        are so stiff along their axis that what a linear motion leaves would buckle them. The nearest motion
+        in the sense of least squares weighted by EA / l0, as in chords.py."""
         beams = self.nominal.network.beams
         built = self.assembly.parts[0]
         rest = (built.straight if isinstance(built, BentBeams) else cast(Beams, built)).rest_length
@@ -203,8 +208,8 @@ class Loading:
         return found if stray <= STRAY * self.nominal.members.span else None
 
     def _newton(self, begin: State, load: Reals, *, limit: int, tolerance: float) -> Here | None:
-        """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent positive definite,
-        the last one included; None where one isn't."""
+        """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent positive
+        definite, the last one included; None where one isn't."""
         own, state, before = self.assembly, begin, np.inf
         for _ in range(limit):
             here = self._at(state)

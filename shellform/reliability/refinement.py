@@ -1,13 +1,14 @@
-"""How far a design's numbers are off because its rods are cut into straight elements: the same model with each rod
-element halved, solved anew along the documented path.
+"""How far a design's numbers are off because its rods are cut into straight elements: the same model with
+each rod element halved, solved anew along the documented path.
 
-With q4 and q8 found on the two meshes and an error of order h² (beam.py), Richardson's estimate of the value at
-h = 0 and of the error of each is
+With q4 and q8 found on the two meshes and an error of order h² (beam.py), Richardson's estimate of the value
+at h = 0 and of the error of each is
 
     q0 = q8 + (q8 - q4) / 3,   q4 - q0 = 4 (q4 - q8) / 3,   q8 - q0 = (q4 - q8) / 3.
 
 New nodes lie on the cubic through both ends of an element with their directions, turned halfway. A path that
-the finer mesh leaves much earlier has no error of order h²; the estimate then tells the size of it and nothing more.
+the finer mesh leaves much earlier has no error of order h²; the estimate then tells the size of it and
+nothing more.
 """
 
 from __future__ import annotations
@@ -55,8 +56,9 @@ class Refined:
 
 @dataclass(frozen=True)
 class MeshError:
-    """`deviation_max` and `deviation_mean`, m, of the design's nodes from the target, `stress`, Pa, the largest
-    bending stress of rods, `critical` the critical load factor; how the path ended on both meshes, `kinds`."""
+    """`deviation_max` and `deviation_mean`, m, of the design's nodes from the target, `stress`, Pa, the
+    largest bending stress of rods, `critical` the critical load factor; how the path ended on both meshes,
+    `kinds`."""
 
     deviation_max: Refined
     deviation_mean: Refined
@@ -66,8 +68,8 @@ class MeshError:
 
 
 def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float = SOUGHT) -> MeshError:
-    """Of a design under the dead `load` (n, 6); critical factors are sought up to `sought`. Raises NotConverged
-    where there is no unloaded equilibrium."""
+    """Of a design under the dead `load` (n, 6); critical factors are sought up to `sought`. Raises
+    NotConverged where there is no unloaded equilibrium."""
     section = shell.rod.resized(design.radius).section
     supports = tuple(int(node) for node in shell.net.supports)
     model = Model(shell.network(design), {"load": load}, shell.target, supports)

@@ -1,9 +1,9 @@
-"""What is asked of a design as built, and whether it holds: drawn structures on their own paths, and the perfect
-one with rod elements halved.
+"""What is asked of a design as built, and whether it holds: drawn structures on their own paths, and the
+perfect one with rod elements halved.
 
-Load cases that are shares of a larger one lie on its path: each drawn structure is loaded once, with the largest, and
-stands under a smaller one where its branch goes on beyond it. So the same structures are judged under the design load
-and under the additional one.
+Load cases that are shares of a larger one lie on its path: each drawn structure is loaded once, with the
+largest, and stands under a smaller one where its branch goes on beyond it. So the same structures are judged
+under the design load and under the additional one.
 """
 
 from __future__ import annotations
@@ -85,8 +85,8 @@ class Safety:
 
 @dataclass(frozen=True)
 class UnderLoad:
-    """What was found under one load: its `standing`, the share that was `required`, and the numbers of the drawn
-    structures that have `fallen`."""
+    """What was found under one load: its `standing`, the share that was `required`, and the numbers of the
+    drawn structures that have `fallen`."""
 
     standing: Standing
     required: float
@@ -100,9 +100,9 @@ class UnderLoad:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What was found of a design: by load case, and the `critical` end of the perfect structure's path under the design load on
-    the halved mesh, followed up to `sought` (None: no factor is asked for); `failed` says what isn't held, a sentence
-    each."""
+    """What was found of a design: by load case, and the `critical` end of the perfect structure's path under
+    the design load on the halved mesh, followed up to `sought` (None: no factor is asked for); `failed` says
+    what isn't held, a sentence each."""
 
     loads: Mapping[str, UnderLoad]
     critical: Limit | None
@@ -128,9 +128,9 @@ def judge(
     initial: Judgement | None = None,
     design_load: str = "design",
 ) -> Judgement:
-    """The design judged under the dead `loads` (n, 6), those that are zero left out; `initial` is the initial design's
-    judgement. Raises InputError where there is no design load, NotConverged where the perfect structure has no unloaded
-    equilibrium."""
+    """The design judged under the dead `loads` (n, 6), those that are zero left out; `initial` is the initial
+    design's judgement. Raises InputError where there is no design load, NotConverged where the perfect
+    structure has no unloaded equilibrium."""
     if design_load not in loads or not loads[design_load].any():
         raise InputError("there is no design load to judge a design under", where="loads", value=design_load)
     found: dict[str, UnderLoad] = {}
@@ -170,8 +170,8 @@ def judge(
 
 
 def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: float) -> Limit:
-    """The end of the perfect structure's path on the mesh with rod elements halved, followed up to the factor `sought`;
-    0 where the finer mesh has no unloaded equilibrium."""
+    """The end of the perfect structure's path on the mesh with rod elements halved, followed up to the factor
+    `sought`; 0 where the finer mesh has no unloaded equilibrium."""
     supports = tuple(int(node) for node in shell.net.supports)
     model = halved(Model(shell.network(design), {"load": load}, shell.target, supports))
     nominal = perfect_of(model, "load", shapes=0)
@@ -181,8 +181,8 @@ def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: fl
 
 
 def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:
-    """The loads that paths are followed for, and for each the load cases that lie on its path with their shares of
-    it, itself included; loads of zero are left out."""
+    """The loads that paths are followed for, and for each the load cases that lie on its path with their
+    shares of it, itself included; loads of zero are left out."""
     size = {name: float(np.linalg.norm(load)) for name, load in loads.items()}
     found: dict[str, dict[str, float]] = {}
     for name in sorted((name for name in loads if size[name] > 0.0), key=lambda name: -size[name]):

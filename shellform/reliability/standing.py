@@ -1,14 +1,14 @@
 """Structures as built, each loaded from nothing on its own path: does it stand?
 
 A structure is relaxed without load from where the perfect one rests, and then loaded step by step (loading.py
-has the path of a single structure). A step begins along the tangent of the path, whose factor is at hand, and goes on
-by whole steps of Newton's. It counts only where every tangent on the way is positive definite and no node
-lands farther than `STRAY` of the span from where the path's tangent led; else it is halved, as on any path. So
-the large steps lead along the same branch as small ones do.
+has the path of a single structure). A step begins along the tangent of the path, whose factor is at hand, and
+goes on by whole steps of Newton's. It counts only where every tangent on the way is positive definite and no
+node lands farther than `STRAY` of the span from where the path's tangent led; else it is halved, as on any
+path. So the large steps lead along the same branch as small ones do.
 
-A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther than
-`FAR` of the span from the perfect structure's; one that loses stability on the way has fallen, whatever it
-would snap to, and how far it came is its load factor.
+A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther
+than `FAR` of the span from the perfect structure's; one that loses stability on the way has fallen, whatever
+it would snap to, and how far it came is its load factor.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ from shellform.structure.solve.loading import SMALLEST
 
 @dataclass(frozen=True)
 class DrawnSample:
-    """The `outcomes` of drawn structures, number after number, and what they say of the probability of standing."""
+    """The `outcomes` of drawn structures, number after number, and what they say of the probability of
+    standing.
+    """
 
     outcomes: tuple[DrawnOutcome, ...]
     standing: Standing
@@ -55,8 +57,8 @@ def sample(
 ) -> DrawnSample:
     """`count` drawn structures of a design, each loaded from nothing with the dead `load` (n, 6).
 
-    The same seed gives the same structures whatever the count. Raises InputError for a count below 1, NotConverged
-    where the perfect structure has no unloaded equilibrium.
+    The same seed gives the same structures whatever the count. Raises InputError for a count below 1,
+    NotConverged where the perfect structure has no unloaded equilibrium.
     """
     if count < 1:
         raise InputError("must be at least 1", where="count", value=count)
@@ -66,8 +68,8 @@ def sample(
 
 
 class Workshop:
-    """Builds and loads drawn structures of one perfect structure, as many side by side as there are cores: each
-    thread takes an assembly with a factor of its own."""
+    """Builds and loads drawn structures of one perfect structure, as many side by side as there are cores:
+    each thread takes an assembly with a factor of its own."""
 
     def __init__(self, nominal: Perfect) -> None:
         self.nominal = nominal
@@ -95,8 +97,8 @@ class Workshop:
         resolution: float = 1 / 64,
         tell: bool = True,
     ) -> Limit:
-        """Where the structure with the errors loses stability under its growing load; what ends its path is looked
-        into only to `tell` it."""
+        """Where the structure with the errors loses stability under its growing load; what ends its path is
+        looked into only to `tell` it."""
         own = self._taken()
         try:
             loading = Loading(self.nominal, own, errors, 0)

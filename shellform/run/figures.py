@@ -133,8 +133,8 @@ def draw_everything(run: Run, *, report: Report = unheard) -> bool:
 
 
 def draw_failure(run: Run) -> list[Path]:
-    """The shape in which the design to build most likely fails, its last stable state moved along the mode in which it
-    gives way; nothing where none of its structures falls."""
+    """The shape in which the design to build most likely fails, its last stable state moved along the mode in
+    which it gives way; nothing where none of its structures falls."""
     from shellform.output.pictures import maps, render
 
     file, told = run.folder / "figures/failure.png", run.summary.failure
@@ -291,7 +291,9 @@ def write_states(
     design: Design,
     states: Mapping[str, State],
 ) -> None:
-    """states/NAME-LOAD.vtp: the loaded geometry with deviations, m, and the end forces of rods and edge beams."""
+    """states/NAME-LOAD.vtp: the loaded geometry with deviations, m, and the end forces of rods and edge
+    beams.
+    """
     from shellform.output.exchange import vtp
     from shellform.output.pictures import maps
 

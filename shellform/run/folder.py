@@ -58,8 +58,8 @@ class Run:
 
     @property
     def best(self) -> str:
-        """The name of the design to build: the verdict's; without one, the last made of the polished, the rounded, the
-        optimised and the initial one.
+        """The name of the design to build: the verdict's; without one, the last made of the polished, the
+        rounded, the optimised and the initial one.
         """
         judged = self.summary.verdict
         if judged is not None and judged.design in self.designs:

@@ -1,9 +1,9 @@
 """The whole job of one case, stage by stage, in a run folder (contracts/run-folder.md).
 
-surface -> net -> initial -> optimise -> safety -> figures -> documents -> report. Each stage leaves its result in the
-folder and a key in `stages.json`: a hash of the entries it depends on, the surface file's bytes, the
-package's version and the stage before. Run again, a stage whose key is unchanged is loaded instead of
-computed. Stages hand on what they made, and the summary with what they add to it.
+surface -> net -> initial -> optimise -> safety -> figures -> documents -> report. Each stage leaves its
+result in the folder and a key in `stages.json`: a hash of the entries it depends on, the surface file's
+bytes, the package's version and the stage before. Run again, a stage whose key is unchanged is loaded instead
+of computed. Stages hand on what they made, and the summary with what they add to it.
 """
 
 from __future__ import annotations

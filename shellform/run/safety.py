@@ -1,9 +1,10 @@
 """The stage "safety": every design examined as it will be built.
 
-For every load case the critical factor of the perfect structure, on the design's mesh and with rod elements halved, and
-how many of its structures as built stand. Load cases that are shares of a larger one lie on its path, and are judged on
-it. Designs to compare with are drawn a few times (`safety.compared`); of those that may be built, from the last one on,
-each that isn't known to fail is drawn in full until one holds. Of the one to build the most likely failure is told.
+For every load case the critical factor of the perfect structure, on the design's mesh and with rod elements
+halved, and how many of its structures as built stand. Load cases that are shares of a larger one lie on its
+path, and are judged on it. Designs to compare with are drawn a few times (`safety.compared`); of those that
+may be built, from the last one on, each that isn't known to fail is drawn in full until one holds. Of the one
+to build the most likely failure is told.
 """
 
 from __future__ import annotations
@@ -56,8 +57,8 @@ class _Examined:
 
 
 def examine(workspace: Workspace) -> Summary:
-    """Examines the run's designs and returns its summary with what was found and the verdict. Raises InputError as the
-    run folder's readers."""
+    """Examines the run's designs and returns its summary with what was found and the verdict. Raises
+    InputError as the run folder's readers."""
     run = read_run(workspace.folder)
     entry = workspace.case.safety
     every = [_of_run(run, name) for name in run.designs]
@@ -113,7 +114,9 @@ def _critical(case: Case, each: _Examined, summary: Summary) -> Summary:
 def _ends(
     each: _Examined, followed: str, shares: Mapping[str, float], asked: Mapping[str, float]
 ) -> dict[str, dict[str, Any]]:
-    """The fields of the loads' records that the path of one of them tells, whose `shares` of the largest are given."""
+    """The fields of the loads' records that the path of one of them tells, whose `shares` of the largest are
+    given.
+    """
     sought = max(SOUGHT, _BEYOND * max((asked.get(name, 0.0) for name in shares), default=0.0))
     try:
         error = mesh_error(each.shell, each.design, each.loads[followed], sought=sought)
@@ -139,7 +142,9 @@ def _ends(
 
 
 def _stand(workspace: Workspace, each: _Examined, count: int, summary: Summary, clock: Clock) -> Summary:
-    """With how many of a design's structures stand under each load; unchanged where as many were drawn before."""
+    """With how many of a design's structures stand under each load; unchanged where as many were drawn
+    before.
+    """
     rows = dict(summary.designs[each.name].loads)
     entry = workspace.case.safety
     for largest, shares in paths(each.loads).items():
@@ -201,8 +206,8 @@ def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
 
 
 def _failure(workspace: Workspace, each: _Examined, count: int) -> FailureRecord | None:
-    """How a design most likely fails, under the smallest load under which one of its structures falls by itself; None
-    where none does."""
+    """How a design most likely fails, under the smallest load under which one of its structures falls by
+    itself; None where none does."""
     workspace.path(FAILURE).unlink(missing_ok=True)
     clock = Clock(0)
     for load in sorted(each.loads, key=lambda name: float(np.linalg.norm(each.loads[name]))):

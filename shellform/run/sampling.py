@@ -56,8 +56,9 @@ def drawn_of(
     clock: Clock,
     tell: Callable[[int], None],
 ) -> DrawnPath:
-    """Structures 0 to `count` of the design `name`, `made` of a shell with tolerances, `under` the load of a name among all;
-    those in the folder are taken from there. Raises NotConverged where the perfect structure has no unloaded equilibrium."""
+    """Structures 0 to `count` of the design `name`, `made` of a shell with tolerances, `under` the load of a
+    name among all; those in the folder are taken from there. Raises NotConverged where the perfect structure
+    has no unloaded equilibrium."""
     shell, design, tolerances = made
     load, loads = under
     key = _key(shell, design, tolerances, loads, seed)

@@ -7,7 +7,9 @@ from shellform.net.grid import edge_diagonals
 
 
 def test_the_vault_has_a_candidate_more_in_each_of_its_22_cells_of_three_joints(shell, vault):
-    """145 cells of four joints, and 22 of three, whose one diagonal ends at no support and lies below the surface."""
+    """145 cells of four joints, and 22 of three, whose one diagonal ends at no support and lies below the
+    surface.
+    """
     more = sf.brace(shell.net, shell.rod, shell.joint, shell.cable, below=vault, edge_cells=True)
     assert (len(shell.cable_ends), len(more.cable_ends)) == (290, 312)
     np.testing.assert_array_equal(more.cable_ends[:290], shell.cable_ends)

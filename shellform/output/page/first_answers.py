@@ -21,8 +21,8 @@ from shellform.structure.elements.state import State
 
 @dataclass(frozen=True)
 class Answer:
-    """What a designer asks first: the `question`, the answer in a few `words`, the `detail` that stands behind it, and if it
-    is `good` (None: neither)."""
+    """What a designer asks first: the `question`, the answer in a few `words`, the `detail` that stands
+    behind it, and if it is `good` (None: neither)."""
 
     question: str
     words: str
