@@ -95,7 +95,7 @@ def page(rows: Sequence[Stands]) -> str:
     lines = [
         "## What stands",
         "",
-        "The critical factor is that of the perfect structure. Structures are drawn with errors of the size's default tolerances, and each",
+        "The critical factor is that of the perfect structure, over the load that is named. Structures are drawn with errors of the size's default tolerances, and each",
         "is loaded from nothing on its own path; the probability's bounds are Clopper and Pearson's, each with 95 %.",
         "",
         "| method | design | load | cables | slack before load | slack under it | critical factor | drawn structures that stand | probability |",

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from scripts import published
+from scripts.published_standing import Stands
 from shellform.case.case import load_case
 from shellform.errors import InputError
 from shellform.optimiser.optimum import Step
@@ -190,6 +191,29 @@ def test_the_files_hold_every_line_and_every_accepted_design(tmp_path, shell, va
     assert "| the target surface and the openings that carry no load | – | – | – |  | – |" in markdown
     assert markdown.count("\n| 2 | 0.2 |") == 1
     assert "| 9 | 3 |" not in markdown
+
+
+def test_a_run_by_the_paper_s_method_stands_beside_ours_with_what_stands_of_each(tmp_path, shell, vault):
+    run = made(tmp_path / "ours", shell, vault)
+    other = made(tmp_path / "theirs", shell, vault, cables=99)
+    with pytest.raises(InputError, match="by the paper's method"):
+        published.beside(run, method=other)
+    case = load_case(ROOT / "scripts/scale_model.toml", ["optimise.method=paper"])
+    theirs = dataclasses.replace(other, case=case)
+    line = {each.key: each for each in published.beside(run, method=theirs)}["cables_end"]
+    assert (line.here, line.method, line.paper) == (119, 99, 130)
+    falls = Stands("paper's", "optimised", "design", 99, 18, 0, 1.0318, "limit point", 40, 0, 0.0, 0.072)
+    not_drawn = Stands(
+        "default", "optimised", "design", 119, 62, 0, None, "no equilibrium", 0, None, None, None
+    )
+    files = published.write_beside(run, method=theirs, stands=[falls, not_drawn])
+    assert [file.name for file in files] == ["published.md", "published.csv", "published_standing.csv"]
+    text = files[0].read_text(encoding="utf-8")
+    told = "| paper's | optimised | design | 99 | 18 | 0 | 1.032 (limit point) | 0 of 40 | 0.000 to 0.072 |"
+    assert told in text
+    assert "| default | optimised | design | 119 | 62 | 0 | no equilibrium | – | – |" in text
+    rows = list(csv.DictReader(io.StringIO(files[2].read_text(encoding="utf-8"))))
+    assert [(row["method"], row["stand"]) for row in rows] == [("paper's", "0"), ("default", "")]
 
 
 def test_runs_that_can_t_be_set_beside_the_paper_are_refused(tmp_path, shell, vault, capsys, monkeypatch):
