@@ -40,7 +40,7 @@ def problem(dome):
 @pytest.fixture(scope="module")
 def found(dome, problem):
     kept = []
-    return sf.optimise(problem, dome.design(), evaluations=30, safety=ASKED, keep=kept.append), kept
+    return sf.optimise(problem, dome.design(), evaluations=50, safety=ASKED, keep=kept.append), kept
 
 
 def test_the_design_found_has_fewer_cables_and_stands_as_a_fresh_sample_says(dome, problem, found):
@@ -53,8 +53,8 @@ def test_the_design_found_has_fewer_cables_and_stands_as_a_fresh_sample_says(dom
 def test_a_search_with_safety_resumed_in_thinning_ends_with_the_same_design_to_the_bit(dome, problem, found):
     whole, kept = found
     for phase in ("descend", "thin"):
-        place = max(k for k, each in enumerate(kept) if each.numbers["phase"] == phase)
-        again = sf.optimise(problem, dome.design(), evaluations=30, safety=ASKED, resume=kept[place])
+        place = [each.numbers["phase"] for each in kept].index(phase)
+        again = sf.optimise(problem, dome.design(), evaluations=50, safety=ASKED, resume=kept[place])
         np.testing.assert_array_equal(again.design.rest_length, whole.design.rest_length)
         np.testing.assert_array_equal(again.design.present, whole.design.present)
         assert (again.evaluations, again.status) == (whole.evaluations, whole.status)
