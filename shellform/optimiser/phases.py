@@ -40,7 +40,8 @@ from shellform.optimiser.trials import (
 from shellform.problem.evaluation import Linearisation
 
 _TINY = -1e-300  # a predicted change that isn't one
-_WORTH = 0.05  # of the objective, gained by a turn, for which another is made where thinning is to end with what stands
+# of the objective, gained by a turn, for which another is made where thinning is to end with what stands
+_WORTH = 0.05
 _MANY = 1 / 12  # of the taut cables: where smaller batches break limits, the stiffness kept is eased
 
 
@@ -59,8 +60,8 @@ def run(search: Search, it: Iterate) -> Iterate:
 
 
 def _confirmed(search: Search, it: Iterate) -> Iterate:
-    """Back to the last accepted design of which a fresh sample agrees that it stands, in steps of 1, 2, 4, ...: the
-    search has chosen its designs by their luck with the structures it tried."""
+    """Back to the last accepted design of which a fresh sample agrees that it stands, in steps of 1, 2, 4,
+    ...: the search has chosen its designs by their luck with the structures it tried."""
     if search.asked is None or not it.accepted:
         return it
     back = 0
@@ -77,7 +78,9 @@ def _confirmed(search: Search, it: Iterate) -> Iterate:
 
 
 def _last_standing(search: Search, it: Iterate) -> Iterate:
-    """Back to the last accepted design that its documented path leads to and, by bisection, that stands as built."""
+    """Back to the last accepted design that its documented path leads to and, by bisection, that stands as
+    built.
+    """
     it = _last_sound(search, it)
     if search.asked is None or not it.accepted:
         return it
@@ -121,8 +124,8 @@ def _climb(search: Search, it: Iterate) -> Iterate:
     """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the
     further loads are borne whole.
 
-    Each goes along the gradient of the constraints on it, with all cables kept taut; it counts where the stable
-    branch reaches farther.
+    Each goes along the gradient of the constraints on it, with all cables kept taut; it counts where the
+    stable branch reaches farther.
     """
     if it.stage == 1.0 or not any(part.term.stabilises for part in search.evaluator.problem.constraints):
         return it
@@ -258,8 +261,8 @@ def _thin(search: Search, it: Iterate) -> Iterate:
 
 
 def _eased(search: Search, it: Iterate) -> Iterate | None:
-    """With less stiffness to keep, where designs stand as built with room to spare: None where one fell since it was
-    last eased, or where it can't be less."""
+    """With less stiffness to keep, where designs stand as built with room to spare: None where one fell since
+    it was last eased, or where it can't be less."""
     solver = search.solver
     least = solver.stiffness * search.softest
     if search.asked is None or it.fell or it.stiffness <= least:

@@ -1,11 +1,11 @@
 """The judge within a search: few drawn structures, the same for every design, that say much.
 
-They are drawn with all deviations enlarged. If the load that structures bear scatters normally about a mean above the
-one asked for, enlarging by e divides that distance, counted in deviations, by e: with P the normal distribution, a share p
-becomes P(P⁻¹(p) / e), so that what one in a hundred does with errors as they are one in sixteen does with half as much again.
-(Larger errors also lower the mean, which errs on the safe side.) A dozen structures then refuse what else a hundred would be
-needed for. The same numbers are drawn for every design (common random numbers), those that fell before first, and
-no more than it takes to refuse.
+They are drawn with all deviations enlarged. If the load that structures bear scatters normally about a mean
+above the one asked for, enlarging by e divides that distance, counted in deviations, by e: with P the normal
+distribution, a share p becomes P(P⁻¹(p) / e), so that what one in a hundred does with errors as they are one
+in sixteen does with half as much again. (Larger errors also lower the mean, which errs on the safe side.) A
+dozen structures then refuse what else a hundred would be needed for. The same numbers are drawn for every
+design (common random numbers), those that fell before first, and no more than it takes to refuse.
 
 The perfect structure's critical factor is asked for beside them, with an allowance for the mesh.
 """
@@ -43,8 +43,8 @@ _SAME = 1e-9  # relative
 
 @dataclass(frozen=True)
 class Required:
-    """What a search asks of designs: the `safety`, the dead `loads` (n, 6) under which structures are drawn, the
-    `design_load` among them, and how many of the structures tried may have `fallen` under each."""
+    """What a search asks of designs: the `safety`, the dead `loads` (n, 6) under which structures are drawn,
+    the `design_load` among them, and how many of the structures tried may have `fallen` under each."""
 
     safety: Safety
     loads: Mapping[str, Reals]
@@ -62,8 +62,8 @@ class AsBuilt:
 
 @dataclass(frozen=True)
 class Tried:
-    """Numbers of the structures that have `fallen` under each load as far as it took to say whether the design `stands`,
-    whether the perfect one keeps its `critical` factor, and the `factorisations` spent."""
+    """Numbers of the structures that have `fallen` under each load as far as it took to say whether the
+    design `stands`, whether the perfect one keeps its `critical` factor, and the `factorisations` spent."""
 
     fallen: Mapping[str, tuple[int, ...]]
     critical: bool
@@ -79,9 +79,10 @@ def as_built(
     *,
     design_load: str = "design",
 ) -> AsBuilt:
-    """What is asked of designs that come after `start`, in trials and of a fresh sample under another seed. Errors are
-    enlarged in trials as far as the start itself bears the design load with them: few structures at the edge of
-    falling can't tell one design from another. Raises NotConverged where it has no unloaded equilibrium."""
+    """What is asked of designs that come after `start`, in trials and of a fresh sample under another seed.
+    Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
+    at the edge of falling can't tell one design from another. Raises NotConverged where it has no unloaded
+    equilibrium."""
     trial = None
     for enlarged in (safety.enlarged, 0.5 * (1.0 + safety.enlarged)):
         own = replace(safety, enlarged=enlarged)
@@ -109,9 +110,10 @@ def required(
     *,
     design_load: str = "design",
 ) -> Required:
-    """What is asked of designs that come after `start`: under the design load what the probability says for enlarged
-    errors, or what `start` shows where that is less, for the search would have nowhere to begin; under other loads
-    likewise, by `Safety.required`. Raises NotConverged where it has no unloaded equilibrium."""
+    """What is asked of designs that come after `start`: under the design load what the probability says for
+    enlarged errors, or what `start` shows where that is less, for the search would have nowhere to begin;
+    under other loads likewise, by `Safety.required`. Raises NotConverged where it has no unloaded
+    equilibrium."""
     own = {name: load for name, load in loads.items() if load.any()}
     every = Required(safety, own, design_load, {name: safety.tried for name in own})
     return _shown(every, tried(shell, start, every, critical=False))
@@ -135,8 +137,8 @@ def tried(
     first: Sequence[int] = (),
     critical: bool = True,
 ) -> Tried:
-    """The design judged by the search's structures, the numbers `first` before the others. Raises NotConverged where
-    it has no unloaded equilibrium."""
+    """The design judged by the search's structures, the numbers `first` before the others. Raises
+    NotConverged where it has no unloaded equilibrium."""
     safety, spent = asked.safety, 0
     fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
     order = [*first, *(number for number in range(safety.tried) if number not in set(first))]
