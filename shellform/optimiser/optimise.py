@@ -65,7 +65,7 @@ from shellform.problem.terms import Misfit, Share
 from shellform.reliability.guide import stretch_deviation
 from shellform.reliability.perfect import perfect
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import AsBuilt, as_built
+from shellform.reliability.trial_structures import Demand, demand
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.threads import dense_on_one
 from shellform.structure.network import assemble
@@ -108,7 +108,7 @@ def optimise(
         if safety is not None:
             share = max(share, safety.stiffness)
             built = {name: problem.loads[name] for name in problem.built_under or problem.loads}
-            asked = as_built(
+            asked = demand(
                 problem.shell, initial or start, built, safety, design_load=problem.design_load.name
             )
         search, it = begin(
@@ -180,7 +180,7 @@ def begin(
     evaluations: int,
     progress: Watch | None = None,
     keep: Keep | None = None,
-    asked: AsBuilt | None = None,
+    asked: Demand | None = None,
 ) -> tuple[Search, Iterate]:
     """A search of the problem and its first iterate. `kept` gives the stiffness, N/m, that no mode may fall
     below under the further loads, from that of the start's softest mode under the design load; what is
@@ -250,7 +250,7 @@ def _is_bound(part: Constraint, problem: Problem) -> bool:
     )
 
 
-def _least_tension(problem: Problem, start: Design, asked: AsBuilt | None) -> float:
+def _least_tension(problem: Problem, start: Design, asked: Demand | None) -> float:
     """N, that a cable keeps so that errors of lengths don't leave it slack: so many deviations as the safety
     asks for of what the median cable is off by, to first order."""
     if asked is None or asked.trial.safety.margin == 0.0 or not start.present.any():

@@ -10,7 +10,7 @@ import numpy as np
 
 from shellform.gridshell.gridshell import Design
 from shellform.problem.problem import Problem
-from shellform.reliability.trial_structures import AsBuilt
+from shellform.reliability.trial_structures import Demand
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import Loaded
 
@@ -63,7 +63,7 @@ class Optimum:
     factorisations: int
     wasted: int
     stiffness: float
-    asked: AsBuilt | None = None
+    asked: Demand | None = None
 
     @property
     def states(self) -> dict[str, State]:

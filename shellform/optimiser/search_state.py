@@ -23,7 +23,7 @@ from shellform.problem.evaluation import Evaluator, Linearisation
 from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, Problem
 from shellform.problem.terms import Term
-from shellform.reliability.trial_structures import AsBuilt
+from shellform.reliability.trial_structures import Demand
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import Loaded
 
@@ -53,7 +53,7 @@ class Search:
     objective_start: float
     inner: Problem
     softest: float
-    asked: AsBuilt | None
+    asked: Demand | None
     least: float
     groups: Indices | None
     always_guarded: bool

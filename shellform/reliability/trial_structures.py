@@ -53,7 +53,7 @@ class Required:
 
 
 @dataclass(frozen=True)
-class AsBuilt:
+class Demand:
     """What is required in each `trial` of a search, and of a fresh sample at its end, `confirmed`."""
 
     trial: Required
@@ -71,14 +71,14 @@ class Tried:
     factorisations: int
 
 
-def as_built(
+def demand(
     shell: Gridshell,
     start: Design,
     loads: Mapping[str, Reals],
     safety: Safety,
     *,
     design_load: str = "design",
-) -> AsBuilt:
+) -> Demand:
     """What is asked of designs that come after `start`, in trials and of a fresh sample under another seed.
     Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
     at the edge of falling can't tell one design from another. Raises NotConverged where it has no unloaded
@@ -97,9 +97,9 @@ def as_built(
         trial = required(shell, start, loads, replace(safety, enlarged=1.0), design_load=design_load)
     fresh = replace(safety, enlarged=1.0, tried=min(safety.drawn, MOST), seed=safety.seed + _CONFIRMED)
     if any(trial.fallen[name] > _known(fresh, name, design_load) for name in trial.fallen):
-        return AsBuilt(trial, required(shell, start, loads, fresh, design_load=design_load))
+        return Demand(trial, required(shell, start, loads, fresh, design_load=design_load))
     known = {name: _known(fresh, name, design_load) for name in trial.fallen}
-    return AsBuilt(trial, Required(fresh, trial.loads, design_load, known))
+    return Demand(trial, Required(fresh, trial.loads, design_load, known))
 
 
 def required(
