@@ -1,4 +1,4 @@
-"""`shellform new`: a commented case file for a surface."""
+"""`shellform new`: a commented case file for a surface, with a design that stands."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from shellform.cli.options import Scripts, with_surface_options
-from shellform.cli.terminal import tell_labelled
+from shellform.cli.options import Quiet, Scripts, with_surface_options
+from shellform.cli.terminal import Progress, tell_labelled
 
 
 @with_surface_options
@@ -17,9 +17,33 @@ def new(
     surface: Annotated[Path, typer.Argument(help="A surface file or shipped builder script.")],
     output: Annotated[Path, typer.Option(help="Case file to write, CASE.toml.")],
     surface_options: Mapping[str, Any],
+    rod: Annotated[
+        str | None, typer.Option(help='Catalogue, or catalogue and section: "gfrp_rods/8 mm".')
+    ] = None,
+    spacing: Annotated[float | None, typer.Option(help="Distance between rods, m.")] = None,
+    thickness: Annotated[float | None, typer.Option(help="Of the concrete, m.")] = None,
+    angle: Annotated[
+        float | None,
+        typer.Option(help="Of the u rods against the x axis, degrees; left out: with the least bending."),
+    ] = None,
     allow_scripts: Scripts = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Write a commented case file for a surface."""
+    """Design a shell that stands and write its commented case file."""
+    from shellform.run.first_design import Wish
     from shellform.run.propose import propose_case
 
-    tell_labelled(propose_case(surface, output, surface_options, allow_scripts=allow_scripts))
+    report = Progress(quiet=quiet)
+    try:
+        told = propose_case(
+            surface,
+            output,
+            surface_options,
+            allow_scripts=allow_scripts,
+            wish=Wish(rod, spacing, thickness, angle),
+            report=report,
+        )
+    finally:
+        report.close()
+    if not quiet:
+        tell_labelled(told)

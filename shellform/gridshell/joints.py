@@ -17,6 +17,13 @@ _PAPER = Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
 _RODS = Rod.round(young=40e9, radius=0.001)
 _OFF = 4.0  # times what fits: as much as a rod's EI changes where its radius is √2 times as large
 _GAP = 1.5  # the same of the gap
+_SPACING = 0.055  # m, of the paper's rods
+
+
+def usual_gap(spacing: float) -> float:
+    """The gap, m, of rods that aren't chosen yet: the depth of the paper's at that spacing. Once they are, it is
+    theirs (`following`)."""
+    return _PAPER.gap * spacing / _SPACING
 
 
 def following(rod: Rod) -> Joint:

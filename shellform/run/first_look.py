@@ -16,6 +16,7 @@ from shellform.case.build_net import net_record, size_text, surface_of, surface_
 from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
 from shellform.errors import InputError
+from shellform.gridshell.joints import usual_gap
 from shellform.net.edges import stand
 from shellform.net.orientation import oriented_net
 from shellform.net.saved import net_document, save_net
@@ -30,7 +31,6 @@ from shellform.surface.shape.target import largest_curvature
 from shellform.written import folder as made
 from shellform.written import write_text
 
-_GAP = 1.0 / 27.5  # of the spacing, as in the paper's scale model
 YOUNG, STRENGTH = 40e9, 255e6  # Pa, of the paper's GFRP rods
 
 
@@ -172,7 +172,7 @@ def net_alone(
         )
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
     report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
-    settings = {"spacing": spacing, "gap": gap or _GAP * spacing}
+    settings = {"spacing": spacing, "gap": gap or usual_gap(spacing)}
     net, found, offset = oriented_net(
         surface, settings, angle=_angle(angle), progress=lambda text: report(Event("net", text))
     )

@@ -1,8 +1,7 @@
-"""`shellform new`: a commented case file for a surface, proposed from its size and curvature.
+"""`shellform new`: a commented case file for a surface, with a design that stands (first_design.py).
 
-The paper's scale model (section 4.1) has 55 mm spacing on 0.56 m². With s the spacing, lengths grow by k = s / 55 mm; stresses stay
-as they are, so that forces grow with k² and bending and torsion stiffness (force × length²) with k⁴, as in table 1. Rods may be no
-thicker than equation (1) r <= f_f / (E κ) allows. Joints follow the rods (joints.py), loads the area.
+Every number comes with its reason. Forces and lengths that only limit the search are the paper's scale model's (section
+4.1: 55 mm spacing), times k = spacing / 55 mm and its square.
 """
 
 from __future__ import annotations
@@ -13,65 +12,87 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from shellform.case.build_net import size_text, surface_of
 from shellform.errors import InputError
 from shellform.net.edges import stretches_of
 from shellform.net.net import Stretch
-from shellform.run.first_look import STRENGTH, YOUNG, largest_radius, surface_entry
-from shellform.surface.shape.target import largest_curvature
+from shellform.records.progress import Event, Kind, Report, unheard
+from shellform.run.first_design import NEEDED, REST_RATIO, THICKNESS, FirstDesign, Wish, first_design
+from shellform.run.first_look import surface_entry
+from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
-_SPACING, _RADIUS = 0.055, 0.001  # m, of the paper's scale model
-_AREA = 0.56  # m², of its surface
-_THICKER = 1.4  # than the paper's, whose openings carry nothing: loaded all over, a dome of its size collapses with 1.05 mm and bears with 1.5
-_CONCRETE = 0.05  # m, 1.2 kN/m²: the paper's 6.9 N on every second crossing are 1.1
-_MARGIN = (
-    0.9  # of the radius by (1): rods curve a little more than the surface between its triangles' corners
-)
+_SPACING = 0.055  # m, of the paper's scale model
 
 
 def propose_case(
-    file: Path, output: Path, options: Mapping[str, Any], *, allow_scripts: bool
+    file: Path,
+    output: Path,
+    options: Mapping[str, Any],
+    *,
+    allow_scripts: bool,
+    wish: Wish | None = None,
+    report: Report = unheard,
 ) -> dict[str, str]:
     """Writes a case for a surface file to `output`; returns what was proposed as labelled lines.
 
-    `options` are the entries of [surface] in a case. Raises InputError where `output` exists or isn't named .toml.
+    `options` are the entries of [surface] in a case; `wish` is what the user wants of the design. Raises InputError where
+    `output` exists or isn't named .toml, and InputError or NotConverged where no design stands (unbuildable.py).
     """
     _check(output)
-    entry = surface_entry(file, options)
-    surface = surface_of(entry, allow_scripts=allow_scripts)
-    bent = largest_curvature(surface)
-    spacing = _short(_SPACING * np.sqrt(surface.area / _AREA))
-    k = spacing / _SPACING
-    allowed = largest_radius(YOUNG, STRENGTH, bent) or np.inf
-    radius = _short(min(_THICKER * _RADIUS * k, _MARGIN * allowed))
+    wanted = wish or Wish()
+    surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
+    report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
+    design = first_design(surface, wanted, lambda text: report(Event("new", text, Kind.NOTE)))
     edges = _edges_told(stretches_of(surface))
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
+    write_text(output, _text(file, entries, surface, design, wanted, edges))
+    return {
+        "size": size_text(surface.size),
+        "spacing": f"{design.spacing:g} m, {design.reason}: {len(design.placed.net.grid.lattice)} crossings",
+        "angle": f"{design.placed.angle:g}°",
+        "rods": f"{design.choice.label} of {design.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",
+        "cables": f"⌀ {1e3 * design.rope.diameter:g} mm",
+        "concrete": f"{1e3 * design.thickness:g} mm",
+        "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures with errors of building",
+        "edges": edges,
+        "case": str(output),
+    }
+
+
+def _text(
+    file: Path, entries: Mapping[str, Any], surface: Surface, design: FirstDesign, wish: Wish, edges: str
+) -> str:
+    """The case file."""
     lines = "\n".join(f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in entries.items())
-    text = f"""\
+    k = design.spacing / _SPACING
+    placed, choice, rope = design.placed, design.choice, design.rope
+    told = "\n".join(f"#   {each}" for each in design.told)
+    offset = "" if placed.offset == (0.0, 0.0) else f"\noffset = {list(placed.offset)!r}"
+    angle = "as asked" if wish.angle is not None else "of those tried its rods bend least"
+    bent = 1.0 / max(placed.net.quality.curvature_max, 1e-12)
+    return f"""\
 # Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {size_text(surface.size)}, {surface.area:.4g} m².
-# If that size is wrong, the unit is: run `shellform new` again with --unit. Lengths are {k:.3g} × the paper's scale model's.
+# If that size is wrong, the unit is: run `shellform new` again with --unit. What was tried:
+{told}
 title = {json.dumps(file.stem, ensure_ascii=False)}
 
 [surface]            # relative to this file
 {lines}
 
 [net]
-spacing = {spacing!r}        # m: about {surface.area / spacing**2:.0f} crossings, as many as the paper's; smaller: nearer, more rods
-angle = 45.0         # degrees of the u rods against x; "auto" seeks the least bending
+spacing = {design.spacing!r}        # m: {design.reason}; {len(placed.net.grid.lattice)} crossings
+angle = {placed.angle!r}         # degrees of the u rods against x: {angle}{offset}
 
 [rod]
-young = 40e9         # Pa, glass-fibre reinforced polymer; or catalogue = "gfrp_rods" in place of young, strength and radius
-strength = 255e6     # Pa, of the paper's rods
-density = 2000.0     # kg/m³
-radius = {radius!r}      # m: equation (1) allows {allowed:.3g} at the surface's largest curvature {bent:.3g} 1/m{_thin_told(radius, k)}
+catalogue = "{choice.catalogue}"
+section = "{_named(choice.label)}"    # equation (1) allows {2e3 * design.allowed:.3g} mm where the net is curved most, to a radius of {bent:.3g} m; \
+rods at {design.tried.stress:.0%} of their strength under the load followed
 
 [cable]
-stiffness = {_short(187.0 * k**2)!r}    # EA, N: the paper's × {k:.3g}²
-rest_ratio = 0.99
-force_max = {_short(20.0 * k**2)!r}     # N, constraint (5): the paper's × {k:.3g}²
+stiffness = {_short(rope.stiffness)!r}    # EA, N: stainless strand 1 × 19, ⌀ {1e3 * rope.diameter:g} mm; much softer cables let the shell buckle
+rest_ratio = {REST_RATIO!r}
+force_max = {_short(rope.force_max)!r}     # N, constraint (5): half of what breaks it
 
 [edges]              # found: {edges}
 outer = "auto"       # ground where the edge is low, elsewhere an edge beam; "fill" brings it down to the ground, "free" lets rods end
@@ -83,13 +104,14 @@ composite = 0.5      # how far they act together: 1 as if glued, 0 loose
 
 [part.concrete]      # on its true area, so that the load stays where the spacing changes
 kind = "concrete"
-thickness = {_CONCRETE!r}     # m
+thickness = {design.thickness!r}     # m: {_thickness_told(design, wish)}
 
 [part.rods]
 kind = "rods"
 
 [[load]]
-name = "design"
+name = "design"      # the initial design stands up to {design.tried.factor:.2f} × this or more ({NEEDED:g} is asked), and {design.standing} of {design.drawn} structures \
+with errors of building do
 factors = {{ concrete = 1.0, rods = 1.0 }}
 
 [[load]]
@@ -104,14 +126,19 @@ misfit_rms_additional = {_short(0.005 * k)!r}     # m, constraint (6): the paper
 [figures]
 limit = {_short(0.010 * k)!r}      # m, end of the colour scale
 """
-    write_text(output, text)
-    return {
-        "size": size_text(surface.size),
-        "spacing": f"{spacing:g} m",
-        "rod radius": f"{radius:g} m (equation 1 allows {allowed:.3g}){_thin_told(radius, k)}",
-        "edges": edges,
-        "case": str(output),
-    }
+
+
+def _thickness_told(design: FirstDesign, wish: Wish) -> str:
+    if wish.thickness is not None:
+        return "as asked"
+    if design.thickness == THICKNESS:
+        return "usual"
+    return "what these rods bear; pour it first, and the rest when it has hardened"
+
+
+def _named(label: str) -> str:
+    """A section's label as it is typed."""
+    return label.replace("⌀", "").replace("×", "x").strip()
 
 
 def _check(output: Path) -> None:
@@ -126,13 +153,6 @@ def _check(output: Path) -> None:
         raise InputError(
             "there is no such folder", where=str(output.parent), remedy="Make it, or choose another --output."
         )
-
-
-def _thin_told(radius: float, k: float) -> str:
-    """What is to be said where rods are thinner than the paper's times k."""
-    if radius >= _short(_RADIUS * k):
-        return ""
-    return f"; thinner than the paper's × {k:.3g}, so look whether they bear the load"
 
 
 def _edges_told(stretches: Sequence[Stretch]) -> str:

@@ -1,0 +1,157 @@
+"""What is sized before anything is solved: the spacing, the cables, and with which section to begin.
+
+Spacing. A net is refused, or its rods break, where cells are large against the surface's radius of curvature; so it is
+at most a third of the radius that all but a twentieth of the surface keeps (a quantile of area: one crease doesn't
+decide). Beside this it follows the span, so that there are enough crossings for the shape and few enough to build, and
+above a metre what is usual on site.
+
+Buckling. The braced grid is taken as an orthotropic shell: across, rods of EI every s bend with D = EI / s; in its
+surface, the cables of EA on both diagonals of each cell resist shear with S = EA / (√2 s). A sphere of such a shell
+buckles at 2 √(D S) / R² and more where the rods' own EA counts too, a barrel at less. The number that stands before
+√(D S) was set by four shells that were solved; it only says where to begin.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import InputError
+from shellform.gridshell.catalogue import Catalogue, label, read_catalogue
+from shellform.gridshell.gridshell import erection_stress
+from shellform.net.net import Net
+from shellform.structure.elements.sections import Section, mass_per_length, stiffness
+from shellform.surface.shape.target import Surface, curvature
+
+SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
+_BY_RADIUS = 3.0  # cells across a radius of curvature
+_CROSSINGS = 260.0  # to begin with
+MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
+_USUAL = 1.0  # m, of rods on site
+_DEPTH = 8.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
+_CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
+_ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008)  # m, diameters in stock
+_ROPE = 0.006  # of the spacing, a rope's diameter
+_ROPE_AREA, _ROPE_YOUNG, _ROPE_STRENGTH = 0.597, 120e9, 1380e6  # of the diameter's square; Pa; Pa at breaking
+_BUCKLING = 1.4
+
+
+@dataclass(frozen=True)
+class Rope:
+    """A stainless strand 1 × 19 of a `diameter`, m, as sold: EA, N, and half of what breaks it, N."""
+
+    diameter: float
+
+    @property
+    def stiffness(self) -> float:
+        """EA, N."""
+        return _ROPE_YOUNG * _ROPE_AREA * self.diameter**2
+
+    @property
+    def force_max(self) -> float:
+        """N."""
+        return 0.5 * _ROPE_STRENGTH * _ROPE_AREA * self.diameter**2
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A `section` with the name of the catalogue that has it."""
+
+    catalogue: str
+    section: Section
+
+    @property
+    def label(self) -> str:
+        """As the catalogue calls it."""
+        return label(self.section)
+
+    @property
+    def bending(self) -> float:
+        """The smaller of EI_y and EI_z, N·m²."""
+        return min(stiffness(self.section)[2:])
+
+
+def curvature_shown(surface: Surface) -> float:
+    """The larger principal curvature, 1/m, that all but a twentieth of the surface keeps."""
+    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface)
+    order = np.argsort(bent)
+    share = np.cumsum(weight[order]) / weight.sum()
+    return float(bent[order][min(int(np.searchsorted(share, SHOWN)), len(bent) - 1)])
+
+
+def vertex_areas(surface: Surface) -> Reals:
+    """A third (v,), m², of the triangles at each vertex."""
+    corner = surface.vertices[surface.triangles]
+    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    result = np.zeros(len(surface.vertices))
+    np.add.at(result, surface.triangles, (area / 3.0)[:, None])
+    return result
+
+
+def first_spacing(surface: Surface) -> tuple[float, str]:
+    """The spacing, m, to begin with, and its reason."""
+    area, bent = surface.area, curvature_shown(surface)
+    finest = math.sqrt(area / MOST_CROSSINGS)
+    wanted = {
+        f"about {_CROSSINGS:.0f} crossings": math.sqrt(area / _CROSSINGS),
+        "usual on site": max(_USUAL, finest),
+        f"a third of the surface's radius of {1.0 / max(bent, 1e-12):.3g} m": 1.0 / (_BY_RADIUS * max(bent, 1e-12)),
+    }  # fmt: skip
+    reason = min(wanted, key=lambda each: wanted[each])
+    if wanted[reason] < finest:
+        return practical(
+            finest
+        ), f"{MOST_CROSSINGS} crossings at the most, where {reason} asks for {wanted[reason]:.2g} m"
+    return practical(wanted[reason]), reason
+
+
+def practical(spacing: float) -> float:
+    """Rounded down to what is set out with a rule: 5 cm steps from half a metre on, else two digits."""
+    if spacing >= 0.5:
+        return round(0.05 * math.floor(spacing / 0.05 + 1e-9), 2)
+    step = 10.0 ** (math.floor(math.log10(spacing)) - 1)
+    return float(f"{step * math.floor(spacing / step + 1e-9):.2g}")
+
+
+def rope_for(spacing: float) -> Rope:
+    """The stock strand nearest to 6 mm at a metre's spacing."""
+    return Rope(min(_ROPES, key=lambda each: abs(math.log(each / (_ROPE * spacing)))))
+
+
+def choices(net: Net, spacing: float, wish: str | None) -> list[Choice]:
+    """Sections that the net's curvature and its spacing allow, by rising stiffness; with a `wish` like
+    "gfrp_rods/8 mm" that one, with the name of a catalogue those of it. Empty where none is thin enough."""
+    found = [
+        each
+        for each in wished(wish)
+        if erection_stress(net, each.section) <= each.section.material.strength
+        and 2.0 * max(each.section.fibres) <= spacing / _DEPTH
+    ]
+    found.sort(key=lambda each: (each.bending, mass_per_length(each.section)))
+    return found
+
+
+def wished(wish: str | None) -> list[Choice]:
+    """The sections among which to choose. Raises InputError for an unknown catalogue or section."""
+    from shellform.gridshell.catalogue import named
+
+    if wish is None:
+        return [Choice(name, each) for name in _CATALOGUES for each in read_catalogue(name).sections]
+    name, _, size = wish.partition("/")
+    catalogue: Catalogue = read_catalogue(name)
+    if not size:
+        return [Choice(name, each) for each in catalogue.sections]
+    try:
+        return [Choice(name, named(catalogue, size))]
+    except InputError as error:
+        raise InputError(error.what, where="--rod", value=wish, remedy=error.remedy) from error
+
+
+def buckling_load(surface: Surface, spacing: float, bending: float, rope: Rope) -> float:
+    """About what load, N/m², the braced grid of rods with EI `bending`, N·m², buckles under."""
+    mean = float(np.average((curvature(surface) ** 2).mean(axis=1), weights=vertex_areas(surface)))
+    across, shear = bending / spacing, rope.stiffness / (math.sqrt(2.0) * spacing)
+    return _BUCKLING * math.sqrt(across * shear) * mean

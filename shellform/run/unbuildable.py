@@ -1,0 +1,154 @@
+"""What can't be built: the reason, how far off it is, where, and a way out that works.
+
+Sizes no shell has are refused with the unit as the first suspicion, and flat surfaces since a flat plate has none of a
+shell's stiffness. Where the search for a first design ends without one, the failure that came nearest says why.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import InputError, NotConverged
+from shellform.net.refusal import NoNet, Stalled
+from shellform.run.sizes import Choice
+from shellform.surface.shape.target import Surface, curvature
+
+if TYPE_CHECKING:
+    from shellform.run.first_design import Placed, Wish
+
+SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
+_FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
+_UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
+
+
+class Why(Enum):
+    """Which of a shell's needs isn't met."""
+
+    NET = "spacing and curvature"
+    SPACING = "spacing"
+    CURVATURE = "curvature"
+    STRENGTH = "strength"
+    STABILITY = "stability"
+    SCATTER = "stability of structures as built"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """How an attempt failed: `why`, at which `spacing` and `thickness`, m, up to which `factor` of its load it stood, with
+    which `choice` of rods on which net (`placed`), `where` (3,), m, the rods' `stress` over their strength, or the net's
+    own `error`."""
+
+    why: Why
+    spacing: float
+    thickness: float
+    factor: float = 0.0
+    choice: Choice | None = None
+    placed: Placed | None = None
+    where: Reals | None = None
+    stress: float = 0.0
+    error: NoNet | Stalled | None = None
+
+
+def refuse_size(surface: Surface) -> None:
+    """Raises InputError for a surface smaller or larger than any shell."""
+    side = float(surface.size[:2].max())
+    if SMALLEST <= side <= LARGEST:
+        return
+    x, y, z = surface.size
+    fitting = [
+        unit for unit, factor in _UNITS.items() if factor != 1.0 and 2.0 <= side * factor <= 0.5 * LARGEST
+    ]
+    remedy = (
+        f"Give the file's unit: --unit {fitting[0]} makes it {side * _UNITS[fitting[0]]:.3g} m."
+        if fitting
+        else "Scale the file to the size that is meant."
+    )
+    raise InputError(
+        f"is {x:.4g} × {y:.4g} × {z:.4g} m, which no gridshell is ({SMALLEST:g} to {LARGEST:g} m): is the unit right?",
+        where="surface.unit",
+        remedy=remedy,
+    )
+
+
+def refuse_flat(surface: Surface) -> None:
+    """Raises InputError for a surface that lies in a plane."""
+    centred = surface.vertices - surface.vertices.mean(axis=0)
+    _, _, axes = np.linalg.svd(centred, full_matrices=False)
+    depth, side = float(np.ptp(centred @ axes[2])), float(np.ptp(centred @ axes[0]))
+    if depth < _FLAT * side:
+        raise InputError(
+            f"keeps to a plane within {depth:.3g} m over {side:.3g} m: a flat plate has no shell's stiffness",
+            where="surface",
+            remedy=f"Give it a rise: a tenth of its span, {0.1 * side:.3g} m, is usual for shells.",
+        )
+
+
+def refused(
+    surface: Surface, failure: Failure | None, wish: Wish, *, bears: float | None = None
+) -> InputError | NotConverged:
+    """What to say of a shell that can't be built: as an error, to be raised. `bears`: a thickness of concrete, m, that was
+    found to stand."""
+    if failure is None or failure.why is Why.NET:
+        error = None if failure is None else failure.error
+        most, radius = _most_curved(surface)
+        spacing = 0.0 if failure is None else failure.spacing
+        return InputError(
+            f"reason: {Why.NET.value}. No net of {spacing:g} m covers it{'' if error is None else f' ({_said(error)})'}; it is "
+            f"curved most at {_at(most)}, to a radius of {radius:.3g} m",
+            where="net.spacing",
+            remedy=f"Round the surface there to {3.0 * max(spacing, radius):.2g} m or more, or cut it into pieces along its creases.",
+        )
+    choice, stress = failure.choice, failure.stress
+    assert choice is not None
+    place = "" if failure.where is None else f" at {_at(failure.where)}"
+    if failure.why is Why.SPACING:
+        need = 8.0 * 2.0 * max(choice.section.fibres)
+        return InputError(
+            f"reason: spacing. Rods of {choice.label} are too thick for a spacing of {failure.spacing:g} m",
+            where="--spacing",
+            remedy=f"Give --spacing {math.ceil(1e3 * need) / 1e3:g} or more, or thinner rods with --rod.",
+        )
+    if failure.why in (Why.CURVATURE, Why.STRENGTH):
+        return InputError(
+            f"reason: {failure.why.value}. {choice.label} of {choice.catalogue} would be stressed to {stress:.0%} of its "
+            f"strength{place}, at a spacing of {failure.spacing:g} m",
+            where="rod",
+            remedy=_thinner_rods(wish)
+            if wish.rod
+            else f"Round the surface there: {max(stress, 1.0):.2g} times its radius is needed.",
+        )
+    what = (
+        f"reason: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
+        f"{failure.spacing:g} m; with {1e3 * failure.thickness:.3g} mm of concrete it stands up to {failure.factor:.2f} × its load, "
+        f"where 1.5 is needed, and gives way first{place}"
+    )
+    if bears is not None:
+        remedy = f"A single layer of rods bears --thickness {bears:g}: pour that first, and the rest when it has hardened."
+    else:
+        remedy = "Give the surface more rise: buckling grows with the square of its curvature."
+    return NotConverged(what, residual=math.nan, iterations=0, remedy=remedy)
+
+
+def _thinner_rods(wish: Wish) -> str:
+    return f"Leave --rod {wish.rod} out, so that rods are chosen that the net allows."
+
+
+def _said(error: NoNet | Stalled) -> str:
+    return error.what if isinstance(error, InputError) else str(error)
+
+
+def _most_curved(surface: Surface) -> tuple[Reals, float]:
+    bent = np.abs(curvature(surface)).max(axis=1)
+    bent[np.concatenate(surface.boundary)] = 0.0
+    at = int(np.argmax(bent))
+    return surface.vertices[at], 1.0 / max(float(bent[at]), 1e-12)
+
+
+def _at(point: Reals) -> str:
+    return "(" + ", ".join(f"{x:.3g}" for x in point) + ") m"
