@@ -40,6 +40,7 @@ from shellform.run.sizes import (
     buckling_load,
     choices,
     first_spacing,
+    least_spacing,
     practical,
     rope_for,
     wished,
@@ -56,7 +57,7 @@ ADDITIONAL = 1.2  # times the concrete: the case "additional"
 REST_RATIO = 0.998  # of the cables: their prestrain is about what they may be off in length
 DRAWN, SEED = 10, 1
 ELEMENTS = 2
-THICKNESS, LEAST_THICKNESS = 0.05, 0.02  # m
+THICKNESS, LEAST_THICKNESS = 0.05, 0.015  # m: usual; a first layer of sprayed concrete
 _ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
@@ -151,9 +152,7 @@ class _Search:
         self._say(text)
 
     def found(self) -> FirstDesign:
-        spacing, self.reason = (
-            first_spacing(self.surface) if self.wish.spacing is None else (self.wish.spacing, "as asked")
-        )
+        spacing, self.reason = self._first_spacing()
         thickness = self.wish.thickness or THICKNESS
         for number in range(_SPACINGS):
             if number:
@@ -165,6 +164,13 @@ class _Search:
             if design is not None:
                 return design
         return self._thinner(spacing, thickness)
+
+    def _first_spacing(self) -> tuple[float, str]:
+        if self.wish.spacing is not None:
+            return self.wish.spacing, "as asked"
+        spacing, reason = first_spacing(self.surface)
+        least = min(least_spacing(each) for each in wished(self.wish.rod))
+        return (spacing, reason) if spacing >= least else (least, "as near as rods of that depth may lie")
 
     def _vain(self, spacing: float, finer: float) -> bool:
         """Whether a finer spacing is too fine to solve, or far too little help."""
@@ -235,27 +241,13 @@ class _Search:
         """The net that bends its rods least, among several angles and offsets. Raises NoNet or Stalled."""
         settings: dict[str, Any] = {"spacing": spacing, "gap": gap, "elements": ELEMENTS}
         angles: Sequence[float] = self.angles if self.wish.angle is None else (self.wish.angle,)
-        nets: list[Placed] = []
-        for angle in angles:
-            try:
-                net = pull_net(self.surface, **settings, angle=math.radians(angle))
-            except (NoNet, Stalled) as error:
-                self.say(f"net at {angle:g}°, {spacing:g} m: {error.reason.value}")
-                continue
-            nets.append(Placed(net, angle, (0.0, 0.0)))
-            self._say(f"net at {angle:g}°, {spacing:g} m: rods bend to a radius of {_radius(net):.3g} m")
+        nets = [each for angle in angles if (each := self._pulled(settings, angle, (0.0, 0.0))) is not None]
         if nets:
             best = _least_bent(nets)
-            self.angles = [each.angle for each in nets if each.net.quality.curvature_max <= (1.0 + 2 * _ALIKE) * best.net.quality.curvature_max][:2]  # fmt: skip
-            try:
-                moved = (
-                    best.net
-                    if len(angles) < len(_ANGLES)
-                    else pull_net(self.surface, **settings, angle=math.radians(best.angle), offset=(0.5, 0.5))
-                )
-                best = _least_bent([best, Placed(moved, best.angle, (0.5, 0.5))])
-            except (NoNet, Stalled):
-                pass  # the net at hand stays the best
+            near = (1.0 + 2.0 * _ALIKE) * best.net.quality.curvature_max
+            self.angles = [each.angle for each in nets if each.net.quality.curvature_max <= near][:2]
+            moved = self._pulled(settings, best.angle, (0.5, 0.5)) if angles is _ANGLES else None
+            best = best if moved is None else _least_bent([best, moved])
         else:
             net, given = climbed_net(
                 self.surface, settings, angle=math.radians(angles[0]), progress=self._say
@@ -266,6 +258,17 @@ class _Search:
             f"rods bend to a radius of {_radius(best.net):.3g} m"
         )
         return replace(best, net=stand(best.net, self.surface))
+
+    def _pulled(self, settings: dict[str, Any], angle: float, offset: tuple[float, float]) -> Placed | None:
+        """The net at that angle, degrees, and offset; None where there is none."""
+        where = f"net at {angle:g}°, {settings['spacing']:g} m"
+        try:
+            net = pull_net(self.surface, **settings, angle=math.radians(angle), offset=offset)
+        except (NoNet, Stalled) as error:
+            self.say(f"{where}: {error.reason.value}")
+            return None
+        self._say(f"{where}: rods bend to a radius of {_radius(net):.3g} m")
+        return Placed(net, angle, offset)
 
     def _stands(
         self, placed: Placed, choice: Choice, rope: Rope, spacing: float, thickness: float

@@ -163,9 +163,10 @@ def _edges_told(stretches: Sequence[Stretch]) -> str:
     told = f"{standing} {'stretch' if standing == 1 else 'stretches'} on the ground"
     if not beams:
         return told
-    highest = max(float(each.points[:, 2].max()) for each in beams)
+    ground = min(float(each.points[:, 2].min()) for each in stretches)
+    highest = max(float(each.points[:, 2].max()) for each in beams) - ground
     return (
-        f"{told}, {len(beams)} edge {'beam' if len(beams) == 1 else 'beams'} up to {highest:.3g} m high"
+        f"{told}, {len(beams)} edge {'beam' if len(beams) == 1 else 'beams'} up to {highest:.3g} m above the lowest"
         + (f", {rings} of them round openings" if rings else "")
     )
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError
-from shellform.gridshell.catalogue import Catalogue, label, read_catalogue
+from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length, stiffness
@@ -31,7 +31,7 @@ _BY_RADIUS = 3.0  # cells across a radius of curvature
 _CROSSINGS = 260.0  # to begin with
 MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
 _USUAL = 1.0  # m, of rods on site
-_DEPTH = 8.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
+_DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
 _ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008)  # m, diameters in stock
 _ROPE = 0.006  # of the spacing, a rope's diameter
@@ -128,16 +128,19 @@ def choices(net: Net, spacing: float, wish: str | None) -> list[Choice]:
         each
         for each in wished(wish)
         if erection_stress(net, each.section) <= each.section.material.strength
-        and 2.0 * max(each.section.fibres) <= spacing / _DEPTH
+        and least_spacing(each) <= spacing * (1.0 + 1e-9)
     ]
     found.sort(key=lambda each: (each.bending, mass_per_length(each.section)))
     return found
 
 
+def least_spacing(choice: Choice) -> float:
+    """The spacing, m, in whole millimetres, below which rods are too deep for a grid of slender rods."""
+    return math.ceil(1e3 * _DEPTH * 2.0 * max(choice.section.fibres) - 1e-9) / 1e3
+
+
 def wished(wish: str | None) -> list[Choice]:
     """The sections among which to choose. Raises InputError for an unknown catalogue or section."""
-    from shellform.gridshell.catalogue import named
-
     if wish is None:
         return [Choice(name, each) for name in _CATALOGUES for each in read_catalogue(name).sections]
     name, _, size = wish.partition("/")

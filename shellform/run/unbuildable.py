@@ -16,7 +16,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
 from shellform.net.refusal import NoNet, Stalled
-from shellform.run.sizes import Choice
+from shellform.run.sizes import Choice, least_spacing
 from shellform.surface.shape.target import Surface, curvature
 
 if TYPE_CHECKING:
@@ -108,11 +108,10 @@ def refused(
     assert choice is not None
     place = "" if failure.where is None else f" at {_at(failure.where)}"
     if failure.why is Why.SPACING:
-        need = 8.0 * 2.0 * max(choice.section.fibres)
         return InputError(
             f"reason: spacing. Rods of {choice.label} are too thick for a spacing of {failure.spacing:g} m",
             where="--spacing",
-            remedy=f"Give --spacing {math.ceil(1e3 * need) / 1e3:g} or more, or thinner rods with --rod.",
+            remedy=f"Give --spacing {least_spacing(choice):g} or more, or thinner rods with --rod.",
         )
     if failure.why in (Why.CURVATURE, Why.STRENGTH):
         return InputError(

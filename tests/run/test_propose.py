@@ -1,23 +1,79 @@
-"""`shellform new`."""
+"""`shellform new`: what it proposes stands, and what can't be built is said with a way out that works."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from shellform.case.build_gridshell import gridshell
+from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import InputError
+from shellform.errors import InputError, NotConverged
+from shellform.gridshell.catalogue import read_catalogue
+from shellform.problem.paths import follow
+from shellform.run.first_design import NEEDED, Wish, first_design
 from shellform.run.propose import propose_case
+from shellform.run.sizes import choices, curvature_shown, first_spacing, practical, rope_for
+from shellform.run.unbuildable import refuse_flat, refuse_size
+from shellform.surface.readers.reading import read_surface
+from shellform.surface.shape.target import make_surface
+from tests.net.edge_shells import barrel, sail
 
 DOME = Path(__file__).parent.parent / "data" / "dome_mm.step"
 
 
-def test_a_proposed_case_loads_and_its_rods_keep_equation_1(tmp_path):
-    propose_case(DOME, tmp_path / "dome.toml", {"fill": "all"}, allow_scripts=False)
-    case = load_case(tmp_path / "dome.toml")
+def dish(size=8.0, rise=1.6, unit=1.0, count=21):
+    """z = rise (1 - (2r/a)²) / 2 over a square, m, in the unit."""
+    x, y = (
+        each.ravel() for each in np.meshgrid(*2 * [np.linspace(-size / 2, size / 2, count)], indexing="ij")
+    )
+    z = rise * (2.0 - (2.0 * x / size) ** 2 - (2.0 * y / size) ** 2) / 2.0
+    i = np.arange(count * count).reshape(count, count)
+    a, b, c, d = (each.ravel() for each in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    return make_surface(np.column_stack([x, y, z]) / unit, faces)
+
+
+def as_obj(file, surface):
+    lines = [f"v {x} {y} {z}" for x, y, z in surface.vertices.tolist()]
+    lines += ["f " + " ".join(str(k + 1) for k in triangle) for triangle in surface.triangles.tolist()]
+    file.write_text("\n".join(lines))
+    return file
+
+
+@pytest.fixture(scope="module")
+def proposed(tmp_path_factory):
+    """The dome's case with one angle tried, and what was told."""
+    case = tmp_path_factory.mktemp("new") / "dome.toml"
+    told = propose_case(DOME, case, {}, allow_scripts=False, wish=Wish(angle=45.0))
+    return case, told
+
+
+def test_a_proposed_case_loads_and_its_initial_design_stands_under_both_loads_as_design_solves_it(proposed):
+    case = load_case(proposed[0], ["net.elements=2"])
     assert Path(case.surface.file).resolve() == DOME.resolve()
-    assert case.surface.fill == "all"
-    assert "equation (1) allows" in (tmp_path / "dome.toml").read_text(encoding="utf-8")
-    assert case.joint.gap == 2 * case.rod.radius
+    surface = surface_of(case.surface)
+    net, _, _ = net_of(case, surface)
+    shell, loads = gridshell(case, net, surface)
+    assert shell.joint.gap == net.grid.gap == 2.0 * shell.rod.section.fibres[1]
+    found = follow(shell, shell.design(rest_ratio=case.cable.rest_ratio), loads, stay=True)
+    assert all(each.on_branch for each in found.values())
+
+
+def test_a_proposed_case_says_why_and_what_its_edges_stand_on(proposed):
+    text, told = proposed[0].read_text(encoding="utf-8"), proposed[1]
+    assert "equation (1) allows" in text
+    assert told["edges"] in text
+    case = load_case(proposed[0])
+    assert {each.name for each in case.load} == {"design", "additional"}
+    assert case.rod.section in {label.split()[0] + " mm" for label in re.findall(r"[\d.]+ mm", text)}
+
+
+def test_the_same_surface_gives_the_same_case(proposed, tmp_path):
+    again = proposed[0].parent / "again.toml"
+    propose_case(DOME, again, {}, allow_scripts=False, wish=Wish(angle=45.0))
+    assert again.read_bytes() == proposed[0].read_bytes()
 
 
 def test_a_case_is_not_overwritten_nor_written_under_another_name_or_to_nowhere(tmp_path):
@@ -31,10 +87,85 @@ def test_a_case_is_not_overwritten_nor_written_under_another_name_or_to_nowhere(
     assert (tmp_path / "mine.toml").read_text() == "mine"
 
 
-def test_a_proposed_case_loads_the_area_and_tells_what_its_edges_stand_on(tmp_path):
-    told = propose_case(DOME, tmp_path / "dome.toml", {}, allow_scripts=False)
-    case = load_case(tmp_path / "dome.toml")
-    assert case.part["concrete"].thickness == 0.05
-    assert {each.name for each in case.load} == {"design", "additional"}
-    assert "on the ground" in told["edges"]
-    assert told["edges"] in (tmp_path / "dome.toml").read_text(encoding="utf-8")
+def test_what_is_wished_for_is_checked():
+    for wish in ({"spacing": 0.0}, {"thickness": -1.0}, {"angle": np.nan}):
+        with pytest.raises(InputError, match=next(iter(wish))):
+            Wish(**wish)
+    with pytest.raises(InputError, match="--rod"):
+        Wish(rod="gfrp_rods/9.5 mm")
+
+
+def test_one_crease_does_not_decide_the_spacing_but_the_radius_of_most_of_the_surface_does():
+    smooth = dish()
+    folded = make_surface(smooth.vertices.copy(), smooth.triangles)
+    points = folded.vertices.copy()
+    points[10 * 21 + 10, 2] += 0.15
+    folded = make_surface(points, folded.triangles)
+    assert curvature_shown(folded) == pytest.approx(curvature_shown(smooth), rel=0.1)
+    assert first_spacing(folded)[0] == first_spacing(smooth)[0]
+    tight = dish(size=2.0, rise=2.0)
+    spacing, reason = first_spacing(tight)
+    assert "radius" in reason or spacing * curvature_shown(tight) <= 1.0 / 3.0 + 1e-9
+
+
+@pytest.mark.parametrize(("exact", "set_out"), [(0.0557, 0.055), (0.234, 0.23), (0.58, 0.55), (1.04, 1.0)])
+def test_spacings_are_rounded_down_to_what_is_set_out(exact, set_out):
+    assert practical(exact) == pytest.approx(set_out)
+    assert rope_for(1.0).diameter == 0.006
+
+
+def test_sections_are_real_ones_that_the_net_and_the_spacing_allow():
+    from shellform.net.chebyshev import pull_net
+
+    net = pull_net(barrel(), spacing=0.1, gap=0.1 / 27.5, angle=np.deg2rad(45.0), elements=2)
+    found = choices(net, 0.1, None)
+    assert found
+    assert [each.bending for each in found] == sorted(each.bending for each in found)
+    for each in found:
+        assert each.section in read_catalogue(each.catalogue).sections
+        assert 2.0 * max(each.section.fibres) <= 0.1 / 7.0
+        assert max(each.section.fibres) <= net.max_radius(
+            young=each.section.material.young, strength=each.section.material.strength
+        ) * (1 + 1e-9)
+
+
+def test_a_size_that_no_shell_has_is_refused_and_the_unit_named_makes_it_one(tmp_path):
+    file = as_obj(tmp_path / "dish.obj", dish(unit=0.001))
+    with pytest.raises(InputError, match="unit") as refused:
+        refuse_size(read_surface(file))
+    unit = re.search(r"--unit (\w+)", refused.value.remedy).group(1)
+    refuse_size(read_surface(file, unit=unit))
+    with pytest.raises(InputError, match="unit"):
+        refuse_size(sail(size=0.01, rise=0.002))
+
+
+def test_a_flat_surface_is_refused_whichever_way_it_lies_and_one_with_the_rise_named_is_not():
+    flat = dish(rise=1e-3)
+    with pytest.raises(InputError, match="flat plate") as refused:
+        refuse_flat(flat)
+    rise = float(re.search(r"span, ([\d.]+) m", refused.value.remedy).group(1))
+    refuse_flat(dish(rise=rise))
+    points = flat.vertices.copy()
+    points[:, 2] += 0.5 * points[:, 0]
+    with pytest.raises(InputError, match="flat plate"):
+        refuse_flat(make_surface(points, flat.triangles))
+
+
+def test_rods_that_break_are_refused_with_their_stress_and_place_and_without_them_it_goes_on():
+    with pytest.raises(InputError, match="curvature") as refused:
+        first_design(barrel(), Wish(rod="gfrp_rods/10 mm", angle=45.0, spacing=0.2))
+    assert "%" in refused.value.what
+    assert " at (" in refused.value.what
+    assert "Leave --rod" in refused.value.remedy
+
+
+def test_concrete_that_no_single_layer_bears_is_refused_and_the_thickness_named_stands():
+    wish = Wish(rod="gfrp_rods/12 mm", spacing=0.8, thickness=0.2, angle=45.0)
+    surface = dish()
+    with pytest.raises(NotConverged, match="stability") as refused:
+        first_design(surface, wish)
+    bears = float(re.search(r"--thickness ([\d.]+)", refused.value.remedy).group(1))
+    found = first_design(surface, Wish(wish.rod, wish.spacing, bears, wish.angle))
+    assert found.thickness == bears < wish.thickness
+    assert found.tried.factor >= NEEDED
+    assert found.standing == found.drawn
