@@ -15,6 +15,7 @@ import argparse
 import json
 import math
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -495,9 +496,14 @@ def ran(arguments: Sequence[str], limit: float) -> Ended:
 
 
 def measured(
-    file: Path, options: Sequence[str], folder: Path, do: Sequence[str], limit: float
+    file: Path,
+    options: Sequence[str],
+    folder: Path,
+    do: Sequence[str],
+    limit: float,
+    quick: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """One row: what each of the steps in `do` came to."""
+    """One row: what each of the steps in `do` came to; `design` with the further options `quick`."""
     row: dict[str, Any] = {"name": file.name}
     if "check" in do or "net" in do:
         check = ran(["check", str(file), *options, "--json"], limit)
@@ -530,22 +536,57 @@ def measured(
         arguments = (
             ["new", str(file), *options, "--output", str(case)]
             if step == "new"
-            else ["design", str(case), "--output", str(folder / "designs" / file.stem), "--quiet"]
+            else [
+                "design",
+                str(case),
+                "--output",
+                str(folder / "designs" / file.stem),
+                "--quiet",
+                "--json",
+                *quick,
+            ]
         )
         ended = ran(arguments, limit)
         row |= {step: ended.status, "reason": ended.words if ended.status else row.get("reason", "")}
         row[f"{step}_seconds"] = ended.seconds
+        row |= proposed(ended.printed) if step == "new" else designed(ended.printed)
         if ended.status != 0:
             break
     return row
+
+
+def proposed(printed: str) -> dict[str, Any]:
+    """Columns of what `new` told: lines of a label of up to 22 letters, two spaces, and its value."""
+    lines = (line[:22].strip() and (line[:22].strip(), line[24:].strip()) for line in printed.splitlines())
+    told = dict(each for each in lines if each)
+    shown = {"rods": "section", "concrete": "concrete", "stands": "stands", "spacing": "proposed"}
+    return {
+        name: re.split(r" \(equation|, |: ", told[label])[0] for label, name in shown.items() if label in told
+    } | ({"stands": told["stands"]} if "stands" in told else {})
+
+
+def designed(printed: str) -> dict[str, Any]:
+    """Columns of what `design` came to."""
+    if not printed.strip():
+        return {}
+    summary = json.loads(printed)
+    verdict = summary.get("verdict") or {}
+    last = list(summary["designs"].values())[-1]
+    return {
+        "holds": verdict.get("holds"),
+        "fails": ", ".join(verdict.get("failed", [])),
+        "cables": last["cables"],
+        "deviation": last["loads"]["design"]["deviation_max"],
+    }
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """The rows in Markdown."""
     steps = [step for step in ("check", "net", "new", "design") if any(step in row for row in rows)]
     lines = [
-        f"| file | size, m | {' | '.join(steps)} | spacing | crossings | distance / spacing | spacing error | s | said |",
-        "| --- " * (8 + len(steps)) + "|",
+        f"| file | size, m | {' | '.join(steps)} | spacing | crossings | distance / spacing | spacing error | section | concrete | "
+        "stands | holds | cables | deviation, mm | s | said |",
+        "| --- " * (14 + len(steps)) + "|",
     ]
     for row in rows:
         ends = " | ".join(
@@ -553,11 +594,17 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             for step in steps
         )
         numbers = [
-            f"{row['spacing']:.3g}" if "spacing" in row else "",
+            f"{row['spacing']:.3g}" if "spacing" in row else str(row.get("proposed", "")),
             str(row.get("crossings", "")),
             f"{100 * row['distance']:.2f} %" if "distance" in row else "",
             f"{100 * row['error']:.2f} %" if "error" in row else "",
-            f"{row['seconds']:.0f}" if "seconds" in row else "",
+            *(str(row.get(name, "")) for name in ("section", "concrete", "stands")),
+            {True: "yes", False: f"no: {row.get('fails')}"}.get(row.get("holds"), ""),  # type: ignore[call-overload]
+            str(row.get("cables", "")),
+            f"{1e3 * row['deviation']:.0f}" if "deviation" in row else "",
+            " + ".join(
+                f"{row[name]:.0f}" for name in ("seconds", "new_seconds", "design_seconds") if name in row
+            ),
         ]
         lines.append(
             f"| {row['name']} | {row.get('size', '')} | {ends} | {' | '.join(numbers)} | {row.get('reason', '')[:150]} |"
@@ -578,7 +625,11 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=[], help="names (their beginnings)")
     parser.add_argument("--limit", type=float, default=120.0, help="s for one command")
     parser.add_argument("--do", nargs="*", default=["check", "net"], help="of check, net, new, design")
+    parser.add_argument(
+        "--quick", action="store_true", help="design: the optimised design alone, in ten evaluations"
+    )
     given = parser.parse_args()
+    quick = QUICK if given.quick else []
     made = given.folder / "files"
     made.mkdir(parents=True, exist_ok=True)
     corpus = [(each.make(made), each.options) for each in STRANGERS]
@@ -595,11 +646,12 @@ def main() -> None:
     for file, options in corpus:
         if given.only and not any(file.stem.startswith(name) for name in given.only):
             continue
-        rows.append(measured(file, options, given.folder, given.do, given.limit))
+        rows.append(measured(file, options, given.folder, given.do, given.limit, quick))
         print(json.dumps(rows[-1], ensure_ascii=False), file=sys.stderr, flush=True)
     print(table(rows))
 
 
+QUICK = ["--until", "optimise", "--set", "optimise.evaluations=10", "--set", "net.elements=2"]
 OPTIONS_OF_OTHERS = {"igl_igloo": ["--up", "y"]}
 
 if __name__ == "__main__":

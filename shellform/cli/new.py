@@ -30,8 +30,8 @@ def new(
     quiet: Quiet = False,
 ) -> None:
     """Design a shell that stands and write its commented case file."""
-    from shellform.run.first_design import Wish
     from shellform.run.propose import propose_case
+    from shellform.run.sizes import Wish
 
     report = Progress(quiet=quiet)
     try:

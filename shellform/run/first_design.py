@@ -36,7 +36,9 @@ from shellform.reliability.standing import sample
 from shellform.run.sizes import (
     MOST_CROSSINGS,
     Choice,
+    Placed,
     Rope,
+    Wish,
     buckling_load,
     choices,
     first_spacing,
@@ -68,35 +70,6 @@ _STEPS = 4  # sections tried on one net
 _THINNER = 8  # thicknesses tried
 _ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
 Say = Callable[[str], None]
-
-
-@dataclass(frozen=True)
-class Wish:
-    """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m, an `angle`,
-    degrees; None: to be found."""
-
-    rod: str | None = None
-    spacing: float | None = None
-    thickness: float | None = None
-    angle: float | None = None
-
-    def __post_init__(self) -> None:
-        for name in ("spacing", "thickness"):
-            value = getattr(self, name)
-            if value is not None and not (value > 0.0 and math.isfinite(value)):
-                raise InputError("must be positive and finite", where=f"--{name}", value=value)
-        if self.angle is not None and not math.isfinite(self.angle):
-            raise InputError("must be degrees or auto", where="--angle", value=self.angle)
-        wished(self.rod)
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A net with the `angle`, degrees, and `offset`, spacings, at which it lies."""
-
-    net: Net
-    angle: float
-    offset: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -209,7 +182,9 @@ class _Search:
             if result.why is Why.STRENGTH:
                 at = _less_stressed(placed.net, possible, at, result.stress - _STRESSED)
             else:
-                wanted = possible[at].bending * max(1.3, (1.1 * NEEDED / max(result.factor, 0.1)) ** 1.3)
+                wanted = possible[at].bending * max(
+                    1.3, (1.1 * NEEDED / max(result.nearness(NEEDED), 0.1)) ** 1.3
+                )
                 at = next((k for k, each in enumerate(possible) if each.bending >= wanted), len(possible) - 1)
         return None
 
@@ -218,11 +193,11 @@ class _Search:
         asked for."""
         failure = self.best
         assert failure is not None
-        if failure.choice is None or failure.placed is None or failure.why is Why.STRENGTH:
+        if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
             raise refused(self.surface, failure, self.wish)
         asked, thinner = thickness, failure.thickness
         for _ in range(_THINNER):
-            thinner = _whole_mm(min(0.8 * thinner, 0.95 * thinner * failure.factor / NEEDED))
+            thinner = _whole_mm(min(0.8 * thinner, 0.95 * thinner * failure.nearness(NEEDED) / NEEDED))
             if thinner < 0.002:
                 break
             result = self._stands(
@@ -317,15 +292,7 @@ class _Search:
         standing = sum(each.stands for each in drawn.outcomes)
         self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the design load")
         if standing < DRAWN:
-            low = min(each.factor if not each.stands else 1.0 for each in drawn.outcomes)
-            return self._keep(
-                replace(
-                    failure,
-                    why=Why.SCATTER,
-                    factor=min(tried.factor, 1.3) * min(max(low, 0.5), 0.95),
-                    placed=placed,
-                )
-            )
+            return self._keep(replace(failure, why=Why.SCATTER, factor=tried.factor, placed=placed))
         material = choice.section.material
         allowed = placed.net.max_radius(young=material.young, strength=material.strength)
         return FirstDesign(

@@ -17,8 +17,9 @@ from shellform.errors import InputError
 from shellform.net.edges import stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.run.first_design import NEEDED, REST_RATIO, THICKNESS, FirstDesign, Wish, first_design
+from shellform.run.first_design import NEEDED, REST_RATIO, THICKNESS, FirstDesign, first_design
 from shellform.run.first_look import surface_entry
+from shellform.run.sizes import Wish
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 

@@ -74,6 +74,35 @@ class Choice:
         return min(stiffness(self.section)[2:])
 
 
+@dataclass(frozen=True)
+class Wish:
+    """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m, an `angle`,
+    degrees; None: to be found."""
+
+    rod: str | None = None
+    spacing: float | None = None
+    thickness: float | None = None
+    angle: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("spacing", "thickness"):
+            value = getattr(self, name)
+            if value is not None and not (value > 0.0 and math.isfinite(value)):
+                raise InputError("must be positive and finite", where=f"--{name}", value=value)
+        if self.angle is not None and not math.isfinite(self.angle):
+            raise InputError("must be degrees or auto", where="--angle", value=self.angle)
+        wished(self.rod)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A net with the `angle`, degrees, and `offset`, spacings, at which it lies."""
+
+    net: Net
+    angle: float
+    offset: tuple[float, float]
+
+
 def curvature_shown(surface: Surface) -> float:
     """The larger principal curvature, 1/m, that all but a twentieth of the surface keeps."""
     bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface)

@@ -9,18 +9,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
 from shellform.net.refusal import NoNet, Stalled
-from shellform.run.sizes import Choice, least_spacing
+from shellform.run.sizes import Choice, Placed, Wish, least_spacing
 from shellform.surface.shape.target import Surface, curvature
-
-if TYPE_CHECKING:
-    from shellform.run.first_design import Placed, Wish
 
 SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
@@ -53,6 +49,10 @@ class Failure:
     where: Reals | None = None
     stress: float = 0.0
     error: NoNet | Stalled | None = None
+
+    def nearness(self, needed: float) -> float:
+        """The factor from which to step on: structures as built fall a little below the one that is `needed`."""
+        return min(self.factor, 0.9 * needed) if self.why is Why.SCATTER else self.factor
 
 
 def refuse_size(surface: Surface) -> None:
@@ -113,7 +113,7 @@ def refused(
             where="--spacing",
             remedy=f"Give --spacing {least_spacing(choice):g} or more, or thinner rods with --rod.",
         )
-    if failure.why in (Why.CURVATURE, Why.STRENGTH):
+    if failure.why is Why.CURVATURE or (failure.why is Why.STRENGTH and bears is None):
         return InputError(
             f"reason: {failure.why.value}. {choice.label} of {choice.catalogue} would be stressed to {stress:.0%} of its "
             f"strength{place}, at a spacing of {failure.spacing:g} m",
@@ -125,7 +125,7 @@ def refused(
     what = (
         f"reason: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
         f"{failure.spacing:g} m; with {1e3 * failure.thickness:.3g} mm of concrete it stands up to {failure.factor:.2f} × its load, "
-        f"where 1.5 is needed, and gives way first{place}"
+        f"where 1.5 is needed, its rods at {stress:.0%} of their strength, and gives way first{place}"
     )
     if bears is not None:
         remedy = f"A single layer of rods bears --thickness {bears:g}: pour that first, and the rest when it has hardened."

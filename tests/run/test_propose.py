@@ -12,9 +12,9 @@ from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import read_catalogue
 from shellform.problem.paths import follow
-from shellform.run.first_design import NEEDED, Wish, first_design
+from shellform.run.first_design import NEEDED, first_design
 from shellform.run.propose import propose_case
-from shellform.run.sizes import choices, curvature_shown, first_spacing, practical, rope_for
+from shellform.run.sizes import Wish, choices, curvature_shown, first_spacing, practical, rope_for
 from shellform.run.unbuildable import refuse_flat, refuse_size
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.target import make_surface
@@ -153,10 +153,12 @@ def test_a_flat_surface_is_refused_whichever_way_it_lies_and_one_with_the_rise_n
 
 def test_rods_that_break_are_refused_with_their_stress_and_place_and_without_them_it_goes_on():
     with pytest.raises(InputError, match="curvature") as refused:
-        first_design(barrel(), Wish(rod="gfrp_rods/10 mm", angle=45.0, spacing=0.2))
+        first_design(barrel(), Wish(rod="gfrp_rods/14 mm", angle=45.0, spacing=0.2))
     assert "%" in refused.value.what
     assert " at (" in refused.value.what
     assert "Leave --rod" in refused.value.remedy
+    found = first_design(barrel(), Wish(angle=45.0, spacing=0.1))
+    assert found.tried.factor >= NEEDED
 
 
 def test_concrete_that_no_single_layer_bears_is_refused_and_the_thickness_named_stands():
