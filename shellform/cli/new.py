@@ -31,7 +31,7 @@ def new(
 ) -> None:
     """Design a shell that stands and write its commented case file."""
     from shellform.run.propose import propose_case
-    from shellform.run.sizes import Wish
+    from shellform.run.sizes import DesignWish
 
     report = Progress(quiet=quiet)
     try:
@@ -40,7 +40,7 @@ def new(
             output,
             surface_options,
             allow_scripts=allow_scripts,
-            wish=Wish(rod, spacing, thickness, angle),
+            wish=DesignWish(rod, spacing, thickness, angle),
             report=report,
         )
     finally:

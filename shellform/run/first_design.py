@@ -35,10 +35,10 @@ from shellform.problem.paths import deviations
 from shellform.reliability.standing import sample
 from shellform.run.sizes import (
     MOST_CROSSINGS,
-    Choice,
+    DesignWish,
     Placed,
+    RodChoice,
     Rope,
-    Wish,
     buckling_load,
     choices,
     first_spacing,
@@ -47,7 +47,7 @@ from shellform.run.sizes import (
     rope_for,
     wished,
 )
-from shellform.run.unbuildable import Failure, Why, refuse_flat, refuse_size, refused
+from shellform.run.unbuildable import Obstacle, Why, refuse_flat, refuse_size, refused
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -92,7 +92,7 @@ class FirstDesign:
     spacing: float
     reason: str
     placed: Placed
-    choice: Choice
+    choice: RodChoice
     rope: Rope
     thickness: float
     tried: Tried
@@ -102,7 +102,7 @@ class FirstDesign:
     told: tuple[str, ...]
 
 
-def first_design(surface: Surface, wish: Wish, say: Say = lambda text: None) -> FirstDesign:
+def first_design(surface: Surface, wish: DesignWish, say: Say = lambda text: None) -> FirstDesign:
     """The design to propose. Raises InputError for a surface of absurd size, a flat one, or one that no net covers or no rod
     follows, NotConverged where nothing stands; both with the reason and a way out."""
     refuse_size(surface)
@@ -113,10 +113,10 @@ def first_design(surface: Surface, wish: Wish, say: Say = lambda text: None) -> 
 class _Search:
     """The search under way: what was tried is `told`."""
 
-    def __init__(self, surface: Surface, wish: Wish, say: Say) -> None:
+    def __init__(self, surface: Surface, wish: DesignWish, say: Say) -> None:
         self.surface, self.wish, self._say = surface, wish, say
         self.told: list[str] = []
-        self.best: Failure | None = None
+        self.best: Obstacle | None = None
         self.reason = "as asked"
         self.angles: Sequence[float] = _ANGLES  # worth trying; with a finer spacing only those that were best
 
@@ -158,7 +158,7 @@ class _Search:
         try:
             placed = self._net(spacing, usual_gap(spacing))
         except (NoNet, Stalled) as error:
-            self._keep(Failure(Why.NET, spacing, thickness, error=error))
+            self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             self.say(f"no net at {spacing:g} m: {error.what if isinstance(error, InputError) else error}")
             return None
         possible = choices(placed.net, spacing, self.wish.rod)
@@ -196,21 +196,30 @@ class _Search:
         if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
             raise refused(self.surface, failure, self.wish)
         asked, thinner = thickness, failure.thickness
+        placed, choice, nearest = failure.placed, failure.choice, failure
+        possible = choices(placed.net, failure.spacing, self.wish.rod)
         for _ in range(_THINNER):
-            thinner = _whole_mm(min(0.8 * thinner, 0.95 * thinner * failure.nearness(NEEDED) / NEEDED))
+            other = choice
+            if failure.why is Why.STRENGTH and choice in possible:
+                at = possible.index(choice)
+                other = possible[_less_stressed(placed.net, possible, at, failure.stress - _STRESSED)]
+            if (
+                other is choice
+            ):  # else the load is kept, and bent rods that leave more of their strength are tried
+                thinner = _whole_mm(min(0.8 * thinner, 0.95 * thinner * failure.nearness(NEEDED) / NEEDED))
+            choice = other
             if thinner < 0.002:
                 break
-            result = self._stands(
-                failure.placed, failure.choice, rope_for(failure.spacing), failure.spacing, thinner
-            )
+            result = self._stands(placed, choice, rope_for(failure.spacing), failure.spacing, thinner)
             if isinstance(result, FirstDesign):
                 if self.wish.thickness is not None or thinner < LEAST_THICKNESS:
-                    raise refused(
-                        self.surface, replace(self.best or failure, thickness=asked), self.wish, bears=thinner
-                    )
+                    nearest = replace(nearest, thickness=asked)
+                    raise refused(self.surface, nearest, self.wish, bears=thinner)
                 return result
             failure = result
-        raise refused(self.surface, self.best, self.wish)
+            if failure.why is Why.NET:
+                break
+        raise refused(self.surface, nearest, self.wish)
 
     def _net(self, spacing: float, gap: float) -> Placed:
         """The net that bends its rods least, among several angles and offsets. Raises NoNet or Stalled."""
@@ -246,11 +255,11 @@ class _Search:
         return Placed(net, angle, offset)
 
     def _stands(
-        self, placed: Placed, choice: Choice, rope: Rope, spacing: float, thickness: float
-    ) -> FirstDesign | Failure:
+        self, placed: Placed, choice: RodChoice, rope: Rope, spacing: float, thickness: float
+    ) -> FirstDesign | Obstacle:
         """The design with these rods and this load, where it stands with the gap that follows its rods too."""
         tried = self._tried(placed.net, choice, rope, thickness)
-        failure = Failure(
+        failure = Obstacle(
             Why.STABILITY, spacing, thickness, tried.factor, choice, placed, tried.where, tried.stress
         )
         what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
@@ -273,7 +282,7 @@ class _Search:
                     progress=self._say,
                 )
             except (NoNet, Stalled) as error:
-                return self._keep(Failure(Why.NET, spacing, thickness, error=error))
+                return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             placed = Placed(stand(net, self.surface), math.degrees(given.angle), given.offset)
             if erection_stress(placed.net, choice.section) > choice.section.material.strength:
                 return self._keep(replace(failure, why=Why.STRENGTH, placed=placed, stress=1.0))
@@ -299,7 +308,7 @@ class _Search:
             spacing, self.reason, placed, choice, rope, thickness, tried, standing, DRAWN, allowed, tuple(self.told)
         )  # fmt: skip
 
-    def _tried(self, net: Net, choice: Choice, rope: Rope, thickness: float) -> Tried:
+    def _tried(self, net: Net, choice: RodChoice, rope: Rope, thickness: float) -> Tried:
         shell, loads = _shell(net, self.surface, choice, rope, thickness)
         design = shell.design(rest_ratio=REST_RATIO)
         assembly = assemble(shell.network(design))
@@ -326,7 +335,7 @@ class _Search:
             shell.target.positions[int(np.argmax(away))],
         )
 
-    def _too_curved(self, placed: Placed, spacing: float, thickness: float) -> Failure:
+    def _too_curved(self, placed: Placed, spacing: float, thickness: float) -> Obstacle:
         """The failure of a net on which every section breaks, or is too deep for the spacing."""
         net = placed.net
         bent = net.curvature.max(axis=1)
@@ -334,9 +343,9 @@ class _Search:
         least = min(wished(self.wish.rod), key=lambda each: erection_stress(net, each.section))
         stress = erection_stress(net, least.section) / least.section.material.strength
         why = Why.CURVATURE if stress > 1.0 else Why.SPACING
-        return Failure(why, spacing, thickness, 0.0, least, placed, place, stress)
+        return Obstacle(why, spacing, thickness, 0.0, least, placed, place, stress)
 
-    def _keep(self, failure: Failure) -> Failure:
+    def _keep(self, failure: Obstacle) -> Obstacle:
         """The failure, kept if it came nearer than those before."""
         if self.best is None or failure.factor >= self.best.factor:
             self.best = failure
@@ -344,7 +353,7 @@ class _Search:
 
 
 def _shell(
-    net: Net, surface: Surface, choice: Choice, rope: Rope, thickness: float
+    net: Net, surface: Surface, choice: RodChoice, rope: Rope, thickness: float
 ) -> tuple[Gridshell, dict[str, Reals]]:
     """The gridshell and its loads; the joint's gap is the net's."""
     rod = Rod(choice.section)
@@ -360,7 +369,7 @@ def _shell(
     return shell, {"design": poured + own, "additional": ADDITIONAL * poured + own}
 
 
-def _less_stressed(net: Net, possible: Sequence[Choice], at: int, excess: float) -> int:
+def _less_stressed(net: Net, possible: Sequence[RodChoice], at: int, excess: float) -> int:
     """The stiffest section below `at` that bending into the net stresses less, by a share `excess` of its strength."""
     share = [erection_stress(net, each.section) / each.section.material.strength for each in possible]
     return next((k for k in range(at - 1, -1, -1) if share[k] <= share[at] - excess), at)

@@ -19,7 +19,7 @@ from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import NEEDED, REST_RATIO, THICKNESS, FirstDesign, first_design
 from shellform.run.first_look import surface_entry
-from shellform.run.sizes import Wish
+from shellform.run.sizes import DesignWish
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
@@ -32,7 +32,7 @@ def propose_case(
     options: Mapping[str, Any],
     *,
     allow_scripts: bool,
-    wish: Wish | None = None,
+    wish: DesignWish | None = None,
     report: Report = unheard,
 ) -> dict[str, str]:
     """Writes a case for a surface file to `output`; returns what was proposed as labelled lines.
@@ -41,7 +41,7 @@ def propose_case(
     `output` exists or isn't named .toml, and InputError or NotConverged where no design stands (unbuildable.py).
     """
     _check(output)
-    wanted = wish or Wish()
+    wanted = wish or DesignWish()
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
     report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
     design = first_design(surface, wanted, lambda text: report(Event("new", text, Kind.NOTE)))
@@ -62,7 +62,12 @@ def propose_case(
 
 
 def _text(
-    file: Path, entries: Mapping[str, Any], surface: Surface, design: FirstDesign, wish: Wish, edges: str
+    file: Path,
+    entries: Mapping[str, Any],
+    surface: Surface,
+    design: FirstDesign,
+    wish: DesignWish,
+    edges: str,
 ) -> str:
     """The case file."""
     lines = "\n".join(f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in entries.items())
@@ -129,7 +134,7 @@ limit = {_short(0.010 * k)!r}      # m, end of the colour scale
 """
 
 
-def _thickness_told(design: FirstDesign, wish: Wish) -> str:
+def _thickness_told(design: FirstDesign, wish: DesignWish) -> str:
     if wish.thickness is not None:
         return "as asked"
     if design.thickness == THICKNESS:

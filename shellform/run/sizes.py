@@ -57,7 +57,7 @@ class Rope:
 
 
 @dataclass(frozen=True)
-class Choice:
+class RodChoice:
     """A `section` with the name of the catalogue that has it."""
 
     catalogue: str
@@ -75,7 +75,7 @@ class Choice:
 
 
 @dataclass(frozen=True)
-class Wish:
+class DesignWish:
     """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m, an `angle`,
     degrees; None: to be found."""
 
@@ -150,7 +150,7 @@ def rope_for(spacing: float) -> Rope:
     return Rope(min(_ROPES, key=lambda each: abs(math.log(each / (_ROPE * spacing)))))
 
 
-def choices(net: Net, spacing: float, wish: str | None) -> list[Choice]:
+def choices(net: Net, spacing: float, wish: str | None) -> list[RodChoice]:
     """Sections that the net's curvature and its spacing allow, by rising stiffness; with a `wish` like
     "gfrp_rods/8 mm" that one, with the name of a catalogue those of it. Empty where none is thin enough."""
     found = [
@@ -163,21 +163,21 @@ def choices(net: Net, spacing: float, wish: str | None) -> list[Choice]:
     return found
 
 
-def least_spacing(choice: Choice) -> float:
+def least_spacing(choice: RodChoice) -> float:
     """The spacing, m, in whole millimetres, below which rods are too deep for a grid of slender rods."""
     return math.ceil(1e3 * _DEPTH * 2.0 * max(choice.section.fibres) - 1e-9) / 1e3
 
 
-def wished(wish: str | None) -> list[Choice]:
+def wished(wish: str | None) -> list[RodChoice]:
     """The sections among which to choose. Raises InputError for an unknown catalogue or section."""
     if wish is None:
-        return [Choice(name, each) for name in _CATALOGUES for each in read_catalogue(name).sections]
+        return [RodChoice(name, each) for name in _CATALOGUES for each in read_catalogue(name).sections]
     name, _, size = wish.partition("/")
     catalogue: Catalogue = read_catalogue(name)
     if not size:
-        return [Choice(name, each) for each in catalogue.sections]
+        return [RodChoice(name, each) for each in catalogue.sections]
     try:
-        return [Choice(name, named(catalogue, size))]
+        return [RodChoice(name, named(catalogue, size))]
     except InputError as error:
         raise InputError(error.what, where="--rod", value=wish, remedy=error.remedy) from error
 

@@ -15,7 +15,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
 from shellform.net.refusal import NoNet, Stalled
-from shellform.run.sizes import Choice, Placed, Wish, least_spacing
+from shellform.run.sizes import DesignWish, Placed, RodChoice, least_spacing
 from shellform.surface.shape.target import Surface, curvature
 
 SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
@@ -35,7 +35,7 @@ class Why(Enum):
 
 
 @dataclass(frozen=True)
-class Failure:
+class Obstacle:
     """How an attempt failed: `why`, at which `spacing` and `thickness`, m, up to which `factor` of its load it stood, with
     which `choice` of rods on which net (`placed`), `where` (3,), m, the rods' `stress` over their strength, or the net's
     own `error`."""
@@ -44,7 +44,7 @@ class Failure:
     spacing: float
     thickness: float
     factor: float = 0.0
-    choice: Choice | None = None
+    choice: RodChoice | None = None
     placed: Placed | None = None
     where: Reals | None = None
     stress: float = 0.0
@@ -90,7 +90,7 @@ def refuse_flat(surface: Surface) -> None:
 
 
 def refused(
-    surface: Surface, failure: Failure | None, wish: Wish, *, bears: float | None = None
+    surface: Surface, failure: Obstacle | None, wish: DesignWish, *, bears: float | None = None
 ) -> InputError | NotConverged:
     """What to say of a shell that can't be built: as an error, to be raised. `bears`: a thickness of concrete, m, that was
     found to stand."""
@@ -134,7 +134,7 @@ def refused(
     return NotConverged(what, residual=math.nan, iterations=0, remedy=remedy)
 
 
-def _thinner_rods(wish: Wish) -> str:
+def _thinner_rods(wish: DesignWish) -> str:
     return f"Leave --rod {wish.rod} out, so that rods are chosen that the net allows."
 
 

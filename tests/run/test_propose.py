@@ -14,7 +14,7 @@ from shellform.gridshell.catalogue import read_catalogue
 from shellform.problem.paths import follow
 from shellform.run.first_design import NEEDED, first_design
 from shellform.run.propose import propose_case
-from shellform.run.sizes import Wish, choices, curvature_shown, first_spacing, practical, rope_for
+from shellform.run.sizes import DesignWish, choices, curvature_shown, first_spacing, practical, rope_for
 from shellform.run.unbuildable import refuse_flat, refuse_size
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.target import make_surface
@@ -46,7 +46,7 @@ def as_obj(file, surface):
 def proposed(tmp_path_factory):
     """The dome's case with one angle tried, and what was told."""
     case = tmp_path_factory.mktemp("new") / "dome.toml"
-    told = propose_case(DOME, case, {}, allow_scripts=False, wish=Wish(angle=45.0))
+    told = propose_case(DOME, case, {}, allow_scripts=False, wish=DesignWish(angle=45.0))
     return case, told
 
 
@@ -72,7 +72,7 @@ def test_a_proposed_case_says_why_and_what_its_edges_stand_on(proposed):
 
 def test_the_same_surface_gives_the_same_case(proposed, tmp_path):
     again = proposed[0].parent / "again.toml"
-    propose_case(DOME, again, {}, allow_scripts=False, wish=Wish(angle=45.0))
+    propose_case(DOME, again, {}, allow_scripts=False, wish=DesignWish(angle=45.0))
     assert again.read_bytes() == proposed[0].read_bytes()
 
 
@@ -90,9 +90,9 @@ def test_a_case_is_not_overwritten_nor_written_under_another_name_or_to_nowhere(
 def test_what_is_wished_for_is_checked():
     for wish in ({"spacing": 0.0}, {"thickness": -1.0}, {"angle": np.nan}):
         with pytest.raises(InputError, match=next(iter(wish))):
-            Wish(**wish)
+            DesignWish(**wish)
     with pytest.raises(InputError, match="--rod"):
-        Wish(rod="gfrp_rods/9.5 mm")
+        DesignWish(rod="gfrp_rods/9.5 mm")
 
 
 def test_one_crease_does_not_decide_the_spacing_but_the_radius_of_most_of_the_surface_does():
@@ -153,21 +153,21 @@ def test_a_flat_surface_is_refused_whichever_way_it_lies_and_one_with_the_rise_n
 
 def test_rods_that_break_are_refused_with_their_stress_and_place_and_without_them_it_goes_on():
     with pytest.raises(InputError, match="curvature") as refused:
-        first_design(barrel(), Wish(rod="gfrp_rods/14 mm", angle=45.0, spacing=0.2))
+        first_design(barrel(), DesignWish(rod="gfrp_rods/14 mm", angle=45.0, spacing=0.2))
     assert "%" in refused.value.what
     assert " at (" in refused.value.what
     assert "Leave --rod" in refused.value.remedy
-    found = first_design(barrel(), Wish(angle=45.0, spacing=0.1))
+    found = first_design(barrel(), DesignWish(angle=45.0, spacing=0.1))
     assert found.tried.factor >= NEEDED
 
 
 def test_concrete_that_no_single_layer_bears_is_refused_and_the_thickness_named_stands():
-    wish = Wish(rod="gfrp_rods/12 mm", spacing=0.8, thickness=0.2, angle=45.0)
+    wish = DesignWish(rod="gfrp_rods/40 mm", spacing=0.8, thickness=0.4, angle=45.0)
     surface = dish()
     with pytest.raises(NotConverged, match="stability") as refused:
         first_design(surface, wish)
     bears = float(re.search(r"--thickness ([\d.]+)", refused.value.remedy).group(1))
-    found = first_design(surface, Wish(wish.rod, wish.spacing, bears, wish.angle))
+    found = first_design(surface, DesignWish(wish.rod, wish.spacing, bears, wish.angle))
     assert found.thickness == bears < wish.thickness
     assert found.tried.factor >= NEEDED
     assert found.standing == found.drawn
