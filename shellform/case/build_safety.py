@@ -27,7 +27,7 @@ def case_safety(case: Case, shell: Gridshell) -> Safety | None:
     """What a search has to keep; None where nothing is required. It draws under a seed of its own, so that
     the sample that is told is a fresh one."""
     entry = case.safety
-    if not entry.required:
+    if not is_required(case):
         return None
     return Safety(
         tolerances=case_tolerances(case, shell),
@@ -42,9 +42,14 @@ def case_safety(case: Case, shell: Gridshell) -> Safety | None:
 def critical_factors_asked(case: Case) -> dict[str, float]:
     """The least critical factor by load case: the larger one where both [safety] and [limits] ask for it."""
     found: dict[str, float] = {}
-    if case.safety.required and case.safety.critical_factor is not None:
+    if is_required(case) and case.safety.critical_factor is not None:
         found["design"] = case.safety.critical_factor
     if case.limits.critical_factor is not None:
         for name in case.limits.critical_loads:
             found[name] = max(found.get(name, 0.0), case.limits.critical_factor)
     return found
+
+
+def is_required(case: Case) -> bool:
+    """Whether a design has to keep what [safety] asks for: the paper's own method is only told."""
+    return case.safety.required and case.optimise.method != "paper"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from shellform.case.build_safety import critical_factors_asked
+from shellform.case.build_safety import critical_factors_asked, is_required
 from shellform.records.as_built import AsBuilt
 from shellform.records.check import Check
 from shellform.records.checks import Bounds, checks
@@ -28,7 +28,7 @@ def run_checks(run: Run) -> list[Check]:
         slack_loads=tuple(limits.slack_loads),
         critical=critical_factors_asked(run.case),
         safety=AsBuilt(
-            safety.probability_design, safety.probability_additional, safety.drawn, safety.required
+            safety.probability_design, safety.probability_additional, safety.drawn, is_required(run.case)
         ),
     )
     return checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
