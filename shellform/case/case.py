@@ -40,12 +40,11 @@ from shellform.case.entries import (
     PointsEntry,
     RobustEntry,
     RodsWeightEntry,
-    SafetyEntry,
     SheetEntry,
     StockRodEntry,
     SurfaceEntry,
-    TolerancesEntry,
 )
+from shellform.case.safety_entries import SafetyEntry, TolerancesEntry
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.gridshell.gridshell import Rod

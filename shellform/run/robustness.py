@@ -13,7 +13,7 @@ from shellform.case.build_problem import scatter_of
 from shellform.case.entries import RobustEntry
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.problem import robust
-from shellform.records.summary import CauseRecord, RobustRecord, SampleRecord
+from shellform.records.scattering import CauseRecord, RobustRecord, SampleRecord
 from shellform.structure.elements.state import State
 from shellform.tables import Table
 

@@ -265,7 +265,7 @@ def _optimise(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) 
 def _safety(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
     if keep:
         return _Ended(parts, summary)
-    from shellform.run.safety import examine
+    from shellform.run.examination import examine
 
     write_summary(workspace.folder, summary)
     return _Ended(parts, examine(workspace))

@@ -14,7 +14,8 @@ from shellform.output.page import report
 from shellform.output.page.charts import line_chart
 from shellform.output.page.embed import embed
 from shellform.output.page.first_answers import answers
-from shellform.records.summary import VerdictRecord
+from shellform.records.check import Cell
+from shellform.records.summary import StandingRecord, VerdictRecord
 from shellform.records.words import number
 from shellform.structure.elements.state import State
 from tests.records.made import summary
@@ -40,11 +41,16 @@ def test_the_answers_are_numbers_of_the_design(shell, designs):
     assert found["Which rods?"].words == "⌀ 2 mm"
     length = sum(rod.length for rod in shell.net.grid.rods)
     assert found["What to buy?"].words == f"{number(length)} m of rod"
-    assert found["Is it safe at 1.2 × the load?"].good
+    assert found["Is it safe at 1.2 × the load?"].good is None, "nothing was drawn"
+    assert found["Is it safe at 1.2 × the load?"].words == "Not examined as built"
+    drawn = summary(designs, "additional", stands=StandingRecord(200, 198, 0.9689, 0.95, 0))
+    cell = Cell("198 of 200 structures as built stand (at least 96 % with 95 % confidence)", True)
+    answer = answers(shell, "polished", design, states, drawn, as_built=cell)[3]
+    assert (answer.words, answer.good) == (cell.found, True)
     assert "isn't known" in found["Is it safe at 1.2 × the load?"].detail
     for known, words in [
-        ({"critical_factor": 1.85}, "ends at 1.85 ×"),
-        ({"critical_factor": None, "critical_sought": 3.0}, "up to 3 ×"),
+        ({"critical_factor": 1.85, "critical_kind": "limit point"}, "ends at 1.850 × (limit point)"),
+        ({"critical_factor": 3.0, "critical_kind": "none"}, "up to 3 ×"),
     ]:
         sought = summary(designs, "design", **known)
         assert words in answers(shell, "polished", design, states, sought)[3].detail

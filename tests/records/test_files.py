@@ -10,9 +10,9 @@ import pytest
 from shellform.errors import Damaged, InputError
 from shellform.optimiser.optimum import Step
 from shellform.records.history import read_history, write_history
+from shellform.records.scattering import SampleRecord
 from shellform.records.stages import StagesDone, read_stages, write_stages
 from shellform.records.summary import (
-    SampleRecord,
     StandingRecord,
     Summary,
     VerdictRecord,

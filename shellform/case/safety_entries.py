@@ -1,0 +1,76 @@
+"""The case file's tables on the structure as built: what it is off by, and what is asked of it."""
+
+from __future__ import annotations
+
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt, model_validator
+
+from shellform.case.entries import Entry
+from shellform.gridshell.tolerances import SOURCES
+
+
+def _default(name: str) -> str:
+    return f"{SOURCES[name]}; left out: by the shell's size"
+
+
+class TolerancesEntry(Entry):
+    """Standard deviations of what a gridshell as built is off by; 0 leaves a cause out. What is left out follows the
+    shell's size, as run folders' case files say with its source.
+    """
+
+    cable_length: NonNegativeFloat | None = Field(None, description=f"m: {_default('cable_length')}")
+    cable_stiffness: NonNegativeFloat | None = Field(
+        None, description=f"share: {_default('cable_stiffness')}"
+    )
+    supports: NonNegativeFloat | None = Field(None, description=f"m, each coordinate: {_default('supports')}")
+    marks: NonNegativeFloat | None = Field(
+        None, description=f"m, of crossings along rods: {_default('marks')}"
+    )
+    rod_stiffness: NonNegativeFloat | None = Field(
+        None, description=f"share, of each rod: {_default('rod_stiffness')}"
+    )
+    rod_bow: NonNegativeFloat | None = Field(
+        None, description=f"rise over length of each rod: {_default('rod_bow')}"
+    )
+    connectors: NonNegativeFloat | None = Field(None, description=f"share: {_default('connectors')}")
+    load_each: NonNegativeFloat | None = Field(
+        None, description=f"share, of each crossing's load: {_default('load_each')}"
+    )
+    load_all: NonNegativeFloat | None = Field(
+        None, description=f"share, of the whole load: {_default('load_all')}"
+    )
+    load_uneven: NonNegativeFloat | None = Field(
+        None, description=f"share, of one half's load: {_default('load_uneven')}"
+    )
+    shape: NonNegativeFloat | None = Field(
+        None, description=f"amplitude of each soft mode over the span: {_default('shape')}"
+    )
+
+
+class SafetyEntry(Entry):
+    """What is asked of the structure as built, drawn with [tolerances]."""
+
+    required: bool = Field(True, description="false: only told, whatever it is")
+    probability_design: float = Field(
+        0.99, ge=0.0, lt=1.0, description="share of drawn structures that stand under the design load"
+    )
+    probability_additional: float | None = Field(
+        None,
+        ge=0.0,
+        lt=1.0,
+        description="under every other load; left out: no less than of the initial design",
+    )
+    critical_factor: float | None = Field(
+        1.25,
+        ge=1.0,
+        description="of the perfect structure under the design load, with rod elements halved",
+    )
+    drawn: PositiveInt = Field(200, description="structures of the design to build")
+    compared: PositiveInt = Field(20, description="structures of the designs to compare with")
+    confidence: float = Field(0.95, gt=0.0, lt=1.0, description="of the probability that is told")
+    seed: NonNegativeInt = Field(0, description="of the drawing; the search draws others")
+
+    @model_validator(mode="after")
+    def _enough(self) -> SafetyEntry:
+        if self.compared > self.drawn:
+            raise ValueError("compared must not exceed drawn")
+        return self
