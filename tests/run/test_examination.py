@@ -1,0 +1,185 @@
+"""Designs examined as built: on a small dome, a few structures each."""
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from shellform.case.build_safety import case_safety, case_tolerances, critical_factors_asked
+from shellform.case.case import load_case
+from shellform.errors import InputError, NotConverged
+from shellform.gridshell.tolerances import SOURCES, default_tolerances
+from shellform.records.progress import Kind
+from shellform.records.summary import read_summary
+from shellform.reliability.safety import paths
+from shellform.reliability.standing import sample
+from shellform.run import examination
+from shellform.run.folder import read_run
+from shellform.run.run import run_case
+from tests.stubs import CASE
+
+FEW = ["safety.drawn=12", "safety.compared=4", "safety.probability_design=0.9", "optimise.unloaded=false"]
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    place = tmp_path_factory.mktemp("examined") / "dome.toml"
+    place.write_text(CASE, encoding="utf-8")
+    return place
+
+
+@pytest.fixture(scope="module")
+def whole(file, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("whole")
+    events = []
+    run_case(load_case(file, FEW), folder, until="safety", report=events.append)
+    return folder, events
+
+
+def test_every_design_tells_its_critical_factor_on_both_meshes_and_how_many_structures_stand(whole):
+    summary = read_summary(whole[0])
+    assert set(summary.designs) == {"unbraced", "initial", "optimised"}
+    for name, design in summary.designs.items():
+        assert design.loads["none"].stands is None
+        for load in ("design", "additional"):
+            row = design.loads[load]
+            assert 0.0 < row.critical_factor <= row.critical_sought
+            assert row.critical_kind in ("limit point", "bifurcation", "none")
+            error = 4.0 / 3.0 * (row.critical_factor - row.critical_factor_halved)
+            assert row.critical_factor_error == pytest.approx(error)
+            assert row.slack is not None
+            if name != "unbraced":
+                assert row.stands.drawn == (12 if name == summary.verdict.design else 4)
+                assert row.stands.standing <= row.stands.drawn
+                assert (row.stands.confidence, row.stands.seed) == (0.95, 0)
+        ratio = design.loads["design"].critical_factor / design.loads["additional"].critical_factor
+        assert ratio == pytest.approx(1.2)
+
+
+def test_what_is_told_is_what_a_sample_of_the_same_seed_finds(whole):
+    run = read_run(whole[0])
+    shell, design = run.shell_of("optimised"), run.designs["optimised"]
+    tolerances = case_tolerances(run.case, shell)
+    (largest,) = paths(run.loads)
+    found = sample(shell, design, run.loads[largest], tolerances, count=12, seed=0).standing
+    told = run.summary.designs["optimised"].loads[largest].stands
+    assert (told.drawn, told.standing, told.at_least) == (found.drawn, found.standing, found.at_least)
+
+
+def test_sampling_tells_how_far_it_is_and_how_long_it_takes_at_most(whole):
+    told = [each for each in whole[1] if each.stage == "safety" and each.kind is Kind.PROGRESS]
+    parts = [each for each in told if each.fraction is not None]
+    assert parts
+    assert all(0.0 < each.fraction <= 1.0 and each.seconds_left >= 0.0 for each in parts)
+    assert parts[-1].seconds_left == pytest.approx(0.0, abs=1e-6)
+
+
+def test_killed_inside_sampling_it_goes_on_and_ends_with_the_same_bytes(file, whole, tmp_path):
+    def stop(event):
+        if event.stage == "safety" and "structure 4 of 4" in event.text:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(load_case(file, FEW), tmp_path, until="safety", report=stop)
+    assert json.loads((tmp_path / "stages.json").read_text()).keys() >= {"optimise"}
+    lines = []
+    run_case(load_case(file, FEW), tmp_path, until="safety", report=lambda event: lines.append(event.text))
+    assert not [line for line in lines if "initial design as built" in line], "kept from before"
+    one, other = (read_summary(each) for each in (tmp_path, whole[0]))
+    assert replace(one, seconds={}) == replace(other, seconds={})
+    for name in ("initial", "optimised"):
+        assert (tmp_path / f"designs/{name}-drawn.json").read_bytes() == (
+            whole[0] / f"designs/{name}-drawn.json"
+        ).read_bytes()
+
+
+def test_other_tolerances_draw_other_structures_and_a_fallen_one_is_explained(file, whole, tmp_path):
+    loose = [*FEW, "tolerances.load_each=0.4", "tolerances.load_uneven=0.3", "tolerances.load_all=0.3"]
+    summary = run_case(load_case(file, [*loose, "safety.required=false"]), tmp_path, until="safety")
+    assert summary.verdict.holds, "only told"
+    found = summary.failure
+    assert found.design == summary.verdict.design
+    assert 0.0 < found.factor < 1.0
+    assert found.driver == next(iter(found.without))
+    assert found.without[found.driver] >= found.factor
+    assert (tmp_path / "states/failure.npz").is_file()
+
+
+def test_the_written_case_says_each_default_tolerance_with_its_source(whole):
+    text = (whole[0] / "case.toml").read_text(encoding="utf-8")
+    run = read_run(whole[0])
+    own = default_tolerances(run.shell)
+    for name, source in SOURCES.items():
+        assert f"# {name} = {getattr(own, name):.6g}  # {source}" in text
+
+
+def test_tolerances_of_the_case_take_the_place_of_the_defaults(file, whole):
+    shell = read_run(whole[0]).shell
+    found = case_tolerances(load_case(file, ["tolerances.marks=0.001", "tolerances.shape=0"]), shell)
+    assert found == replace(default_tolerances(shell), marks=0.001, shape=0.0)
+    safety = case_safety(load_case(file, ["safety.drawn=500", "safety.seed=7"]), shell)
+    assert (safety.drawn, safety.seed) == (60, 8)
+    assert case_safety(load_case(file, ["safety.required=false"]), shell) is None
+
+
+@pytest.mark.parametrize(
+    ("settings", "asked"),
+    [
+        ([], {"design": 1.25}),
+        (["limits.critical_factor=1.5"], {"design": 1.5}),
+        (["limits.critical_factor=1.1"], {"design": 1.25}),
+        (
+            ["limits.critical_factor=1.1", 'limits.critical_loads=["additional"]'],
+            {"design": 1.25, "additional": 1.1},
+        ),
+        (["safety.required=false"], {}),
+        (["safety.required=false", "limits.critical_factor=1.1"], {"design": 1.1}),
+    ],
+)
+def test_the_larger_of_both_critical_factors_is_asked_for(file, settings, asked):
+    assert critical_factors_asked(load_case(file, settings)) == asked
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        ("tolerances.marks=-1", "tolerances.marks.*greater than or equal to 0"),
+        ("tolerances.cable=1", "no known entry; did you mean"),
+        ("safety.probability_design=1.0", "less than 1"),
+        ("safety.drawn=10", "compared must not exceed drawn"),
+    ],
+)
+def test_bad_entries_are_refused(file, setting, words):
+    with pytest.raises(InputError, match=words):
+        load_case(file, [setting])
+
+
+def test_a_run_that_ends_before_optimising_is_judged_and_has_its_page(file, tmp_path):
+    with pytest.raises(NotConverged):
+        run_case(load_case(file, ["load.force=1e3"]), tmp_path)
+    summary = read_summary(tmp_path)
+    assert not summary.verdict.holds
+    assert "ended without a result" in summary.verdict.failed[0]
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "does not hold" in page
+    assert "deforms excessively" in page
+
+
+def test_until_optimise_nothing_is_claimed_of_the_structure_as_built(file, tmp_path):
+    summary = run_case(load_case(file, FEW), tmp_path, until="optimise")
+    assert not summary.verdict.holds
+    assert "As built under the design load" in summary.verdict.not_examined
+    assert summary.designs["optimised"].loads["design"].stands is None
+
+
+def test_a_design_without_unloaded_equilibrium_is_told_as_not_found(file, whole, tmp_path, monkeypatch):
+    def lost(*arguments, **settings):
+        raise NotConverged("there is none")
+
+    monkeypatch.setattr(examination, "mesh_error", lost)
+    monkeypatch.setattr(examination, "drawn_of", lost)
+    summary = run_case(load_case(file, [*FEW, "safety.seed=3"]), tmp_path, until="safety")
+    row = summary.designs["optimised"].loads["design"]
+    assert row.critical_kind == "not found: there is none"
+    assert row.critical_factor is None
+    assert "Critical factor of the design load" in summary.verdict.not_examined
