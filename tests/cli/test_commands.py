@@ -1,5 +1,6 @@
 """The commands, as a user calls them: results, exit status, and messages without traceback."""
 
+import html
 import json
 import signal
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 
 from shellform.cli import program
 from shellform.records.stages import STAGES
+from tests.stubs import CASE
 
 ROOT = Path(__file__).parent.parent.parent
 MODEL = {
@@ -214,6 +216,12 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
         "optimise.evaluations=5",
         "--set",
         "optimise.polish=3",
+        "--set",
+        "safety.required=false",
+        "--set",
+        "safety.drawn=4",
+        "--set",
+        "safety.compared=2",
     ]
     result = shellform(*arguments)
     assert result.returncode == 0, result.stderr
@@ -256,3 +264,31 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
         model = json.loads((run / f"designs/{name}.json").read_text(encoding="utf-8"))
         away = np.linalg.norm(np.array(model["nodes"]) + moved - model["start"]["positions"], axis=1)
         assert away.max() == pytest.approx(designs[name]["loads"]["design"]["deviation_max"], abs=0.9e-6)
+
+
+def test_a_design_that_does_not_hold_ends_with_status_3_and_has_its_page(tmp_path):
+    case = tmp_path / "dome.toml"
+    case.write_text(CASE, encoding="utf-8")
+    arguments = ["design", case, "--output", tmp_path / "run", "--until", "safety"]
+    for setting in (
+        "safety.drawn=4",
+        "safety.compared=2",
+        "safety.critical_factor=9.0",
+        "optimise.unloaded=false",
+    ):
+        arguments += ["--set", setting]
+    result = shellform(*arguments)
+    assert result.returncode == 3, result.stderr
+    verdict = json.loads((tmp_path / "run/summary.json").read_text(encoding="utf-8"))["verdict"]
+    assert not verdict["holds"]
+    reasons = [each for each in verdict["failed"] if each.startswith("Critical factor of the design load")]
+    assert len(reasons) == 1
+    assert reasons[0] in result.stdout, "the same words"
+    page = shellform("report", tmp_path / "run")
+    assert page.returncode == 0, page.stderr
+    text = html.unescape((tmp_path / "run/report.html").read_text(encoding="utf-8"))
+    assert reasons[0] in text
+    assert "The optimised design does not hold" in text
+    assert "The optimised design does not hold" in result.stdout
+    kept = shellform(*arguments)
+    assert kept.returncode == 3, "what was kept is judged as before"
