@@ -470,3 +470,19 @@ def test_workers_can_be_threads_of_one_process_to_try_out_the_engine(tmp_path):
             for each in batch
         ]
     assert sorted(each.key for each in found) == [f"{k:032d}" for k in range(9)]
+
+
+def test_the_probability_of_standing_is_a_column_an_objective_and_a_limit_of_a_study(tmp_path):
+    file = study_file(
+        tmp_path,
+        "[set]\nsafety.drawn = 4\nsafety.compared = 2\noptimise.unloaded = false\noptimise.evaluations = 1\n"
+        "[vary]\nrod.radius = [0.0009, 0.001]\n"
+        '[column]\nat_least = "designs.best.loads.design.stands.at_least"\ncables = "designs.best.cables"\n'
+        '[objective]\nat_least = "max"\ncables = "min"\n[limit]\ncables = 1000\n',
+    )
+    found = run_study(file, tmp_path / "out", workers=1)
+    assert found.failed == 0
+    with (tmp_path / "out/table.csv").open(encoding="utf-8") as text:
+        told = list(csv.DictReader(text))
+    assert len(told) == 2
+    assert all(0.0 <= float(row["at_least"]) < 1.0 for row in told)
