@@ -13,8 +13,8 @@ def _default(name: str) -> str:
 
 
 class TolerancesEntry(Entry):
-    """Standard deviations of what a gridshell as built is off by; 0 leaves a cause out. What is left out follows the
-    shell's size, as run folders' case files say with its source.
+    """Standard deviations of what a gridshell as built is off by; 0 leaves a cause out. What is left out
+    follows the shell's size, as run folders' case files say with its source.
     """
 
     cable_length: NonNegativeFloat | None = Field(None, description=f"m: {_default('cable_length')}")

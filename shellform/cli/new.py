@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from shellform.cli.options import Quiet, Scripts, with_surface_options
-from shellform.cli.terminal import Progress, tell_labelled
+from shellform.cli.terminal import Spinner, tell_labelled
 
 
 @with_surface_options
@@ -33,7 +33,7 @@ def new(
     from shellform.run.propose import propose_case
     from shellform.run.sizes import DesignWish
 
-    report = Progress(quiet=quiet)
+    report = Spinner(quiet=quiet)
     try:
         told = propose_case(
             surface,

@@ -21,8 +21,8 @@ _SPACING = 0.055  # m, of the paper's rods
 
 
 def usual_gap(spacing: float) -> float:
-    """The gap, m, of rods that aren't chosen yet: the depth of the paper's at that spacing. Once they are, it is
-    theirs (`following`)."""
+    """The gap, m, of rods that aren't chosen yet: the depth of the paper's at that spacing. Once they are, it
+    is theirs (`following`)."""
     return _PAPER.gap * spacing / _SPACING
 
 

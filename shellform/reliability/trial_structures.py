@@ -61,7 +61,7 @@ class Demand:
 
 
 @dataclass(frozen=True)
-class Tried:
+class JudgedTrial:
     """Numbers of the structures that have `fallen` under each load as far as it took to say whether the
     design `stands`, whether the perfect one keeps its `critical` factor, and the `factorisations` spent."""
 
@@ -119,7 +119,7 @@ def required(
     return _shown(every, tried(shell, start, every, critical=False))
 
 
-def _shown(asked: Required, shown: Tried) -> Required:
+def _shown(asked: Required, shown: JudgedTrial) -> Required:
     """The same with as many fallen as the probability allows or the start has `shown`."""
     safety, fallen = asked.safety, {}
     for name in asked.loads:
@@ -136,7 +136,7 @@ def tried(
     *,
     first: Sequence[int] = (),
     critical: bool = True,
-) -> Tried:
+) -> JudgedTrial:
     """The design judged by the search's structures, the numbers `first` before the others. Raises
     NotConverged where it has no unloaded equilibrium."""
     safety, spent = asked.safety, 0
@@ -176,19 +176,19 @@ def tried(
                     if factor < share * (1.0 - _SAME):
                         fallen[name].append(number)
             if not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares):
-                return Tried({name: tuple(own) for name, own in fallen.items()}, kept, False, spent)
-    return Tried({name: tuple(own) for name, own in fallen.items()}, kept, True, spent)
+                return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, False, spent)
+    return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, True, spent)
 
 
-def stands(shell: Gridshell, design: Design, asked: Required, *, first: Sequence[int] = ()) -> Tried:
+def stands(shell: Gridshell, design: Design, asked: Required, *, first: Sequence[int] = ()) -> JudgedTrial:
     """As `tried`; a design without unloaded equilibrium doesn't stand."""
     try:
         return tried(shell, design, asked, first=first)
     except NotConverged as error:
-        return Tried({name: () for name in asked.loads}, False, False, error.iterations)
+        return JudgedTrial({name: () for name in asked.loads}, False, False, error.iterations)
 
 
-def confirm(shell: Gridshell, design: Design, asked: Required) -> Tried:
+def confirm(shell: Gridshell, design: Design, asked: Required) -> JudgedTrial:
     """As `stands`, and with the critical factor kept on the mesh with rod elements halved."""
     found, factor = stands(shell, design, asked), asked.safety.critical_factor
     if not found.stands or factor is None:

@@ -1,10 +1,11 @@
 """The design that `shellform new` proposes: a net, rods, cables and a load under which it stands.
 
-Nets are pulled at several angles, and the one that bends its rods least is taken. Then the initial design is solved
-under its growing load, for the rods with which the estimate says to begin (sizes.py), stiffer ones where it falls,
-finer spacings where the stiffest that equation (1) allows falls, and thinner concrete last. What stands up to `NEEDED`
-times its load is pulled anew with the gap that follows its rods, solved again, and ten structures with the errors of
-building are drawn and loaded. Two elements a segment are enough for that: they change critical factors by half a percent.
+Nets are pulled at several angles, and the one that bends its rods least is taken. Then the initial design is
+solved under its growing load, for the rods with which the estimate says to begin (sizes.py), stiffer ones
+where it falls, finer spacings where the stiffest that equation (1) allows falls, and thinner concrete last.
+What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
+ten structures with the errors of building are drawn and loaded. Two elements a segment are enough for that:
+they change critical factors by half a percent.
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -74,8 +75,8 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Tried:
-    """What a design came to: the `factor` of its load up to which it stands, the rods' `stress` over their strength and the
-    largest `deviation`, m, at the last state, and `where` that is (3,), m."""
+    """What a design came to: the `factor` of its load up to which it stands, the rods' `stress` over their
+    strength and the largest `deviation`, m, at the last state, and `where` that is (3,), m."""
 
     factor: float
     stress: float
@@ -85,9 +86,10 @@ class Tried:
 
 @dataclass(frozen=True)
 class FirstDesign:
-    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; `choice` of rods; `rope`; `thickness`, m, of the
-    concrete; what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest fibre distance, m,
-    that equation (1) allows rods of that material (`allowed`); what was `told` on the way."""
+    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; `choice` of rods; `rope`;
+    `thickness`, m, of the concrete; what the perfect structure came to (`tried`); of `drawn` structures
+    `standing`; the largest fibre distance, m, that equation (1) allows rods of that material (`allowed`);
+    what was `told` on the way."""
 
     spacing: float
     reason: str
@@ -103,8 +105,8 @@ class FirstDesign:
 
 
 def first_design(surface: Surface, wish: DesignWish, say: Say = lambda text: None) -> FirstDesign:
-    """The design to propose. Raises InputError for a surface of absurd size, a flat one, or one that no net covers or no rod
-    follows, NotConverged where nothing stands; both with the reason and a way out."""
+    """The design to propose. Raises InputError for a surface of absurd size, a flat one, or one that no net
+    covers or no rod follows, NotConverged where nothing stands; both with the reason and a way out."""
     refuse_size(surface)
     refuse_flat(surface)
     return _Search(surface, wish, say).found()
@@ -189,8 +191,8 @@ class _Search:
         return None
 
     def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
-        """The thickest concrete that stands where the design falls. Raises where less than a layer is left, or another was
-        asked for."""
+        """The thickest concrete that stands where the design falls. Raises where less than a layer is left,
+        or another was asked for."""
         failure = self.best
         assert failure is not None
         if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
@@ -257,7 +259,9 @@ class _Search:
     def _stands(
         self, placed: Placed, choice: RodChoice, rope: Rope, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
-        """The design with these rods and this load, where it stands with the gap that follows its rods too."""
+        """The design with these rods and this load, where it stands with the gap that follows its rods
+        too.
+        """
         tried = self._tried(placed.net, choice, rope, thickness)
         failure = Obstacle(
             Why.STABILITY, spacing, thickness, tried.factor, choice, placed, tried.where, tried.stress
@@ -370,7 +374,9 @@ def _shell(
 
 
 def _less_stressed(net: Net, possible: Sequence[RodChoice], at: int, excess: float) -> int:
-    """The stiffest section below `at` that bending into the net stresses less, by a share `excess` of its strength."""
+    """The stiffest section below `at` that bending into the net stresses less, by a share `excess` of its
+    strength.
+    """
     share = [erection_stress(net, each.section) / each.section.material.strength for each in possible]
     return next((k for k in range(at - 1, -1, -1) if share[k] <= share[at] - excess), at)
 

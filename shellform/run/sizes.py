@@ -1,14 +1,14 @@
 """What is sized before anything is solved: the spacing, the cables, and with which section to begin.
 
-Spacing. A net is refused, or its rods break, where cells are large against the surface's radius of curvature; so it is
-at most a third of the radius that all but a twentieth of the surface keeps (a quantile of area: one crease doesn't
-decide). Beside this it follows the span, so that there are enough crossings for the shape and few enough to build, and
-above a metre what is usual on site.
+Spacing. A net is refused, or its rods break, where cells are large against the surface's radius of curvature;
+so it is at most a third of the radius that all but a twentieth of the surface keeps (a quantile of area: one
+crease doesn't decide). Beside this it follows the span, so that there are enough crossings for the shape and
+few enough to build, and above a metre what is usual on site.
 
-Buckling. The braced grid is taken as an orthotropic shell: across, rods of EI every s bend with D = EI / s; in its
-surface, the cables of EA on both diagonals of each cell resist shear with S = EA / (√2 s). A sphere of such a shell
-buckles at 2 √(D S) / R² and more where the rods' own EA counts too, a barrel at less. The number that stands before
-√(D S) was set by four shells that were solved; it only says where to begin.
+Buckling. The braced grid is taken as an orthotropic shell: across, rods of EI every s bend with D = EI / s;
+in its surface, the cables of EA on both diagonals of each cell resist shear with S = EA / (√2 s). A sphere of
+such a shell buckles at 2 √(D S) / R² and more where the rods' own EA counts too, a barrel at less. The number
+that stands before √(D S) was set by four shells that were solved; it only says where to begin.
 """
 
 from __future__ import annotations
@@ -76,8 +76,8 @@ class RodChoice:
 
 @dataclass(frozen=True)
 class DesignWish:
-    """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m, an `angle`,
-    degrees; None: to be found."""
+    """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m,
+    an `angle`, degrees; None: to be found."""
 
     rod: str | None = None
     spacing: float | None = None

@@ -1,7 +1,8 @@
 """What can't be built: the reason, how far off it is, where, and a way out that works.
 
-Sizes no shell has are refused with the unit as the first suspicion, and flat surfaces since a flat plate has none of a
-shell's stiffness. Where the search for a first design ends without one, the failure that came nearest says why.
+Sizes no shell has are refused with the unit as the first suspicion, and flat surfaces since a flat plate has
+none of a shell's stiffness. Where the search for a first design ends without one, the failure that came
+nearest says why.
 """
 
 from __future__ import annotations
@@ -36,9 +37,9 @@ class Why(Enum):
 
 @dataclass(frozen=True)
 class Obstacle:
-    """How an attempt failed: `why`, at which `spacing` and `thickness`, m, up to which `factor` of its load it stood, with
-    which `choice` of rods on which net (`placed`), `where` (3,), m, the rods' `stress` over their strength, or the net's
-    own `error`."""
+    """How an attempt failed: `why`, at which `spacing` and `thickness`, m, up to which `factor` of its load
+    it stood, with which `choice` of rods on which net (`placed`), `where` (3,), m, the rods' `stress` over
+    their strength, or the net's own `error`."""
 
     why: Why
     spacing: float
@@ -51,7 +52,9 @@ class Obstacle:
     error: NoNet | Stalled | None = None
 
     def nearness(self, needed: float) -> float:
-        """The factor from which to step on: structures as built fall a little below the one that is `needed`."""
+        """The factor from which to step on: structures as built fall a little below the one that is
+        `needed`.
+        """
         return min(self.factor, 0.9 * needed) if self.why is Why.SCATTER else self.factor
 
 
@@ -92,8 +95,8 @@ def refuse_flat(surface: Surface) -> None:
 def refused(
     surface: Surface, failure: Obstacle | None, wish: DesignWish, *, bears: float | None = None
 ) -> InputError | NotConverged:
-    """What to say of a shell that can't be built: as an error, to be raised. `bears`: a thickness of concrete, m, that was
-    found to stand."""
+    """What to say of a shell that can't be built: as an error, to be raised. `bears`: a thickness of
+    concrete, m, that was found to stand."""
     if failure is None or failure.why is Why.NET:
         error = None if failure is None else failure.error
         most, radius = _most_curved(surface)

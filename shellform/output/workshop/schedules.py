@@ -91,9 +91,9 @@ def rods(built: Built, cutting: Cutting) -> Table:
     rows = tuple(
         (
             name, rod.direction, rod.length, label(section), weight * rod.length if weight else None,
-            len(rod.marks),
-            " ".join(f"{mark:.4f}" for mark in rod.marks), " ".join(map(str, rod.crossings.tolist())),
-            ", ".join(said for _, said in sorted(places[k])), "spliced" if k in cutting.spliced else "",
+            len(rod.marks), " ".join(f"{mark:.4f}" for mark in rod.marks),
+            " ".join(map(str, rod.crossings.tolist())), ", ".join(said for _, said in sorted(places[k])),
+            "spliced" if k in cutting.spliced else "",
         )
         for k, (name, rod) in enumerate(zip(rod_names(built.grid), built.grid.rods, strict=True))
     )  # fmt: skip
@@ -192,8 +192,8 @@ def bars(built: Built, cutting: Cutting) -> Table:
             rows.append((f"B{number}", place, names[piece.rod], part, piece.length, at, piece.start, last))
             at += piece.length + cutting.kerf
     heads = (
-        "bar", "piece", "rod", "part", "length [m]", "begins on the bar at [m]", "begins on the rod at [m]",
-        "offcut [m]",
+        "bar", "piece", "rod", "part", "length [m]", "begins on the bar at [m]",
+        "begins on the rod at [m]", "offcut [m]",
     )  # fmt: skip
     return Table("bars", heads, tuple(rows), cutting_notes(cutting, names))
 
@@ -364,13 +364,9 @@ def survey(built: Built) -> Table:
 
 
 def all_tables(built: Built, cutting: Cutting) -> list[Table]:
-    """Every schedule, that of the splices also where there are none, so that none is left from another
-    stock.
-    """
-    tables = [
-        rods(built, cutting), bars(built, cutting), splices(built, cutting), marks(built), cables(built),
-        supports(built), survey(built),
-    ]  # fmt: skip
+    """Every schedule, that of the splices also where there are none: none is left from another stock."""
+    tables = [make(built, cutting) for make in (rods, bars, splices)]
+    tables += [make(built) for make in (marks, cables, supports, survey)]
     return (
         [*tables, edge_table(built.shell, built.design, _told_states(built), rod_names(built.grid))]
         if built.shell.net.edges
