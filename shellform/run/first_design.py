@@ -74,9 +74,9 @@ Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
-class Tried:
-    """What a design came to: the `factor` of its load up to which it stands, the rods' `stress` over their
-    strength and the largest `deviation`, m, at the last state, and `where` that is (3,), m."""
+class Followed:
+    """What a design came to: the `factor` of its load up to which it stands, the rods' `stress` over their strength and the
+    largest `deviation`, m, at the last state, and `where` that is (3,), m."""
 
     factor: float
     stress: float
@@ -97,7 +97,7 @@ class FirstDesign:
     choice: RodChoice
     rope: Rope
     thickness: float
-    tried: Tried
+    tried: Followed
     standing: int
     drawn: int
     allowed: float
@@ -312,7 +312,7 @@ class _Search:
             spacing, self.reason, placed, choice, rope, thickness, tried, standing, DRAWN, allowed, tuple(self.told)
         )  # fmt: skip
 
-    def _tried(self, net: Net, choice: RodChoice, rope: Rope, thickness: float) -> Tried:
+    def _tried(self, net: Net, choice: RodChoice, rope: Rope, thickness: float) -> Followed:
         shell, loads = _shell(net, self.surface, choice, rope, thickness)
         design = shell.design(rest_ratio=REST_RATIO)
         assembly = assemble(shell.network(design))
@@ -332,7 +332,7 @@ class _Search:
         except NotConverged as error:
             state = error.state if isinstance(error.state, State) else state
         away = deviations(shell, state)
-        return Tried(
+        return Followed(
             factor,
             float(shell.utilisation(design, stressed).max()),
             float(away.max()),
