@@ -10,6 +10,7 @@ from shellform.gridshell.catalogue import Catalogue as Catalogue
 from shellform.gridshell.catalogue import neighbours as neighbours
 from shellform.gridshell.catalogue import read_catalogue as read_catalogue
 from shellform.gridshell.catalogue import rounded_up as rounded_up
+from shellform.gridshell.edge_beams import EdgeBeam as EdgeBeam
 from shellform.gridshell.gridshell import Cable as Cable
 from shellform.gridshell.gridshell import Design as Design
 from shellform.gridshell.gridshell import Gridshell as Gridshell
@@ -24,7 +25,9 @@ from shellform.net.chebyshev import NetTuning as NetTuning
 from shellform.net.chebyshev import pull_net as pull_net
 from shellform.net.grid import Grid as Grid
 from shellform.net.grid import GridRod as GridRod
+from shellform.net.net import EdgeLine as EdgeLine
 from shellform.net.net import Net as Net
+from shellform.net.net import Stretch as Stretch
 from shellform.net.notes import NetNote as NetNote
 from shellform.net.notes import NoteKind as NoteKind
 from shellform.net.quality import Quality as Quality
@@ -75,9 +78,14 @@ from shellform.problem.variables import FreeRadius as FreeRadius
 from shellform.problem.variables import Rates as Rates
 from shellform.problem.variables import RestLengths as RestLengths
 from shellform.problem.variables import Variable as Variable
+from shellform.reliability.path_of_one import Limit as Limit
+from shellform.reliability.probability import Standing as Standing
 from shellform.reliability.safety import Judgement as Judgement
 from shellform.reliability.safety import Safety as Safety
+from shellform.reliability.safety import UnderLoad as UnderLoad
 from shellform.reliability.safety import judge as judge
+from shellform.reliability.trial_structures import Demand as Demand
+from shellform.reliability.trial_structures import Required as Required
 from shellform.site import calibration as calibration
 from shellform.site import erection as erection
 from shellform.site import retensioning as retensioning
