@@ -146,9 +146,11 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
             "robust.supports=5e-5",
             "robust.loads_all=0.05",
             "robust.samples=5",
+            "safety.drawn=2",
+            "safety.compared=1",
         ],
     )
-    summary = run_case(case, tmp_path, until="optimise")
+    summary = run_case(case, tmp_path, until="safety")
     with (tmp_path / "history.csv").open(encoding="utf-8", newline="") as file:
         row = next(csv.DictReader(file))
     named = [

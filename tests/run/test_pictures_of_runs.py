@@ -58,8 +58,8 @@ def test_histories_are_drawn_from_the_run_s_file_and_missed_where_nothing_was_op
     with pytest.raises(InputError, match=r"history.csv: isn't there: nothing was optimised yet"):
         draw_designs(run, Wish(quantity="history"))
     text = (
-        "evaluation,accepted,objective,term.misfit,constraint.cable_force,cables\n"
-        "0,1,1.0,1.0,-0.7,293\n1,1,0.6,0.6,0.0,130\n"
+        "evaluation,accepted,objective,term.misfit,constraint.cable_force,cables,stage,seconds\n"
+        "0,1,1.0,1.0,-0.7,293,1.0,0.1\n1,1,0.6,0.6,0.0,130,1.0,0.2\n"
     )
     (run.folder / "history.csv").write_text(text, encoding="utf-8")
     assert names(draw_designs(run, Wish(quantity="history", endings=(".pdf",)))) == [
