@@ -8,6 +8,7 @@ from shellform.case.case import dump_case, load_case
 from shellform.gridshell.grouping import cut_lengths
 from shellform.net.grid import lattice_grid
 from shellform.net.net import Net
+from shellform.net.notes import NetNote, NoteKind
 from shellform.net.quality import Quality
 from shellform.net.saved import load_net, save_net
 from shellform.structure.elements.state import from_vectors
@@ -59,7 +60,8 @@ def nets(draw):
         **maps,
     )
     ends = np.unique(np.concatenate([rod.nodes[[0, -1]] for rod in grid.rods]))
-    return Net(grid, target, ends, quality, tuple(draw(st.lists(st.text(max_size=20), max_size=3))))
+    notes = st.builds(NetNote, st.sampled_from(NoteKind), st.text(max_size=20))
+    return Net(grid, target, ends, quality, tuple(draw(st.lists(notes, max_size=3))))
 
 
 @few
