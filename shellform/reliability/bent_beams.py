@@ -45,17 +45,20 @@ class BentBeams:
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy (m,) J, end forces (m, 12) N and N·m, packed lower tangents (m, 78), filled `into`."""
-        return self._alone.evaluate(self._turned(state), tangent=tangent, into=into)
+        alone, own = self.apart(state)
+        return alone.evaluate(own, tangent=tangent, into=into)
 
     def local_forces(self, state: State) -> Reals:
         """Equation (16), (m, 7), N and N·m."""
-        return self._alone.local_forces(self._turned(state))
+        alone, own = self.apart(state)
+        return alone.local_forces(own)
 
-    def _turned(self, state: State) -> State:
+    def apart(self, state: State) -> tuple[Beams, State]:
+        """The straight beams, each between two nodes of its own (2 i and 2 i + 1), and the state of those,
+        turned: a spin of a node is one of its beams' ends."""
         flat = self.straight.ends.ravel()
-        return State(
-            state.positions[flat], rotation.product(state.quaternions[flat], self.turns.reshape(-1, 4))
-        )
+        turned = rotation.product(state.quaternions[flat], self.turns.reshape(-1, 4))
+        return self._alone, State(state.positions[flat], turned)
 
 
 def curved(straight: Beams, curvature: Reals) -> BentBeams:

@@ -32,6 +32,7 @@ from shellform.arrays import Indices, Reals
 from shellform.structure.answers.results import end_stress_by_force
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
+from shellform.structure.elements.parts import Part
 from shellform.structure.elements.sections import Section
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
@@ -82,7 +83,7 @@ def element_columns(assembly: Assembly, dofs: Indices, values: Reals) -> sp.csc_
     return sp.csc_array((values[taken], (rows[taken], columns[taken])), shape=(len(assembly.free), len(rows)))
 
 
-def by_stiffness(assembly: Assembly, state: State, *rates: Beams) -> sp.csc_array:
+def by_stiffness(assembly: Assembly, state: State, *rates: Part) -> sp.csc_array:
     """Derivatives (f, k) of the internal forces by k variables, on each of which the beams' stiffness depends
     at one of the `rates`: end forces are linear in the stiffness, so that beams with the rate for a stiffness
     have the derivative for end forces (A.27 to A.29)."""

@@ -15,6 +15,8 @@ has
 
 from __future__ import annotations
 
+from typing import Protocol, runtime_checkable
+
 import numpy as np
 
 from shellform.arrays import Indices, Reals
@@ -30,6 +32,14 @@ _STEP = 1e-30  # of the complex shift: its square vanishes beside 1
 _CHUNK = 200  # elements whose products of motions are summed at a time
 
 
+@runtime_checkable
+class _BeamLike(Protocol):
+    """Beams, or what follows their kernel with ends of its own."""
+
+    def dofs(self) -> Indices: ...
+    def apart(self, state: State) -> tuple[Beams, State]: ...
+
+
 def bilinear(part: Part, state: State, left: Reals, right: Reals) -> float:
     """Sum of l_k'K r_k over the motions `left`, `right` (6 n, k), m and rad, with the tangent K of one part.
 
@@ -42,14 +52,14 @@ def bilinear(part: Part, state: State, left: Reals, right: Reals) -> float:
 
 def bilinear_by_dof(assembly: Assembly, state: State, left: Reals, right: Reals) -> Reals:
     """Derivative (6 n,), N and N·m, of the sum of l_k'K r_k by every node's translations and rotation
-    increments, for beams and cables.
+    increments, for beams (bent ones too) and cables.
     """
     total = np.zeros(6 * assembly.count)
     for part in assembly.parts:
-        if isinstance(part, Beams) and len(part.ends):
-            _add_beams(part, state, left, right, total)
-        elif isinstance(part, Cables) and len(part.ends):
+        if isinstance(part, Cables):
             _add_cables(part, state, left, right, total)
+        elif isinstance(part, _BeamLike):
+            _add_beams(part.dofs(), *part.apart(state), left, right, total)
     return total
 
 
@@ -66,14 +76,14 @@ def bilinear_by_rest_length(cables: Cables, state: State, left: Reals, right: Re
     return np.where(taut, -cables.stiffness * whole / cables.rest_length**2, 0.0)
 
 
-def _add_beams(beams: Beams, state: State, left: Reals, right: Reals, total: Reals) -> None:
-    """One complex pass for each of the twelve degrees of freedom, every element with ends of its own."""
+def _add_beams(dofs: Indices, beams: Beams, state: State, left: Reals, right: Reals, total: Reals) -> None:
+    """One complex pass for each of the twelve degrees of freedom `dofs` (m, 12), every element with ends of
+    its own."""
     count = len(beams.ends)
-    dofs = beams.dofs()
+    if not count:
+        return
     weights = _packed_products(dofs, left, right)
-    ends = np.arange(2 * count).reshape(-1, 2)
-    place = state.positions[beams.ends].reshape(-1, 3)
-    turn = state.quaternions[beams.ends].reshape(-1, 4)
+    place, turn = state.positions, state.quaternions
     stiffness = np.column_stack([beams.axial, beams.torsion, beams.bending_y, beams.bending_z])
     energy, force = np.empty(count, complex), np.empty((count, 12), complex)
     blocks, none = np.empty((count, 78), complex), np.empty((0, 7), complex)
@@ -89,7 +99,7 @@ def _add_beams(beams: Beams, state: State, left: Reals, right: Reals, total: Rea
             count,
             positions,
             quaternions,
-            ends,
+            beams.ends,
             beams.frames,
             beams.rest_length,
             stiffness,

@@ -32,7 +32,7 @@ Sign: theta_y and M_y follow the paper's (12), which counts turns about the loca
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -102,6 +102,12 @@ class Beams:
         blocks = _NOTHING if not tangent else np.empty((count, 78)) if into is None else into
         share(evaluate, count, *self._kernel_input(state), energy, force, blocks, _NOTHING, _NOTHING)
         return Evaluation(energy, force, blocks if tangent else None)
+
+    def apart(self, state: State) -> tuple[Beams, State]:
+        """The same beams, each between two nodes of its own (2 i and 2 i + 1), and the state of those."""
+        flat = self.ends.ravel()
+        ends = np.arange(len(flat)).reshape(-1, 2)
+        return replace(self, ends=ends), State(state.positions[flat], state.quaternions[flat])
 
     def local_forces(self, state: State) -> Reals:
         """Equation (16): N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam, (m, 7), N and N·m."""
