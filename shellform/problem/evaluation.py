@@ -105,12 +105,12 @@ class Evaluator:
 
     def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Linearisation:
         """The linearisation of a design whose equilibria `states` at the stage are known. Raises OffBranch
-        where one isn't stable.
+        where one isn't stable, or where a term can't be measured.
         """
         self.factorisations += len(states)
         try:
             return self._linearised(self.assembly(design), design, states, stage)
-        except NotPositiveDefinite as error:
+        except (NotPositiveDefinite, NotConverged) as error:
             raise OffBranch(str(error)) from error
 
     def evaluate(

@@ -118,10 +118,10 @@ class Loading:
         factor, width, good = 0.0, step, 0
         while here is not None and factor < most:
             goal = most if factor + width > most - 1e-12 else factor + width
-            there = self._step(here, goal, last=goal == most)
+            there = self.step(here, goal, last=goal == most)
             if there is None:
                 width, good = 0.5 * width, 0
-                here = self._at(here.state)  # its factor was replaced
+                here = self.at(here.state)  # its factor was replaced
                 if width < smallest:
                     break
                 continue
@@ -193,7 +193,7 @@ class Loading:
                 positions[np.ix_(nodes, group)] += factor.solve(right[np.ix_(nodes, group)])
         return State(positions, state.quaternions)
 
-    def _step(self, here: Here, goal: float, *, last: bool) -> Here | None:
+    def step(self, here: Here, goal: float, *, last: bool) -> Here | None:
         """From a state on the branch to the load factor `goal`."""
         load = goal * self.load
         change = self._solved(here, load)
@@ -212,7 +212,7 @@ class Loading:
         definite, the last one included; None where one isn't."""
         own, state, before = self.assembly, begin, np.inf
         for _ in range(limit):
-            here = self._at(state)
+            here = self.at(state)
             if here is None:
                 return None
             residual = self.measure.residual(here.balance, load)
@@ -226,7 +226,7 @@ class Loading:
             state = moved(state, own.chords.corrected(state, change))
         return None
 
-    def _at(self, state: State) -> Here | None:
+    def at(self, state: State) -> Here | None:
         """The state with its tangent's factor; None where that isn't positive definite."""
         balance = self.assembly.evaluate(state)
         self.spent += 1

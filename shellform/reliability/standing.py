@@ -13,9 +13,10 @@ it would snap to, and how far it came is its load factor.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
+from typing import TypeVar
 
 from shellform.arrays import Reals
 from shellform.errors import InputError
@@ -33,6 +34,8 @@ from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.loading import SMALLEST
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -82,11 +85,7 @@ class Workshop:
         self, errors: Errors, *, number: int = 0, step: float = STEP, smallest: float = SMALLEST
     ) -> DrawnOutcome:
         """The structure with the errors, loaded from nothing."""
-        own = self._taken()
-        try:
-            return Loading(self.nominal, own, errors, number).outcome(step, smallest)
-        finally:
-            self._idle.put(own)
+        return self.with_structure(errors, lambda loading: loading.outcome(step, smallest), number=number)
 
     def limit(
         self,
@@ -99,14 +98,21 @@ class Workshop:
     ) -> Limit:
         """Where the structure with the errors loses stability under its growing load; what ends its path is
         looked into only to `tell` it."""
-        own = self._taken()
-        try:
-            loading = Loading(self.nominal, own, errors, 0)
+
+        def ended(loading: Loading) -> Limit:
             here, factor = loading.followed(most, step, resolution)
             if here is None:
                 return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
             kind = BORNE if factor >= most else (loading.kind(here) if tell else ENDED)
             return Limit(factor, kind, here.state, loading.spent)
+
+        return self.with_structure(errors, ended)
+
+    def with_structure(self, errors: Errors, work: Callable[[Loading], Found], *, number: int = 0) -> Found:
+        """What `work` finds of the structure with the errors, on an assembly that is its own meanwhile."""
+        own = self._taken()
+        try:
+            return work(Loading(self.nominal, own, errors, number))
         finally:
             self._idle.put(own)
 

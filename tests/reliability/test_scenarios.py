@@ -1,0 +1,113 @@
+"""How much of a load drawn structures bear, and its derivatives by what the design varies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.gridshell.tolerances import Tolerances
+from shellform.net.grid import CONNECTOR
+from shellform.problem.evaluation import Evaluator
+from shellform.problem.problem import LoadCase
+from shellform.reliability.perfect import perfect
+from shellform.reliability.scenarios import borne_factors, scenarios
+from shellform.reliability.standing import Workshop
+from shellform.structure.answers.sensitivity import stiffness_rate
+
+AS_BUILT = Tolerances(
+    cable_length=3e-4,
+    supports=3e-4,
+    marks=3e-4,
+    load_each=0.1,
+    load_all=0.05,
+    connectors=0.1,
+    rod_bow=1e-3,
+    shape=5e-4,
+)
+NUMBERS = np.arange(
+    2
+)  # the branch of the first ends at a limit point, of the second where a cable goes slack
+STEP = 1e-6  # relative: errors of central differences are about 1e-8 of the slope beside rounding
+
+
+@pytest.fixture(scope="module")
+def case(dome):
+    return LoadCase("design", dome.point_load(6.0, every=2))
+
+
+@pytest.fixture(scope="module")
+def asked(dome, case):
+    return scenarios(dome, dome.design(), case, AS_BUILT, seed=7, numbers=NUMBERS, most=3.0)
+
+
+def factors(shell, design, asked):
+    return np.array([each.factor for each in borne_factors(shell, design, asked)])
+
+
+def test_the_factor_is_where_the_path_of_the_drawn_structure_ends(dome, case, asked):
+    nominal = perfect(dome, dome.design(), case.force)
+    found = factors(dome, dome.design(), asked)
+    for scenario, factor in zip(asked.scenarios, found, strict=True):
+        end = Workshop(nominal).limit(scenario.errors, most=3.0, step=0.25, resolution=1e-4)
+        # A tenth of the stiffness is left: of a root, a hundredth of the distance over which it falls.
+        assert 0.98 * end.factor < factor <= end.factor + 1e-4
+
+
+def test_factors_follow_the_rest_lengths_to_first_order(dome, asked):
+    design = dome.design()
+    change = np.random.default_rng(0).normal(size=len(design.rest_length)) * design.rest_length
+    told = [each.factor_by_rest_length @ change for each in borne_factors(dome, design, asked)]
+    longer, shorter = (
+        replace(design, rest_length=design.rest_length + sign * STEP * change) for sign in (1.0, -1.0)
+    )
+    found = (factors(dome, longer, asked) - factors(dome, shorter, asked)) / (2.0 * STEP)
+    assert found == pytest.approx(told, rel=1e-5)
+
+
+@pytest.mark.parametrize("varied", ["radius", "axial", "torsion", "bending"])
+def test_factors_follow_stiffnesses_to_first_order(dome, asked, varied):
+    # Connectors as soft along their axis that it matters.
+    shell, design = replace(dome, joint=replace(dome.joint, axial=71.5)), dome.design()
+    if varied == "radius":
+        rate, size = shell.beams_by_radius(design.radius), design.radius
+        changed = [(shell, replace(design, radius=size * (1.0 + sign * 1e-5))) for sign in (1.0, -1.0)]
+    else:
+        place = {"axial": (1, 0, 0, 0), "torsion": (0, 1, 0, 0), "bending": (0, 0, 1, 1)}[varied]
+        rate, size = (
+            stiffness_rate(shell.beams(design.radius), CONNECTOR, place),
+            getattr(shell.joint, varied),
+        )
+        joints = [replace(shell.joint, **{varied: size * (1.0 + sign * 1e-3)}) for sign in (1.0, -1.0)]
+        changed = [(replace(shell, joint=joint), design) for joint in joints]
+    told = [size * each.factor_by_rate[0] for each in borne_factors(shell, design, asked, rates=(rate,))]
+    more, less = (factors(*each, asked) for each in changed)
+    assert (more - less) / (2e-5 if varied == "radius" else 2e-3) == pytest.approx(told, rel=1e-5)
+
+
+def test_a_structure_that_bears_what_is_asked_for_has_no_slope(dome, asked):
+    found = borne_factors(dome, dome.design(), replace(asked, most=0.5))
+    assert [each.factor for each in found] == [0.5] * len(NUMBERS)
+    assert not np.any([each.factor_by_rest_length for each in found])
+
+
+def test_scenarios_are_terms_of_a_problem(dome, case, asked):
+    design = dome.design()
+    problem = sf.Problem(
+        dome,
+        case,
+        [sf.Share(1.0, sf.Misfit("design"))],
+        [sf.AtLeast(1.0, asked)],
+        variables=[sf.RestLengths(), sf.FreeRadius()],
+    )
+    evaluator = Evaluator(problem, design)
+    states = {"design": perfect(dome, design, 0.5 * case.force).states[-1]}
+    found = evaluator.seed(design, states, 1.0)
+    assert found.constraints == pytest.approx(1.0 - factors(dome, design, asked))
+    assert found.constraints_by_variables.any(axis=1).all()
+
+
+def test_without_a_stiffness_that_is_left_there_is_no_end_of_the_branch(asked):
+    with pytest.raises(InputError, match="positive"):
+        replace(asked, left=0.0)
