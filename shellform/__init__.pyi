@@ -17,6 +17,7 @@ from shellform.gridshell.gridshell import Gridshell as Gridshell
 from shellform.gridshell.gridshell import Joint as Joint
 from shellform.gridshell.gridshell import Rod as Rod
 from shellform.gridshell.gridshell import brace as brace
+from shellform.gridshell.layers import TwoLayers as TwoLayers
 from shellform.gridshell.loads import Region as Region
 from shellform.gridshell.scatter import Scatter as Scatter
 from shellform.gridshell.tolerances import Tolerances as Tolerances

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.case.build_rod import given_section, rod_material
+from shellform.case.build_rod import given_section, layered, rod_material, stock
 from shellform.case.case import (
     Case,
     ConcreteEntry,
@@ -27,6 +27,7 @@ from shellform.gridshell import loads
 from shellform.gridshell.catalogue import Catalogue, largest, named, radius_bounds, read_catalogue
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
 from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace, max_radius
+from shellform.gridshell.layers import single
 from shellform.gridshell.loads import Region
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Material, Rectangle, Round, Tube
@@ -70,7 +71,7 @@ def edge_beam(entry: EdgeBeamEntry, rod: Rod) -> EdgeBeam:
             Round(entry.radius, material) if entry.wall is None else Tube(entry.radius, entry.wall, material)
         )
     # The round rod of a lath's or a tube's area stands for it in a bundle.
-    radius = math.sqrt(rod.section.constants[0] / math.pi)
+    radius = math.sqrt(single(rod.section).constants[0] / math.pi)
     return EdgeBeam(Bundle(radius, 19 if entry.rods is None else entry.rods, entry.composite, material))
 
 
@@ -82,14 +83,14 @@ def rod_of(entry: OwnRodEntry | StockRodEntry, net: Net) -> Rod:
     if section is not None:
         return Rod(section)
     if isinstance(entry, StockRodEntry):
-        return Rod(largest(read_catalogue(entry.catalogue), net))
+        return Rod(largest(stock(entry, entry.catalogue), net))
     material = rod_material(entry)
     radius = net.max_radius(young=material.young, strength=material.strength)
     if not math.isfinite(radius):
         raise InputError(
             "is needed: the net is straight, so that it bears rods of any size", where="rod.radius"
         )
-    return Rod(Round(radius, material))
+    return Rod(layered(entry, Round(radius, material)))
 
 
 @dataclass(frozen=True)
@@ -126,8 +127,8 @@ def rod_bounds(case: Case, shell: Gridshell) -> tuple[float, float]:
 def rounding_catalogue(case: Case) -> Catalogue | None:
     """The catalogue to which a free radius is rounded, if there is one."""
     if case.optimise.catalogue is not None:
-        return read_catalogue(case.optimise.catalogue)
-    return read_catalogue(case.rod.catalogue) if isinstance(case.rod, StockRodEntry) else None
+        return stock(case.rod, case.optimise.catalogue)
+    return stock(case.rod, case.rod.catalogue) if isinstance(case.rod, StockRodEntry) else None
 
 
 def load_cases(case: Case, shell: Gridshell, surface: Surface) -> dict[str, Reals]:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from shellform.case.entries import OwnRodEntry, StockRodEntry
-from shellform.gridshell.catalogue import named, read_catalogue
+from shellform.gridshell.catalogue import Catalogue, named, read_catalogue
+from shellform.gridshell.layers import TwoLayers
 from shellform.structure.elements.sections import Material, Rectangle, Round, Section, Tube, isotropic
 
 
@@ -18,6 +21,22 @@ def rod_material(entry: OwnRodEntry | StockRodEntry) -> Material:
 
 def given_section(entry: OwnRodEntry | StockRodEntry) -> Section | None:
     """The section that the case's rods have whatever the net; None where the net's curvature decides."""
+    section = _of_a_lath(entry)
+    return None if section is None else layered(entry, section)
+
+
+def layered(entry: OwnRodEntry | StockRodEntry, section: Section) -> Section:
+    """Rods of the section in as many layers as the case has them."""
+    return TwoLayers(section, entry.composite) if entry.layers == 2 else section
+
+
+def stock(entry: OwnRodEntry | StockRodEntry, source: str) -> Catalogue:
+    """The catalogue `source` with its sections in as many layers as the case's rods have."""
+    found = read_catalogue(source)
+    return replace(found, sections=tuple(layered(entry, each) for each in found.sections))
+
+
+def _of_a_lath(entry: OwnRodEntry | StockRodEntry) -> Section | None:
     if isinstance(entry, StockRodEntry):
         return None if entry.section is None else named(read_catalogue(entry.catalogue), entry.section)
     material = rod_material(entry)

@@ -93,6 +93,12 @@ class _BoughtEntry(Entry):
         None, description="in which rods are bought, m; left out: the catalogue's, or 6 m"
     )
     kerf: float = Field(0.003, ge=0.0, description="width of a saw cut, m")
+    layers: Literal[1, 2] = Field(
+        1, description="2: bent as two single laths one above the other, then locked by shear blocks"
+    )
+    composite: float = Field(
+        0.5, ge=0.0, le=1.0, description="how far two layers act together, 1 as if glued, 0 loose"
+    )
 
 
 class OwnRodEntry(_BoughtEntry):

@@ -21,6 +21,7 @@ import numpy as np
 from shellform.errors import InputError
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.gridshell import Design, Gridshell, Rod, erection_stress
+from shellform.gridshell.layers import TwoLayers
 from shellform.net.net import Net
 from shellform.structure.elements.sections import (
     SHAPES,
@@ -146,7 +147,10 @@ def _checked(where: str, make: Callable[[], Any]) -> Any:
 
 
 def label(section: Section) -> str:
-    """What a section is called: "⌀ 10 mm", "⌀ 42 × 3.5 mm", "50 × 35 mm", "19 rods ⌀ 10 mm"."""
+    """What a section is called: "⌀ 10 mm", "⌀ 42 × 3.5 mm", "50 × 35 mm", "2 layers of 50 × 35 mm", "19
+    rods ⌀ 10 mm"."""
+    if isinstance(section, TwoLayers):
+        return f"2 layers of {label(section.single)}"
     if isinstance(section, Bundle):
         return f"{section.count} rods ⌀ {2e3 * section.radius:g} mm"
     if isinstance(section, Round):

@@ -17,6 +17,7 @@ is counted loose). A bundle's outermost fibre lies γ d + r from where its stres
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,6 +65,10 @@ class Bundle:
     def sizes(self) -> tuple[float, ...]:
         """The rods' radius."""
         return (self.radius,)
+
+    def with_sizes(self, sizes: Sequence[float]) -> Bundle:
+        """As many rods of that radius, m."""
+        return Bundle(sizes[0], self.count, self.composite, self.material)
 
     @property
     def constants(self) -> tuple[float, float, float, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,10 +12,10 @@ from numpy.typing import ArrayLike
 from shellform.arrays import Flags, Indices, Reals, reals
 from shellform.errors import InputError
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
+from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_stress
 from shellform.gridshell.loads import points
 from shellform.net.grid import ROD, cells, edge_diagonals, grid_beams
 from shellform.net.net import Net
-from shellform.structure.answers.results import bending_utilisation, utilisation
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.sections import Round, Section, isotropic, stiffness, stiffness_by_size
@@ -90,8 +89,7 @@ class Rod:
 
     def resized(self, radius: float) -> Rod:
         """The rod with a similar section of that radius, m."""
-        kind: Any = type(self.section)
-        return Rod(kind(*(size / self.radius * radius for size in self.section.sizes), self.section.material))
+        return Rod(self.section.with_sizes([size / self.radius * radius for size in self.section.sizes]))
 
 
 @dataclass(frozen=True)
@@ -159,6 +157,7 @@ class Gridshell:
     edge: EdgeBeam | None = None
     cable_lengths: Reals = field(init=False)
     _edges: Beams | None = field(init=False, repr=False, compare=False)
+    _locks: Beams | None = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         place = self.net.target.positions[self.cable_ends]
@@ -167,6 +166,7 @@ class Gridshell:
             self, "cable_lengths", reals("cable_lengths", lengths, (len(self.cable_ends),), positive=True)
         )
         object.__setattr__(self, "_edges", edge_beams(self.net, self.edge))
+        object.__setattr__(self, "_locks", locks(self.net, self.rod.section, self.target))
 
     @property
     def target(self) -> State:
@@ -202,8 +202,13 @@ class Gridshell:
         return {ROD: self.rod.resized(radius).section}
 
     def beams(self, radius: float) -> Beams:
-        """Rods of the radius, m, and connectors; then edge beams and their clamps, whatever the radius."""
+        """Rods of the radius, m, and connectors; what locks rods in two layers; then edge beams and their
+        clamps, whatever the radius.
+        """
         own = grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
+        if self._locks is not None:
+            larger = (radius / self.rod.radius) ** 4
+            own = joined(own, replace(self._locks, bending_y=larger * self._locks.bending_y))
         return own if self._edges is None else joined(own, self._edges)
 
     def beams_by_radius(self, radius: float) -> Beams:
@@ -214,6 +219,7 @@ class Gridshell:
         rate = self.rod.resized(radius).stiffness_by_radius
         rods = beams.of_kind(ROD)
         axial, torsion, bending_y, bending_z = (np.where(rods, value, 0.0) for value in rate)
+        bending_y = np.where(beams.of_kind(LOCK), 4.0 / radius * beams.bending_y, bending_y)
         return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
 
     def cables(self, design: Design) -> Cables:
@@ -235,21 +241,23 @@ class Gridshell:
         return Network(flat, self.beams(design.radius), self.cables(design), fixed, imposed)
 
     def rod_forces(self, design: Design, state: State) -> Reals:
-        """Section forces (16) (r, 7), N and N·m, of the rods' elements, rod after rod."""
+        """Section forces (16) (r, 7), N and N·m, of the rods' elements, rod after rod; those in two layers
+        with what locks them."""
         beams = self.beams(design.radius)
-        return beams.local_forces(state)[beams.of_kind(ROD)]
+        return rod_forces(beams, beams.local_forces(state))
 
     def utilisation(self, design: Design, state: State) -> Reals:
         """Largest fibre stress (r,) of the rods' elements over their strength; 0 where it isn't known."""
-        beams = self.beams(design.radius)
-        used = utilisation(beams, beams.local_forces(state), self.sections(design.radius))
-        return used[beams.of_kind(ROD)]
+        section, beams = self.rod.resized(design.radius).section, self.beams(design.radius)
+        stress = rod_stress(section, beams, beams.local_forces(state))
+        return np.asarray(stress.max(axis=1) / section.material.strength)
 
     def bending_utilisation(self, design: Design, state: State) -> Reals:
         """Bending stress (r, 2) at both ends of the rods' elements over their flexural strength, M r / (I
         f_f) for round ones (1); 0 where it isn't known.
         """
-        return bending_utilisation(self.sections(design.radius)[ROD], self.rod_forces(design, state))
+        section, beams = self.rod.resized(design.radius).section, self.beams(design.radius)
+        return rod_bending_stress(section, beams, beams.local_forces(state)) / section.material.strength
 
 
 def erection_stress(net: Net, section: Section) -> float:

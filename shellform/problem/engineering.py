@@ -20,9 +20,10 @@ import scipy.sparse as sp
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.layers import LOCK, TwoLayers, rod_stress
 from shellform.net.grid import CONNECTOR, ROD
 from shellform.problem.terms import LoadedDesign, Measurement, Term
-from shellform.structure.answers.results import end_stress, end_stress_by_force, twist
+from shellform.structure.answers.results import end_stress_by_force, twist
 from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.answers.stability import modes
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
@@ -43,7 +44,7 @@ _TURN = 0.1  # rad, the unit of turns
 @dataclass(frozen=True)
 class RodUtilisation(Term):
     """The largest fibre stress of the rods, for round ones |N|/A + |M| r/I, at any end, over their strength;
-    erection stress is in it.
+    erection stress is in it, and with two layers what their locks add (layers.py).
     """
 
     name = "utilisation"
@@ -57,18 +58,24 @@ class RodUtilisation(Term):
             raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
         section = rod.resized(design.radius).section
         beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
-        chosen = shell.sections(design.radius)
-        forces = beams.local_forces(state)
+        forces, by_dof = beams.local_forces(state), beams.local_forces_by_dof(state)
         own = beams.of_kind(ROD)
-        values = end_stress(beams, forces, chosen)[own].ravel() / rod.strength
-        by_force = end_stress_by_force(beams, forces, chosen)[own] / rod.strength
-        rows = (by_force @ beams.local_forces_by_dof(state)[own]).reshape(len(values), 12)
-        by_radius = (by_force @ rate.local_forces(state)[own][:, :, None])[:, :, 0]
+        values = rod_stress(section, beams, forces).ravel() / rod.strength
+        by_force = end_stress_by_force(beams, forces, shell.sections(design.radius))[own] / rod.strength
+        rows = (by_force @ by_dof[own]).reshape(len(values), 12)
+        rates = rate.local_forces(state)
+        by_radius = (by_force @ rates[own][:, :, None])[:, :, 0]
         for end in range(2):
             three = forces[own][:, [0, 2 + 3 * end, 3 + 3 * end]].T
             by_radius[:, end] += (
                 np.array(section.sizes) / design.radius @ stress_by_size(section, *three) / rod.strength
             )
+        locked, ends = beams.of_kind(LOCK), [2, 5]
+        if isinstance(section, TwoLayers) and locked.any():
+            by_moment = section.couple_stress_by_moment(forces[locked][:, ends]) / rod.strength
+            rows += (by_moment[:, :, None] * by_dof[locked][:, ends]).reshape(len(values), 12)
+            own_stress = section.couple_stress(forces[locked][:, ends]) / rod.strength
+            by_radius += by_moment * rates[locked][:, ends] - 3.0 / design.radius * own_stress
         return _largest(shell, 1.0, values, np.repeat(beams.dofs()[own], 2, axis=0), rows, by_radius.ravel())
 
 

@@ -120,7 +120,7 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
             segment = nominal[begin:end]
             longer = (own[i + 1] - own[i]) / segment.sum()
             length[rod.elements[begin:end]] = max(longer, _LEAST - 1.0) * segment
-        stiffness[rod.elements] = np.exp(t.rod_stiffness * z["rod_stiffness"][k])
+        stiffness[rod.elements] = stiffness[rod.locks] = np.exp(t.rod_stiffness * z["rod_stiffness"][k])
         bow = 8.0 * t.rod_bow / float(nominal.sum()) * z["rod_bow"][2 * k : 2 * k + 2]
         # An element that runs against the rod has its local y axis turned round and goes the other way.
         curvature[rod.elements] = np.column_stack([np.full(len(nominal), bow[0]), rod.sense * bow[1]])

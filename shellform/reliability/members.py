@@ -7,13 +7,14 @@ straight in the stress-free state, marked where something else touches them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.layers import LOCK
 from shellform.structure.elements.beam import Beams
 from shellform.structure.model import Model
 
@@ -23,11 +24,13 @@ _STRAIGHT_ON = 0.99  # cosine of the angle between two elements of one rod
 @dataclass(frozen=True)
 class Member:
     """One rod: its `elements` (k,) among the beams from end to end, each one's `sense` (k,) ±1 along the rod,
-    and `marks` (q,) ascending places 0..k among its nodes that are measured on it, the ends included."""
+    and `marks` (q,) ascending places 0..k among its nodes that are measured on it, the ends included; `locks`
+    (k or 0,), the beams that lock its two layers."""
 
     elements: Indices
     sense: Reals
     marks: Indices
+    locks: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
 @dataclass(frozen=True)
@@ -53,18 +56,19 @@ class Members:
 
 def members_of(shell: Gridshell) -> Members:
     """Those of a gridshell, all candidate cables counted, whatever design."""
-    grid = shell.net.grid
+    grid, beams = shell.net.grid, shell.beams(shell.rod.radius)
+    locked = np.flatnonzero(beams.of_kind(LOCK))
     rods, first = [], 0
     for rod in grid.rods:
         count = len(rod.nodes) - 1
         marks = np.unique(np.concatenate([[0], rod.at, [count]])).astype(np.int64)
-        rods.append(Member(first + np.arange(count), np.ones(count), marks))
+        own = slice(first, first + count)
+        rods.append(Member(first + np.arange(count), np.ones(count), marks, locked[own]))
         first += count
     connectors = first + np.arange(len(grid.lattice))
     held = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
     middle = grid.flat[grid.crossing_nodes].mean(axis=1)[:, :2]
     zone = np.asarray(cKDTree(middle).query(grid.flat[:, :2])[1], dtype=np.int64)
-    length = shell.beams(shell.rod.radius).rest_length  # edge beams come last, and are made without error
     return Members(
         tuple(rods),
         connectors,
@@ -73,7 +77,7 @@ def members_of(shell: Gridshell) -> Members:
         zone,
         len(middle),
         shell.target.positions,
-        length,
+        beams.rest_length,  # edge beams come last, and are made without error
     )
 
 
@@ -82,8 +86,9 @@ def members_of_model(model: Model) -> Members:
     network = model.network
     beams, count = network.beams, len(network.nodes)
     rod = np.array([kind == "rod" for kind in beams.kinds])[beams.kind]
+    other = ~(rod | beams.of_kind(LOCK))
     touched = np.asarray(network.fixed.any(axis=1))
-    for ends in (beams.ends[~rod], network.cables.ends):
+    for ends in (beams.ends[other], network.cables.ends):
         touched[ends.ravel()] = True
     rods = tuple(
         Member(elements, sense, _marked(beams, elements, sense, touched))
@@ -93,7 +98,7 @@ def members_of_model(model: Model) -> Members:
     places = network.nodes if model.start is None else model.start.positions
     return Members(
         rods,
-        np.flatnonzero(~rod),
+        np.flatnonzero(other),
         len(network.cables.ends),
         held,
         np.arange(count),

@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.layers import LOCK, locks_along, rod_bending_stress
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import errors_of, variables
 from shellform.reliability.members import members_of_model
@@ -26,7 +27,7 @@ from shellform.reliability.path_of_one import SOUGHT, Limit
 from shellform.reliability.perfect import perfect_of
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements import rotation
-from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.sections import Section
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
@@ -88,8 +89,9 @@ def critical_factor(shell: Gridshell, design: Design, load: Reals, *, sought: fl
 
 
 def halved(model: Model) -> Model:
-    """The model with each beam of the kind "rod" cut in two; its nodes come first, in their order."""
-    network, start = model.network, model.start
+    """The model with each beam of the kind "rod" cut in two, and what locks its layers with it, built into
+    the start anew; its nodes come first, in their order."""
+    network = model.network
     beams, count = network.beams, len(network.nodes)
     rods = np.flatnonzero(np.array([kind == "rod" for kind in beams.kinds])[beams.kind])
     a, b = beams.ends[rods].T
@@ -103,6 +105,9 @@ def halved(model: Model) -> Model:
     rest[len(beams.ends) :] *= 0.5
     finer = replace(cut, ends=np.vstack([ends, again]), rest_length=rest)
     wider = np.zeros((len(rods), 6))
+    start = None if model.start is None else _between(model.start, beams, rods)
+    if start is not None and beams.of_kind(LOCK).any():
+        finer = _with_locks_cut(finer, start, beams, rods, new)
     return Model(
         Network(
             nodes,
@@ -112,16 +117,34 @@ def halved(model: Model) -> Model:
             np.vstack([network.imposed, wider]),
         ),
         {name: np.vstack([load, wider]) for name, load in model.loads.items()},
-        None if start is None else _between(start, beams, rods),
+        start,
         model.supported,
     )
 
 
+def _with_locks_cut(finer: Beams, start: State, beams: Beams, rods: Indices, middle: Indices) -> Beams:
+    """The beams with each lock that lies along one of the `rods` cut at its `middle` node."""
+    place = {(a, b): k for k, (a, b) in enumerate(beams.ends[rods].tolist())}
+    whole = beams.of_kind(LOCK) & np.array([(a, b) in place for a, b in beams.ends.tolist()])
+    cut = np.flatnonzero(whole)
+    along = np.array([place[a, b] for a, b in beams.ends[cut].tolist()], dtype=np.int64)
+    ends, bending = beams.ends[cut], np.tile(beams.bending_y[cut], 2)
+    halves = np.vstack(
+        [np.column_stack([ends[:, 0], middle[along]]), np.column_stack([middle[along], ends[:, 1]])]
+    )
+    y_axes = np.tile(beams.frames[rods[along], 0, :, 1], (2, 1))
+    kept = np.setdiff1d(np.arange(len(finer.ends)), cut)
+    return joined(_chosen(finer, kept), locks_along(start, halves, y_axes, bending))
+
+
 def _repeated(beams: Beams, rods: np.ndarray) -> Beams:
     """The beams, then those of the rods once more."""
-    every = np.concatenate([np.arange(len(beams.ends)), rods])
+    return _chosen(beams, np.concatenate([np.arange(len(beams.ends)), rods]))
+
+
+def _chosen(beams: Beams, chosen: Indices) -> Beams:
     names = ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length", "frames", "kind")
-    return replace(beams, **{name: getattr(beams, name)[every] for name in names})
+    return replace(beams, **{name: getattr(beams, name)[chosen] for name in names})
 
 
 def _between(start: State, beams: Beams, rods: np.ndarray) -> State:
@@ -155,6 +178,5 @@ def _numbers(
     workshop, limit = _limit(model, sought)
     state, beams = workshop.nominal.states[-1], model.network.beams
     away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
-    forces = beams.local_forces(state)[beams.kind == beams.kinds.index("rod")]
-    stress = float(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]).max())
+    stress = float(rod_bending_stress(section, beams, beams.local_forces(state)).max())
     return float(away.max()), float(away.mean()), stress, limit.factor, limit.kind

@@ -16,7 +16,7 @@ from shellform.arrays import read_arrays
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.net.grid import ROD
+from shellform.gridshell.layers import rod_forces
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.folder import Run, read_run
@@ -300,7 +300,8 @@ def write_states(
     labels = ("N", "Mx_a", "My_a", "Mz_a", "Mx_b", "My_b", "Mz_b")
     for each, state in states.items():
         beams = shell.beams(design.radius)
-        forces = beams.local_forces(state)[beams.of_kind(ROD) | beams.of_kind(EDGE)]  # as net.lines
+        forces = beams.local_forces(state)
+        forces = np.vstack([rod_forces(beams, forces), forces[beams.of_kind(EDGE)]])  # as net.lines
         columns = {label: forces[:, k] for k, label in enumerate(labels)}
         vtp.write_vtp(folder / f"states/{name}-{each}.vtp", maps.panel_of(shell, design, state), columns)
 

@@ -11,6 +11,8 @@ stable equilibria are the same both ways, and the erected grid is a known one. I
 supports moving back (loading.py), and the steps are put in reverse. A `lift` (a crane, a tower) acts from
 before the supports move until they have arrived. Stresses are those of equation σ = |N|/A + |M| r/I at both
 ends of every rod element.
+
+Rods in two layers slide until the cables are tight; then they are locked as they lie, and the load follows.
 """
 
 from __future__ import annotations
@@ -23,9 +25,10 @@ from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError, NotConverged
-from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.structure.answers.results import end_stress
+from shellform.gridshell.gridshell import Design, Gridshell, Rod
+from shellform.gridshell.layers import TwoLayers, locks, rod_stress
 from shellform.structure.elements import rotation
+from shellform.structure.elements.beam import joined
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
@@ -136,6 +139,7 @@ def erect(
         for name, each in (("weight", weight), ("lift", lift), ("load", load))
     )
     teams = _teams(design, groups)
+    locked, shell = shell, _sliding(shell)
     unbraced = replace(design, present=np.zeros(len(design.present), dtype=bool))
     site = _Site(shell, unbraced)
     erected = find_equilibrium(site.assembly, shell.target, own).state
@@ -151,7 +155,11 @@ def erect(
         steps += more
     if last.any():
         there = braced.assembly.with_parts((shell.beams(now.radius), shell.cables(now)))
-        site = _Site(shell, now, there)
+        blocks = locks(shell.net, locked.rod.resized(now.radius).section, state)
+        if blocks is not None:
+            network = shell.network(now)
+            there = assemble(replace(network, beams=joined(network.beams, blocks)))
+        site = _Site(locked, now, there)
 
         def note(share: float, found: Equilibrium) -> None:
             steps.append(site.step("loading", share, found.state, own + share * last))
@@ -164,6 +172,14 @@ def erect(
                 remedy="Brace it better or load it less.",
             )
     return Erection(tuple(steps), shell.rod.strength)
+
+
+def _sliding(shell: Gridshell) -> Gridshell:
+    """The shell before blocks lock its rods, if they have two layers."""
+    section = shell.rod.section
+    if not isinstance(section, TwoLayers):
+        return shell
+    return replace(shell, rod=Rod(replace(section, composite=0.0)))
 
 
 def laid_out(shell: Gridshell) -> State:
@@ -191,13 +207,13 @@ class _Site:
     def __init__(self, shell: Gridshell, design: Design, assembly: Assembly | None = None) -> None:
         self.shell, self.design = shell, design
         self.assembly = assemble(shell.network(design)) if assembly is None else assembly
-        self.sections = shell.sections(design.radius)
+        self.section = shell.rod.resized(design.radius).section
 
     def step(self, stage: str, share: float, state: State, load: Reals) -> ErectionStep:
         """The state as a step."""
         beams, cables = self.assembly.beams[0], self.shell.cables(self.design)
-        stress = end_stress(beams, beams.local_forces(state), self.sections).max(axis=1)
-        worst = int(np.nanargmax(stress))
+        stress = rod_stress(self.section, beams, beams.local_forces(state)).max(axis=1)
+        worst = int(np.argmax(stress))
         tension = float(cables.tension(state).max(initial=0.0))
         supports = self.shell.net.supports
         forces = (self.assembly.evaluate(state, tangent=False).force - load)[supports, :3]

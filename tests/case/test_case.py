@@ -4,8 +4,11 @@ from pathlib import Path
 
 import pytest
 
+from shellform.case.build_gridshell import rounding_catalogue
+from shellform.case.build_rod import given_section
 from shellform.case.case import check_script, dump_case, load_case, shipped_surfaces
 from shellform.errors import InputError
+from shellform.gridshell.catalogue import label
 
 ROOT = Path(__file__).parent.parent.parent
 GOOD = (ROOT / "scripts/scale_model.toml").read_text(encoding="utf-8")
@@ -25,6 +28,17 @@ def test_shipped_cases_are_valid_and_survive_being_written(tmp_path, name):
     again = load_case(write(tmp_path, dump_case(case)))
     assert again == case
     assert Path(case.surface.file).is_file()
+
+
+def test_rods_in_two_layers_are_laths_of_a_catalogue_twice(tmp_path):
+    stock = 'catalogue = "timber_laths"\nsection = "15 x 5 mm"\nlayers = 2\ncomposite = 0.7'
+    own = GOOD.split("[rod]")[1].split("[", 1)[0]
+    case = load_case(write(tmp_path, GOOD.replace(own, f"\n{stock}\n\n")))
+    section = given_section(case.rod)
+    assert label(section) == "2 layers of 15 × 5 mm"
+    assert section.composite == 0.7
+    assert {label(each) for each in rounding_catalogue(case).sections} > {"2 layers of 50 × 35 mm"}
+    assert load_case(write(tmp_path, dump_case(case))) == case
 
 
 def test_settings_take_the_place_of_entries():

@@ -15,6 +15,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import ROD
 from shellform.net.net import Net
 from shellform.net.quality import shear_angles
 from shellform.output.pictures.panel import Panel
@@ -95,7 +96,9 @@ def _utilisation(shell: Gridshell, design: Design, state: State) -> Map:
 
 def _curvature(shell: Gridshell, design: Design, state: State) -> Map:
     _, _, about_y, about_z = stiffness(shell.rod.resized(design.radius).section)
-    bent = np.linalg.norm(_moments(shell, design, state) / [about_y, about_z], axis=2)
+    beams = shell.beams(design.radius)
+    own = beams.local_forces(state)[beams.of_kind(ROD)]  # those of the laths: what locks them is bent by less
+    bent = np.linalg.norm(own[:, [[2, 3], [5, 6]]] / [about_y, about_z], axis=2)
     return Map(worst_at_nodes(shell.net, bent), "curvature of the rods", ("1/m", 1.0), state.positions)
 
 
@@ -125,13 +128,6 @@ QUANTITIES: dict[str, Callable[[Gridshell, Design, State], Map]] = {
     "shear": _shear,
     "mode": _mode,
 }
-
-
-def _moments(shell: Gridshell, design: Design, state: State) -> Reals:
-    """Bending moments (m, 2, 2), N·m, of the rod elements at their two ends about their local y and z
-    axes.
-    """
-    return np.asarray(shell.rod_forces(design, state)[:, [[2, 3], [5, 6]]])
 
 
 def along_rods(net: Net, at_crossings: Reals) -> Reals:

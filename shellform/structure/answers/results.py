@@ -69,13 +69,6 @@ def utilisation(beams: Beams, forces: Reals, sections: Mapping[str, Section]) ->
     return np.asarray(end_stress(beams, forces, sections).max(axis=1) / strength[beams.kind])
 
 
-def bending_utilisation(section: Section, forces: Reals) -> Reals:
-    """Bending stress over strength (m, 2) at both ends of beams of one section, without their axial force; 0
-    without a known strength.
-    """
-    return np.asarray(section.bending(forces[:, [2, 5]], forces[:, [3, 6]]) / section.material.strength)
-
-
 def twist(deformations: Reals) -> Reals:
     """Rotation (m,), rad, of each beam's second end against its first about its own axis, from its
     deformations (17) (m, 7): for a connector upright on the grid, the turning of the two rods against each

@@ -14,7 +14,7 @@ rectangle's is in a corner.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Protocol
 
@@ -62,6 +62,9 @@ class Section(Protocol):
     @property
     def sizes(self) -> tuple[float, ...]:
         """Its sizes, m, in the order in which it is made of them."""
+
+    def with_sizes(self, sizes: Sequence[float]) -> Section:
+        """The section of the same kind and material with other sizes, m, in their order."""
 
     @property
     def constants(self) -> tuple[float, float, float, float]:
@@ -140,6 +143,11 @@ class Round:
         """The radius."""
         return (self.radius,)
 
+    def with_sizes(self, sizes: Sequence[float]) -> Round:
+        """Of these sizes, m."""
+        (radius,) = sizes
+        return Round(radius, self.material)
+
     @property
     def constants(self) -> tuple[float, float, float, float]:
         """A = πr², J = 2 I, I = πr⁴/4."""
@@ -187,6 +195,11 @@ class Tube:
     def sizes(self) -> tuple[float, ...]:
         """Radius and thickness."""
         return self.radius, self.thickness
+
+    def with_sizes(self, sizes: Sequence[float]) -> Tube:
+        """Of these sizes, m."""
+        radius, thickness = sizes
+        return Tube(radius, thickness, self.material)
 
     @property
     def constants(self) -> tuple[float, float, float, float]:
@@ -246,6 +259,11 @@ class Rectangle:
     def sizes(self) -> tuple[float, ...]:
         """Width and height."""
         return self.width, self.height
+
+    def with_sizes(self, sizes: Sequence[float]) -> Rectangle:
+        """Of these sizes, m."""
+        width, height = sizes
+        return Rectangle(width, height, self.material)
 
     @property
     def constants(self) -> tuple[float, float, float, float]:

@@ -1,0 +1,224 @@
+"""Rods in two layers: bent as single laths, locked by shear blocks, stressed by both."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.gridshell.catalogue import label
+from shellform.gridshell.gridshell import erection_stress
+from shellform.gridshell.layers import TwoLayers, locked_bending, locks_along, rod_stress
+from shellform.gridshell.tolerances import Tolerances
+from shellform.output.workshop.block_schedule import block_table
+from shellform.output.workshop.nesting import cut
+from shellform.problem.engineering import RodUtilisation
+from shellform.problem.evaluation import Evaluator
+from shellform.problem.paths import deviations, follow
+from shellform.reliability.drawing import errors_of, variables
+from shellform.reliability.members import members_of
+from shellform.reliability.refinement import halved
+from shellform.site.erection import erect
+from shellform.structure.elements.beam import joined, make_beams
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.sections import Material, Rectangle, mass_per_length, stiffness
+from shellform.structure.elements.state import from_vectors
+from shellform.structure.model import Model, read_model, write_model
+from shellform.structure.network import Network, assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from tests.net.edge_shells import sail
+
+LARCH = Material(12e9, 0.75e9, 460.0, 24e6)
+LATH = Rectangle(0.050, 0.035, LARCH)
+
+
+def test_two_laths_with_a_gap_have_the_second_moment_of_the_textbook():
+    """50 × 35 mm twice, 35 mm between them: 2 b h³/12 loose, 2 (b h³/12 + b h (h)²) glued, 26 times one."""
+    glued, loose = TwoLayers(LATH, 1.0), TwoLayers(LATH, 0.0)
+    alone = 0.050 * 0.035**3 / 12
+    assert loose.constants[2] == pytest.approx(2.0 * alone)
+    assert locked_bending(loose)[0] == pytest.approx(12e9 * 2.0 * alone)
+    assert locked_bending(glued)[0] == pytest.approx(12e9 * 26.0 * alone)
+    assert locked_bending(glued)[1] == pytest.approx(12e9 * 2.0 * 0.035 * 0.050**3 / 12)
+    assert mass_per_length(glued) == pytest.approx(2.0 * 460.0 * 0.050 * 0.035)
+    assert label(glued) == "2 layers of 50 × 35 mm"
+
+
+def test_laths_bear_what_bending_them_cost_and_then_the_load_s_share():
+    """A cantilever bent to κ₀ = 0.12 /m and locked there, then bent on by a moment m at its end:
+
+        b κ + B (κ - κ₀) = m,  σ = E κ h/2 + B |κ - κ₀| / (a A)
+
+    with b = 4287.5, B = 25 725 N·m² (γ = 0.5), a A = 1.225e-4 m³. For m = 1.2 kN·m: κ = 0.142841 /m,
+    σ = 29.997 + 4.797 MPa by hand. Blocks rest on chords, laths on arcs: 1e-5."""
+    pair, count, bent = TwoLayers(LATH, 0.5), 33, 0.12
+    along = np.linspace(0.0, 3.0, count)
+    flat = np.column_stack([along, 0.0 * along, 0.0 * along])
+    ends = np.column_stack([np.arange(count - 1), np.arange(1, count)])
+    ea, gj, eiy, eiz = stiffness(pair)
+    laths = make_beams(flat, ends, axial=ea, torsion=gj, bending_y=eiy, bending_z=eiz)
+    curved = np.column_stack([np.sin(bent * along) / bent, 0.0 * along, (np.cos(bent * along) - 1.0) / bent])
+    state = from_vectors(curved, np.column_stack([0.0 * along, bent * along, 0.0 * along]))
+    blocks = locks_along(state, ends, np.tile([0.0, 1.0, 0.0], (count - 1, 1)), pair.locking)
+    fixed = np.zeros((count, 6), dtype=bool)
+    fixed[0] = True
+    beams = joined(laths, blocks)
+    cables = make_cables(np.zeros((0, 2), dtype=int), rest_length=[], stiffness=[])
+    network = Network(flat, beams, cables, fixed, np.zeros((count, 6)))
+    load = np.zeros((count, 6))
+    load[-1, 4] = 1200.0
+    found = find_equilibrium(assemble(network), state, load).state
+    assert found.rotations[-1, 1] / 3.0 == pytest.approx(0.142841, rel=1e-4)
+    assert rod_stress(pair, beams, beams.local_forces(found)) == pytest.approx(34.794e6, rel=1e-4)
+
+
+@pytest.fixture(scope="module")
+def shells():
+    """A sail on its corners of laths of 12 × 6 mm, sliding, half locked and in one layer, and their load."""
+    surface = sail(size=3.0, rise=0.3)
+    net = sf.pull_net(surface, spacing=0.5, gap=0.006, angle=np.deg2rad(45.0), elements=2)
+    lath = Rectangle(0.012, 0.006, LARCH)
+    joint, cable = sf.Joint(axial=1e5, torsion=0.5, bending=0.5, gap=0.006), sf.Cable(stiffness=2e3)
+    found = {
+        name: sf.brace(net, sf.Rod(section), joint, cable, below=surface)
+        for name, section in (
+            ("single", lath), ("loose", TwoLayers(lath, 0.0)), ("locked", TwoLayers(lath, 0.5))
+        )
+    }  # fmt: skip
+    return found, found["single"].point_load(1.0)
+
+
+@pytest.fixture(scope="module")
+def solved(shells):
+    found, load = shells
+    return {
+        name: {
+            case: each.equilibrium.state
+            for case, each in follow(shell, shell.design(), {"none": 0.0 * load, "design": load}).items()
+        }
+        for name, shell in found.items()
+    }
+
+
+def test_two_layers_are_bent_as_easily_as_one_and_stand_stiffer(shells, solved):
+    found, _ = shells
+    single, locked = found["single"], found["locked"]
+    assert erection_stress(single.net, locked.rod.section) == erection_stress(single.net, single.rod.section)
+    sunk = {
+        name: float((deviations(found[name], own["design"]) - deviations(found[name], own["none"])).max())
+        for name, own in solved.items()
+    }
+    assert sunk["locked"] < 0.6 * sunk["loose"] < 0.6 * sunk["single"]
+
+
+def test_locks_have_no_stress_in_the_target_and_local_axes_of_their_rods(shells, solved):
+    shell = shells[0]["locked"]
+    beams = shell.beams(shell.rod.radius)
+    locked, rods = beams.of_kind("lock"), beams.of_kind("rod")
+    assert locked.sum() == rods.sum() > 0
+    np.testing.assert_array_equal(beams.ends[locked], beams.ends[rods])
+    np.testing.assert_allclose(beams.local_forces(shell.target)[locked], 0.0, atol=1e-9)
+    own = replace(beams, bending_y=beams.bending_y * locked, bending_z=0.0 * beams.bending_z)
+    state = solved["locked"]["design"]
+    turned = beams.local_deformations(state)[rods] - beams.local_deformations(shell.target)[rods]
+    fresh = own.local_deformations(state)[locked]
+    np.testing.assert_allclose(fresh[:, [2, 5]], turned[:, [2, 5]], atol=0.02 * np.abs(turned).max())
+
+
+def test_utilisation_adds_what_erection_left_and_what_blocks_bear(shells, solved):
+    found, _ = shells
+    shell, state = found["locked"], solved["locked"]["design"]
+    section, beams = shell.rod.section, shell.beams(shell.rod.radius)
+    forces = beams.local_forces(state)
+    own, locked = forces[beams.of_kind("rod")], forces[beams.of_kind("lock")]
+    by_hand = [
+        np.abs(own[:, 0]) / (2 * 0.012 * 0.006)
+        + 0.5 * np.abs(own[:, 2 + end]) * 6 / (0.012 * 0.006**2)
+        + 0.5 * np.abs(own[:, 3 + end]) * 6 / (0.006 * 0.012**2)
+        + np.abs(locked[:, 2 + end]) / (0.012 * 0.012 * 0.006)
+        for end in (0, 3)
+    ]
+    np.testing.assert_allclose(
+        shell.utilisation(shell.design(), state), np.max(by_hand, axis=0) / section.material.strength
+    )
+    total = shell.rod_forces(shell.design(), state)
+    np.testing.assert_allclose(total[:, 2], own[:, 2] + locked[:, 2])
+    table = block_table(shell, shell.design(), {"design": state}, ["a"] * len(shell.net.grid.rods))
+    assert max(row[4] for row in table.rows) > 0.0
+
+
+def test_gradients_hold_with_two_layers(shells):
+    found, load = shells
+    problem = sf.Problem(
+        found["locked"],
+        sf.LoadCase("wet", load),
+        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.RodRadius())],
+        [sf.AtMost(0.9, RodUtilisation("wet"))],
+        variables=[sf.RestLengths(), sf.FreeRadius(0.004, 0.008)],
+    )
+    evaluator = Evaluator(problem, found["locked"].design())
+    states = {name: each.equilibrium.state for name, each in evaluator.begin().items()}
+    point = evaluator.seed(found["locked"].design(), states, 1.0)
+    direction = np.append(np.random.default_rng(2).normal(size=len(point.variables) - 1), 3.0)
+    step = 1e-5
+    designs = [
+        evaluator.blocks.design(point.variables + s * step * direction, point.design.present) for s in (1, -1)
+    ]
+    plus, minus = (evaluator.evaluate(each, states, 1.0) for each in designs)
+    slope = (plus.objective - minus.objective) / (2 * step)
+    assert point.objective_by_variables @ direction == pytest.approx(slope, rel=1e-5)
+    slope = (plus.constraints[0] - minus.constraints[0]) / (2 * step)
+    assert point.constraints_by_variables[0] @ direction == pytest.approx(slope, rel=1e-5)
+
+
+def test_erection_slides_and_the_load_finds_locked_rods(shells):
+    found, load = shells
+    loose, locked = (
+        erect(found[name], found[name].design(), load=load, step=0.5) for name in ("loose", "locked")
+    )
+    assert [each.stage for each in loose.steps].count("loading") == 2
+    for one, other in zip(loose.steps, locked.steps, strict=True):
+        if one.stage != "loading":
+            np.testing.assert_array_equal(one.state.positions, other.state.positions)
+    sunk = [
+        float(np.ptp([step.height for step in each.steps if step.stage in ("tightening", "loading")][-3:]))
+        for each in (loose, locked)
+    ]
+    assert sunk[1] < sunk[0]
+
+
+def test_locks_are_cut_with_their_rods_and_scatter_with_them(shells, solved, tmp_path):
+    found, load = shells
+    shell = found["locked"]
+    supports = tuple(int(node) for node in shell.net.supports)
+    write_model(
+        tmp_path / "m.json", Model(shell.network(shell.design()), {"load": load}, shell.target, supports)
+    )
+    model = read_model(tmp_path / "m.json")
+    finer = halved(model)
+    beams = finer.network.beams
+    assert beams.of_kind("lock").sum() == beams.of_kind("rod").sum() == 2 * len(shell.net.grid.rod_ends)
+    np.testing.assert_allclose(beams.local_forces(finer.start)[beams.of_kind("lock")], 0.0, atol=1e-8)
+    assembly, none = assemble(finer.network), 0.0 * finer.loads["load"]
+    before = find_equilibrium(assembly, finer.start, none).state
+    after = find_equilibrium(assembly, before, finer.loads["load"]).state
+    sunk = np.linalg.norm(after.positions - before.positions, axis=1).max()
+    own = solved["locked"]
+    expected = np.linalg.norm(own["design"].positions - own["none"].positions, axis=1).max()
+    assert sunk == pytest.approx(expected, rel=0.06)
+    members = members_of(shell)
+    errors = errors_of(members, Tolerances(rod_stiffness=0.1), variables(members, 1, 0))
+    for rod in members.rods:
+        np.testing.assert_array_equal(errors.beam_stiffness[rod.locks], errors.beam_stiffness[rod.elements])
+
+
+def test_each_rod_takes_two_laths_of_stock(shells):
+    grid = shells[0]["locked"].net.grid
+    twice = cut(grid, stock=6.0, laths=2)
+    assert sum(len(bar.pieces) for bar in twice.bars) == 2 * len(grid.rods)
+
+
+def test_blocks_that_lock_more_than_glue_are_refused():
+    with pytest.raises(InputError, match="between 0 and 1"):
+        TwoLayers(LATH, 1.2)
