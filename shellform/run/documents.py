@@ -9,6 +9,7 @@ from shellform.gridshell.catalogue import read_catalogue
 from shellform.output.exchange import exports
 from shellform.output.workshop import drawings, nesting, schedules
 from shellform.output.workshop.schedules import Built
+from shellform.output.workshop.splice_schedule import cutting_notes
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.summary import DocumentsRecord
 from shellform.run.folder import Run
@@ -44,7 +45,9 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     a line that says why.
     """
     built = built_design(run)
-    cutting = nesting.cut(run.net.grid, stock=stock_length(run.case), kerf=run.case.rod.kerf)
+    cutting = nesting.cut(
+        run.net.grid, stock=stock_length(run.case), kerf=run.case.rod.kerf, laths=run.case.rod.layers
+    )
     report(Event("documents", f"schedules of the {built.name} design"))
     schedules.write_schedules(run.folder / "schedules", built, cutting)
     report(Event("documents", "drawings"))
@@ -53,7 +56,7 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     exports.write_exports(run.folder / "models", built, run.surface, run.loads)
     if exports.no_step():
         report(Event("documents", f"no STEP file: {exports.no_step()}", Kind.NOTE))
-    notes = schedules.cutting_notes(cutting, schedules.rod_names(run.net.grid))
+    notes = cutting_notes(cutting, schedules.rod_names(run.net.grid))
     for note in notes[1:]:
         report(Event("documents", note, Kind.NOTE))
     return DocumentsRecord(

@@ -15,12 +15,14 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
+from shellform.gridshell.layers import TwoLayers
 from shellform.net.grid import crossing_points
 from shellform.net.net import EdgeLine
 from shellform.output.exchange.opensees import opensees_script
 from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import PENS
 from shellform.output.workshop.schedules import Built, cable_crossings, rod_names
+from shellform.structure.elements import rotation
 from shellform.surface.shape.target import Surface
 from shellform.written import whole, write_text
 
@@ -40,8 +42,8 @@ _LAYERS = {
 def write_exports(
     folder: str | Path, built: Built, target: Surface, loads: Mapping[str, Reals], *, load: str = "design"
 ) -> list[Path]:
-    """Writes gridshell.vtu, .3dm, .glb, .step and, but for designs with edge beams, gridshell-opensees.py for
-    the geometry under `load`; returns the files.
+    """Writes gridshell.vtu, .3dm, .glb, .step and, but for designs with edge beams or rods in two layers,
+    gridshell-opensees.py for the geometry under `load`; returns the files.
 
     `loads` (n, 6) by name. The .step is left out where gmsh can't be loaded (`no_step` says why). Raises
     InputError for an unknown load and where files can't be written.
@@ -132,15 +134,17 @@ def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "d
 
 
 def write_glb(path: str | Path, built: Built, target: Surface, *, load: str = "design") -> None:
-    """A picture in space: rods as tubes of their true radius, cables thinner, supports as blocks, the target
-    translucent.
+    """A picture in space: rods as tubes of their true radius, each lath of two layers as one; cables thinner,
+    supports as blocks, the target translucent.
     """
     from shellform.surface.readers.gltf import Solid, write_glb
 
     grid, state, radius = built.grid, built.states[load], built.design.radius
     solids = []
+    up = rotation.matrices(state.quaternions)[:, :, 2]
     for direction in "uv":
-        ways = [state.positions[rod.nodes] for rod in grid.rods if rod.direction == direction]
+        rods = [rod.nodes for rod in grid.rods if rod.direction == direction]
+        ways = [state.positions[nodes] + level * up[nodes] for nodes in rods for level in _levels(built)]
         solids.append(Solid(f"rods {direction}", *_tubes(ways, radius), _shade(f"rods {direction}")))
     shell = built.shell
     if shell.edge is not None and shell.net.edges:
@@ -164,6 +168,12 @@ def write_glb(path: str | Path, built: Built, target: Surface, *, load: str = "d
     solids.append(Solid("target", target.vertices, target.normals, target.triangles, _shade("target", 0.35)))
     with whole(path, ".glb") as partial:
         write_glb(partial, solids)
+
+
+def _levels(built: Built) -> tuple[float, ...]:
+    """Heights, m, of a rod's laths over its axis."""
+    section = built.shell.rod.resized(built.design.radius).section
+    return (-0.5 * section.apart, 0.5 * section.apart) if isinstance(section, TwoLayers) else (0.0,)
 
 
 def write_step(path: str | Path, built: Built, *, load: str = "design") -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.layers import layers_of
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import LoadRecord, Summary
 from shellform.records.words import critical_words, number
@@ -61,23 +62,24 @@ def answers(
         if main is None or not math.isfinite(shell.rod.strength)
         else f"; at {100 * main.rod_utilisation_max:.0f} % of their strength"
     )
+    locked = "" if layers_of(section) == 1 else "; bent lath by lath, then locked by shear blocks"
     found.append(
         Answer(
             "Which rods?",
             label(section),
-            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}",
+            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}{locked}",
         )
     )
     if more is not None:
         found.append(_is_safe(main, more, as_built, math.isfinite(shell.rod.strength)))
-    mass = mass_per_length(section) * float(rods.sum())
+    mass, laths = mass_per_length(section) * float(rods.sum()), layers_of(section)
     weight = f" ({number(mass)} kg)" if mass > 0.0 else ""
     lengths = None if summary.documents is None else summary.documents.cut_lengths
     cut = "" if lengths is None else f", cut to {lengths} different lengths"
     found.append(
         Answer(
             "What to buy?",
-            f"{number(float(rods.sum()))} m of rod{weight}",
+            f"{number(laths * float(rods.sum()))} m of {'rod' if laths == 1 else 'laths, two a rod'}{weight}",
             f"{len(rods)} rods, {len(shell.net.grid.lattice)} connectors, {len(shell.net.supports)} supports, "
             f"{len(cables.ends)} cables of {number(float(cables.rest_length.sum()))} m in all{cut}",
         )

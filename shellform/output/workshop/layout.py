@@ -18,8 +18,10 @@ from shellform.arrays import Reals
 from shellform.gridshell.catalogue import label
 from shellform.net.grid import GridRod
 from shellform.net.notes import NoteKind
+from shellform.output.workshop.block_schedule import block_marks
 from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import (
+    MM,
     Box,
     Mark,
     Point,
@@ -34,7 +36,6 @@ from shellform.output.workshop.marks import (
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.schedules import Built, cable_crossings, rod_names, rounds
 
-MM = 1e3
 _APART = 0.2  # of their height: between words
 
 
@@ -48,6 +49,7 @@ def flat_grid(built: Built) -> Sheet:
     names = rod_names(grid)
     for name, rod in zip(names, grid.rods, strict=True):
         marks += _rod(built, name, rod, s)
+    marks += block_marks(built.shell)
     marks += _ends(built, s, marks)
     low, high = MM * grid.flat[:, :2].min(axis=0), MM * grid.flat[:, :2].max(axis=0)
     for direction in "uv":
@@ -63,11 +65,9 @@ def flat_grid(built: Built) -> Sheet:
         f"{label(built.shell.rod.resized(built.design.radius).section)}; "
         f"{len(grid.lattice)} connectors.",
         *(
-            [
-                f"{note.text[:1].upper()}{note.text[1:]}: rods cross there without a connector."
-                for note in built.shell.net.notes
-                if note.kind is NoteKind.JOINTS
-            ]
+            f"{note.text[:1].upper()}{note.text[1:]}: rods cross there without a connector."
+            for note in built.shell.net.notes
+            if note.kind is NoteKind.JOINTS
         ),
     )
     rows = tuple(

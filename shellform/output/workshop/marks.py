@@ -10,6 +10,7 @@ import numpy as np
 
 WIDE = 0.88  # width of a figure over its height, in the widest of the usual fonts
 
+MM = 1e3  # in a metre
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]  # x from, y from, x to, y to
 
@@ -26,6 +27,7 @@ class Pen:
 PENS = {
     "RODS_U": Pen("#0072b2", 0.35),
     "RODS_V": Pen("#d55e00", 0.35),
+    "SHEAR_BLOCKS": Pen("#000000", 0.7),
     "EDGE_BEAMS": Pen("#009e73", 0.7),
     "CROSSINGS": Pen("#000000", 0.18),
     "CROSSING_NUMBERS": Pen("#000000", 0.18),

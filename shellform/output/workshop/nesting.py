@@ -74,9 +74,9 @@ class Cutting:
         return 1.0 - used / (self.stock * len(self.bars))
 
 
-def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF) -> Cutting:
-    """The grid's rods nested into bars of the length `stock`, m. Raises InputError where the stock is too
-    short to splice rods from.
+def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1) -> Cutting:
+    """The grid's rods, each of as many `laths`, nested into bars of the length `stock`, m. Raises InputError
+    where the stock is too short to splice rods from.
     """
     if not (stock > 0.0 and math.isfinite(stock)):
         raise InputError("must be positive", where="rod.stock_length", value=stock)
@@ -84,7 +84,7 @@ def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF) -> Cutting:
         raise InputError("must lie between 0 and the stock length", where="rod.kerf", value=kerf)
     pieces: list[Piece] = []
     spliced = 0
-    for number, rod in enumerate(grid.rods):
+    for number, rod in [each for each in enumerate(grid.rods) for _ in range(laths)]:
         cuts = [] if rod.length <= stock + _EQUAL else _splices(rod, stock, backwards=spliced % 2 == 1)
         spliced += bool(cuts)
         ends = [0.0, *cuts, rod.length]

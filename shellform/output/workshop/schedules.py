@@ -37,13 +37,16 @@ from shellform.errors import InputError
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import cut_lengths
+from shellform.gridshell.layers import layers_of
 from shellform.net.grid import Grid, crossing_points
+from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.edge_schedule import edge_names, edge_table
 from shellform.output.workshop.nesting import Cutting
+from shellform.output.workshop.splice_schedule import cutting_notes, splice_table
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
-from shellform.tables import Table, Value, write_tables
+from shellform.tables import Table, write_tables
 
 RESERVE = 0.02  # of the rest length, at both ends of a turnbuckle's range
 
@@ -102,64 +105,16 @@ def rods(built: Built, cutting: Cutting) -> Table:
         "marks from the first end [m]", "crossing numbers", "bars", "note",
     )  # fmt: skip
     notes = cutting_notes(cutting, rod_names(built.grid))
+    if layers_of(section) == 2:
+        notes += ("Each rod is two laths of that length; masses are of both, without shear blocks.",)
     if not weight:
         notes += ("No masses: the rods' density isn't known (rod.density).",)
     return Table("rods", heads, rows, notes)
 
 
-def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
-    """What the buyer and the carpenter must know, a sentence each."""
-    count = len(cutting.bars)
-    fewer = "fewer" if count == cutting.least else f"fewer than {cutting.least}"
-    said = [
-        f"{count} bars of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, "
-        f"{100 * cutting.waste:.0f} % waste; {fewer} can't do."
-    ]
-    if cutting.spliced:
-        which = ", ".join(names[rod] for rod in cutting.spliced)
-        said.append(
-            f"{len(cutting.spliced)} rods are longer than the stock and must be SPLICED; the analysis takes "
-            "a splice for as stiff and as "
-            f"strong as the rod: {which}."
-        )
-    return tuple(said)
-
-
 def splices(built: Built, cutting: Cutting) -> Table:
-    """Where rods longer than the stock are spliced, and what the splices bear at each load: tension N and
-    bending moment, interpolated between the nodes."""
-    grid, beams = built.grid, built.shell.beams(built.design.radius)
-    first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in grid.rods])])  # element of each rod
-    forces = {name: beams.local_forces(built.states[name]) for name in _in_order(built)}
-    names = rod_names(grid)
-    places = sorted(
-        (piece.rod, piece.start) for bar in cutting.bars for piece in bar.pieces if piece.part > 1
-    )
-    rows = []
-    for number, at in places:
-        rod = grid.rods[number]
-        inside = int(np.clip(np.searchsorted(rod.arc, at) - 1, 0, len(rod.arc) - 2))
-        share = (at - rod.arc[inside]) / (rod.arc[inside + 1] - rod.arc[inside])
-        before = int(np.searchsorted(rod.marks, at)) - 1
-        row: list[Value] = [
-            names[number],
-            float(at),
-            int(rod.crossings[before]),
-            int(rod.crossings[before + 1]),
-        ]
-        for own in forces.values():
-            axial, _, y_a, z_a, _, y_b, z_b = own[first[number] + inside]
-            # Both ends' moments are counted as they turn the ends, so that a constant bending moment has
-            # opposite signs there.
-            bent = (1.0 - share) * np.array([y_a, z_a]) - share * np.array([y_b, z_b])
-            row += [float(axial), float(np.linalg.norm(bent))]
-        rows.append(tuple(row))
-    heads = ["rod", "from the first end [m]", "after crossing", "before crossing"]
-    for name in forces:
-        heads += [f"{_stage(name)}: tension [N]", f"{_stage(name)}: bending moment [N m]"]
-    return Table(
-        "splices", tuple(heads), tuple(rows), cutting_notes(cutting, names)[1:] or ("No rod is spliced.",)
-    )
+    """Where rods longer than the stock are spliced, and what the splices bear at each load."""
+    return splice_table(built.shell, built.design, _told_states(built), rod_names(built.grid), cutting)
 
 
 def marks(built: Built) -> Table:
@@ -365,13 +320,12 @@ def survey(built: Built) -> Table:
 
 def all_tables(built: Built, cutting: Cutting) -> list[Table]:
     """Every schedule, that of the splices also where there are none: none is left from another stock."""
+    told = built.shell, built.design, _told_states(built), rod_names(built.grid)
     tables = [make(built, cutting) for make in (rods, bars, splices)]
     tables += [make(built) for make in (marks, cables, supports, survey)]
-    return (
-        [*tables, edge_table(built.shell, built.design, _told_states(built), rod_names(built.grid))]
-        if built.shell.net.edges
-        else tables
-    )
+    if layers_of(built.shell.rod.section) == 2:
+        tables.append(block_table(*told))
+    return [*tables, edge_table(*told)] if built.shell.net.edges else tables
 
 
 def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:

@@ -1,0 +1,77 @@
+"""What is spliced from stock: notes for who buys and cuts, and the schedule of splices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.layers import LOCK, TwoLayers
+from shellform.net.grid import ROD
+from shellform.output.workshop.nesting import Cutting
+from shellform.structure.elements.state import State
+from shellform.tables import Table, Value
+
+
+def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
+    """What the buyer and the carpenter must know, a sentence each."""
+    count = len(cutting.bars)
+    fewer = "fewer" if count == cutting.least else f"fewer than {cutting.least}"
+    said = [
+        f"{count} bars of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, "
+        f"{100 * cutting.waste:.0f} % waste; {fewer} can't do."
+    ]
+    if cutting.spliced:
+        which = ", ".join(names[rod] for rod in cutting.spliced)
+        said.append(
+            f"{len(cutting.spliced)} rods are longer than the stock and must be SPLICED; the analysis takes "
+            "a splice for as stiff and as "
+            f"strong as the rod: {which}."
+        )
+    return tuple(said)
+
+
+def splice_table(
+    shell: Gridshell, design: Design, states: Mapping[str, State], rods: Sequence[str], cutting: Cutting
+) -> Table:
+    """Where rods longer than the stock are spliced, and what the splices bear in each of the `states`:
+    tension N and bending moment, interpolated between the nodes; in two layers, what the lath does that is
+    pulled more. `rods` are the rods' names."""
+    grid, beams = shell.net.grid, shell.beams(design.radius)
+    section = shell.rod.resized(design.radius).section
+    first = np.concatenate([[0], np.cumsum([len(rod.nodes) - 1 for rod in grid.rods])])  # element of each rod
+    forces = {name: beams.local_forces(state) for name, state in states.items()}
+    locked = beams.of_kind(LOCK)
+    places = sorted(
+        {(piece.rod, piece.start) for bar in cutting.bars for piece in bar.pieces if piece.part > 1}
+    )
+    rows = []
+    for number, at in places:
+        rod = grid.rods[number]
+        inside = int(np.clip(np.searchsorted(rod.arc, at) - 1, 0, len(rod.arc) - 2))
+        share = (at - rod.arc[inside]) / (rod.arc[inside + 1] - rod.arc[inside])
+        before = int(np.searchsorted(rod.marks, at)) - 1
+        row: list[Value] = [
+            rods[number],
+            float(at),
+            int(rod.crossings[before]),
+            int(rod.crossings[before + 1]),
+        ]
+        for own in forces.values():
+            axial, _, y_a, z_a, _, y_b, z_b = own[beams.of_kind(ROD)][first[number] + inside]
+            # Both ends' moments are counted as they turn the ends, so that a constant bending moment has
+            # opposite signs there.
+            bent = (1.0 - share) * np.array([y_a, z_a]) - share * np.array([y_b, z_b])
+            if isinstance(section, TwoLayers):
+                axial, bent = 0.5 * axial, 0.5 * bent
+                if locked.any():
+                    couple = own[locked][first[number] + inside]
+                    axial += abs((1.0 - share) * couple[2] - share * couple[5]) / section.apart
+            row += [float(axial), float(np.linalg.norm(bent))]
+        rows.append(tuple(row))
+    heads = ["rod", "from the first end [m]", "after crossing", "before crossing"]
+    for name in forces:
+        heads += [f"{name}: tension [N]", f"{name}: bending moment [N m]"]
+    notes = cutting_notes(cutting, list(rods))[1:] or ("No rod is spliced.",)
+    return Table("splices", tuple(heads), tuple(rows), notes)
