@@ -26,6 +26,9 @@ def new(
         float | None,
         typer.Option(help="Of the u rods against the x axis, degrees; left out: with the least bending."),
     ] = None,
+    layers: Annotated[
+        int, typer.Option(help="2: rods of two laths, bent one by one, then locked by shear blocks.")
+    ] = 1,
     allow_scripts: Scripts = False,
     quiet: Quiet = False,
 ) -> None:
@@ -40,7 +43,7 @@ def new(
             output,
             surface_options,
             allow_scripts=allow_scripts,
-            wish=DesignWish(rod, spacing, thickness, angle),
+            wish=DesignWish(rod, spacing, thickness, angle, layers),
             report=report,
         )
     finally:

@@ -24,6 +24,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
 from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace, erection_stress
 from shellform.gridshell.joints import following, usual_gap
+from shellform.gridshell.layers import single
 from shellform.gridshell.loads import concrete, pressure, rods
 from shellform.gridshell.tolerances import default_tolerances
 from shellform.net.chebyshev import pull_net
@@ -144,7 +145,7 @@ class _Search:
         if self.wish.spacing is not None:
             return self.wish.spacing, "as asked"
         spacing, reason = first_spacing(self.surface)
-        least = min(least_spacing(each) for each in wished(self.wish.rod))
+        least = min(least_spacing(each) for each in wished(self.wish.rod, self.wish.layers))
         return (spacing, reason) if spacing >= least else (least, "as near as rods of that depth may lie")
 
     def _vain(self, spacing: float, finer: float) -> bool:
@@ -163,7 +164,7 @@ class _Search:
             self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             self.say(f"no net at {spacing:g} m: {error.what if isinstance(error, InputError) else error}")
             return None
-        possible = choices(placed.net, spacing, self.wish.rod)
+        possible = choices(placed.net, spacing, self.wish.rod, self.wish.layers)
         if not possible:
             self._keep(self._too_curved(placed, spacing, thickness))
             return None
@@ -199,7 +200,7 @@ class _Search:
             raise refused(self.surface, failure, self.wish)
         asked, thinner = thickness, failure.thickness
         placed, choice, nearest = failure.placed, failure.choice, failure
-        possible = choices(placed.net, failure.spacing, self.wish.rod)
+        possible = choices(placed.net, failure.spacing, self.wish.rod, self.wish.layers)
         for _ in range(_THINNER):
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
@@ -344,7 +345,9 @@ class _Search:
         net = placed.net
         bent = net.curvature.max(axis=1)
         place = net.target.positions[net.grid.rod_ends[int(np.argmax(bent))]].mean(axis=0)
-        least = min(wished(self.wish.rod), key=lambda each: erection_stress(net, each.section))
+        least = min(
+            wished(self.wish.rod, self.wish.layers), key=lambda each: erection_stress(net, each.section)
+        )
         stress = erection_stress(net, least.section) / least.section.material.strength
         why = Why.CURVATURE if stress > 1.0 else Why.SPACING
         return Obstacle(why, spacing, thickness, 0.0, least, placed, place, stress)
@@ -363,7 +366,7 @@ def _shell(
     rod = Rod(choice.section)
     fitting = following(rod)
     joint = Joint(fitting.axial, fitting.torsion, fitting.bending, net.grid.gap)
-    radius = math.sqrt(choice.section.constants[0] / math.pi)
+    radius = math.sqrt(single(choice.section).constants[0] / math.pi)
     edge = EdgeBeam(Bundle(radius, 19, 0.5, choice.section.material)) if net.edges else None
     shell = brace(net, rod, joint, Cable(rope.stiffness), below=surface, edge=edge)
     own = rods(net, choice.section)

@@ -14,12 +14,14 @@ from typing import Any
 
 from shellform.case.build_net import size_text, surface_of
 from shellform.errors import InputError
+from shellform.gridshell.catalogue import label
+from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import NEEDED, REST_RATIO, THICKNESS, FirstDesign, first_design
 from shellform.run.first_look import surface_entry
-from shellform.run.sizes import DesignWish
+from shellform.run.sizes import DesignWish, RodChoice
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
@@ -92,9 +94,9 @@ angle = {placed.angle!r}         # degrees of the u rods against x: {angle}{offs
 
 [rod]
 catalogue = "{choice.catalogue}"
-section = "{_named(choice.label)}"    # equation (1) allows {2e3 * design.allowed:.3g} mm where the net is curved most, to a radius of {bent:.3g} m; \
+section = "{_named(label(single(choice.section)))}"    # equation (1) allows {2e3 * design.allowed:.3g} mm where the net is curved most, to a radius of {bent:.3g} m; \
 rods at {design.tried.stress:.0%} of their strength under the load followed
-
+{_layers(choice)}
 [cable]
 stiffness = {_short(rope.stiffness)!r}    # EA, N: stainless strand 1 × 19, ⌀ {1e3 * rope.diameter:g} mm; much softer cables let the shell buckle
 rest_ratio = {REST_RATIO!r}
@@ -142,9 +144,19 @@ def _thickness_told(design: FirstDesign, wish: DesignWish) -> str:
     return "what these rods bear; pour it first, and the rest when it has hardened"
 
 
-def _named(label: str) -> str:
+def _layers(choice: RodChoice) -> str:
+    """The entries of rods in two layers."""
+    if layers_of(choice.section) == 1:
+        return ""
+    return """\
+layers = 2           # bent lath by lath, then locked by shear blocks
+composite = 0.5      # how far these make them act together: 1 as if glued, 0 loose
+"""
+
+
+def _named(told: str) -> str:
     """A section's label as it is typed."""
-    return label.replace("⌀", "").replace("×", "x").strip()
+    return told.replace("⌀", "").replace("×", "x").strip()
 
 
 def _check(output: Path) -> None:

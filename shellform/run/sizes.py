@@ -22,8 +22,9 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
+from shellform.gridshell.layers import TwoLayers, locked_bending
 from shellform.net.net import Net
-from shellform.structure.elements.sections import Section, mass_per_length, stiffness
+from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.target import Surface, curvature
 
 SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
@@ -33,6 +34,7 @@ MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
 _USUAL = 1.0  # m, of rods on site
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
+_LATHS = "timber_laths"  # whose rods are built in two layers
 _ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008)  # m, diameters in stock
 _ROPE = 0.006  # of the spacing, a rope's diameter
 _ROPE_AREA, _ROPE_YOUNG, _ROPE_STRENGTH = 0.597, 120e9, 1380e6  # of the diameter's square; Pa; Pa at breaking
@@ -70,19 +72,20 @@ class RodChoice:
 
     @property
     def bending(self) -> float:
-        """The smaller of EI_y and EI_z, N·m²."""
-        return min(stiffness(self.section)[2:])
+        """The smaller of EI_y and EI_z, N·m², under loads."""
+        return min(locked_bending(self.section))
 
 
 @dataclass(frozen=True)
 class DesignWish:
     """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m,
-    an `angle`, degrees; None: to be found."""
+    an `angle`, degrees; None: to be found; rods in how many `layers`."""
 
     rod: str | None = None
     spacing: float | None = None
     thickness: float | None = None
     angle: float | None = None
+    layers: int = 1
 
     def __post_init__(self) -> None:
         for name in ("spacing", "thickness"):
@@ -91,6 +94,8 @@ class DesignWish:
                 raise InputError("must be positive and finite", where=f"--{name}", value=value)
         if self.angle is not None and not math.isfinite(self.angle):
             raise InputError("must be degrees or auto", where="--angle", value=self.angle)
+        if self.layers not in (1, 2):
+            raise InputError("must be 1 or 2", where="--layers", value=self.layers)
         wished(self.rod)
 
 
@@ -150,12 +155,13 @@ def rope_for(spacing: float) -> Rope:
     return Rope(min(_ROPES, key=lambda each: abs(math.log(each / (_ROPE * spacing)))))
 
 
-def choices(net: Net, spacing: float, wish: str | None) -> list[RodChoice]:
+def choices(net: Net, spacing: float, wish: str | None, layers: int = 1) -> list[RodChoice]:
     """Sections that the net's curvature and its spacing allow, by rising stiffness; with a `wish` like
-    "gfrp_rods/8 mm" that one, with the name of a catalogue those of it. Empty where none is thin enough."""
+    "gfrp_rods/8 mm" that one, with the name of a catalogue those of it; rods in so many `layers`. Empty where
+    none is thin enough."""
     found = [
         each
-        for each in wished(wish)
+        for each in wished(wish, layers)
         if erection_stress(net, each.section) <= each.section.material.strength
         and least_spacing(each) <= spacing * (1.0 + 1e-9)
     ]
@@ -168,8 +174,13 @@ def least_spacing(choice: RodChoice) -> float:
     return math.ceil(1e3 * _DEPTH * 2.0 * max(choice.section.fibres) - 1e-9) / 1e3
 
 
-def wished(wish: str | None) -> list[RodChoice]:
-    """The sections among which to choose. Raises InputError for an unknown catalogue or section."""
+def wished(wish: str | None, layers: int = 1) -> list[RodChoice]:
+    """The sections among which to choose, in so many `layers`; two are laths where nothing is wished. Raises
+    InputError for an unknown catalogue or section.
+    """
+    if layers == 2:
+        found = wished(_LATHS if wish is None else wish)
+        return [RodChoice(each.catalogue, TwoLayers(each.section)) for each in found]
     if wish is None:
         return [RodChoice(name, each) for name in _CATALOGUES for each in read_catalogue(name).sections]
     name, _, size = wish.partition("/")
