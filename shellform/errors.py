@@ -31,6 +31,14 @@ class InputError(ShellformError, ValueError):
         super().__init__(f"{head}{found}{tail}")
 
 
+def not_installed(what: str, extra: str, error: ImportError) -> InputError:
+    """That `what` was asked for needs a library of the optional dependencies `extra`, which can't be loaded."""
+    return InputError(
+        f"{what}: the library {error.name or 'asked for'} can't be loaded ({error})",
+        remedy=f'Install it with: pip install "shellform[{extra}]".',
+    )
+
+
 class Damaged(InputError):
     """A file that shellform wrote, or should have, and that can't be taken up: what it holds has to be made
     anew.

@@ -48,8 +48,8 @@ FLOORS = {
     "shellform.structure": [["elements", "refusals"], ["solve"], ["network"], ["model"], ["answers"]],
     "shellform.output": [["pictures"], ["workshop"], ["exchange"], ["page", "notebook"]],
 }
-# Behind which module each library lies. Of VTK three parts are used for three things that have no line in
-# common: to draw, to write VTP, to read VTK's own files. Of CVXOPT two: CHOLMOD, and interior points.
+# Behind which module each library lies. Of VTK two parts are used for two things that have no line in
+# common: to draw, to read VTK's own files. Of CVXOPT two: CHOLMOD, and interior points.
 DOORS = {
     "binpacking": "output/workshop/nesting.py",
     "cvxopt": "optimiser/quadratic.py",
@@ -77,7 +77,7 @@ DOORS = {
 }
 ALSO = {  # the further doors, for the reason above
     "cvxopt": {"structure/solve/factorisation.py"},
-    "vtkmodules": {"output/exchange/vtp.py", "surface/readers/vtkfiles.py"},
+    "vtkmodules": {"surface/readers/vtkfiles.py"},
 }
 SMALL = {"numpy", "scipy", "msgspec", "pydantic", "rich", "tomli_w", "typer"}  # used where they are needed
 NOT_LOADED = sorted({*DOORS, *SMALL, "IPython"} - {"cvxopt.cholmod"})
@@ -191,7 +191,7 @@ def test_circles_of_imports_are_found():
         member_of("shellform.surface.readers.mend", "shellform.surface") == "shellform.surface.readers.mend"
     )
     assert member_of("shellform.surface.readers.gltf", "shellform.surface") == "shellform.surface.readers"
-    assert "shellform.output.pictures.scene" in graph()["shellform.output.notebook"]  # within a function
+    assert "shellform.output.pictures.vectors" in graph()["shellform.output.notebook"]  # within a function
     assert "shellform.run.run" in graph()["shellform.study"]  # in a stub
 
 

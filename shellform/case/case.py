@@ -242,15 +242,19 @@ def shipped_surfaces() -> Path:
 
 
 def check_script(path: Path, *, allow_scripts: bool) -> None:
-    """Raises InputError for a builder script from elsewhere, which would run its code, unless that is
-    allowed.
-    """
-    if path.suffix == ".py" and not allow_scripts and shipped_surfaces() not in path.resolve().parents:
+    """Raises InputError for a builder script whose code isn't that of a shipped one, unless that is allowed."""
+    if path.suffix == ".py" and path.is_file() and not allow_scripts and not _shipped(path):
         raise InputError(
             "is a Python script from outside the shipped surfaces and isn't run unasked",
             where=str(path),
             remedy="Read it, and if you trust it, add --allow-scripts.",
         )
+
+
+def _shipped(script: Path) -> bool:
+    """Whether a script is, to the byte, one that comes with shellform, wherever it lies."""
+    code = script.read_bytes()
+    return any(code == each.read_bytes() for each in shipped_surfaces().glob("*.py"))
 
 
 def _set(data: dict[str, Any], setting: str) -> None:

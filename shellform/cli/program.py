@@ -19,6 +19,7 @@ from shellform.cli.calibrate import calibrate
 from shellform.cli.check import check
 from shellform.cli.design import design
 from shellform.cli.erect import erect
+from shellform.cli.example import example
 from shellform.cli.net import net
 from shellform.cli.new import new
 from shellform.cli.render import render
@@ -40,6 +41,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for _command in (
+    example,
     check,
     new,
     net,

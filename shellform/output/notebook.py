@@ -14,7 +14,7 @@ from shellform.errors import InputError
 from shellform.gridshell.gridshell import Gridshell
 from shellform.net.net import Net
 from shellform.optimiser.optimum import Optimum
-from shellform.output.pictures import maps, net_maps, sheets
+from shellform.output.pictures import maps, net_maps, painter, sheets
 from shellform.output.pictures.images import png_bytes
 from shellform.output.pictures.panel import Look, Panel
 
@@ -59,9 +59,7 @@ def _png(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> byte
     many = len(rows[0]) > 1
     laid = sheets.table(rows, look, heading) if many else sheets.single(rows[0], look)[0]
     try:
-        from shellform.output.pictures import scene
-
-        (picture,) = scene.drawn([laid])
+        (picture,) = painter.drawn([laid])
     except InputError:  # no OpenGL
         from shellform.output.pictures import vectors
 

@@ -180,14 +180,16 @@ def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:
 
 
 def pictures_possible(report: Report) -> bool:
-    """Whether VTK can draw; if not, one line says why: everything but the pictures is still made."""
-    try:
-        from shellform.output.pictures import scene
+    """Whether pictures can be drawn; if not, one line says why: everything else is still made."""
+    from shellform.output.pictures import painter
 
-        scene.require()
+    try:
+        painter.require()
     except InputError as error:
         report(Event("figures", f"no pictures: {error}", Kind.NOTE))
         return False
+    if not painter.shades():
+        report(Event("figures", painter.AS_LINES, Kind.NOTE))
     return True
 
 

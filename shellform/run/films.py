@@ -36,9 +36,10 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> l
 
     Raises InputError for unknown names and where VTK can't draw, NotConverged where there is no path.
     """
-    from shellform.output.pictures import render, scene
+    from shellform.output.pictures import images, painter, render
 
-    scene.require()  # before minutes are spent on states
+    painter.require()  # before minutes are spent on states
+    images.require(wish.endings)
     name = wish.design or run.best
     for what, each, known in [
         ("--design", name, list(run.designs)),

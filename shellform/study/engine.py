@@ -21,7 +21,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from shellform.errors import InputError
+from shellform.errors import InputError, not_installed
 from shellform.study.jobs import Job
 from shellform.study.outcome import Outcome, Status
 
@@ -69,11 +69,14 @@ def engine(
     to nobody without the certificate that is made for each cluster. With `processes` False the workers are
     threads, to try out the engine. Raises InputError where a cluster doesn't answer.
     """
-    import dask
-    from distributed import (  # before the settings: it adds its own, which would be forgotten with them
-        Client,
-        LocalCluster,
-    )
+    try:
+        import dask
+        from distributed import (  # before the settings: it adds its own, which would be forgotten with them
+            Client,
+            LocalCluster,
+        )
+    except ImportError as error:
+        raise not_installed("studies", "study", error) from error
 
     for name in ("distributed", "distributed.client", "bokeh", "tornado", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters of what they tell is in the rows

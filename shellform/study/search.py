@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Generator, Iterable, Mapping
 from typing import Any
 
+from shellform.errors import not_installed
 from shellform.study.front import objectives, signed
 from shellform.study.outcome import Row, Status, Value
 from shellform.study.plan import Plan
@@ -21,8 +22,10 @@ def generations(
     plan: Plan,
 ) -> Generator[Callable[[], Iterable[Mapping[str, Value]]], list[Row], None]:
     """Generation after generation, each told the rows (with the study's columns) of the one before."""
-    import optuna
-
+    try:
+        import optuna
+    except ImportError as error:
+        raise not_installed('method = "search"', "study", error) from error
     entry, signs = plan.study, signed(plan.study.objective)
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     with warnings.catch_warnings():

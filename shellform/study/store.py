@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from shellform.errors import InputError
+from shellform.errors import InputError, not_installed
 from shellform.records.files import plain
 from shellform.study.outcome import ListedDesign, Outcome, Status, Value
 from shellform.tables import Table, table_text
@@ -174,6 +174,16 @@ def line_of(design: ListedDesign) -> str:
     return json.dumps(plain(design)) + "\n"
 
 
+def arrow() -> tuple[Any, Any]:
+    """PyArrow and its reader and writer of Parquet. Raises InputError where they aren't installed."""
+    try:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+    except ImportError as error:
+        raise not_installed("tables of studies", "study", error) from error
+    return pa, pq
+
+
 def designs_of(file: Path) -> Iterator[ListedDesign]:
     """The designs of a study in order, as `run_study` lists them."""
     with open(file, encoding="utf-8") as lines:
@@ -184,8 +194,7 @@ def designs_of(file: Path) -> Iterator[ListedDesign]:
 
 def write_table(folder: Path, log: Log, columns: Mapping[str, str]) -> int:
     """Writes the tables of all designs in designs.jsonl that have a row in the log; returns how many."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    pa, pq = arrow()
 
     own: dict[str, int] = {}
     for design in designs_of(folder / "designs.jsonl"):
@@ -277,8 +286,7 @@ def read_table(folder: str | Path, columns: Sequence[str] | None = None, filters
 
     Raises InputError where there is none, or a damaged one.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    pa, pq = arrow()
 
     file = Path(folder) / "table.parquet"
     if not file.is_file():

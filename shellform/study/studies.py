@@ -36,7 +36,7 @@ from shellform.study.jobs import Job, disk_is_full, locked, work
 from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
 from shellform.study.page_of_study import write_study_page
 from shellform.study.plan import Plan, changes, length, read_study, resolved
-from shellform.study.store import Log, designs_of, line_of, picked, write_table
+from shellform.study.store import Log, arrow, designs_of, line_of, picked, write_table
 from shellform.written import write_text
 
 _SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
@@ -113,6 +113,7 @@ def run_study(
     disk is full or no design has a result.
     """
     plan = read_study(file)
+    arrow()  # before hours are spent on designs
     place = Path(folder).resolve()
     try:
         for part in ("runs", "stages"):

@@ -1,10 +1,15 @@
-"""Gridshells as lines for ParaView (VTP); the door to VTK's writer, which needs no OpenGL."""
+"""Gridshells as lines for ParaView, as VTK's XML of polygonal data (VTP; VTK File Formats, "XML File Formats":
+arrays in line, in base 64, compressed by zlib in one block each).
+"""
 
 from __future__ import annotations
 
+import base64
+import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +18,8 @@ from shellform.arrays import Reals, indices, reals
 from shellform.errors import InputError
 from shellform.output.pictures.panel import Panel
 from shellform.written import door, write_text
+
+_TYPES = {"f": ("Float64", "<f8"), "i": ("Int64", "<i8"), "u": ("UInt8", "|u1")}
 
 
 def write_vtp(path: str | Path, panel: Panel, cells: Mapping[str, ArrayLike] | None = None) -> None:
@@ -60,29 +67,44 @@ def _write(
     points: Mapping[str, Reals],
     cells: Mapping[str, NDArray[Any]],
 ) -> None:
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
-
-    places, lines, mesh = vtkPoints(), vtkCellArray(), vtkPolyData()
-    places.SetData(numpy_to_vtk(np.array(nodes), deep=True))
-    starts = numpy_to_vtkIdTypeArray(np.arange(0, 2 * len(pairs) + 1, 2, dtype=np.int64), deep=True)
-    lines.SetData(
-        starts, numpy_to_vtkIdTypeArray(np.ascontiguousarray(pairs.ravel(), dtype=np.int64), deep=True)
+    kinds = {"Verts": 0, "Lines": len(pairs), "Strips": 0, "Polys": 0}
+    counts = " ".join(f'NumberOf{kind}="{count}"' for kind, count in kinds.items())
+    lines = {"connectivity": pairs.ravel(), "offsets": 2 * np.arange(1, len(pairs) + 1)}
+    parts = {
+        "PointData": points,
+        "CellData": cells,
+        "Points": {"Points": nodes},
+        **{
+            kind: lines if count else {name: np.zeros(0, int) for name in lines}
+            for kind, count in kinds.items()
+        },
+    }
+    body = "\n".join(
+        f"      <{part}>\n"
+        + "".join(f"        {_data_array(name, values)}\n" for name, values in arrays.items())
+        + f"      </{part}>"
+        for part, arrays in parts.items()
     )
-    mesh.SetPoints(places)
-    mesh.SetLines(lines)
-    for attributes, named in [(mesh.GetPointData(), points), (mesh.GetCellData(), cells)]:
-        for name, values in named.items():
-            column = numpy_to_vtk(np.ascontiguousarray(values), deep=True)
-            column.SetName(name)
-            attributes.AddArray(column)
-    writer = vtkXMLPolyDataWriter()
-    writer.SetInputData(mesh)
-    writer.WriteToOutputStringOn()  # Python tells of a full disc, VTK only by leaving no file
-    writer.Write()
-    write_text(target, writer.GetOutputString())  # arrays stand in base 64
+    write_text(
+        target,
+        '<?xml version="1.0"?>\n<VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" '
+        'header_type="UInt64" compressor="vtkZLibDataCompressor">\n  <PolyData>\n'
+        f'    <Piece NumberOfPoints="{len(nodes)}" {counts}>\n{body}\n    </Piece>\n  </PolyData>\n</VTKFile>\n',
+    )
+
+
+def _data_array(name: str, values: NDArray[Any]) -> str:
+    """One array as an element: in base 64 the count and sizes of its blocks (here one), then what they hold,
+    compressed.
+    """
+    kind, form = _TYPES[values.dtype.kind]
+    data = np.ascontiguousarray(values, dtype=form).tobytes()
+    packed = zlib.compress(data)
+    sizes = np.array([1, len(data), 0, len(packed)] if data else [0, 0, 0], dtype="<u8").tobytes()
+    text = b"".join(base64.b64encode(part) for part in ((sizes, packed) if data else (sizes,)))
+    width = values.shape[1] if values.ndim == 2 else 1
+    head = f'type="{kind}" Name={quoteattr(name)} NumberOfComponents="{width}" format="binary"'
+    return f"<DataArray {head}>{text.decode()}</DataArray>"
 
 
 def _rows(name: str, given: ArrayLike, lengths: Sequence[int]) -> Reals:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shellform.errors import InputError
+from shellform.errors import InputError, not_installed
 from shellform.output.pictures.legend import cable_colours, rod_colours
 from shellform.written import door, whole
 
@@ -71,6 +71,12 @@ def write_film(path: str | Path, frames: Sequence[NDArray[np.uint8]], *, rate: i
         (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(partial, still, rate)
 
 
+def require(endings: Sequence[str]) -> None:
+    """Raises InputError where a film with one of these endings can't be written for want of a library."""
+    if ".mp4" in endings:
+        _ffmpeg()
+
+
 def few_colours(pictures: Sequence[NDArray[np.uint8]], count: int = 256) -> list[Any]:
     """The pictures (height, width, 3) as Pillow's palette images of at most `count` colours (128 or more),
     all with one palette, so that no scale changes on the way.
@@ -121,8 +127,7 @@ def _write_gif(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> No
 
 
 def _write_mp4(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> None:
-    import imageio_ffmpeg
-
+    imageio_ffmpeg = _ffmpeg()
     height, width = (2 * (each // 2) for each in frames[0].shape[:2])  # the codec wants even numbers
     writer = imageio_ffmpeg.write_frames(
         str(path), (width, height), fps=rate, codec="libx264", quality=None, pix_fmt_out="yuv420p",
@@ -137,3 +142,11 @@ def _write_mp4(path: Path, frames: Sequence[NDArray[np.uint8]], rate: int) -> No
         not path.is_file() or not path.stat().st_size
     ):  # ffmpeg tells of a full disc on its own standard error only
         raise OSError(0, "ffmpeg left no file")
+
+
+def _ffmpeg() -> Any:
+    try:
+        import imageio_ffmpeg
+    except ImportError as error:
+        raise not_installed("films as MP4 (GIF needs nothing more)", "film", error) from error
+    return imageio_ffmpeg

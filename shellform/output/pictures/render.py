@@ -4,8 +4,8 @@ arrays.
     from shellform import render
     image = render.deviation("wet.png", shell, best.states["wet"], best.design, limit=0.010)
 
-Panels (`panel.py`, `maps.py`) are laid out on pages (`sheets.py`) and drawn in one window, off-screen
-(`scene.py`), or as lines (`vectors.py`). The same input gives the same picture.
+Panels (`panel.py`, `maps.py`) are laid out on pages (`sheets.py`) and drawn (`painter.py`) in one window,
+off-screen (`scene.py`), or as lines (`vectors.py`). The same input gives the same picture.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from shellform.arrays import Reals
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.output.pictures import maps
+from shellform.output.pictures import maps, painter
 from shellform.output.pictures.images import FILMS, write_film, write_png
 from shellform.output.pictures.panel import LIMIT, Look, Panel
 from shellform.output.pictures.sheets import Canvas, single, table
@@ -81,9 +81,7 @@ def pictures(paths: Sequence[str | Path], panels: Sequence[Panel], look: Look | 
     pages = [single([panel], look or Look())[0] for panel in panels]
     endings = {door(path, *FORMATS).suffix.lower() for path in paths}
     if endings == {".png"}:
-        from shellform.output.pictures import scene
-
-        for path, drawn in zip(paths, scene.drawn(pages), strict=True):
+        for path, drawn in zip(paths, painter.drawn(pages), strict=True):
             write_png(path, drawn)
         return
     for path, page in zip(paths, pages, strict=True):
@@ -98,9 +96,7 @@ def film(
     """
     for path in paths:
         door(path, *FILMS)
-    from shellform.output.pictures import scene
-
-    frames = list(scene.drawn(single(panels, look or Look(size=(960, 600)))))
+    frames = list(painter.drawn(single(panels, look or Look(size=(960, 600)))))
     for path in paths:
         write_film(path, frames, rate=rate)
 
@@ -113,9 +109,7 @@ def _written(path: str | Path | None, page: Canvas) -> Image:
 
         vectors.write(target, page)
         return vectors.rasterised(page)
-    from shellform.output.pictures import scene
-
-    (picture,) = scene.drawn([page])
+    (picture,) = painter.drawn([page])
     if target is not None:
         write_png(target, picture)
     return picture

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from shellform.errors import InputError
+from shellform.errors import InputError, not_installed
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 
 _POLYGONS = (5, 7, 9)  # VTK_TRIANGLE, VTK_POLYGON, VTK_QUAD
@@ -63,10 +63,14 @@ def read_vtk(file: Path, choice: Choice, kind: str) -> Draft:
 
 
 def _reader(kind: str) -> Any:
-    if kind == "vtk":
+    try:
         from vtkmodules.vtkIOLegacy import vtkGenericDataObjectReader
-
-        return vtkGenericDataObjectReader()
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
-
-    return vtkXMLPolyDataReader() if kind == "vtp" else vtkXMLUnstructuredGridReader()
+        from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridReader
+    except ImportError as error:
+        raise not_installed(f"a surface as {kind.upper()}", "cad-exchange", error) from error
+    readers = {
+        "vtk": vtkGenericDataObjectReader,
+        "vtp": vtkXMLPolyDataReader,
+        "vtu": vtkXMLUnstructuredGridReader,
+    }
+    return readers[kind]()

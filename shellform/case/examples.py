@@ -1,0 +1,99 @@
+"""The cases that come with the package, laid beside their surfaces in a folder of the user's.
+
+In the repository they stand in scripts/ and their surfaces in surfaces/; in a wheel both lie in the package.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import shellform
+from shellform.case.case import shipped_surfaces
+from shellform.errors import InputError
+from shellform.written import write_text
+
+
+@dataclass(frozen=True)
+class Example:
+    """A shipped case: what it is `about`, its `files` in the folder of the cases, the `surface` that they name
+    ("" for none), and the `command` that computes the first of the files.
+    """
+
+    about: str
+    files: tuple[str, ...]
+    surface: str
+    command: str
+
+
+EXAMPLES = {
+    "vault": Example(
+        "the paper's scale model, 0.9 × 0.55 m, rods of 2 mm",
+        ("scale_model.toml",),
+        "vault.py",
+        "shellform design scale_model.toml --output run",
+    ),
+    "radius": Example(
+        "the same vault, the rods' radius found as well",
+        ("scale_model_radius.toml",),
+        "vault.py",
+        "shellform design scale_model_radius.toml --output run",
+    ),
+    "full-size": Example(
+        "a shell of 18 × 11 m",
+        ("full_size.toml",),
+        "shell_18x11.py",
+        "shellform design full_size.toml --output run",
+    ),
+    "dome": Example(
+        "a dome from a CAD file (STEP, in mm)",
+        ("dome.toml",),
+        "dome_mm.step",
+        "shellform design dome.toml --output run",
+    ),
+    "model": Example(
+        "an arch of one bent rod and a cable as a model file of one's own",
+        ("bent_arch.json",),
+        "",
+        "shellform analyse bent_arch.json --load snow --output result.json",
+    ),
+    "study": Example(
+        "eight designs of the vault: how the weights of the objective trade off",
+        ("study_weights.toml", "scale_model.toml"),
+        "vault.py",
+        "shellform study study_weights.toml --output study",
+    ),
+}
+
+
+def lay_example(name: str, folder: str | Path) -> list[Path]:
+    """Writes the files of an example into a folder and returns them, the one to compute first. Raises
+    InputError for an unknown name, and where a file of that name with other content is there.
+    """
+    if name not in EXAMPLES:
+        raise InputError("is no example", where="NAME", value=name, remedy=f"Known: {', '.join(EXAMPLES)}.")
+    example, place = EXAMPLES[name], Path(folder)
+    texts = {each: _at_home((_cases() / each).read_text(encoding="utf-8")) for each in example.files}
+    if example.surface:
+        source = shipped_surfaces() / example.surface
+        texts[example.surface] = source.read_text(encoding="utf-8")
+    for each, text in texts.items():
+        file = place / each
+        if file.exists() and (not file.is_file() or file.read_text(encoding="utf-8") != text):
+            raise InputError("is there already", where=str(file), remedy="Choose another folder.")
+    for each, text in texts.items():
+        write_text(place / each, text)
+    return [place / each for each in texts]
+
+
+def _cases() -> Path:
+    package = Path(shellform.__file__).resolve().parent
+    inside = package / "_cases"
+    return inside if inside.is_dir() else package.parent / "scripts"
+
+
+def _at_home(text: str) -> str:
+    """A case whose files all stand in its own folder."""
+    return (
+        text.replace('"../surfaces/', '"').replace("scripts/shellform", "shellform").replace("scripts/", "")
+    )
