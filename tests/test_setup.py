@@ -1,0 +1,68 @@
+"""The scripts' set-up installs what is locked, and says so where it can't."""
+
+import os
+import subprocess
+from pathlib import Path
+
+import pytest
+
+SETUP = Path(__file__).parent.parent / "scripts/setup"
+# In place of a virtual environment's Python: notes what it is asked for, and lets the locked install fail as told.
+PYTHON = """#!/usr/bin/env bash
+echo "$*" >> "$CALLS"
+case "$*" in *--require-hashes*) if [ -n "$FAILS" ]; then echo "$FAILS"; exit 1; fi ;; esac
+"""
+
+
+@pytest.fixture
+def set_up(tmp_path):
+    (tmp_path / "venv/bin").mkdir(parents=True)
+    stub = tmp_path / "venv/bin/python"
+    stub.write_text(PYTHON, encoding="utf-8")
+    stub.chmod(0o755)
+
+    def run(extras, fails=""):
+        calls = tmp_path / "calls"
+        calls.write_text("", encoding="utf-8")
+        done = subprocess.run(
+            ["bash", "-eu", "-c", f"extras={extras}; source {SETUP}; echo ready"],
+            env={**os.environ, "SHELLFORM_VENV": str(tmp_path / "venv"), "CALLS": str(calls), "FAILS": fails},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return done, calls.read_text(encoding="utf-8").splitlines()
+
+    return run
+
+
+def test_users_get_what_is_locked_without_tests_and_mkl_and_only_once(set_up):
+    done, (locked, package) = set_up("all")
+    assert done.stdout == "ready\n"
+    assert "--require-hashes" in locked
+    assert [word.rpartition("/")[2] for word in locked.split() if word.endswith(".txt")] == ["all.txt"]
+    assert "--no-deps" in package
+    assert "MKL" not in done.stderr
+    assert set_up("all")[1] == []
+
+
+def test_the_tests_set_up_serves_users_too_and_announces_the_licence_of_mkl(set_up):
+    done, calls = set_up("all,mkl,docs,test")
+    assert "proprietary" in done.stderr
+    assert len(calls) == 2
+    assert set_up("all")[1] == []
+
+
+def test_a_file_that_is_not_the_locked_one_ends_the_set_up(set_up):
+    done, calls = set_up("all", "THESE PACKAGES DO NOT MATCH THE HASHES FROM THE REQUIREMENTS FILE.")
+    assert done.returncode == 2
+    assert "DO NOT MATCH" in done.stderr
+    assert len(calls) == 1
+
+
+def test_where_the_lock_does_not_fit_the_bounds_are_installed_and_that_is_said(set_up):
+    done, calls = set_up("all", "ERROR: No matching distribution found for numpy==2.4.6")
+    assert done.stdout == "ready\n"
+    assert "No matching distribution" in done.stderr
+    assert "what pyproject.toml's bounds allow" in done.stderr
+    assert calls[-1].endswith("[all]")
