@@ -38,6 +38,16 @@ def render(
     film: Annotated[
         str | None, typer.Option(help="pour: the load coming on; erection: the grid rising from the ground.")
     ] = None,
+    width_mm: Annotated[
+        float | None, typer.Option("--width-mm", help="Width in print, mm; letters and lines follow it.")
+    ] = None,
+    dpi: Annotated[float | None, typer.Option(help="Pixels an inch in print (default: 300).")] = None,
+    font_size: Annotated[
+        float | None, typer.Option(help="Height of the letters in print, points (default: 9).")
+    ] = None,
+    force_limit: Annotated[
+        float | None, typer.Option(help="End of the cables' colour scale, N; left out: the largest force.")
+    ] = None,
     quiet: Quiet = False,
 ) -> None:
     """Draw maps of a run, or a film."""
@@ -48,6 +58,7 @@ def render(
         design=design, load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods,
         transparent=transparent,
         kind=kind, film=film,
+        force_limit=force_limit, width_mm=width_mm, dpi=dpi, font_size=font_size,
     )  # fmt: skip
     if film is None:
         files = draw_designs(read_run(run), asked)

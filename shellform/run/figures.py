@@ -32,11 +32,29 @@ QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode"
 FILMS = ("pour", "erection")
 
 
+_USUAL = (1600, 1000)  # pixels
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A picture in print: its `width`, m, pixels an inch `dots`, and height of the letters, points."""
+
+    width: float
+    dots: float = 300.0
+    letters: float = 9.0  # the smallest capitals are then 2 mm high
+
+    def size(self, shape: tuple[int, int]) -> tuple[int, int]:
+        """Pixels of a picture with the proportions of `shape`."""
+        across = round(self.width / 0.0254 * self.dots)
+        return across, round(across * shape[1] / shape[0])
+
+
 @dataclass(frozen=True)
 class Wish:
     """What of a run is to be drawn, and how: `design` and `load` (all of them), `quantity`, its `limit` in SI
     units (the case's for the deviation, 1 for the utilisation, what the rods bear for their curvature, else
-    the largest), and the rest as in panel.py."""
+    the largest), that of the cables' forces `force_limit`, N (0: the largest), the `paper` that it is for, and
+    the rest as in panel.py."""
 
     design: str | None = None
     load: str | None = None
@@ -47,6 +65,8 @@ class Wish:
     thickness: float = 0.0
     transparent: bool = False
     endings: tuple[str, ...] = (".png",)
+    force_limit: float = 0.0
+    paper: Paper | None = None
 
 
 def wish(
@@ -61,10 +81,17 @@ def wish(
     transparent: bool,
     kind: str | None,
     film: str | None,
+    force_limit: float | None = None,
+    width_mm: float | None = None,
+    dpi: float | None = None,
+    font_size: float | None = None,
 ) -> Wish:
     """A wish as the command line says it: `size` as WIDTHxHEIGHT, the file's `kind` without a dot. Raises
     InputError for bad options.
     """
+    paper = _paper(width_mm, dpi, font_size, film)
+    if force_limit is not None and not 0.0 < force_limit < float("inf"):
+        raise InputError("must be positive", where="--force-limit", value=force_limit)
     if film is not None and film not in FILMS:
         raise InputError("is no film", where="--film", value=film, remedy=f"Known: {', '.join(FILMS)}.")
     if film is not None and (transparent or quantity in ("spring", "mode", "history")):
@@ -96,7 +123,30 @@ def wish(
         thickness,
         transparent,
         endings,
+        force_limit or 0.0,
+        paper,
     )
+
+
+def _paper(
+    width_mm: float | None, dpi: float | None, font_size: float | None, film: str | None
+) -> Paper | None:
+    """The paper that the options name. Raises InputError for what can't be printed."""
+    given = {"--width-mm": width_mm, "--dpi": dpi, "--font-size": font_size}
+    for name, value in given.items():
+        if value is not None and not 0.0 < value < float("inf"):
+            raise InputError("must be positive", where=name, value=value)
+    if width_mm is None:
+        for name in ("--dpi", "--font-size"):
+            if given[name] is not None:
+                raise InputError(
+                    "says nothing without a width", where=name, remedy="Give --width-mm 180, say."
+                )
+        return None
+    if film is not None:
+        raise InputError("is for pictures in print", where="--width-mm", remedy="Films take --size.")
+    usual = Paper(width_mm / 1000.0)
+    return Paper(usual.width, dpi or usual.dots, font_size or usual.letters)
 
 
 def _pixels(text: str) -> tuple[int, int]:
@@ -209,7 +259,7 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
         return draw_histories(run, ending=asked.endings[0])
     if asked.quantity == "spring":  # what the springs still pull is the net's, whatever the design
         look = Look(
-            size=asked.size or (1600, 1000),
+            size=asked.size or _USUAL,
             view=asked.view,
             thickness=asked.thickness,
             transparent=asked.transparent,
@@ -227,7 +277,12 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
             figures
             / f"{_stem(asked, 'deviations' if asked.quantity == 'deviation' else 'all')}{asked.endings[0]}"
         )
-        render.sheet(page, shown, replace(look, size=_half(asked.size)), heading=run.case.title)
+        render.sheet(
+            page,
+            shown,
+            replace(look, size=_half(look.size if asked.paper else asked.size)),
+            heading=run.case.title,
+        )
         files.append(page)
     return files
 
@@ -275,15 +330,19 @@ def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:
     if math.isfinite(borne):
         usual["curvature"] = borne
     force = max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
-    return Look(
+    look = Look(
         limit=wish.limit or usual.get(wish.quantity, largest),
-        size=wish.size or (1600, 1000),
+        size=wish.size or _USUAL,
         view=wish.view,
         thickness=wish.thickness,
-        force=force,
+        force=wish.force_limit or force,
         surface=Skin(run.surface.vertices, run.surface.triangles),
         transparent=wish.transparent,
     )
+    paper = wish.paper
+    if paper is None:
+        return look
+    return replace(look, size=paper.size(look.size), dots=paper.dots, letters=paper.letters)
 
 
 def write_states(

@@ -3,6 +3,7 @@
 import functools
 import itertools
 import os
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -521,3 +522,24 @@ def test_films_of_nothing_or_with_other_endings_are_refused(tmp_path):
     with pytest.raises(InputError, match="can't be written"):
         images.write_film(tmp_path / "b.mp4", [np.zeros((60, 80, 3), dtype=np.uint8)])
     assert [path.name for path in tmp_path.iterdir()] == ["b.mp4"]
+
+
+def test_letters_on_paper_have_the_height_asked_for_and_stay_letters(tmp_path):
+    look = Look(size=(1200, 750), dots=300.0, letters=8.0)
+    render.picture(tmp_path / "a.svg", panel(), look)
+    text = (tmp_path / "a.svg").read_text(encoding="utf-8")
+    width, height = re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', text).groups()
+    assert (float(width), float(height)) == pytest.approx((1200 / 300 * 72, 750 / 300 * 72))
+    assert "deviation from the target</text>" in text
+    heights = [float(each) for each in re.findall(r"font-size: ([\d.]+)px", text)]
+    # whole pixels round them, and the keys' letters are 0.9 as high
+    assert max(heights) == pytest.approx(8.0, abs=0.3)
+    assert min(heights) > 0.85 * 8.0
+    render.picture(tmp_path / "a.pdf", panel(), look)
+    assert (
+        b"/TrueType" in (tmp_path / "a.pdf").read_bytes()
+        or b"CIDFontType2" in (tmp_path / "a.pdf").read_bytes()
+    )
+    render.picture(tmp_path / "a.png", panel(), look)
+
+    assert Image.open(tmp_path / "a.png").info["dpi"] == pytest.approx((300.0, 300.0), abs=0.02)

@@ -22,20 +22,20 @@ _PACKED = np.array([65536, 256, 1])  # a colour as one number
 _HOLD = 1.5  # s that the last frame stays
 
 
-def write_png(path: str | Path, picture: NDArray[np.uint8]) -> None:
-    """Writes a picture (height, width, 3 or 4). Raises InputError for another ending and where the file can't
-    be written.
+def write_png(path: str | Path, picture: NDArray[np.uint8], *, dots: float = 160.0) -> None:
+    """Writes a picture (height, width, 3 or 4), `dots` pixels an inch. Raises InputError for another ending
+    and where the file can't be written.
     """
     with whole(door(path, ".png")) as partial:
-        partial.write_bytes(png_bytes(picture))
+        partial.write_bytes(png_bytes(picture, dots=dots))
 
 
-def png_bytes(picture: NDArray[np.uint8]) -> bytes:
+def png_bytes(picture: NDArray[np.uint8], *, dots: float = 160.0) -> bytes:
     """A picture (height, width, 3 or 4) as the content of a PNG file."""
     from PIL import Image
 
     content = io.BytesIO()
-    Image.fromarray(picture).save(content, format="png", compress_level=4)
+    Image.fromarray(picture).save(content, format="png", compress_level=4, dpi=(dots, dots))
     return content.getvalue()
 
 

@@ -86,8 +86,8 @@ class Look:
     cables (0: the largest drawn). `size` (width, height) of one picture in pixels; `view` one of VIEWS;
     `thickness` of the rods, times their own (0: their own, but at least as thick as can be seen). `surface`
     is drawn translucent. `frame` (p, 3), m, are further points that must be in view: give the nodes of all
-    states where single pictures are to be compared. `transparent`: no background. Raises InputError for what
-    can't be drawn.
+    states where single pictures are to be compared. `transparent`: no background. On paper `dots` pixels are
+    an inch, and `letters` points high (0: as fits the picture). Raises InputError for what can't be drawn.
     """
 
     limit: float = LIMIT
@@ -98,6 +98,8 @@ class Look:
     surface: Skin | None = None
     frame: ArrayLike | None = None
     transparent: bool = False
+    dots: float = 160.0
+    letters: float = 0.0
 
     def __post_init__(self) -> None:
         if self.view not in VIEWS:
@@ -106,7 +108,9 @@ class Look:
             )
         if not 0.0 < self.limit < np.inf:
             raise InputError("must be positive", where="figures.limit", value=self.limit)
-        for name in ("thickness", "force"):
+        if not 0.0 < self.dots < np.inf:
+            raise InputError("must be positive", where="dots", value=self.dots)
+        for name in ("thickness", "force", "letters"):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise InputError("must be 0 or more", where=name, value=getattr(self, name))
         if self.size[0] < SMALLEST[0] or self.size[1] < SMALLEST[1]:
@@ -140,7 +144,8 @@ def scale_of(panels: Sequence[Panel], look: Look, size: tuple[int, int]) -> Scal
     reach = max(max(float(np.ptp(panel.positions, axis=0).max()) for panel in panels), 1e-9)
     force = look.force or max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
     slack = any((panel.cable_forces <= 0.0).any() for panel in panels)
-    letters = max(11, round(0.034 * min(size[1], 0.7 * size[0])))
+    usual = max(11, round(0.034 * min(size[1], 0.7 * size[0])))
+    letters = round(look.letters * look.dots / 72.0) or usual
     beyond = any(panel.deviation.max() > look.limit * (1.0 + 1e-9) for panel in panels)
     return Scale(
         look.limit, beyond, max(force, 0.0), slack, reach, letters, panels[0].quantity, panels[0].unit

@@ -32,7 +32,6 @@ _DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
 _FAR = -1.5  # values further below their limit than this run out of the picture: what is near is what counts
 FORMATS = (".png", ".svg", ".pdf")
 _DOTS = 160.0  # pixels an inch
-_POINT = 72.0 / _DOTS  # points a pixel
 _INCH, _POINTS = 25.4, 72.0  # mm and points in an inch
 _CAPITAL = 0.73  # height of a capital over the font's size
 _WIDE = 3.0  # value / limit - 1 above which the axis turns logarithmic beyond 1
@@ -316,14 +315,21 @@ def _write(figure: Figure, target: Path, resolution: float) -> None:
     undated: dict[str, None] = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(
         target.suffix.lower(), {}
     )
-    with whole(target) as partial, rc_context({"svg.hashsalt": "shellform", "path.simplify": False}):
+    with whole(target) as partial, _lasting():
         figure.savefig(partial, dpi=resolution, metadata=undated)
 
 
-def blank(size: tuple[int, int], *, transparent: bool = False) -> Axes:
-    """An empty page measured in pixels from its lower left corner."""
+def _lasting() -> Any:
+    """Words stay words, text in SVG and embedded TrueType in PDF, and the same page gives the same bytes."""
+    return rc_context(
+        {"svg.hashsalt": "shellform", "path.simplify": False, "svg.fonttype": "none", "pdf.fonttype": 42}
+    )
+
+
+def blank(size: tuple[int, int], *, transparent: bool = False, dots: float = _DOTS) -> Axes:
+    """An empty page measured in pixels, `dots` an inch, from its lower left corner."""
     figure = Figure(
-        figsize=(size[0] / _DOTS, size[1] / _DOTS), dpi=_DOTS, facecolor="none" if transparent else "white"
+        figsize=(size[0] / dots, size[1] / dots), dpi=dots, facecolor="none" if transparent else "white"
     )
     FigureCanvasAgg(figure)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0, size[0]), ylim=(0, size[1]))
@@ -336,9 +342,18 @@ def strokes(axes: Axes, ends: Reals, widths: Reals, colours: ArrayLike) -> None:
     above earlier ones.
     """
     lines = LineCollection(
-        list(np.round(ends, 1)), linewidths=widths * _POINT, colors=colours, capstyle="round", clip_on=False
+        list(np.round(ends, 1)),
+        linewidths=widths * _point(axes),
+        colors=colours,
+        capstyle="round",
+        clip_on=False,
     )
     axes.add_collection(lines, autolim=False)
+
+
+def _point(axes: Axes) -> float:
+    """Points a pixel of a page."""
+    return float(_POINTS / axes.figure.dpi)
 
 
 def areas(axes: Axes, corners: Reals, colour: str) -> None:
@@ -352,7 +367,7 @@ def areas(axes: Axes, corners: Reals, colour: str) -> None:
 def letter(axes: Axes, word: Word, corner: tuple[float, float]) -> None:
     """A word of a drawing whose lower left corner stands at `corner`."""
     axes.text(
-        corner[0] + word.at[0], corner[1] + word.at[1], word.text, fontsize=word.pixels * _POINT,
+        corner[0] + word.at[0], corner[1] + word.at[1], word.text, fontsize=word.pixels * _point(axes),
         color=word.colour,
         weight="bold" if word.bold else "normal", ha=word.justify, va="baseline",
     )  # fmt: skip
@@ -370,7 +385,7 @@ def save(axes: Axes, path: str | Path) -> None:
     """Writes a page as .svg, .pdf or .png: the same page gives the same bytes."""
     figure = axes.figure
     assert isinstance(figure, Figure)
-    _write(figure, door(path, *FORMATS), _DOTS)
+    _write(figure, door(path, *FORMATS), figure.dpi)
 
 
 def pixels(axes: Axes) -> NDArray[np.uint8]:

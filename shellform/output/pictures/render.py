@@ -82,7 +82,7 @@ def pictures(paths: Sequence[str | Path], panels: Sequence[Panel], look: Look | 
     endings = {door(path, *FORMATS).suffix.lower() for path in paths}
     if endings == {".png"}:
         for path, drawn in zip(paths, painter.drawn(pages), strict=True):
-            write_png(path, drawn)
+            write_png(path, drawn, dots=pages[0].look.dots)
         return
     for path, page in zip(paths, pages, strict=True):
         _written(path, page)
@@ -111,5 +111,5 @@ def _written(path: str | Path | None, page: Canvas) -> Image:
         return vectors.rasterised(page)
     (picture,) = painter.drawn([page])
     if target is not None:
-        write_png(target, picture)
+        write_png(target, picture, dots=page.look.dots)
     return picture

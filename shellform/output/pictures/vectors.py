@@ -36,7 +36,7 @@ def rasterised(page: Canvas) -> NDArray[np.uint8]:
 
 
 def _drawn(page: Canvas) -> Any:
-    axes = plots.blank(page.size, transparent=page.look.transparent)
+    axes = plots.blank(page.size, transparent=page.look.transparent, dots=page.look.dots)
     for each in page.drawings:
         corner = (float(each.corner[0]), float(page.size[1] - each.corner[1] - each.size[1]))
         if each.panel is not None:
