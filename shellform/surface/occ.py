@@ -35,6 +35,7 @@ _AGREES = (
     0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
 )
 _SAMPLES = 33  # points on a curve that tell its extent
+_SAME = 1e-9  # of the extent of a curve: ends so near close it
 
 
 @contextlib.contextmanager
@@ -84,13 +85,17 @@ def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
 
 
 def write_curves(path: Path, curves: Sequence[Reals]) -> None:
-    """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), a straight
-    line where there are two.
+    """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), closed where
+    the last is the first, a straight line where there are two.
     """
     with session(), errors(path, "gmsh can't write the curves", "Choose another folder."):
         occ = gmsh.model.occ
         for points in curves:
-            tags = [occ.addPoint(*point) for point in points.tolist()]
+            closed = len(points) > 2 and np.allclose(
+                points[0], points[-1], rtol=0.0, atol=_SAME * np.ptp(points)
+            )
+            tags = [occ.addPoint(*point) for point in points[: len(points) - closed].tolist()]
+            tags += tags[:1] * closed
             if len(tags) > 2:
                 occ.addSpline(tags)
             else:

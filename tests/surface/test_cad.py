@@ -325,3 +325,16 @@ def test_a_broken_pipe_does_not_kill_the_process_after_gmsh_was_at_work():
     root = Path(__file__).parent.parent.parent
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root)
     assert (result.returncode, result.stdout.strip()) == (0, "told")
+
+
+def test_a_curve_that_ends_where_it_begins_is_written_closed(tmp_path):
+    from shellform.surface.occ import gmsh, session, write_curves
+
+    angle = np.linspace(0.0, 2.0 * np.pi, 25)
+    ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(25)])
+    write_curves(tmp_path / "ring.step", [ring])
+    with session():
+        gmsh.model.occ.importShapes(str(tmp_path / "ring.step"), highestDimOnly=False)
+        gmsh.model.occ.synchronize()
+        (curve,) = gmsh.model.getEntities(1)
+        assert gmsh.model.occ.getMass(*curve) == pytest.approx(2.0 * np.pi, rel=1e-4)
