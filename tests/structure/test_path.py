@@ -1,17 +1,20 @@
 """Path following, modes and critical loads."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shellform.errors import InputError, NotConverged
 from shellform.structure.answers.stability import critical_load, linearised_factor, modes
-from shellform.structure.elements.state import at_rest
+from shellform.structure.elements.rotation import identity
+from shellform.structure.elements.state import State, at_rest
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve import path
 from shellform.structure.solve.equilibrium import find_equilibrium, newton
 from shellform.structure.solve.loading import Drive, advance, forces
 from shellform.structure.solve.path import follow
-from shellform.verification.models import chain
+from shellform.verification.models import CLAMP, chain, line
 
 PIN = [True, True, True, False, False, False]
 
@@ -198,3 +201,37 @@ def test_moving_supports_take_the_free_nodes_along():
     assert found.equilibrium.stable
     np.testing.assert_allclose(found.equilibrium.state.positions[20], [0.8, 0.0, 0.05], atol=1e-12)
     assert np.abs(found.equilibrium.state.positions[:, 2]).max() > 0.2
+
+
+def pushed_strip(elements):
+    """A pinned strip and what pushes its end in to 0.6 of its length, with a force that says to which side."""
+    network = plane(chain(line(elements), (1e4, 1.0, 1.0, 1.0), {0: PIN, elements: PIN}))
+    imposed, aside = np.zeros((2, elements + 1, 6))
+    imposed[elements, 0] = -0.4
+    aside[elements // 2, 2] = 1e-3
+    return replace(network, imposed=imposed), Drive(np.zeros_like(aside), imposed, aside)
+
+
+def test_a_strip_pushed_to_0_6_of_its_length_in_five_increments_folds_no_element():
+    network, drive = pushed_strip(20)
+    assembly, state = assemble(network), at_rest(network.nodes)
+    for k in range(5):
+        found = advance(assembly, state, drive, begin=0.2 * k, end=0.2 * (k + 1)).equilibrium
+        state = found.state
+    chords = np.diff(state.positions, axis=0)
+    assert found.stable
+    assert np.abs(state.positions[:, 2]).max() == pytest.approx(0.3488, abs=5e-5)
+    assert (np.einsum("ij,ij->i", chords[1:], chords[:-1]) > 0.0).all()
+
+
+def test_a_straight_strip_pushed_past_a_node_keeps_its_elements_in_order():
+    network, drive = pushed_strip(20)
+    found = advance(assemble(network), at_rest(network.nodes), replace(drive, base=0.0 * drive.base))
+    assert (np.diff(found.equilibrium.state.positions[:, 0]) > 0.0).all()
+
+
+def test_an_element_that_the_supports_reverse_is_named_and_not_accepted():
+    network = chain(line(2), (1e4, 1.0, 1.0, 1.0), {0: CLAMP, 1: CLAMP, 2: CLAMP})
+    folded = State(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, 1e-9]]), identity(3))
+    with pytest.raises(NotConverged, match=r"beams\[1\] is turned.*180 degrees.*more elements"):
+        find_equilibrium(assemble(network), folded, np.zeros((3, 6)))

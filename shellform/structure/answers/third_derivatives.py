@@ -108,6 +108,7 @@ def _add_beams(dofs: Indices, beams: Beams, state: State, left: Reals, right: Re
             blocks,
             none,
             none,
+            np.empty(count),
         )
         np.add.at(total, dofs[:, dof], (blocks.imag * weights).sum(axis=1) / _STEP)
 

@@ -26,6 +26,9 @@ into a bent structure, an edge beam or a lath locked to another, has its stress-
 the node turned by R in that state, and the element's triad E in it, the axes at that end are R' E
 (`built_in`).
 
+Equation (12) turns back at 90 degrees; ends that are turned farther than 45 degrees against the chord go over to
+the rotation vector (local_rotation.py), which holds up to 180.
+
 Sign: theta_y and M_y follow the paper's (12), which counts turns about the local y axis negative
 (left-handed); theta_x and theta_z are right-handed.
 """
@@ -100,8 +103,9 @@ class Beams:
         count = len(self.ends)
         energy, force = np.empty(count), np.empty((count, 12))
         blocks = _NOTHING if not tangent else np.empty((count, 78)) if into is None else into
-        share(evaluate, count, *self._kernel_input(state), energy, force, blocks, _NOTHING, _NOTHING)
-        return Evaluation(energy, force, blocks if tangent else None)
+        turn = np.empty(count)
+        share(evaluate, count, *self._kernel_input(state), energy, force, blocks, _NOTHING, _NOTHING, turn)
+        return Evaluation(energy, force, blocks if tangent else None, float(turn.max(initial=0.0)))
 
     def apart(self, state: State) -> tuple[Beams, State]:
         """The same beams, each between two nodes of its own (2 i and 2 i + 1), and the state of those."""
@@ -130,9 +134,8 @@ class Beams:
         count = len(self.ends)
         forces, deformations = np.empty((count, 7)), np.empty((count, 7))
         inputs = self._kernel_input(state)
-        share(
-            evaluate, count, *inputs, np.empty(count), np.empty((count, 12)), _NOTHING, forces, deformations
-        )
+        energy, force, turn = np.empty(count), np.empty((count, 12)), np.empty(count)
+        share(evaluate, count, *inputs, energy, force, _NOTHING, forces, deformations, turn)
         return forces, deformations
 
     def _kernel_input(self, state: State) -> tuple[Reals | Indices, ...]:

@@ -18,7 +18,12 @@ from __future__ import annotations
 import numpy as np
 
 from shellform.compiled import njit
+from shellform.structure.elements.local_rotation import NEAR, turned_far
 from shellform.structure.elements.rotation import matrix
+
+# The least (a_y + b_y)·e_y, 2 at rest, from which the roll of the element triad is taken; below, where the chord
+# has turned about z until it lies nearly along them, it is taken from the z axes in the same way.
+_UPRIGHT = 0.25
 
 
 @njit(cache=True, error_model="numpy", nogil=True, fastmath={"contract"})
@@ -36,9 +41,11 @@ def evaluate(  # type: ignore[no-untyped-def]
     blocks,
     local_force,
     local_deformation,
+    turn,
 ):
     """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled
-    where they have rows.
+    where they have rows, `turn` (m,) with the largest of the ends' local rotations and the twist from one to the
+    other, rad, where an end is turned farther than equation (12) measures (local_rotation.py), else 0.
 
     Positions and quaternions may be complex, for derivatives by complex steps (third_derivatives.py).
     """
@@ -62,11 +69,16 @@ def evaluate(  # type: ignore[no-untyped-def]
     S = np.empty((3, 3), dtype)
     alpha = np.zeros(6, dtype)
     K = np.empty((9, 9), dtype)
+    curvature = np.empty((2, 3, 3), dtype)  # of the local rotations at an end that is turned far
     for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
         l0 = rest_length[e]
         EA, GJ, EIy, EIz = stiffness[e, 0], stiffness[e, 1], stiffness[e, 2], stiffness[e, 3]
         l = _triads(positions, quaternions, frames[e], a, b, E, A, B, Q)
+        by_z = _rolled_by_z(A, B)
+        if by_z:  # the same element by the other pair of axes, its y axis along z
+            l = _triads(positions, quaternions, _by_z(frames[e]), a, b, E, A, B, Q)
+            EIy, EIz = EIz, EIy
 
         # Local rotations (12) and moments (15, 18); order xa, ya, za, xb, yb, zb.
         theta[0], theta[1], theta[2] = (
@@ -83,6 +95,17 @@ def evaluate(  # type: ignore[no-untyped-def]
             sine[k] = theta[k]
             cosine[k] = np.sqrt(1.0 - sine[k] * sine[k])
             theta[k] = np.arcsin(sine[k])
+        far_a = (A[0, 0] + A[1, 1] + A[2, 2]).real < NEAR
+        far_b = (B[0, 0] + B[1, 1] + B[2, 2]).real < NEAR
+        turn[e] = 0.0
+        if far_a:
+            turn[e] = turned_far(A, moment[:3], theta[:3], h[:3], curvature[0])
+        if far_b:
+            turn[e] = max(turn[e], turned_far(B, moment[3:], theta[3:], h[3:], curvature[1]))
+        if far_a or far_b:
+            turn[e] = max(turn[e], abs((theta[0] - theta[3]).real))
+        if by_z and (A[1, 1] + B[1, 1]).real < _UPRIGHT:
+            turn[e] = np.pi  # neither pair of axes tells how the element is rolled
         N = EA * (l - l0) / l0
         moment[0] = GJ * (theta[0] - theta[3]) / l0
         moment[1] = EIy * (4.0 * theta[1] + 2.0 * theta[4]) / l0
@@ -99,12 +122,32 @@ def evaluate(  # type: ignore[no-untyped-def]
             local_force[e, 0], local_deformation[e, 0] = N, l - l0
             for k in range(6):
                 local_force[e, 1 + k], local_deformation[e, 1 + k] = moment[k], theta[k]
+            if by_z:
+                _back(local_force[e])
+                _back(local_deformation[e])
 
         # g = sum c_k h_k on each end is the axial vector of Q = sum +-c_k (triad vector)(element axis)'; M =
         # Q - tr(Q) I.
         for end in range(2):
             T = A if end == 0 else B
             M = Ma if end == 0 else Mb
+            k = 3 * end
+            if far_b if end else far_a:
+                turned_far(T, moment[k : k + 3], theta[k : k + 3], h[k : k + 3], curvature[end])
+                for i in range(3):
+                    g[end, i] = (
+                        moment[k] * h[k, i] + moment[k + 1] * h[k + 1, i] + moment[k + 2] * h[k + 2, i]
+                    )
+                for i in range(3):
+                    for j in range(3):
+                        M[i, j] = curvature[end, i, j]
+                M[0, 1] += 0.5 * g[end, 2]
+                M[1, 0] -= 0.5 * g[end, 2]
+                M[1, 2] += 0.5 * g[end, 0]
+                M[2, 1] -= 0.5 * g[end, 0]
+                M[2, 0] += 0.5 * g[end, 1]
+                M[0, 2] -= 0.5 * g[end, 1]
+                continue
             cx, cy, cz = c[3 * end], c[3 * end + 1], c[3 * end + 2]
             for i in range(3):
                 Q[i, 0] = -cy * T[i, 2] - cz * T[i, 1]
@@ -142,6 +185,8 @@ def evaluate(  # type: ignore[no-untyped-def]
 
         # h_k / (2 cos theta_k): gradients of the local rotations by the rotation increment of their end.
         for end in range(2):
+            if far_b if end else far_a:
+                continue  # filled by then
             T = A if end == 0 else B
             k = 3 * end
             s = 0.5 / cosine[k]
@@ -154,8 +199,11 @@ def evaluate(  # type: ignore[no-untyped-def]
         near_a[0], near_a[1], near_a[2] = GJ / l0, 4.0 * EIy / l0, 4.0 * EIz / l0
         far[0], far[1], far[2] = -GJ / l0, 2.0 * EIy / l0, 2.0 * EIz / l0
         for k in range(3):
-            near_b[k] = near_a[k] + moment[k + 3] * sine[k + 3] / cosine[k + 3]
-            near_a[k] += moment[k] * sine[k] / cosine[k]
+            near_b[k] = near_a[k]
+            if not far_b:
+                near_b[k] += moment[k + 3] * sine[k + 3] / cosine[k + 3]
+            if not far_a:
+                near_a[k] += moment[k] * sine[k] / cosine[k]
 
         # P: the quadratic form of the two ends' rotation increments with the element triad at rest, from the
         # derivatives of the moments by the local rotations, the arcsine's own curvature with them, and from
@@ -301,6 +349,37 @@ def _turn(E, K, row, column, X):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, inline="always")
+def _rolled_by_z(A, B):  # type: ignore[no-untyped-def]
+    """Whether the roll of the element has to be taken from the ends' z axes instead of their y axes: the chord
+    has turned about z so far that it lies along the y axes, or beyond them.
+    """
+    upright, along = (A[1, 1] + B[1, 1]).real, (A[2, 2] + B[2, 2]).real
+    if upright < _UPRIGHT:
+        return True
+    return along < 0.0 and along**2 + (A[1, 2] + B[1, 2]).real ** 2 > upright**2
+
+
+@njit(cache=True)
+def _by_z(frame):  # type: ignore[no-untyped-def]
+    """The axes (2, 3, 3) at both ends turned by 90 degrees about x: y along z, z along -y."""
+    result = np.empty_like(frame)
+    for end in range(2):
+        for i in range(3):
+            result[end, i, 0], result[end, i, 1] = frame[end, i, 0], frame[end, i, 2]
+            result[end, i, 2] = -frame[end, i, 1]
+    return result
+
+
+@njit(cache=True)
+def _back(local):  # type: ignore[no-untyped-def]
+    """Puts rows in the order of (16) or (17), about axes turned by `_by_z`, back about the element's own."""
+    for y in (2, 5):
+        about_y = local[y : y + 1].copy()
+        local[y] = local[y + 1]
+        local[y + 1] = -about_y[0]
+
+
+@njit(cache=True, inline="always")
 def _row(r):  # type: ignore[no-untyped-def]
     """Where row r of a packed lower triangle begins."""
     return r * (r + 1) // 2
@@ -320,13 +399,24 @@ def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length,
     )
     rate = np.zeros((7, 9), dtype)
     turned = np.empty(9, dtype)
+    theta, none = np.empty(3, dtype), np.zeros(3, dtype)
+    h, curvature = np.empty((6, 3), dtype), np.empty((3, 3), dtype)
     for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
         l = _triads(positions, quaternions, frames[e], a, b, E, A, B, Q)
+        by_z = _rolled_by_z(A, B)
+        if by_z:
+            l = _triads(positions, quaternions, _by_z(frames[e]), a, b, E, A, B, Q)
         v0, v1 = A[0, 1] + B[0, 1], A[1, 1] + B[1, 1]
         eta = v0 / v1
         rate[:] = 0.0
         rate[0, 0] = 1.0
+        far_a = (A[0, 0] + A[1, 1] + A[2, 2]).real < NEAR
+        far_b = (B[0, 0] + B[1, 1] + B[2, 2]).real < NEAR
+        if far_a:
+            turned_far(A, none, theta, h[:3], curvature)
+        if far_b:
+            turned_far(B, none, theta, h[3:], curvature)
         for k in range(6):
             T = A if k < 3 else B
             axis = k % 3
@@ -341,6 +431,8 @@ def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length,
                 h0, h1, h2 = -T[2, 0], -T[2, 1], T[0, 0] + T[1, 1]
             scale = 0.5 / np.sqrt(1.0 - s * s)
             h0, h1, h2 = scale * h0, scale * h1, scale * h2
+            if far_a if k < 3 else far_b:
+                h0, h1, h2 = h[k, 0], h[k, 1], h[k, 2]
             row = rate[1 + k]
             own = 3 if k < 3 else 6
             row[own], row[own + 1], row[own + 2] = h0, h1, h2
@@ -352,6 +444,8 @@ def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length,
             row[7] += h0 * B[0, 1] / v1
         l0 = rest_length[e]
         EA, GJ, EIy, EIz = stiffness[e, 0], stiffness[e, 1], stiffness[e, 2], stiffness[e, 3]
+        if by_z:
+            EIy, EIz = EIz, EIy
         for k in range(7):
             for j in range(9):
                 if k == 0:
@@ -368,6 +462,8 @@ def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length,
                 result[e, k, 6 + i] = along
                 result[e, k, 3 + i] = E[i, 0] * turned[3] + E[i, 1] * turned[4] + E[i, 2] * turned[5]
                 result[e, k, 9 + i] = E[i, 0] * turned[6] + E[i, 1] * turned[7] + E[i, 2] * turned[8]
+        if by_z:
+            _back(result[e])
 
 
 @njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})

@@ -20,12 +20,13 @@ class Evaluation:
     1) / 2).
 
     The tangent is the packed lower triangle, row by row, of each element's symmetric Hessian; None where not
-    asked for.
+    asked for. `turned`, rad: the largest local rotation or twist of a beam, 0 where all are below 45 degrees.
     """
 
     energy: Reals
     force: Reals
     tangent: Reals | None
+    turned: float = 0.0
 
 
 class Part(Protocol):

@@ -31,13 +31,14 @@ class Balance:
     None).
 
     `largest` is the largest component of any element's end force, moments over the node's arm, N: the scale
-    for residuals.
+    for residuals. `turned`, rad: the largest local rotation or twist of a beam, 0 where all are below 45 degrees.
     """
 
     energy: float
     force: Reals
     tangent: Reals | None
     largest: float
+    turned: float = 0.0
 
 
 class Assembly:
@@ -95,7 +96,7 @@ class Assembly:
     def evaluate(self, state: State, *, tangent: bool = True) -> Balance:
         """Energy, internal forces and, if asked for, the tangent at the state."""
         began = time.perf_counter()
-        energy, largest = 0.0, 0.0
+        energy, largest, turned = 0.0, 0.0, 0.0
         force = np.zeros(6 * self.count)
         for part, dofs, (first, last) in zip(self.parts, self._dofs, self._shares, strict=True):
             if not len(dofs):
@@ -103,13 +104,14 @@ class Assembly:
             block = self._entries[first:last].reshape(len(dofs), -1) if tangent else None
             result = part.evaluate(state, tangent=tangent, into=block)
             energy += float(result.energy.sum())
+            turned = max(turned, result.turned)
             largest = max(largest, _add_forces(dofs, self.reach, result.force, force))
         values = None
         if tangent:
             values = np.empty(len(self.matrix.indices))
             share(_gather, len(values), *self._sources, self._entries, values)
         self.clock["assembly"] += time.perf_counter() - began
-        return Balance(energy, force.reshape(-1, 6), values, largest)
+        return Balance(energy, force.reshape(-1, 6), values, largest, turned)
 
     def force_along(self, state: State, motion: Reals) -> Reals:
         """How the internal forces (n, 6) begin to change, N and N·m, as the nodes move by `motion` (n, 6),

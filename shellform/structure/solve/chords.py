@@ -57,6 +57,21 @@ class ChordKeeper:
             family = Symmetric(block.indptr.astype(np.int64), block.indices.astype(np.int64))
             self.axes.append((nodes, np.array(group), family.factor_thin(block.data)))
 
+    def largest_turn(self, before: State, after: State) -> float:
+        """The largest angle, rad, between a beam's chord in one state and in the other."""
+        one, two = (
+            each.positions[self.ends[:, 1]] - each.positions[self.ends[:, 0]] for each in (before, after)
+        )
+        across, along = np.linalg.norm(np.cross(one, two), axis=1), (one * two).sum(axis=1)
+        return float(np.arctan2(across, along).max(initial=0.0))
+
+    def halved(self, before: State, after: State) -> bool:
+        """Whether a beam of one state has less than half its length, or is reversed, in the other."""
+        one, two = (
+            each.positions[self.ends[:, 1]] - each.positions[self.ends[:, 0]] for each in (before, after)
+        )
+        return bool(((one * two).sum(axis=1) < 0.5 * (one * one).sum(axis=1)).any())
+
     def corrected(self, state: State, step: Reals) -> Reals:
         """The step (n, 6) with its translations corrected."""
         if not len(self.ends):

@@ -32,7 +32,7 @@ from shellform.errors import NotConverged
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
-from shellform.structure.solve.residual import ResidualNorm, Turning, held
+from shellform.structure.solve.residual import ResidualNorm, Turning, check_turned, held, overturned
 
 # unbalanced over largest force; rounding leaves about 1e-10 for rods of EA/l = 1e7 N/m and 10 N loads
 TOLERANCE = 1e-8
@@ -110,6 +110,7 @@ def find_equilibrium(
                 remedy="Apply the load in more increments, or start from a state nearer to the equilibrium.",
             )
         walk.step(on_branch)
+    check_turned(assembly, walk.state, walk.now, walk.factorisations)
     stable, negative = stability(assembly, walk.now)
     return Equilibrium(walk.state, walk.now.energy, walk.residual, walk.factorisations, stable, negative)
 
@@ -141,6 +142,7 @@ def newton(
         noise = measure.rounding(now, state, load) if residual > _STAGNANT * before else 0.0
         before = residual
         if residual <= max(tolerance, noise):
+            check_turned(assembly, state, now, spent)
             stable, negative = stability(assembly, now)
             return Equilibrium(state, now.energy, residual, spent, stable, negative)
         if not np.isfinite(residual):
@@ -290,6 +292,9 @@ class _Relaxation:
             whole_step = self.assembly.chords.corrected(self.state, share * step)
             trial = moved(self.state, whole_step)
             then = self.assembly.evaluate(trial)
+            if overturned(self.assembly, self.state, self.now.turned, trial, then.turned):
+                share *= 0.5
+                continue
             rise = then.energy - self.now.energy - float(np.einsum("ij,ij", self.load, whole_step))
             rounding = 1e-12 * (abs(then.energy) + abs(self.now.energy))
             residual = self.measure.residual(then, self.load)

@@ -5,8 +5,8 @@ here: from an equilibrium, loads and imposed displacements change together in in
 unless said otherwise); each is solved from the one before by steps that may not lose definiteness on the way
 (`on_branch`). Where they do, or where many steps are needed, the increment is halved, down to `SMALLEST` of
 the whole; after two that succeed it is doubled again. Where even the smallest fails the stable branch has
-ended; the rest is then applied at once and implicit dynamic relaxation follows the snap-through to wherever
-it ends. So the same start and load always lead to the same state. Supports that move take the free nodes
+ended; the rest is then applied at once, supports being moved no farther at a time than no element folds, and
+implicit dynamic relaxation follows the snap-through to wherever it ends. So the same start and load always lead to the same state. Supports that move take the free nodes
 along by the tangent, K dx = -K_held d, before the steps begin.
 """
 
@@ -23,11 +23,12 @@ from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
-from shellform.structure.solve.residual import held
+from shellform.structure.solve.residual import held, overturned
 
 STEP = 0.25
 SMALLEST = 1.0 / 64.0
 _PATIENCE = 25  # factorisations of one increment; on the branch five or six are enough
+_LEAST = 1e-6  # of the whole, by which supports move on at least where the branch has ended
 _REGROWTH = 2  # good increments before one is doubled again
 
 Report = Callable[[float, Equilibrium], None]
@@ -145,11 +146,17 @@ def advance(
         if good == _REGROWTH:
             width, good = min(2.0 * width, widest), 0
     if share < 1.0 and not stay:
-        then = _with_supports(state, drive, (1.0 - share) * (end - begin))
-        found = find_equilibrium(assembly, then, drive.at(end), tolerance=tolerance, limit=limit)
-        spent += found.factorisations
-        if report is not None:
-            report(1.0, found)
+        at = share
+        while True:
+            then, at = _moved_on(assembly, state, drive, at, begin, end)
+            found = find_equilibrium(
+                assembly, then, drive.at(begin + at * (end - begin)), tolerance=tolerance, limit=limit
+            )
+            state, spent = found.state, spent + found.factorisations
+            if report is not None:
+                report(at, found)
+            if at == 1.0:
+                break
     elif share < 1.0 or found is None:
         found = find_equilibrium(
             assembly, state, drive.at(begin + share * (end - begin)), tolerance=tolerance
@@ -166,13 +173,39 @@ def limit_factor(assembly: Assembly, start: State, load: Reals, *, most: float =
     return most * apply_load(assembly, start, none, most * load, step=0.0625, stay=True).share
 
 
+def _moved_on(
+    assembly: Assembly, state: State, drive: Drive, share: float, begin: float, end: float
+) -> tuple[State, float]:
+    """The state with the supports moved on from a share of the whole, to its end or as far as they turn no element
+    too far and halve the length of none, and the share reached. Raises NotConverged where they can't move.
+    """
+    goal = 1.0
+    while True:
+        then = _with_supports(state, drive, (goal - share) * (end - begin))
+        if not drive.moves_supports or not _folded(assembly, state, then):
+            return then, goal
+        goal = share + 0.5 * (goal - share)
+        if goal - share < _LEAST:
+            raise NotConverged(
+                "Supports that move fold an element",
+                state=state,
+                remedy="Apply the motion in more increments, or divide the rods into more elements.",
+            )
+
+
+def _folded(assembly: Assembly, before: State, after: State) -> bool:
+    """Whether moving supports turn an element too far or halve its length."""
+    was, turned = (assembly.evaluate(each, tangent=False).turned for each in (before, after))
+    return assembly.chords.halved(before, after) or overturned(assembly, before, was, after, turned)
+
+
 def _with_supports(state: State, drive: Drive, change: float) -> State:
     return moved(state, change * drive.imposed) if drive.moves_supports else state
 
 
 def _carried(assembly: Assembly, state: State, drive: Drive, change: float) -> tuple[State, int]:
     """The state with the supports moved by the change of the factor and the free nodes along with them, and
-    factorisations spent.
+    factorisations spent. Raises NotConverged where that folds an element.
     """
     if not drive.moves_supports:
         return state, 0
@@ -182,5 +215,9 @@ def _carried(assembly: Assembly, state: State, drive: Drive, change: float) -> t
     try:
         step[assembly.free] = assembly.matrix.factor(held(assembly, assembly.evaluate(state))).solve(pull)
     except NotPositiveDefinite:
-        return _with_supports(state, drive, change), 1
-    return moved(state, assembly.chords.corrected(state, step.reshape(-1, 6))), 1
+        then = _with_supports(state, drive, change)
+    else:
+        then = moved(state, assembly.chords.corrected(state, step.reshape(-1, 6)))
+    if _folded(assembly, state, then):
+        raise NotConverged("Supports that move fold an element", state=state, iterations=1)
+    return then, 1

@@ -36,7 +36,7 @@ from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
 from shellform.structure.solve.factorisation import Indefinite
 from shellform.structure.solve.loading import Drive
-from shellform.structure.solve.residual import ResidualNorm, Turning, held
+from shellform.structure.solve.residual import ResidualNorm, Turning, held, overturned
 
 FIRST = 0.1  # of the goal, the first step's change of the factor
 MOST = 500  # points
@@ -142,6 +142,7 @@ class _Here:
     tangent: Reals
     rate: float
     iterations: int
+    turned: float
 
     @property
     def negative(self) -> int:
@@ -188,7 +189,7 @@ class _Path:
             raise InputError(
                 "nothing moves under this load", where="path", remedy="Choose a load that acts on free nodes."
             )
-        return _Here(state, factor, found, tangent, 1.0 / speed, iterations)
+        return _Here(state, factor, found, tangent, 1.0 / speed, iterations, balance.turned)
 
     def step(self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float) -> _Here:
         """The point at `size` from `here`. Raises _Missed."""
@@ -280,8 +281,12 @@ class _Path:
         )
 
     def _settled(self, here: _Here, state: State, factor: float, iterations: int) -> _Here:
-        """The converged point, its rate signed by which way along the path the factor grows."""
+        """The converged point, its rate signed by which way along the path the factor grows. Raises _Missed where
+        an element has turned too far on the way.
+        """
         found = self.point(state, factor, iterations)
+        if overturned(self.assembly, here.state, here.turned, state, found.turned):
+            raise _Missed
         onward = float(np.sign(found.tangent[self.moving] @ self.between(here.state, state))) or 1.0
         return replace(found, rate=onward * abs(found.rate))
 

@@ -1,5 +1,5 @@
-"""How far a state is from equilibrium, what holds a rod that is free to spin, and Newton's step under dead
-moments.
+"""How far a state is from equilibrium, how far its elements may turn, what holds a rod that is free to spin, and
+Newton's step under dead moments.
 """
 
 from __future__ import annotations
@@ -9,10 +9,15 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from shellform.arrays import Reals
 from shellform.compiled import njit
+from shellform.errors import NotConverged
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.factorisation import Factor
 
+HOLDS = np.radians(
+    170.0
+)  # the largest local rotation that is accepted: at 180 degrees its measure turns back
+_UNTOLD = np.radians(90.0)  # of twist, up to which it is not told
 _HELD = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
 
 
@@ -54,6 +59,37 @@ class ResidualNorm:
         last_bit = 4.0 * np.finfo(float).eps * float(np.abs(state.positions).max(initial=0.0))
         scale = self.scale(balance, load)
         return stiffest * last_bit / scale if scale > 0.0 else 0.0
+
+
+def overturned(assembly: Assembly, before: State, was: float, after: State, turned: float) -> bool:
+    """Whether an element has turned, or may have on the way, beyond what its local rotation is measured for: from
+    one state to the other, at which `Balance.turned` was `was` and is `turned`.
+    """
+    if turned == 0.0:  # more in one step than a chord and nodes together can turn
+        return False
+    nodes = np.abs(np.einsum("ij,ij->i", before.quaternions, after.quaternions)).min(initial=1.0)
+    chord = assembly.chords.largest_turn(before, after)
+    return turned > HOLDS or max(was, _UNTOLD) + 4.0 * np.arccos(min(nodes, 1.0)) + chord > np.pi
+
+
+def check_turned(assembly: Assembly, state: State, balance: Balance, spent: int) -> None:
+    """Raises NotConverged naming the element where one has turned beyond what its local rotation is measured
+    for.
+    """
+    if balance.turned <= HOLDS:
+        return
+    worst = [np.linalg.norm(beams.local_deformations(state)[:, 1:4], axis=1) for beams in assembly.beams]
+    worst = [
+        np.maximum(near, np.linalg.norm(beams.local_deformations(state)[:, 4:], axis=1))
+        for near, beams in zip(worst, assembly.beams, strict=True)
+    ]
+    beam = int(np.argmax(np.concatenate(worst)))
+    raise NotConverged(
+        f"beams[{beam}] is turned against its ends by {np.degrees(balance.turned):.0f} degrees",
+        state=state,
+        iterations=spent,
+        remedy="Apply the load in more increments, or divide the rod into more elements.",
+    )
 
 
 def held(assembly: Assembly, balance: Balance) -> Reals:
