@@ -4,8 +4,8 @@ Every limit holds under every load case, and those that matter before concrete c
 critical load factor F is kept by a load case "critical NAME", F times the load case, that every accepted
 design bears on its stable branch, its softest mode keeping a share of the initial design's stiffness under
 the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is followed by stable
-states again: in the end the paths are followed closely (`critical_factors`), and a design whose path ends
-before F isn't feasible.
+states again: in the end the perfect structure's path is followed closely (refinement.py), and a design whose
+path ends before F isn't feasible.
 """
 
 from __future__ import annotations
@@ -41,12 +41,10 @@ from shellform.problem.robust import RobustMisfit
 from shellform.problem.terms import CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.problem.variables import FreeRadius, RestLengths, Variable
 from shellform.structure.answers import results
-from shellform.structure.answers.stability import critical_load, modes
+from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
-from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.loading import forces
 
 # of the initial design's softest mode under the design load, that is left at the critical factor asked for
 _SOFTEST = 0.25
@@ -205,55 +203,3 @@ def edge_utilisation(shell: Gridshell, beams: Beams, forces: Reals) -> float:
     if shell.edge is None or not shell.net.edges:
         return 0.0
     return float(np.nanmax(results.utilisation(beams, forces, {EDGE: shell.edge.section})))
-
-
-def below_factor(factors: Mapping[str, Mapping[str, Any]], wanted: float, names: Sequence[str]) -> list[str]:
-    """Those of the load cases `names` whose path ends below the `wanted` factor, as `critical_factors` found
-    it by following.
-    """
-    found = {name: factors[name]["critical_factor"] for name in names if name in factors}
-    return [name for name, factor in found.items() if factor is not None and factor < wanted * (1.0 - _EQUAL)]
-
-
-def critical_factors(
-    shell: Gridshell, design: Design, unloaded: State, loads: Mapping[str, Reals], *, wanted: float | None
-) -> dict[str, dict[str, Any]]:
-    """For each load case the factor at which the design's path from the `unloaded` state loses stability:
-    `critical_factor`, None where it doesn't up to `critical_sought`, and the `critical_kind` of point."""
-    goal = max(_SOUGHT, 1.5 * (wanted or 0.0))
-    assembly, found = assemble(shell.network(design)), dict[str, dict[str, Any]]()
-    sizes = {name: float(np.linalg.norm(load)) for name, load in loads.items()}
-    # The largest first: a load case that is a share of another one has the same path, and isn't followed
-    # again.
-    for name in sorted((name for name in loads if sizes[name]), key=lambda name: -sizes[name]):
-        larger = next((each for each in found if _is_share(loads[name], loads[each])), None)
-        if larger is None:
-            found[name] = _critical(assembly, unloaded, loads[name], goal)
-        else:
-            factor = found[larger]["critical_factor"]
-            factor = None if factor is None else factor * sizes[larger] / sizes[name]
-            found[name] = (
-                {**found[larger], "critical_factor": factor}
-                if factor is None or factor <= goal
-                else _told(goal)
-            )
-    return {name: found[name] for name in loads if name in found}
-
-
-def _is_share(load: Reals, larger: Reals) -> bool:
-    share = float(np.vdot(load, larger) / np.vdot(larger, larger))
-    return share > 0.0 and bool(
-        np.allclose(load, share * larger, rtol=0.0, atol=1e-12 * float(np.abs(larger).max()))
-    )
-
-
-def _told(goal: float) -> dict[str, Any]:
-    return {"critical_sought": goal, "critical_factor": None, "critical_kind": None}
-
-
-def _critical(assembly: Assembly, unloaded: State, load: Reals, goal: float) -> dict[str, Any]:
-    try:
-        end = critical_load(assembly, unloaded, forces(load), goal=goal)
-    except NotConverged as error:  # the rest of the summary stands without it
-        return _told(goal) | {"critical_kind": f"not found: {error.what}"}
-    return _told(goal) | ({} if end is None else {"critical_factor": end.factor, "critical_kind": end.kind})

@@ -84,8 +84,12 @@ def critical_factor(shell: Gridshell, design: Design, load: Reals, *, sought: fl
     """The load factor at which a design, loaded from nothing, loses stability, and what ends its path. Raises
     NotConverged where there is no unloaded equilibrium."""
     supports = tuple(int(node) for node in shell.net.supports)
-    model = Model(shell.network(design), {"load": load}, shell.target, supports)
-    return _limit(model, sought)[1]
+    return critical_of(Model(shell.network(design), {"load": load}, shell.target, supports), sought=sought)
+
+
+def critical_of(model: Model, load: str = "load", *, sought: float = SOUGHT) -> Limit:
+    """The same of a model file under one of its load cases, with a start. Raises InputError, NotConverged."""
+    return _limit(model, load, sought)[1]
 
 
 def halved(model: Model) -> Model:
@@ -164,8 +168,8 @@ def _between(start: State, beams: Beams, rods: np.ndarray) -> State:
     return State(np.vstack([start.positions, middle]), np.vstack([start.quaternions, half]))
 
 
-def _limit(model: Model, sought: float) -> tuple[Workshop, Limit]:
-    nominal = perfect_of(model, "load", shapes=0)
+def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
+    nominal = perfect_of(model, load, shapes=0)
     workshop = Workshop(nominal)
     members = members_of_model(model)
     none = errors_of(members, Tolerances(), variables(members, 0, 0))
@@ -175,7 +179,7 @@ def _limit(model: Model, sought: float) -> tuple[Workshop, Limit]:
 def _numbers(
     model: Model, target: Reals, section: Section, sought: float
 ) -> tuple[float, float, float, float, str]:
-    workshop, limit = _limit(model, sought)
+    workshop, limit = _limit(model, "load", sought)
     state, beams = workshop.nominal.states[-1], model.network.beams
     away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
     stress = float(rod_bending_stress(section, beams, beams.local_forces(state)).max())

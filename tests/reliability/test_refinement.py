@@ -1,5 +1,6 @@
 """Rod elements halved, Richardson's estimate, critical factors that are factors; and how structures fail."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -8,11 +9,17 @@ import pytest
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.failure import explained, most_likely
-from shellform.reliability.path_of_one import BORNE, LIMIT_POINT
+from shellform.reliability.path_of_one import BIFURCATION, BORNE, LIMIT_POINT
 from shellform.reliability.perfect import perfect, perfect_of
-from shellform.reliability.refinement import Refined, critical_factor, halved, mesh_error
+from shellform.reliability.refinement import Refined, critical_factor, critical_of, halved, mesh_error
 from shellform.reliability.standing import Workshop
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
+from shellform.structure.network import Network
+from shellform.verification import exact
+from shellform.verification.models import PIN, chain, in_plane, line, load_at
 
 LARGE = Tolerances(cable_length=3e-4, supports=3e-4, marks=3e-4, load_each=0.1, load_all=0.05, connectors=0.1)
 
@@ -61,6 +68,64 @@ def test_a_load_that_is_borne_as_far_as_was_looked_has_no_critical_kind(dome, no
 def test_the_critical_factor_scales_with_the_load(dome, nominal):
     one, half = (critical_factor(dome, dome.design(), s * nominal.load).factor for s in (1.0, 0.5))
     assert half == pytest.approx(2.0 * one, rel=1e-3)
+
+
+def low_arch(rise, elements=24):
+    """Timoshenko's low arch, pinned, a half sine of the `rise` in radii of gyration, and the load in the same
+    shape of which 1 is EI (pi/L)^4 times that radius; L = EI = 1. The height a of the arch under the load q
+    is given by q = rise - a + a (rise^2 - a^2) / 4."""
+    radius = 1.0 / 400.0
+    points, along = line(elements), np.sin(np.pi * np.linspace(0.0, 1.0, elements + 1))
+    points[:, 2] = rise * radius * along
+    network = in_plane(chain(points, (radius**-2, 1.0, 1.0, 1.0), {0: PIN, elements: PIN}))
+    # A taut string between the supports, which are held: forces of a size, against which none count as none.
+    string = make_cables([[0, elements]], rest_length=0.5, stiffness=1.0)
+    network = replace(network, cables=string)
+    load = np.zeros((elements + 1, 6))
+    load[:, 2] = -(np.pi**4) * radius * along / elements
+    return Model(network, {"load": load}, at_rest(points), (0, elements))
+
+
+@pytest.mark.parametrize(
+    ("rise", "factor", "kind"),
+    [
+        # Fung and Kaplan, NACA TN 2840 (1952): from a rise of 22^0.5 radii on the arch sways aside where a^2 =
+        # rise^2 - 16, before it would snap through at a^2 = (rise^2 - 4) / 3.
+        (8.0, 8.0 + 3.0 * 48.0**0.5, BIFURCATION),
+        (4.4, 4.4 - 5.12**0.5 + 5.12**0.5 * (4.4**2 - 5.12) / 4.0, LIMIT_POINT),
+    ],
+)
+def test_a_low_arch_sways_aside_before_it_snaps_through_where_it_is_high_enough(rise, factor, kind):
+    model = low_arch(rise)
+    share = {name: 0.5 * factor * load for name, load in model.loads.items()}
+    end = critical_of(Model(model.network, share, model.start, model.supported))
+    # O(h^2) of 24 chords, and what the arch isn't infinitely low.
+    assert 0.5 * factor * end.factor == pytest.approx(factor, rel=0.01)
+    assert end.kind == kind
+
+
+def test_eulers_column_buckles_at_its_load_though_its_straight_path_goes_on():
+    network = in_plane(chain(line(24), (1e6, 1.0, 1.0, 1.0), {0: PIN, 24: [False, *PIN[1:]]}))
+    load = load_at(network, 24, [-4.0, 0.0, 0.0])
+    end = critical_of(Model(network, {"load": load}, at_rest(network.nodes), (0, 24)))
+    assert 4.0 * end.factor == pytest.approx(np.pi**2, rel=3e-3)  # O(h^2) late
+    assert end.kind == BIFURCATION
+
+
+def test_a_column_braced_by_prestressed_cables_buckles_at_timoshenkos_load():
+    points = np.vstack([line(24), [[0.5, 0.0, 1.0], [0.5, 0.0, -1.0]]])
+    fixed = np.zeros((27, 6), dtype=bool)
+    fixed[:, [1, 3, 5]] = True
+    fixed[0, :3] = fixed[24, 2] = fixed[25:, :3] = True
+    ends = np.column_stack([np.arange(24), np.arange(1, 25)])
+    beams = make_beams(points, ends, axial=1e6, torsion=1.0, bending_y=1.0, bending_z=1.0)
+    cables = make_cables([[12, 25], [12, 26]], rest_length=0.95, stiffness=25.0)
+    network = Network(points, beams, cables, fixed, np.zeros((27, 6)))
+    reference = exact.braced_column(50.0 / 0.95)
+    model = Model(network, {"load": load_at(network, 24, [-8.0, 0.0, 0.0])}, at_rest(points), (0, 24, 25, 26))
+    end = critical_of(model)
+    assert 8.0 * end.factor == pytest.approx(reference, rel=5e-3)
+    assert end.kind == BIFURCATION
 
 
 def test_mesh_errors_are_told_of_all_four_numbers(dome, nominal):
