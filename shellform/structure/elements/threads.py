@@ -8,6 +8,7 @@ decisions can magnify: 108 and 102 cables.
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _WORTH_SHARING = 500  # elements; below, starting the threads takes longer than the loop
+_OWN = threading.local()  # `taken` in a thread whose siblings keep the other cores busy
 
 
 def cores() -> int:
@@ -41,9 +43,9 @@ def dense_on_one() -> Iterator[None]:
 
 def share(loop: Callable[..., Any], count: int, *arguments: Any) -> None:
     """Runs `loop(start, stop, *arguments)` over 0 to `count`; the loop has to release the interpreter
-    (nogil).
+    (nogil). Side by side with others it runs on its own core.
     """
-    number = min(cores(), count // _WORTH_SHARING)
+    number = 1 if getattr(_OWN, "taken", False) else min(cores(), count // _WORTH_SHARING)
     if number < 2:
         loop(0, count, *arguments)
         return
@@ -56,13 +58,13 @@ def share(loop: Callable[..., Any], count: int, *arguments: Any) -> None:
 
 
 def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """`work` on every item, on as many threads as there are cores; results in order. The first error that is
-    raised ends the rest.
+    """`work` on every item, on as many threads as there are cores; results in order. What is done so within
+    one of the items stays on its thread. The first error that is raised ends the rest.
     """
-    number = min(cores(), len(items))
+    number = 1 if getattr(_OWN, "taken", False) else min(cores(), len(items))
     if number < 2:
         return [work(item) for item in items]
-    with ThreadPoolExecutor(number, thread_name_prefix="shellform-case") as pool:
+    with ThreadPoolExecutor(number, "shellform-case", _take) as pool:
         running = [pool.submit(work, item) for item in items]
         try:
             return [each.result() for each in running]
@@ -70,6 +72,11 @@ def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[
             for each in running:
                 each.cancel()
             raise
+
+
+def _take() -> None:
+    """Says of the thread that it has a core to itself."""
+    _OWN.taken = True
 
 
 @cache
