@@ -182,24 +182,20 @@ class ModalStiffness(Term):
         assembly = assemble(shell.network(design))
         found = modes(assembly, state, _MODES)
         mass = residual.ResidualNorm(assembly).mass_shape
-        rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
-        rows, by_radius, by_rest = [], [], []
-        for shape in found.shapes:
-            unit = shape / np.sqrt(float(mass @ shape.ravel()[assembly.free] ** 2))
-            mode = unit.reshape(-1, 1)
-            rows.append(bilinear_by_dof(assembly, state, mode, mode))
-            by_radius.append(bilinear(rate, state, mode, mode))
-            by_rest.append(bilinear_by_rest_length(cables, state, mode, mode))
+        flat = found.shapes.reshape(_MODES, -1)
+        size = np.sqrt((flat[:, assembly.free] ** 2) @ mass)
+        motions = (flat / size[:, None]).T
         stiffness = found.stiffness
         weight, largest = _smooth(-stiffness * np.abs(stiffness), SHARPNESS / self.scale**2)
-        weight = 2.0 * np.abs(stiffness) * weight
+        weighted = 2.0 * np.abs(stiffness) * weight * motions
+        rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
         spread = np.zeros(len(shell.cable_ends))
-        spread[np.flatnonzero(design.present)] = weight @ np.array(by_rest)
+        spread[design.present] = bilinear_by_rest_length(cables, state, weighted, motions)
         return Measurement(
             np.array([-largest]),
-            sp.csr_array((weight @ np.array(rows))[None]),
+            sp.csr_array(bilinear_by_dof(assembly, state, weighted, motions)[None]),
             sp.csr_array(spread[None]),
-            np.array([float(weight @ np.array(by_radius))]),
+            np.array([bilinear(rate, state, weighted, motions)]),
         )
 
 
