@@ -91,7 +91,12 @@ class Net:
     @property
     def lines(self) -> Indices:
         """Node pairs (m, 2) of the elements of all rods, then of the edge beams: what is drawn."""
-        return np.vstack([self.grid.rod_ends, *(line.ends for line in self.edges)])
+        return np.vstack([self.grid.rod_ends, self.edge_lines])
+
+    @property
+    def edge_lines(self) -> Indices:
+        """Node pairs (m, 2) of the elements of the edge beams."""
+        return np.vstack([np.zeros((0, 2), dtype=np.int64), *(line.ends for line in self.edges)])
 
     @property
     def curvature(self) -> Reals:

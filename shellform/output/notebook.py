@@ -38,7 +38,7 @@ def gridshell_png(shell: Gridshell) -> bytes:
     panel = Panel(
         title, net.positions, net.beams, net.deviation, shell.cable_ends, none, net.supports, net.load_points,
         net.rod_radius,
-        net.quantity, net.unit,
+        net.quantity, net.unit, net.edges,
     )  # fmt: skip
     return _png([[panel]], Look(limit=net_maps.limit_of(panel), size=_SIZE))
 

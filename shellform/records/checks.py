@@ -75,6 +75,11 @@ def checks(
 
     bent = {name: _stressed(designs[name].radius / largest[name], rods[name]) for name in designs}
     beyond = [load for load in loads if load not in ("none", "design")]
+    edged = (
+        loads
+        if any(each.edge_utilisation_max for row in rows.values() for each in row.loads.values())
+        else []
+    )
     misfit = 1e3 * bounds.misfit
     deviating = [
         Check(f"{check.name}, root mean square (6)", check.limit, check.cells)
@@ -100,6 +105,7 @@ def checks(
             lambda row, rods: _stressed(_stress(row), rods),
             loads,
         ),
+        *under("Edge beams", "stress up to 100 % of the strength", lambda row, rods: _edged(row), edged),
         Check("Rods bent into the shape (1)", "up to 100 % of the curvature they bear", bent),
         *_limited(rows, list(designs), bounds),
         *deviating,
@@ -119,6 +125,14 @@ def _stress(row: LoadRecord) -> float:
     """
     error = row.rod_utilisation_error or 0.0
     return max(row.rod_utilisation_max, row.rod_utilisation_max - 0.75 * error)
+
+
+def _edged(row: LoadRecord) -> Cell:
+    """The stress of edge beams over their strength."""
+    share = row.edge_utilisation_max or 0.0
+    return share_of(
+        share, f"Take edge beams {share:.1f} times as strong (edges.beam: more rods, or a section)."
+    )
 
 
 def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: Bounds) -> list[Check]:

@@ -84,8 +84,8 @@ def demand(
     at the edge of falling can't tell one design from another. Raises NotConverged where it has no unloaded
     equilibrium."""
     trial = None
-    for enlarged in (safety.enlarged, 0.5 * (1.0 + safety.enlarged)):
-        own = replace(safety, enlarged=enlarged)
+    for factor in (safety.enlarged, 0.5 * (1.0 + safety.enlarged)):
+        own = replace(safety, enlarged=factor)
         most = {name: own.tried for name, load in loads.items() if load.any()}
         most[design_load] = _known(own, design_load, design_load)
         asked = Required(own, {name: loads[name] for name in most}, design_load, most)
@@ -142,7 +142,7 @@ def tried(
     safety, spent = asked.safety, 0
     fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
     order = [*first, *(number for number in range(safety.tried) if number not in set(first))]
-    larger = _enlarged(safety.tolerances, safety.enlarged)
+    larger = enlarged(safety.tolerances, safety.enlarged)
     kept = True
     for largest, shares in paths(asked.loads).items():
         nominal = perfect(shell, design, asked.loads[largest])
@@ -210,7 +210,8 @@ def _none(members: Members, seed: int) -> Errors:
     return errors_of(members, Tolerances(), variables(members, seed, 0))
 
 
-def _enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
+def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
+    """The same causes with deviations larger by a factor, as far as shares go."""
     most = 0.5  # the largest share that tolerances take
     return Tolerances(
         **{

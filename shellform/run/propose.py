@@ -19,13 +19,16 @@ from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.run.first_design import NEEDED, REST_RATIO, THICKNESS, FirstDesign, first_design
+from shellform.run.first_design import THICKNESS, FirstDesign, first_design
 from shellform.run.first_look import surface_entry
+from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
 from shellform.run.sizes import DesignWish, RodChoice
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
+_EVALUATIONS, _POLISHED = 30, 10
+_BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
 def propose_case(
@@ -57,7 +60,7 @@ def propose_case(
         "rods": f"{design.choice.label} of {design.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",
         "cables": f"⌀ {1e3 * design.rope.diameter:g} mm",
         "concrete": f"{1e3 * design.thickness:g} mm",
-        "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures with errors of building",
+        "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures with {_BUILT}",
         "edges": edges,
         "case": str(output),
     }
@@ -91,6 +94,7 @@ title = {json.dumps(file.stem, ensure_ascii=False)}
 [net]
 spacing = {design.spacing!r}        # m: {design.reason}; {len(placed.net.grid.lattice)} crossings
 angle = {placed.angle!r}         # degrees of the u rods against x: {angle}{offset}
+elements = {ELEMENTS}         # beams a segment; what is asked of the design has to hold with twice as many
 
 [rod]
 catalogue = "{choice.catalogue}"
@@ -99,16 +103,17 @@ rods at {design.tried.stress:.0%} of their strength under the load followed
 {_layers(choice)}
 [cable]
 stiffness = {_short(rope.stiffness)!r}    # EA, N: stainless strand 1 × 19, ⌀ {1e3 * rope.diameter:g} mm; much softer cables let the shell buckle
-rest_ratio = {REST_RATIO!r}
+rest_ratio = {design.rest_ratio!r}    # a prestrain that takes up what cables are off in length
 force_max = {_short(rope.force_max)!r}     # N, constraint (5): half of what breaks it
+without = false      # true: show too what the grid does without cables
 
 [edges]              # found: {edges}
 outer = "auto"       # ground where the edge is low, elsewhere an edge beam; "fill" brings it down to the ground, "free" lets rods end
 openings = "auto"    # [[edges.stretch]] names walls and abutments by height, box or curve
 
 [edges.beam]
-rods = 19            # in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
-composite = 0.5      # how far they act together: 1 as if glued, 0 loose
+rods = {design.bundle}            # {_edges_stressed(design)}in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
+composite = {COMPOSITE!r}      # how far they act together: 1 as if glued, 0 loose
 
 [part.concrete]      # on its true area, so that the load stays where the spacing changes
 kind = "concrete"
@@ -119,20 +124,26 @@ kind = "rods"
 
 [[load]]
 name = "design"      # the initial design stands up to {design.tried.factor:.2f} × this or more ({NEEDED:g} is asked), and {design.standing} of {design.drawn} structures \
-with errors of building do
+with {_BUILT} do
 factors = {{ concrete = 1.0, rods = 1.0 }}
 
 [[load]]
 name = "additional"  # the case under which the shell must still stand, constraint (6)
-factors = {{ concrete = 1.2, rods = 1.0 }}
+factors = {{ concrete = {ADDITIONAL!r}, rods = {ADDITIONAL!r} }}   # the design load lies on its path, so that structures are loaded once for both
+
+[limits]
+utilisation = 1.0    # of the rods' strength, under any load
 
 [optimise]
 misfit = 0.7         # w1
 cable_force = 0.3    # w2
 misfit_rms_additional = {_short(0.005 * k)!r}     # m, constraint (6): the paper's 5 mm × {k:.3g}
+evaluations = {_EVALUATIONS}     # a first answer in minutes; 100 leave fewer cables
+polish = {_POLISHED}
+unloaded = false     # true: make the design without regard to the loads too, to compare with
 
 [figures]
-limit = {_short(0.010 * k)!r}      # m, end of the colour scale
+limit = {_short(design.tried.deviation)!r}      # m, end of the colour scale: how far the initial design goes under {NEEDED:g} × its load
 """
 
 
@@ -142,6 +153,10 @@ def _thickness_told(design: FirstDesign, wish: DesignWish) -> str:
     if design.thickness == THICKNESS:
         return "usual"
     return "what these rods bear; pour it first, and the rest when it has hardened"
+
+
+def _edges_stressed(design: FirstDesign) -> str:
+    return f"stressed to {design.tried.edge:.0%} of their strength; " if design.placed.net.edges else ""
 
 
 def _layers(choice: RodChoice) -> str:

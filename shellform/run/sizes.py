@@ -14,6 +14,7 @@ that stands before √(D S) was set by four shells that were solved; it only say
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,7 @@ from shellform.errors import InputError
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import TwoLayers, locked_bending
+from shellform.gridshell.tolerances import tolerances_of_size
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.target import Surface, curvature
@@ -39,6 +41,9 @@ _ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.00
 _ROPE = 0.006  # of the spacing, a rope's diameter
 _ROPE_AREA, _ROPE_YOUNG, _ROPE_STRENGTH = 0.597, 120e9, 1380e6  # of the diameter's square; Pa; Pa at breaking
 _BUCKLING = 1.4
+_PRESTRAIN = (0.002, 0.004)  # of the cables: the most is two thirds of what half their strength strains them
+_AMPLE = 2.0  # times what is needed, by the estimate of buckling: there the sections begin
+_BENT = 0.65  # of a rod's strength, that bending it into the net takes at the most of the first that is tried
 
 
 @dataclass(frozen=True)
@@ -155,6 +160,14 @@ def rope_for(spacing: float) -> Rope:
     return Rope(min(_ROPES, key=lambda each: abs(math.log(each / (_ROPE * spacing)))))
 
 
+def rest_ratio_for(surface: Surface, spacing: float) -> float:
+    """Of the cables, rest length over length: their prestrain takes up what all but one in twenty are off in
+    length, within bounds."""
+    span, length = float(surface.size.max()), math.sqrt(2.0) * spacing
+    off = tolerances_of_size(span, longest_rod=span, longest_cable=length).cable_length
+    return round(1.0 - min(max(2.0 * off / length, _PRESTRAIN[0]), _PRESTRAIN[1]), 4)
+
+
 def choices(net: Net, spacing: float, wish: str | None, layers: int = 1) -> list[RodChoice]:
     """Sections that the net's curvature and its spacing allow, by rising stiffness; with a `wish` like
     "gfrp_rods/8 mm" that one, with the name of a catalogue those of it; rods in so many `layers`. Empty where
@@ -167,6 +180,23 @@ def choices(net: Net, spacing: float, wish: str | None, layers: int = 1) -> list
     ]
     found.sort(key=lambda each: (each.bending, mass_per_length(each.section)))
     return found
+
+
+def first_choice(
+    net: Net, surface: Surface, spacing: float, possible: Sequence[RodChoice], needed: float
+) -> int:
+    """Which of the `possible` sections to begin with, so that the grid buckles under `needed`, N/m², by the
+    estimate: the least stiff that leaves a third of its strength to the load, or what comes nearest."""
+    rope = rope_for(spacing)
+    spare = [
+        k
+        for k, each in enumerate(possible)
+        if erection_stress(net, each.section) <= _BENT * each.section.material.strength
+    ] or list(range(len(possible)))
+    enough = (
+        k for k in spare if buckling_load(surface, spacing, possible[k].bending, rope) >= _AMPLE * needed
+    )
+    return next(enough, spare[-1])
 
 
 def least_spacing(choice: RodChoice) -> float:

@@ -31,6 +31,7 @@ class Why(Enum):
     SPACING = "spacing"
     CURVATURE = "curvature"
     STRENGTH = "strength"
+    EDGES = "strength of edge beams"
     STABILITY = "stability"
     SCATTER = "stability of structures as built"
 

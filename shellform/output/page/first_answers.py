@@ -1,5 +1,5 @@
 """The answers to what a designer asks first, of the design to build: how far off, how many cables, which
-rods, is it safe, what to buy.
+rods, is it safe, what does it stand on, what to buy.
 """
 
 from __future__ import annotations
@@ -13,11 +13,17 @@ import numpy as np
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import layers_of
+from shellform.net.net import Net
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import LoadRecord, Summary
 from shellform.records.words import critical_words, number
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
+
+_EDGES = {
+    "ground": "on the ground", "wall": "on walls", "abutment": "on abutments", "beam": "on edge beams",
+    "free": "free", "pin": "pinned in mid-air",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,8 @@ def answers(
     )
     if more is not None:
         found.append(_is_safe(main, more, as_built, math.isfinite(shell.rod.strength)))
+    if shell.net.stretches:
+        found.append(_stands_on(shell.net, more))
     mass, laths = mass_per_length(section) * float(rods.sum()), layers_of(section)
     weight = f" ({number(mass)} kg)" if mass > 0.0 else ""
     lengths = None if summary.documents is None else summary.documents.cut_lengths
@@ -85,6 +93,17 @@ def answers(
         )
     )
     return found
+
+
+def _stands_on(net: Net, more: LoadRecord | None) -> Answer:
+    """The lengths of the edge by kind."""
+    lengths: dict[str, float] = {}
+    for each in net.stretches:
+        lengths[each.kind] = lengths.get(each.kind, 0.0) + each.length
+    words = ", ".join(f"{number(length)} m {_EDGES[kind]}" for kind, length in lengths.items())
+    used = None if more is None else more.edge_utilisation_max
+    beams = f"; edge beams, drawn dark, at {100 * used:.0f} % of their strength" if net.edges and used else ""
+    return Answer("What does its edge stand on?", words, f"{len(net.supports)} supports{beams}")
 
 
 def _how_far(main: LoadRecord) -> Answer:

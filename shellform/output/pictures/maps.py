@@ -82,6 +82,7 @@ def panel_of(
         chosen.radius,
         seen.quantity,
         seen.unit,
+        shell.net.edge_lines,
     )
 
 

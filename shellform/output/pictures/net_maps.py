@@ -49,6 +49,7 @@ def panel_of(net: Net, name: str) -> Panel:
         0.02 * net.spacing,
         quantity,
         unit,
+        net.edge_lines,
     )
 
 

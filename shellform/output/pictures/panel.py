@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
 
 LIMIT = 0.010  # m, end of the colour scale in figures 12 to 14
+EDGE_BEAM = 1.8  # times as thick as rods edge beams are drawn
 VIEWS = ("best", "top", "front", "side")
 SMALLEST = (160, 120)  # pixels; below it the title leaves no room for the shell
 LARGEST = 8000  # pixels a side: drawn at twice that, near which drivers end
@@ -29,7 +30,7 @@ class Panel:
 
     `positions` (n, 3), m; rod elements `beams` (m, 2); `deviation` (n,), m, of each node from its target;
     `cables` (c, 2) with their `cable_forces` (c,), N, slack at or below zero; nodes of `supports` (s,) and of
-    loads, `load_points` (k,); `rod_radius`, m. `quantity` says what `deviation` measures where it is
+    loads, `load_points` (k,); `rod_radius`, m; elements `edges` (e, 2) of edge beams. `quantity` says what `deviation` measures where it is
     something else, in a `unit` of a name and so much in SI. Raises InputError for wrong shapes and indices.
     """
 
@@ -44,6 +45,7 @@ class Panel:
     rod_radius: float
     quantity: str = "deviation from the target"
     unit: tuple[str, float] = ("mm", 1e-3)
+    edges: Indices = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
     def __post_init__(self) -> None:
         put = functools.partial(object.__setattr__, self)
@@ -56,7 +58,7 @@ class Panel:
             raise InputError(
                 "deviation is a distance and can't be negative", value=float(self.deviation.min())
             )
-        for name, width in [("beams", 2), ("cables", 2), ("supports", 0), ("load_points", 0)]:
+        for name, width in [("beams", 2), ("cables", 2), ("edges", 2), ("supports", 0), ("load_points", 0)]:
             shape = (None, width) if width else (None,)
             put(name, indices(name, getattr(self, name), shape, below=count))
         put("cable_forces", reals("cable_forces", self.cable_forces, (len(self.cables),)))

@@ -26,6 +26,7 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.output.pictures.legend import LOAD, SLACK, SUPPORT, SURFACE, Word, cable_colours, rod_colours
 from shellform.output.pictures.panel import (
+    EDGE_BEAM,
     Panel,
     Skin,
     arrow_length,
@@ -154,6 +155,11 @@ def _add(plotter: pv.Plotter, panel: Panel, page: Canvas) -> None:
         rods.point_data["colour"] = rod_colours(panel.deviation / scale.limit)
         tubes = rods.strip(join=True, max_length=len(panel.positions)).tube(radius=radius, n_sides=12)
         plotter.add_mesh(tubes, scalars="colour", rgb=True, **_MATT)
+    kept = long_enough(panel.positions, panel.edges)
+    if len(kept):
+        beams = _lines(panel.positions, panel.edges[kept]).strip(join=True, max_length=len(panel.positions))
+        tube = beams.tube(radius=EDGE_BEAM * radius, n_sides=12)
+        plotter.add_mesh(tube, color=SUPPORT, ambient=0.5, diffuse=0.5, render=False)
     kept = long_enough(panel.positions, panel.cables)
     if len(kept):  # each cable has its own two points, so that its thickness and colour are its own
         share = np.clip(panel.cable_forces[kept] / (scale.force or 1.0), 0.0, 1.0)

@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 from shellform.arrays import Reals
 from shellform.output.pictures import plots
 from shellform.output.pictures.legend import LOAD, SLACK, SUPPORT, SURFACE, cable_colours, rod_colours
-from shellform.output.pictures.panel import Panel, Skin, arrow_length, cable_thickness, drawn_radius
+from shellform.output.pictures.panel import (
+    EDGE_BEAM,
+    Panel,
+    Skin,
+    arrow_length,
+    cable_thickness,
+    drawn_radius,
+)
 from shellform.output.pictures.sheets import Canvas, Drawing
 from shellform.output.pictures.view import Camera
 
@@ -70,9 +77,11 @@ def _add(axes: Any, drawing: Drawing, panel: Panel, page: Canvas, corner: Reals)
     share = np.clip(panel.cable_forces / (scale.force or 1.0), 0.0, 1.0)
     ties = np.where((share > 0.0)[:, None], cable_colours(share) / 255.0, _rgb(SLACK))
     rods = rod_colours(panel.deviation[panel.beams].mean(axis=1) / scale.limit) / 255.0
-    pairs = np.vstack([panel.beams, panel.cables])
-    widths = 2.0 * radius * np.concatenate([np.ones(len(rods)), cable_thickness(share)])
-    colours = np.vstack([rods, ties])
+    edges = len(panel.edges)
+    pairs = np.vstack([panel.beams, panel.cables, panel.edges])
+    thick = [np.ones(len(rods)), cable_thickness(share), np.full(edges, EDGE_BEAM)]
+    widths = 2.0 * radius * np.concatenate(thick)
+    colours = np.vstack([rods, ties, np.tile(_rgb(SUPPORT), (edges, 1))])
     depth = near[pairs].mean(axis=1)
     tips, tips_near = flat(panel.positions[panel.load_points] + [0.0, 0.0, arrow_length(scale)])
     feet = place[panel.load_points]

@@ -1,0 +1,114 @@
+"""One design on the way to what `shellform new` proposes, solved under its growing load and drawn as built.
+
+Two elements a segment are enough for that: they change critical factors by half a percent. Structures are
+drawn with errors of building a quarter larger than they are to be expected: few of them then refuse what else
+more would be needed for (trial_structures.py).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.case.build_problem import edge_utilisation
+from shellform.errors import NotConverged
+from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
+from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace
+from shellform.gridshell.joints import following
+from shellform.gridshell.layers import single
+from shellform.gridshell.loads import concrete, rods
+from shellform.gridshell.tolerances import default_tolerances
+from shellform.net.net import Net
+from shellform.problem.paths import deviations
+from shellform.reliability.standing import sample
+from shellform.reliability.trial_structures import enlarged
+from shellform.run.sizes import RodChoice, rest_ratio_for, rope_for
+from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.loading import apply_load
+from shellform.surface.shape.target import Surface
+
+ELEMENTS = 2
+NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
+ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
+DRAWN, SEED, ENLARGED = 12, 1, 1.25
+COMPOSITE = 0.5  # how far the rods of an edge beam act together
+_SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
+
+
+@dataclass(frozen=True)
+class Followed:
+    """What a design came to: the `factor` of its load up to which it stands, the stress over the strength of its rods
+    (`stress`) and of its edge beams (`edge`), the largest `deviation`, m, at the last state, and `where` that is (3,), m."""
+
+    factor: float
+    stress: float
+    edge: float
+    deviation: float
+    where: Reals
+
+
+def followed(net: Net, surface: Surface, choice: RodChoice, bundle: int, thickness: float) -> Followed:
+    """The design followed up to `NEEDED` times its load, edge beams being bundles of so many rods."""
+    shell, load = _shell(net, surface, choice, bundle, thickness)
+    design = shell.design(rest_ratio=rest_ratio_for(surface, net.grid.scale))
+    assembly = assemble(shell.network(design))
+    none = np.zeros((shell.node_count, 6))
+    factor, borne = 0.0, none
+    state, stressed = shell.target, shell.target
+    try:
+        state = find_equilibrium(assembly, shell.target, none).state
+        for goal in (ADDITIONAL, NEEDED):  # the stress counts under the first
+            more = goal * load
+            found = apply_load(assembly, state, borne, more, stay=True, smallest=_SMALLEST)
+            factor += (goal - factor) * found.share
+            state, borne = found.equilibrium.state, more
+            stressed = state if goal == ADDITIONAL else stressed
+            if not found.on_branch:
+                break
+    except NotConverged as error:
+        state = error.state if isinstance(error.state, State) else state
+    away, beams = deviations(shell, state), shell.beams(design.radius)
+    return Followed(
+        factor,
+        float(shell.utilisation(design, stressed).max()),
+        edge_utilisation(shell, beams, beams.local_forces(stressed)),
+        float(away.max()),
+        shell.target.positions[int(np.argmax(away))],
+    )
+
+
+def drawn_standing(net: Net, surface: Surface, choice: RodChoice, bundle: int, thickness: float) -> int:
+    """How many of `DRAWN` structures stand under the design load."""
+    shell, load = _shell(net, surface, choice, bundle, thickness)
+    drawn = sample(
+        shell,
+        shell.design(rest_ratio=rest_ratio_for(surface, net.grid.scale)),
+        load,
+        enlarged(default_tolerances(shell), ENLARGED),
+        count=DRAWN,
+        seed=SEED,
+    )
+    return sum(each.stands for each in drawn.outcomes)
+
+
+def _shell(
+    net: Net, surface: Surface, choice: RodChoice, bundle: int, thickness: float
+) -> tuple[Gridshell, Reals]:
+    """The gridshell and its load (n, 6), N; the joint's gap is the net's."""
+    rope = rope_for(net.grid.scale)
+    rod = Rod(choice.section)
+    fitting = following(rod)
+    joint = Joint(fitting.axial, fitting.torsion, fitting.bending, net.grid.gap)
+    radius = math.sqrt(single(choice.section).constants[0] / math.pi)
+    edge = EdgeBeam(Bundle(radius, bundle, COMPOSITE, choice.section.material)) if net.edges else None
+    shell = brace(net, rod, joint, Cable(rope.stiffness), below=surface, edge=edge)
+    own = rods(net, choice.section)
+    if edge is not None:
+        own = own + weight(net, edge)
+    poured = concrete(net, surface, thickness=thickness)
+    return shell, poured + own
