@@ -27,8 +27,11 @@ def new(
         typer.Option(help="Of the u rods against the x axis, degrees; left out: with the least bending."),
     ] = None,
     layers: Annotated[
-        int, typer.Option(help="2: rods of two laths, bent one by one, then locked by shear blocks.")
-    ] = 1,
+        int | None,
+        typer.Option(
+            help="2: rods of two laths or tubes, bent one by one, then locked by shear blocks; left out: where one falls."
+        ),
+    ] = None,
     allow_scripts: Scripts = False,
     quiet: Quiet = False,
 ) -> None:

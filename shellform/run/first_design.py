@@ -2,7 +2,8 @@
 
 Nets are pulled at several angles, and the one that bends its rods least is taken. Then the initial design is
 solved under its growing load, for the rods with which the estimate says to begin (sizes.py), stiffer ones
-where it falls, finer spacings where the stiffest that equation (1) allows falls, and thinner concrete last.
+where it falls, two layers where the stiffest that equation (1) allows falls, finer spacings, and thinner
+concrete last.
 What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
 a dozen structures are drawn and loaded (first_trial.py). Edge beams are bundles, of more rods where few of
 them are stressed too much or the shell nearly stands.
@@ -22,6 +23,7 @@ import numpy as np
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Rod, erection_stress
 from shellform.gridshell.joints import following, usual_gap
+from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
 from shellform.net.chebyshev import pull_net
 from shellform.net.edges import stand
@@ -40,6 +42,7 @@ from shellform.run.sizes import (
     first_choice,
     first_spacing,
     least_spacing,
+    next_choice,
     practical,
     rest_ratio_for,
     rope_for,
@@ -99,6 +102,8 @@ class _Search:
         self.told: list[str] = []
         self.best: Obstacle | None = None
         self.reason = "as asked"
+        one = (1,) if wish.rod else (1, 2)
+        self.layers: Sequence[int] = one if wish.layers is None else (wish.layers,)
         self.angles: Sequence[float] = _ANGLES  # worth trying; with a finer spacing only those that were best
 
     def say(self, text: str) -> None:
@@ -123,7 +128,7 @@ class _Search:
         if self.wish.spacing is not None:
             return self.wish.spacing, "as asked"
         spacing, reason = first_spacing(self.surface)
-        least = min(least_spacing(each) for each in wished(self.wish.rod, self.wish.layers))
+        least = min(least_spacing(each) for each in wished(self.wish.rod, self.layers[0]))
         return (spacing, reason) if spacing >= least else (least, "as near as rods of that depth may lie")
 
     def _vain(self, spacing: float, finer: float) -> bool:
@@ -142,27 +147,28 @@ class _Search:
             self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             self.say(f"no net at {spacing:g} m: {error.what if isinstance(error, InputError) else error}")
             return None
-        possible = choices(placed.net, spacing, self.wish.rod, self.wish.layers)
-        if not possible:
+        for layers in self.layers:
+            possible = choices(placed.net, spacing, self.wish.rod, layers)
+            result = self._first_that_stands(placed, possible, spacing, thickness) if possible else None
+            if result is not None:
+                return result
+        if self.best is None:
             self._keep(self._too_curved(placed, spacing, thickness))
-            return None
-        load = pressure(thickness, 2500.0)
-        at = first_choice(placed.net, self.surface, spacing, possible, NEEDED * load)
+        return None
+
+    def _first_that_stands(
+        self, placed: Placed, possible: Sequence[RodChoice], spacing: float, thickness: float
+    ) -> FirstDesign | None:
+        """The design with the first of the `possible` sections, by rising stiffness, that stands; None where
+        none does that is likely to."""
+        at = first_choice(placed.net, self.surface, spacing, possible, NEEDED * pressure(thickness, 2500.0))
         tried_before: set[int] = set()
-        for _ in range(_STEPS):
-            if at in tried_before:
-                break
+        while at not in tried_before and len(tried_before) < _STEPS:
             tried_before.add(at)
             result = self._stands(placed, possible[at], spacing, thickness)
             if isinstance(result, FirstDesign):
                 return result
-            if result.why is Why.STRENGTH:
-                at = _less_stressed(placed.net, possible, at, result.stress - _STRESSED)
-            else:
-                wanted = possible[at].bending * max(
-                    1.3, (1.1 * NEEDED / max(result.nearness(NEEDED), 0.1)) ** 1.3
-                )
-                at = next((k for k, each in enumerate(possible) if each.bending >= wanted), len(possible) - 1)
+            at = _next(placed.net, possible, at, result)
         return None
 
     def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
@@ -174,15 +180,13 @@ class _Search:
             raise refused(self.surface, failure, self.wish)
         asked, thinner = thickness, failure.thickness
         placed, choice, nearest = failure.placed, failure.choice, failure
-        possible = choices(placed.net, failure.spacing, self.wish.rod, self.wish.layers)
+        layers = layers_of(choice.section)
+        possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
         for _ in range(_THINNER):
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
-                at = possible.index(choice)
-                other = possible[_less_stressed(placed.net, possible, at, failure.stress - _STRESSED)]
-            if (
-                other is choice
-            ):  # else the load is kept, and bent rods that leave more of their strength are tried
+                other = possible[_next(placed.net, possible, possible.index(choice), failure)]
+            if other is choice:  # else the load is kept, and rods that leave more of their strength are tried
                 thinner = _whole_mm(min(0.8 * thinner, 0.95 * thinner * failure.nearness(NEEDED) / NEEDED))
             choice = other
             if thinner < 0.002:
@@ -298,7 +302,7 @@ class _Search:
         bent = net.curvature.max(axis=1)
         place = net.target.positions[net.grid.rod_ends[int(np.argmax(bent))]].mean(axis=0)
         least = min(
-            wished(self.wish.rod, self.wish.layers), key=lambda each: erection_stress(net, each.section)
+            wished(self.wish.rod, self.layers[0]), key=lambda each: erection_stress(net, each.section)
         )
         stress = erection_stress(net, least.section) / least.section.material.strength
         why = Why.CURVATURE if stress > 1.0 else Why.SPACING
@@ -317,12 +321,12 @@ def _edges_may_help(failure: Obstacle) -> bool:
     return failure.why is Why.EDGES or (falls and failure.nearness(NEEDED) >= _NEAR * NEEDED)
 
 
-def _less_stressed(net: Net, possible: Sequence[RodChoice], at: int, excess: float) -> int:
-    """The stiffest section below `at` that bending into the net stresses less, by a share `excess` of its
-    strength.
-    """
-    share = [erection_stress(net, each.section) / each.section.material.strength for each in possible]
-    return next((k for k in range(at - 1, -1, -1) if share[k] <= share[at] - excess), at)
+def _next(net: Net, possible: Sequence[RodChoice], at: int, failure: Obstacle) -> int:
+    """The section to try after the one that failed."""
+    times = 0.0
+    if failure.why is not Why.STRENGTH:
+        times = max(1.3, (1.1 * NEEDED / max(failure.nearness(NEEDED), 0.1)) ** 1.3)
+    return next_choice(net, possible, at, failure.stress, times, _STRESSED)
 
 
 def _least_bent(nets: Sequence[Placed]) -> Placed:

@@ -23,7 +23,7 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
-from shellform.gridshell.layers import TwoLayers, locked_bending
+from shellform.gridshell.layers import TwoLayers, layers_of, locked_bending
 from shellform.gridshell.tolerances import tolerances_of_size
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length
@@ -77,20 +77,28 @@ class RodChoice:
 
     @property
     def bending(self) -> float:
-        """The smaller of EI_y and EI_z, N·m², under loads."""
-        return min(locked_bending(self.section))
+        """EI_y, N·m²: across the surface, under loads."""
+        return locked_bending(self.section)[0]
+
+    @property
+    def moment(self) -> float:
+        """About what bending moment across the surface it bears under loads, N·m: its strength times I / d, d the
+        distance of the outermost fibre."""
+        material, fibre = self.section.material, self.section.fibres[1]
+        outermost = 3.0 * fibre if layers_of(self.section) == 2 else fibre
+        return material.strength * self.bending / (material.young * outermost)
 
 
 @dataclass(frozen=True)
 class DesignWish:
     """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m,
-    an `angle`, degrees; None: to be found; rods in how many `layers`."""
+    an `angle`, degrees, rods in so many `layers`; None: to be found, of a named rod one layer."""
 
     rod: str | None = None
     spacing: float | None = None
     thickness: float | None = None
     angle: float | None = None
-    layers: int = 1
+    layers: int | None = None
 
     def __post_init__(self) -> None:
         for name in ("spacing", "thickness"):
@@ -99,7 +107,7 @@ class DesignWish:
                 raise InputError("must be positive and finite", where=f"--{name}", value=value)
         if self.angle is not None and not math.isfinite(self.angle):
             raise InputError("must be degrees or auto", where="--angle", value=self.angle)
-        if self.layers not in (1, 2):
+        if self.layers not in (None, 1, 2):
             raise InputError("must be 1 or 2", where="--layers", value=self.layers)
         wished(self.rod)
 
@@ -199,17 +207,37 @@ def first_choice(
     return next(enough, spare[-1])
 
 
+def next_choice(
+    net: Net, possible: Sequence[RodChoice], at: int, stress: float, times: float, most: float
+) -> int:
+    """The section to try after that `at`, whose `stress` over its strength is told: the least stiff that is at
+    least so many `times` as stiff (0: the stiffest of all) and whose stress is likely to be `most` at the most, else
+    the stiffest such one; `at` where there is none.
+
+    Bending into the net stresses every section as it is; what the load adds goes with the moment that it bears.
+    """
+    own, bent = (
+        possible[at],
+        [erection_stress(net, each.section) / each.section.material.strength for each in possible],
+    )
+    added = max(stress - bent[at], 0.0)
+    fit = [k for k, each in enumerate(possible) if bent[k] + added * own.moment / each.moment <= most]
+    if not times:
+        return fit[-1] if fit else at
+    return next((k for k in fit if possible[k].bending >= times * own.bending), fit[-1] if fit else at)
+
+
 def least_spacing(choice: RodChoice) -> float:
     """The spacing, m, in whole millimetres, below which rods are too deep for a grid of slender rods."""
     return math.ceil(1e3 * _DEPTH * 2.0 * max(choice.section.fibres) - 1e-9) / 1e3
 
 
 def wished(wish: str | None, layers: int = 1) -> list[RodChoice]:
-    """The sections among which to choose, in so many `layers`; two are laths where nothing is wished. Raises
-    InputError for an unknown catalogue or section.
+    """The sections among which to choose, in so many `layers`. Raises InputError for an unknown catalogue or
+    section.
     """
     if layers == 2:
-        found = wished(_LATHS if wish is None else wish)
+        found = [*wished(None), *wished(_LATHS)] if wish is None else wished(wish)
         return [RodChoice(each.catalogue, TwoLayers(each.section)) for each in found]
     if wish is None:
         return [RodChoice(name, each) for name in _CATALOGUES for each in read_catalogue(name).sections]
