@@ -15,6 +15,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import typing
 from collections import defaultdict
 from pathlib import Path
 from typing import Any
@@ -89,7 +90,9 @@ def commands() -> str:
         "file, entry, value and remedy); 3 no usable result, or a design to build that doesn't hold (what was computed is "
         "kept); 130 stopped by Ctrl-C (kept, and resumable).\n"
     ]
+    functions = {each.callback.__name__: each.callback for each in app.registered_commands if each.callback}
     for name, command in group.commands.items():
+        hints = typing.get_type_hints(functions[name])
         arguments = " ".join(_argument(each) for each in command.params if each.param_type_name == "argument")
         parts.append(
             f"## {name}\n\n{command.help}\n\n```text\nshellform {name} {arguments} [OPTIONS]\n```\n".replace(
@@ -103,11 +106,22 @@ def commands() -> str:
             if each.param_type_name == "argument":
                 rows.append([f"`{_argument(each)}`", getattr(each, "help", None) or "", ""])
                 continue
-            kind = "" if each.is_flag else f" {(each.metavar or each.type.name).upper()}"
+            kind = "" if each.is_flag else f" {each.metavar or _kind(hints[each.name])}"
             default = "required" if each.required else _shown(each.default)
             rows.append([f"`{each.opts[0]}{kind}`", each.help or "", default])
         parts.append(table(["argument or option", "meaning", "default"], rows) + "\n")
     return "\n".join(parts)
+
+
+def _kind(hint: Any) -> str:
+    """The word for what an option takes."""
+    words = {Path: "PATH", int: "INTEGER", float: "NUMBER", str: "TEXT"}
+    inside = [
+        hint,
+        *typing.get_args(hint),
+        *(each for part in typing.get_args(hint) for each in typing.get_args(part)),
+    ]
+    return next(words[each] for each in inside if each in words)
 
 
 def _argument(parameter: Any) -> str:
@@ -273,13 +287,9 @@ def speed() -> str:
         ]
         for row in found["rows"]
     ]
+    told = "; ".join([*found["notes"], f"load of the machine before: {found['load_before']:g}"])
     notes = (PAGES / "speed.md").read_text(encoding="utf-8")
-    return (
-        notes
-        + f"\n## The numbers\n\n{found['about']}\n\n"
-        + table(["what", "value", "unit", "aim"], cells)
-        + "\n"
-    )
+    return notes + f"\n## The numbers\n\n{told}.\n\n" + table(["what", "value", "unit", "aim"], cells) + "\n"
 
 
 if __name__ == "__main__":

@@ -11,13 +11,13 @@ from pathlib import Path
 import shellform
 from shellform.case.case import shipped_surfaces
 from shellform.errors import InputError
-from shellform.written import write_text
+from shellform.written import whole
 
 
 @dataclass(frozen=True)
 class Example:
     """A shipped case: what it is `about`, its `files` in the folder of the cases, the `surface` that they name
-    ("" for none), and the `command` that computes the first of the files.
+    ("" for none), and the `command` to begin with.
     """
 
     about: str
@@ -51,6 +51,12 @@ EXAMPLES = {
         "dome_mm.step",
         "shellform design dome.toml --output run",
     ),
+    "rhino": Example(
+        "the same dome as a mesh in a Rhino file",
+        (),
+        "dome.3dm",
+        "shellform new dome.3dm --layer Shell --output mine.toml",
+    ),
     "model": Example(
         "an arch of one bent rod and a cable as a model file of one's own",
         ("bent_arch.json",),
@@ -73,17 +79,19 @@ def lay_example(name: str, folder: str | Path) -> list[Path]:
     if name not in EXAMPLES:
         raise InputError("is no example", where="NAME", value=name, remedy=f"Known: {', '.join(EXAMPLES)}.")
     example, place = EXAMPLES[name], Path(folder)
-    texts = {each: _at_home((_cases() / each).read_text(encoding="utf-8")) for each in example.files}
+    contents = {
+        each: _at_home((_cases() / each).read_text(encoding="utf-8")).encode() for each in example.files
+    }
     if example.surface:
-        source = shipped_surfaces() / example.surface
-        texts[example.surface] = source.read_text(encoding="utf-8")
-    for each, text in texts.items():
+        contents[example.surface] = (shipped_surfaces() / example.surface).read_bytes()
+    for each, content in contents.items():
         file = place / each
-        if file.exists() and (not file.is_file() or file.read_text(encoding="utf-8") != text):
+        if file.exists() and (not file.is_file() or file.read_bytes() != content):
             raise InputError("is there already", where=str(file), remedy="Choose another folder.")
-    for each, text in texts.items():
-        write_text(place / each, text)
-    return [place / each for each in texts]
+    for each, content in contents.items():
+        with whole(place / each) as partial:
+            partial.write_bytes(content)
+    return [place / each for each in contents]
 
 
 def _cases() -> Path:

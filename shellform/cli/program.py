@@ -18,6 +18,7 @@ from shellform.cli.analyse import analyse
 from shellform.cli.calibrate import calibrate
 from shellform.cli.check import check
 from shellform.cli.design import design
+from shellform.cli.docs import docs
 from shellform.cli.erect import erect
 from shellform.cli.example import example
 from shellform.cli.net import net
@@ -54,6 +55,7 @@ for _command in (
     survey,
     erect,
     verify,
+    docs,
 ):
     app.command()(_command)
 
