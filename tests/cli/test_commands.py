@@ -3,18 +3,15 @@
 import html
 import json
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shellform.cli import program
 from shellform.records.stages import STAGES
+from tests.command import ROOT, begin, shellform, shellform_process
 from tests.stubs import CASE
 
-ROOT = Path(__file__).parent.parent.parent
 MODEL = {
     "format": "shellform-model",
     "version": 1,
@@ -23,16 +20,6 @@ MODEL = {
     "supports": [{"node": 0, "fixed": [True] * 6}],
     "loads": {"tip": [{"node": 2, "force": [0, 0, -1]}], "side": [{"node": 2, "force": [0, 1, 0]}]},
 }
-
-
-def shellform(*arguments, timeout=300):
-    return subprocess.run(
-        [sys.executable, "-m", "shellform", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        cwd=ROOT,
-    )
 
 
 def refused(result, *words):
@@ -49,7 +36,7 @@ def model_file(tmp_path, **changes):
 
 
 def test_analyse_writes_the_result_of_the_contract(tmp_path):
-    result = shellform("analyse", model_file(tmp_path), "--load", "tip", "--increments", 2)
+    result = shellform_process("analyse", model_file(tmp_path), "--load", "tip", "--increments", 2)
     assert result.returncode == 0, result.stderr
     found = json.loads(result.stdout)
     assert found["converged"]
@@ -167,16 +154,9 @@ def test_net_alone_writes_the_contract_s_file_for_a_mesh(tmp_path):
 
 
 def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
-    arguments = [
-        sys.executable,
-        "-m",
-        "shellform",
-        "design",
-        "scripts/scale_model.toml",
-        "--output",
-        str(tmp_path),
-    ]
-    job = subprocess.Popen(arguments, stderr=subprocess.PIPE, text=True, cwd=ROOT)
+    case = tmp_path / "dome.toml"
+    case.write_text(CASE, encoding="utf-8")
+    job = begin("design", case, "--output", tmp_path / "run")
     assert job.stderr is not None
     for line in job.stderr:
         if line.startswith("net: done"):
@@ -186,7 +166,7 @@ def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
     assert job.wait(60) == 130
     assert "stopped" in said
     assert "Traceback" not in said
-    again = shellform("design", "scripts/scale_model.toml", "--output", tmp_path, "--until", "net")
+    again = shellform("design", case, "--output", tmp_path / "run", "--until", "net")
     assert again.stderr.count("kept") == 2
 
 
@@ -251,7 +231,7 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
         "report.html",
     ):
         assert (run / name).stat().st_size > 0
-    again = shellform(*arguments, timeout=60)
+    again = shellform(*arguments)
     assert again.returncode == 0
     assert again.stderr.count("kept") == len(STAGES)
     page = shellform("report", run, "--output", tmp_path / "page.html")

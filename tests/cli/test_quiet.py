@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from tests.cli.test_commands import ROOT, shellform
+from tests.command import ROOT, shellform, shellform_process
 from tests.stubs import CASE, study_file
 
 
@@ -15,7 +15,7 @@ from tests.stubs import CASE, study_file
 def made(tmp_path_factory):
     place = tmp_path_factory.mktemp("quiet")
     (place / "dome.toml").write_text(CASE, encoding="utf-8")
-    return place, shellform(
+    return place, shellform_process(
         "design", place / "dome.toml", "--output", place / "run", "--until", "net", "--quiet"
     )
 

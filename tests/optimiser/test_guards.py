@@ -10,6 +10,12 @@ from shellform.problem.evaluation import Evaluator
 
 
 @pytest.fixture(scope="module")
+def shell(dome):
+    """A small one."""
+    return dome
+
+
+@pytest.fixture(scope="module")
 def start(shell):
     wet = shell.point_load(2.0, every=2)
     problem = sf.Problem(
@@ -96,11 +102,7 @@ def test_a_quadratic_problem_is_solved_to_its_conditions_of_optimality():
 
 
 def test_a_start_that_snaps_through_under_the_additional_load_is_led_to_a_design_that_bears_it(shell):
-    openings = [
-        [[x + r * np.cos(k * np.pi / 6), y + r * np.sin(k * np.pi / 6)] for k in range(12)]
-        for x, y, r in [(0.47, 0.0, 0.132), (-0.47, -0.02, 0.132), (0.02, 0.29, 0.152), (-0.05, -0.29, 0.152)]
-    ]
-    wet = 1.1 * shell.point_load(6.9, every=2, openings=openings)
+    wet = shell.point_load(5.4, every=2)
     problem = sf.Problem(
         shell,
         sf.LoadCase("wet", wet),

@@ -29,6 +29,12 @@ ALL = Scatter(
 
 
 @pytest.fixture(scope="module")
+def shell(dome):
+    """A small one: each test solves it many times."""
+    return dome
+
+
+@pytest.fixture(scope="module")
 def loaded(shell):
     """The initial design under a fraction of the paper's load."""
     load, design = shell.point_load(3.0, every=2), shell.design()

@@ -23,13 +23,17 @@ HISTORY = """evaluation,accepted,objective,term.misfit,term.cable_force,constrai
 """
 
 
-def begin(root, folder, *settings):
-    """A run until the stage "initial": not optimised, and without pictures."""
-    case = load_case(
+def small_case(root, *settings):
+    """The vault with rods twice as far apart."""
+    return load_case(
         root / "scripts/scale_model.toml",
         ["net.spacing=0.11", "surface.size=0.03", "load.force=2.0", *settings],
     )
-    run_case(case, folder, until="initial")
+
+
+def begin(root, folder, *settings):
+    """A run until the stage "initial": not optimised, and without pictures."""
+    run_case(small_case(root, *settings), folder, until="initial")
     return folder
 
 

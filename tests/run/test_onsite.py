@@ -4,11 +4,8 @@ refused.
 
 import csv
 import json
-import subprocess
-import sys
 import tomllib
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,19 +19,9 @@ from shellform.run.run import run_case
 from shellform.site import measurements
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
+from tests.command import ROOT, shellform
 
-ROOT = Path(__file__).parent.parent.parent
 NOISE = 0.15e-3
-
-
-def shellform(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "shellform", *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        timeout=300,
-        cwd=ROOT,
-    )
 
 
 def refused(result, *words):
