@@ -31,6 +31,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = ROOT / "shellform/documentation"
 PICTURES = ROOT / "scripts/pictures"
 SPEED = ROOT / "scripts/benchmark.json"
+WORKER = ROOT / "scripts/iframe-worker.js"
 SITE = ROOT / "shellform/_site"
 
 
@@ -71,6 +72,16 @@ def build(site: Path) -> None:
             str(ROOT / "scripts/mkdocs.yml"),
         ]
         subprocess.run(command, env=environment, check=True)
+    _keep_inside(site)
+
+
+def _keep_inside(site: Path) -> None:
+    """Puts the one script that the theme asks the network for into the site."""
+    shutil.copy(WORKER, site / "assets/iframe-worker.js")
+    for page in site.rglob("*.html"):
+        inside = "../" * (len(page.relative_to(site).parts) - 1) + "assets/iframe-worker.js"
+        text = page.read_text(encoding="utf-8")
+        page.write_text(text.replace("https://unpkg.com/iframe-worker/shim", inside), encoding="utf-8")
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
@@ -147,8 +158,9 @@ def case_file() -> str:
             parts.append("`title` (text): stands on drawings and the page.\n")
             continue
         parts.append(f"## [{name}]\n")
-        for kind in _kinds(field):
-            parts.append(_entry(kind, kinds[kind]))
+        several = _kinds(field)
+        for kind in several:
+            parts.append(_entry(kind, kinds[kind], heading=len(several) > 1))
     for kind in ("StretchEntry", "EdgeBeamEntry"):
         parts.append(_entry(kind, kinds[kind]))
     return "\n".join(parts)
@@ -169,7 +181,7 @@ def _kinds(field: Any) -> list[str]:
     return list(dict.fromkeys(found + _kinds(parts)))
 
 
-def _entry(kind: str, schema: dict[str, Any]) -> str:
+def _entry(kind: str, schema: dict[str, Any], *, heading: bool = True) -> str:
     """One table of the case file."""
     rows = [
         [
@@ -181,7 +193,9 @@ def _entry(kind: str, schema: dict[str, Any]) -> str:
         for name, each in schema.get("properties", {}).items()
     ]
     title = kind.removesuffix("Entry")
-    return f"### {title} {{ #{title.lower()} }}\n\n{schema.get('description', '')}\n\n{table(['entry', 'value', 'default', 'meaning'], rows)}\n"
+    head = f"### {title} {{ #{title.lower()} }}\n\n" if heading else ""
+    cells = table(["entry", "value", "default", "meaning"], rows)
+    return f"{head}{schema.get('description', '')}\n\n{cells}\n"
 
 
 def _type(field: dict[str, Any]) -> str:
@@ -230,7 +244,7 @@ def names() -> str:
     for name, (home, original) in lazy.homes("shellform.study").items():
         rooms["study"].append((f"study.{name}", f"{home}.{original}"))
     text = [
-        "# Python\n\nThe public names, `import shellform as sf`, by room in the order of the package; written from their "
+        "# Python\n\nThe public names, `import shellform as sf`, by room; written from their "
         "docstrings. Lengths are in m, forces in N, angles in rad. Each name is loaded when it is first used.\n"
     ]
     for room in sorted(rooms):
@@ -239,7 +253,7 @@ def names() -> str:
             if whole == "shellform.study.study" or name == "study":
                 continue
             text.append(
-                f"### sf.{name} {{ #sf-{name} }}\n\n::: {whole}\n    options:\n      show_root_heading: false\n      show_root_toc_entry: false\n      heading_level: 4\n"
+                f"### sf.{name} {{ #sf-{name} }}\n\n::: {whole}\n    options:\n      show_root_toc_entry: false\n      heading_level: 4\n"
             )
     return "\n".join(text)
 

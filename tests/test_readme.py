@@ -1,4 +1,4 @@
-"""The README's example runs as printed, and its map of the package is true."""
+"""The README's example runs as printed, its links lead somewhere, and the map of the package is true."""
 
 import re
 import subprocess
@@ -12,11 +12,19 @@ from tests.test_layers import FLOORS, modules
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 EXAMPLE = re.search(r"## In Python\n\n```python\n(.*?)```", README, re.DOTALL)[1]
-ARCHITECTURE = re.search(r"## Architecture\n(.*?)\n## ", README, re.DOTALL)[1]
+GUIDE = (ROOT / "shellform/documentation/how-to/contribute.md").read_text(encoding="utf-8")
+ARCHITECTURE = GUIDE[GUIDE.index("## Architecture\n") :]
 
 
-def test_the_example_is_under_thirty_lines():
-    assert len(EXAMPLE.splitlines()) < 30
+def test_the_readme_is_a_screen_and_a_half():
+    assert len(README.splitlines()) <= 80
+    assert len(EXAMPLE.splitlines()) <= 16
+
+
+def test_the_readme_s_links_lead_somewhere():
+    links = re.findall(r"\]\(([^)]*)\)", README)
+    assert len(links) > 5
+    assert [link for link in links if not (ROOT / link).is_file()] == []
 
 
 def test_the_example_runs_character_for_character_as_printed(tmp_path):
