@@ -31,7 +31,16 @@ from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.orientation import cost
 from shellform.net.refusal import NoNet, Stalled
-from shellform.run.first_trial import DRAWN, ELEMENTS, NEEDED, Followed, drawn_standing, followed
+from shellform.run.first_trial import (
+    DRAWN,
+    ELEMENTS,
+    NEEDED,
+    PULLED,
+    FirstParts,
+    Followed,
+    drawn_standing,
+    followed,
+)
 from shellform.run.sizes import (
     MOST_CROSSINGS,
     DesignWish,
@@ -42,6 +51,7 @@ from shellform.run.sizes import (
     first_choice,
     first_spacing,
     least_spacing,
+    load_borne,
     next_choice,
     practical,
     rest_ratio_for,
@@ -187,7 +197,10 @@ class _Search:
             if failure.why is Why.STRENGTH and choice in possible:
                 other = possible[_next(placed.net, possible, possible.index(choice), failure)]
             if other is choice:  # else the load is kept, and rods that leave more of their strength are tried
-                thinner = _whole_mm(min(0.8 * thinner, 0.95 * thinner * failure.nearness(NEEDED) / NEEDED))
+                share = min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
+                if failure.why is Why.STRENGTH:
+                    share = min(max(load_borne(placed.net, choice, failure.stress, _STRESSED), 0.5), 0.9)
+                thinner = _whole_mm(share * thinner)
             choice = other
             if thinner < 0.002:
                 break
@@ -249,7 +262,11 @@ class _Search:
         self, placed: Placed, choice: RodChoice, bundle: int, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design, where it stands with the gap that follows its rods too."""
-        tried = followed(placed.net, self.surface, choice, bundle, thickness)
+        parts = FirstParts(choice, bundle, rest_ratio_for(self.surface, spacing))
+        tried = followed(placed.net, self.surface, parts, thickness)
+        if tried.factor >= NEEDED and tried.pull > PULLED:
+            parts = parts.eased(tried.pull)
+            tried = followed(placed.net, self.surface, parts, thickness)
         failure = Obstacle(
             Why.STABILITY, spacing, thickness, tried.factor, choice, placed, tried.where, tried.stress
         )
@@ -281,18 +298,17 @@ class _Search:
             placed = Placed(stand(net, self.surface), math.degrees(given.angle), given.offset)
             if erection_stress(placed.net, choice.section) > choice.section.material.strength:
                 return self._keep(replace(failure, why=Why.STRENGTH, placed=placed, stress=1.0))
-            tried = followed(placed.net, self.surface, choice, bundle, thickness)
+            tried = followed(placed.net, self.surface, parts, thickness)
             if tried.factor < NEEDED:
                 return self._keep(replace(failure, factor=tried.factor, placed=placed))
-        standing = drawn_standing(placed.net, self.surface, choice, bundle, thickness)
+        standing = drawn_standing(placed.net, self.surface, parts, thickness)
         self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the design load")
         if standing < DRAWN:
             return self._keep(replace(failure, why=Why.SCATTER, factor=tried.factor, placed=placed))
         material = choice.section.material
         allowed = placed.net.max_radius(young=material.young, strength=material.strength)
         return FirstDesign(
-            spacing, self.reason, placed, choice, rope_for(spacing), bundle,
-            rest_ratio_for(self.surface, spacing), thickness, tried, standing, DRAWN,
+            spacing, self.reason, placed, choice, rope_for(spacing), bundle, parts.rest_ratio, thickness, tried, standing, DRAWN,
             allowed, tuple(self.told),
         )  # fmt: skip
 

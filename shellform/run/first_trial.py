@@ -8,7 +8,7 @@ more would be needed for (trial_structures.py).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from shellform.net.net import Net
 from shellform.problem.paths import deviations
 from shellform.reliability.standing import sample
 from shellform.reliability.trial_structures import enlarged
-from shellform.run.sizes import RodChoice, rest_ratio_for, rope_for
+from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, RodChoice, rope_for
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -36,26 +36,45 @@ ELEMENTS = 2
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
 DRAWN, SEED, ENLARGED = 12, 1, 1.25
+PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
 COMPOSITE = 0.5  # how far the rods of an edge beam act together
 _SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
 
 
 @dataclass(frozen=True)
+class FirstParts:
+    """What a first design is made of: the `choice` of rods, how many rods an edge beam has (`bundle`), and the
+    cables' `rest_ratio`."""
+
+    choice: RodChoice
+    bundle: int
+    rest_ratio: float
+
+    def eased(self, pull: float) -> FirstParts:
+        """The same with so much less prestrain that cables whose largest force is `pull` times their limit
+        come down to `PULLED`."""
+        prestrain = 1.0 - self.rest_ratio - (pull - PULLED) * STRAINED
+        return replace(self, rest_ratio=round(1.0 - max(prestrain, LEAST_PRESTRAIN), 4))
+
+
+@dataclass(frozen=True)
 class Followed:
-    """What a design came to: the `factor` of its load up to which it stands, the stress over the strength of its rods
-    (`stress`) and of its edge beams (`edge`), the largest `deviation`, m, at the last state, and `where` that is (3,), m."""
+    """What a design came to: the `factor` of its load up to which it stands; under the additional load the
+    stress over the strength of its rods (`stress`) and of its edge beams (`edge`), and the cables' largest force
+    over its limit (`pull`); the largest `deviation`, m, at the last state, and `where` that is (3,), m."""
 
     factor: float
     stress: float
     edge: float
+    pull: float
     deviation: float
     where: Reals
 
 
-def followed(net: Net, surface: Surface, choice: RodChoice, bundle: int, thickness: float) -> Followed:
-    """The design followed up to `NEEDED` times its load, edge beams being bundles of so many rods."""
-    shell, load = _shell(net, surface, choice, bundle, thickness)
-    design = shell.design(rest_ratio=rest_ratio_for(surface, net.grid.scale))
+def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> Followed:
+    """The design followed up to `NEEDED` times its load."""
+    shell, load = _shell(net, surface, parts, thickness)
+    design = shell.design(rest_ratio=parts.rest_ratio)
     assembly = assemble(shell.network(design))
     none = np.zeros((shell.node_count, 6))
     factor, borne = 0.0, none
@@ -77,17 +96,18 @@ def followed(net: Net, surface: Surface, choice: RodChoice, bundle: int, thickne
         factor,
         float(shell.utilisation(design, stressed).max()),
         edge_utilisation(shell, beams, beams.local_forces(stressed)),
+        float(shell.cables(design).tension(stressed).max(initial=0.0)) / rope_for(net.grid.scale).force_max,
         float(away.max()),
         shell.target.positions[int(np.argmax(away))],
     )
 
 
-def drawn_standing(net: Net, surface: Surface, choice: RodChoice, bundle: int, thickness: float) -> int:
+def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> int:
     """How many of `DRAWN` structures stand under the design load."""
-    shell, load = _shell(net, surface, choice, bundle, thickness)
+    shell, load = _shell(net, surface, parts, thickness)
     drawn = sample(
         shell,
-        shell.design(rest_ratio=rest_ratio_for(surface, net.grid.scale)),
+        shell.design(rest_ratio=parts.rest_ratio),
         load,
         enlarged(default_tolerances(shell), ENLARGED),
         count=DRAWN,
@@ -96,18 +116,16 @@ def drawn_standing(net: Net, surface: Surface, choice: RodChoice, bundle: int, t
     return sum(each.stands for each in drawn.outcomes)
 
 
-def _shell(
-    net: Net, surface: Surface, choice: RodChoice, bundle: int, thickness: float
-) -> tuple[Gridshell, Reals]:
+def _shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> tuple[Gridshell, Reals]:
     """The gridshell and its load (n, 6), N; the joint's gap is the net's."""
-    rope = rope_for(net.grid.scale)
-    rod = Rod(choice.section)
+    rope, section = rope_for(net.grid.scale), parts.choice.section
+    rod = Rod(section)
     fitting = following(rod)
     joint = Joint(fitting.axial, fitting.torsion, fitting.bending, net.grid.gap)
-    radius = math.sqrt(single(choice.section).constants[0] / math.pi)
-    edge = EdgeBeam(Bundle(radius, bundle, COMPOSITE, choice.section.material)) if net.edges else None
+    radius = math.sqrt(single(section).constants[0] / math.pi)
+    edge = EdgeBeam(Bundle(radius, parts.bundle, COMPOSITE, section.material)) if net.edges else None
     shell = brace(net, rod, joint, Cable(rope.stiffness), below=surface, edge=edge)
-    own = rods(net, choice.section)
+    own = rods(net, section)
     if edge is not None:
         own = own + weight(net, edge)
     poured = concrete(net, surface, thickness=thickness)

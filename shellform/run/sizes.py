@@ -40,8 +40,9 @@ _LATHS = "timber_laths"  # whose rods are built in two layers
 _ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008)  # m, diameters in stock
 _ROPE = 0.006  # of the spacing, a rope's diameter
 _ROPE_AREA, _ROPE_YOUNG, _ROPE_STRENGTH = 0.597, 120e9, 1380e6  # of the diameter's square; Pa; Pa at breaking
+STRAINED = 0.5 * _ROPE_STRENGTH / _ROPE_YOUNG  # of a rope under the largest force that it is let bear
 _BUCKLING = 1.4
-_PRESTRAIN = (0.002, 0.004)  # of the cables: the most is two thirds of what half their strength strains them
+LEAST_PRESTRAIN, _MOST_PRESTRAIN = 0.001, 0.004  # of the cables
 _AMPLE = 2.0  # times what is needed, by the estimate of buckling: there the sections begin
 _BENT = 0.65  # of a rod's strength, that bending it into the net takes at the most of the first that is tried
 
@@ -173,7 +174,7 @@ def rest_ratio_for(surface: Surface, spacing: float) -> float:
     length, within bounds."""
     span, length = float(surface.size.max()), math.sqrt(2.0) * spacing
     off = tolerances_of_size(span, longest_rod=span, longest_cable=length).cable_length
-    return round(1.0 - min(max(2.0 * off / length, _PRESTRAIN[0]), _PRESTRAIN[1]), 4)
+    return round(1.0 - min(max(2.0 * off / length, LEAST_PRESTRAIN), _MOST_PRESTRAIN), 4)
 
 
 def choices(net: Net, spacing: float, wish: str | None, layers: int = 1) -> list[RodChoice]:
@@ -183,8 +184,7 @@ def choices(net: Net, spacing: float, wish: str | None, layers: int = 1) -> list
     found = [
         each
         for each in wished(wish, layers)
-        if erection_stress(net, each.section) <= each.section.material.strength
-        and least_spacing(each) <= spacing * (1.0 + 1e-9)
+        if _bent(net, each) <= 1.0 and least_spacing(each) <= spacing * (1.0 + 1e-9)
     ]
     found.sort(key=lambda each: (each.bending, mass_per_length(each.section)))
     return found
@@ -196,11 +196,7 @@ def first_choice(
     """Which of the `possible` sections to begin with, so that the grid buckles under `needed`, N/m², by the
     estimate: the least stiff that leaves a third of its strength to the load, or what comes nearest."""
     rope = rope_for(spacing)
-    spare = [
-        k
-        for k, each in enumerate(possible)
-        if erection_stress(net, each.section) <= _BENT * each.section.material.strength
-    ] or list(range(len(possible)))
+    spare = [k for k, each in enumerate(possible) if _bent(net, each) <= _BENT] or list(range(len(possible)))
     enough = (
         k for k in spare if buckling_load(surface, spacing, possible[k].bending, rope) >= _AMPLE * needed
     )
@@ -211,20 +207,30 @@ def next_choice(
     net: Net, possible: Sequence[RodChoice], at: int, stress: float, times: float, most: float
 ) -> int:
     """The section to try after that `at`, whose `stress` over its strength is told: the least stiff that is at
-    least so many `times` as stiff (0: the stiffest of all) and whose stress is likely to be `most` at the most, else
-    the stiffest such one; `at` where there is none.
+    least so many `times` as stiff and whose stress is likely to be `most` at the most, else the stiffest such
+    one; with 0 `times` the one that is likely to be stressed least. `at` where there is none.
 
     Bending into the net stresses every section as it is; what the load adds goes with the moment that it bears.
     """
-    own, bent = (
-        possible[at],
-        [erection_stress(net, each.section) / each.section.material.strength for each in possible],
-    )
+    own, bent = possible[at], [_bent(net, each) for each in possible]
     added = max(stress - bent[at], 0.0)
-    fit = [k for k, each in enumerate(possible) if bent[k] + added * own.moment / each.moment <= most]
+    likely = [share + added * own.moment / each.moment for share, each in zip(bent, possible, strict=True)]
+    fit = [k for k, share in enumerate(likely) if share <= most]
     if not times:
-        return fit[-1] if fit else at
+        return min(fit, key=likely.__getitem__, default=at)
     return next((k for k in fit if possible[k].bending >= times * own.bending), fit[-1] if fit else at)
+
+
+def load_borne(net: Net, choice: RodChoice, stress: float, most: float) -> float:
+    """What share of the load a section bears with a stress of `most` over its strength, whose `stress` under all of
+    it is told."""
+    bent = _bent(net, choice)
+    return max(most - bent, 0.0) / max(stress - bent, 1e-12)
+
+
+def _bent(net: Net, choice: RodChoice) -> float:
+    """What bending into the net takes of a section's strength."""
+    return erection_stress(net, choice.section) / choice.section.material.strength
 
 
 def least_spacing(choice: RodChoice) -> float:
