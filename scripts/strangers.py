@@ -6,7 +6,7 @@ and (two STEP files) Open CASCADE, in m, mm, cm, in and ft, z up and y up; every
 Files of others can be added by `--files`.
 
 Run: PYTHONPATH=. python scripts/strangers.py FOLDER [--files OTHER ...] [--only NAME ...] [--limit 120]
-     [--do make check net new design]
+     [--do make check net new design] [--until safety] [--quick]
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import json
 import math
 import os
 import re
+import resource
 import signal
 import subprocess
 import sys
@@ -466,17 +467,19 @@ STRANGERS = (
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: `status` (None: broken off), what it `printed`, its last `words`, `seconds`."""
+    """How a command ended: `status` (None: broken off), what it `printed`, its last `words`, the `seconds` that it
+    took, and those of processors."""
 
     status: int | None
     printed: str
     words: str
     seconds: float
+    processor: float
 
 
 def ran(arguments: Sequence[str], limit: float) -> Ended:
     """`shellform` with these arguments, given `limit` s; what it started is ended with it."""
-    began = time.perf_counter()
+    began, before = time.perf_counter(), _processor()
     child = subprocess.Popen(
         [sys.executable, "-m", "shellform", *arguments],
         stdout=subprocess.PIPE,
@@ -492,7 +495,14 @@ def ran(arguments: Sequence[str], limit: float) -> Ended:
         printed, said = child.communicate()
         status = None
     lines = said.strip().splitlines()
-    return Ended(status, printed, lines[-1] if lines else "", time.perf_counter() - began)
+    took = time.perf_counter() - began
+    return Ended(status, printed, lines[-1] if lines else "", took, _processor() - before)
+
+
+def _processor() -> float:
+    """s, of all that were started and have ended."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def measured(
@@ -502,6 +512,7 @@ def measured(
     do: Sequence[str],
     limit: float,
     quick: Sequence[str] = (),
+    until: str = "safety",
 ) -> dict[str, Any]:
     """One row: what each of the steps in `do` came to; `design` with the further options `quick`."""
     row: dict[str, Any] = {"name": file.name}
@@ -543,12 +554,14 @@ def measured(
                 str(folder / "designs" / file.stem),
                 "--quiet",
                 "--json",
+                "--until",
+                until,
                 *quick,
             ]
         )
         ended = ran(arguments, limit)
         row |= {step: ended.status, "reason": ended.words if ended.status else row.get("reason", "")}
-        row[f"{step}_seconds"] = ended.seconds
+        row[f"{step}_seconds"], row[f"{step}_processor"] = ended.seconds, ended.processor
         row |= proposed(ended.printed) if step == "new" else designed(ended.printed)
         if ended.status != 0:
             break
@@ -559,10 +572,12 @@ def proposed(printed: str) -> dict[str, Any]:
     """Columns of what `new` told: lines of a label of up to 22 letters, two spaces, and its value."""
     lines = (line[:22].strip() and (line[:22].strip(), line[24:].strip()) for line in printed.splitlines())
     told = dict(each for each in lines if each)
-    shown = {"rods": "section", "concrete": "concrete", "stands": "stands", "spacing": "proposed"}
-    return {
+    shown = {"rods": "section", "concrete": "concrete", "spacing": "proposed"}
+    found = {
         name: re.split(r" \(equation|, |: ", told[label])[0] for label, name in shown.items() if label in told
-    } | ({"stands": told["stands"]} if "stands" in told else {})
+    }
+    crossings = re.search(r"(\d+) crossings$", told.get("spacing", ""))
+    return found | ({"crossings": crossings[1]} if crossings else {})
 
 
 def designed(printed: str) -> dict[str, Any]:
@@ -571,12 +586,16 @@ def designed(printed: str) -> dict[str, Any]:
         return {}
     summary = json.loads(printed)
     verdict = summary.get("verdict") or {}
-    last = list(summary["designs"].values())[-1]
+    built = summary["designs"][verdict.get("design", list(summary["designs"])[-1])]
+    loads = {name: built["loads"][name] for name in ("design", "additional")}
+    stands = {name: row.get("stands") or {} for name, row in loads.items()}
     return {
         "holds": verdict.get("holds"),
         "fails": ", ".join(verdict.get("failed", [])),
-        "cables": last["cables"],
-        "deviation": last["loads"]["design"]["deviation_max"],
+        "cables": f"{built['cables']} of {summary['model']['cables']}",
+        "deviation": loads["design"]["deviation_max"],
+        "stands": " and ".join(f"{each['standing']} of {each['drawn']}" for each in stands.values() if each),
+        "factor": loads["design"].get("critical_factor_halved"),
     }
 
 
@@ -585,8 +604,8 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     steps = [step for step in ("check", "net", "new", "design") if any(step in row for row in rows)]
     lines = [
         f"| file | size, m | {' | '.join(steps)} | spacing | crossings | distance / spacing | spacing error | section | concrete | "
-        "stands | holds | cables | deviation, mm | s | said |",
-        "| --- " * (14 + len(steps)) + "|",
+        "holds | cables | deviation, mm | stand at 1.0 and 1.2 | factor | s | processor s | said |",
+        "| --- " * (16 + len(steps)) + "|",
     ]
     for row in rows:
         ends = " | ".join(
@@ -598,13 +617,16 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
             str(row.get("crossings", "")),
             f"{100 * row['distance']:.2f} %" if "distance" in row else "",
             f"{100 * row['error']:.2f} %" if "error" in row else "",
-            *(str(row.get(name, "")) for name in ("section", "concrete", "stands")),
+            *(str(row.get(name, "")) for name in ("section", "concrete")),
             {True: "yes", False: f"no: {row.get('fails')}"}.get(row.get("holds"), ""),  # type: ignore[call-overload]
             str(row.get("cables", "")),
             f"{1e3 * row['deviation']:.0f}" if "deviation" in row else "",
+            str(row.get("stands", "")),
+            f"{row['factor']:.2f}" if row.get("factor") else "",
             " + ".join(
                 f"{row[name]:.0f}" for name in ("seconds", "new_seconds", "design_seconds") if name in row
             ),
+            " + ".join(f"{row[name]:.0f}" for name in ("new_processor", "design_processor") if name in row),
         ]
         lines.append(
             f"| {row['name']} | {row.get('size', '')} | {ends} | {' | '.join(numbers)} | {row.get('reason', '')[:150]} |"
@@ -625,8 +647,9 @@ def main() -> None:
     parser.add_argument("--only", nargs="*", default=[], help="names (their beginnings)")
     parser.add_argument("--limit", type=float, default=120.0, help="s for one command")
     parser.add_argument("--do", nargs="*", default=["check", "net"], help="of check, net, new, design")
+    parser.add_argument("--until", default="safety", help="last stage of design")
     parser.add_argument(
-        "--quick", action="store_true", help="design: the optimised design alone, in ten evaluations"
+        "--quick", action="store_true", help="design: in ten evaluations, eighty structures drawn"
     )
     given = parser.parse_args()
     quick = QUICK if given.quick else []
@@ -646,12 +669,20 @@ def main() -> None:
     for file, options in corpus:
         if given.only and not any(file.stem.startswith(name) for name in given.only):
             continue
-        rows.append(measured(file, options, given.folder, given.do, given.limit, quick))
+        rows.append(measured(file, options, given.folder, given.do, given.limit, quick, given.until))
         print(json.dumps(rows[-1], ensure_ascii=False), file=sys.stderr, flush=True)
     print(table(rows))
 
 
-QUICK = ["--until", "optimise", "--set", "optimise.evaluations=10", "--set", "net.elements=2"]
+QUICK = [
+    f"--set={each}"
+    for each in (
+        "optimise.evaluations=10",
+        "optimise.polish=3",
+        "safety.drawn=80",
+        "safety.compared=5",
+    )
+]
 OPTIONS_OF_OTHERS = {"igl_igloo": ["--up", "y"]}
 
 if __name__ == "__main__":
