@@ -10,6 +10,7 @@ from PIL import Image
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.net.net import Stretch
 from shellform.output.page import report
 from shellform.output.page.charts import line_chart
 from shellform.output.page.embed import embed
@@ -19,6 +20,25 @@ from shellform.records.summary import StandingRecord, VerdictRecord
 from shellform.records.words import number
 from shellform.structure.elements.state import State
 from tests.records.made import summary
+
+
+def test_the_edge_is_told_by_what_it_stands_on_where_that_is_known(shell):
+    arch, foot = shell.target.positions[:3], shell.target.positions[:2]
+    stretches = (Stretch("ground", "", foot, False, False), Stretch("beam", "", arch, False, False))
+    standing = replace(shell, net=replace(shell.net, stretches=stretches))
+    design = standing.design()
+    rows = {"initial": design}
+    found = {
+        answer.question: answer
+        for answer in answers(standing, "initial", design, {"design": shell.target}, summary(rows))
+    }
+    words = found["What does its edge stand on?"].words
+    assert (
+        words
+        == f"{number(stretches[0].length)} m on the ground, {number(stretches[1].length)} m on edge beams"
+    )
+    asked = answers(shell, "initial", design, {"design": shell.target}, summary(rows))
+    assert all(answer.question != "What does its edge stand on?" for answer in asked)
 
 
 @pytest.fixture

@@ -49,6 +49,7 @@ def test_a_sound_design_holds_all_checks_those_of_the_optimiser_among_them(shell
         ("additional", {"on_branch": False}, "Stands under 1.2 × the load"),
         ("none", {"rod_utilisation_max": 1.01}, "Rods under no load"),
         ("additional", {"deviation_rms": 0.0051}, "Deviation under 1.2 × the load, root mean square (6)"),
+        ("additional", {"edge_utilisation_max": 1.02}, "Edge beams under 1.2 × the load"),
         ("design", {"residual": float("nan")}, "In equilibrium under the design load"),
         (
             None,

@@ -11,10 +11,25 @@ from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import read_catalogue
+from shellform.gridshell.gridshell import erection_stress
 from shellform.problem.paths import follow
-from shellform.run.first_design import NEEDED, first_design
+from shellform.run.first_design import first_design
+from shellform.run.first_trial import NEEDED, PULLED, FirstParts
 from shellform.run.propose import propose_case
-from shellform.run.sizes import DesignWish, choices, curvature_shown, first_spacing, practical, rope_for
+from shellform.run.sizes import (
+    LEAST_PRESTRAIN,
+    STRAINED,
+    DesignWish,
+    choices,
+    curvature_shown,
+    first_spacing,
+    load_borne,
+    next_choice,
+    practical,
+    rest_ratio_for,
+    rope_for,
+    wished,
+)
 from shellform.run.unbuildable import refuse_flat, refuse_size
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.target import make_surface
@@ -114,10 +129,43 @@ def test_spacings_are_rounded_down_to_what_is_set_out(exact, set_out):
     assert rope_for(1.0).diameter == 0.006
 
 
-def test_sections_are_real_ones_that_the_net_and_the_spacing_allow():
+@pytest.fixture(scope="module")
+def net():
+    """On a barrel."""
     from shellform.net.chebyshev import pull_net
 
-    net = pull_net(barrel(), spacing=0.1, gap=0.1 / 27.5, angle=np.deg2rad(45.0), elements=2)
+    return pull_net(barrel(), spacing=0.1, gap=0.1 / 27.5, angle=np.deg2rad(45.0), elements=2)
+
+
+def test_after_a_section_that_falls_a_stiffer_one_comes_and_after_one_that_breaks_one_less_stressed(net):
+    found = choices(net, 0.1, None)
+    share = [erection_stress(net, each.section) / each.section.material.strength for each in found]
+    at = len(found) // 2
+    stiffer = next_choice(net, found, at, share[at], 2.0, 0.95)
+    assert found[stiffer].bending >= 2.0 * found[at].bending
+    assert share[stiffer] <= 0.95
+    bent = int(np.argmax(share))
+    assert share[next_choice(net, found, bent, share[bent], 0.0, 0.95)] == min(share)
+    assert next_choice(net, found, at, 50.0, 0.0, 0.01) == at, "none would do"
+    half = 0.5 * (share[at] + 0.95)
+    assert load_borne(net, found[at], half, 0.95) == pytest.approx(2.0)
+
+
+def test_two_layers_are_stiffer_across_the_surface_and_bent_like_one(net):
+    one, two = wished("gfrp_rods/6 mm", 1)[0], wished("gfrp_rods/6 mm", 2)[0]
+    assert two.bending > 2.0 * one.bending
+    assert two.moment > 2.0 * one.moment
+    assert erection_stress(net, two.section) == pytest.approx(erection_stress(net, one.section))
+
+
+def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none():
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996)
+    assert 1.0 - parts.eased(PULLED + 0.2).rest_ratio == pytest.approx(0.004 - 0.2 * STRAINED, abs=1e-4)
+    assert parts.eased(3.0).rest_ratio == 1.0 - LEAST_PRESTRAIN
+    assert 1.0 - rest_ratio_for(dish(), 0.4) > 1.0 - rest_ratio_for(dish(), 4.0)
+
+
+def test_sections_are_real_ones_that_the_net_and_the_spacing_allow(net):
     found = choices(net, 0.1, None)
     assert found
     assert [each.bending for each in found] == sorted(each.bending for each in found)
