@@ -44,3 +44,17 @@ def test_dense_algebra_within_the_block_runs_on_one_thread():
         with threads.dense_on_one():
             assert counts() == {1}
         assert counts() == before
+
+
+def test_work_within_an_item_stays_on_its_thread(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "2")
+    seen = []
+
+    def work(_):
+        own, names = threading.current_thread().name, set()
+        threads.side_by_side(lambda _: names.add(threading.current_thread().name), range(4))
+        threads.share(lambda *_: names.add(threading.current_thread().name), 10_000)
+        seen.append(names == {own})
+
+    threads.side_by_side(work, range(2))
+    assert seen == [True, True]
