@@ -29,7 +29,8 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import NotConverged
-from shellform.reliability.path_of_one import STEP, Here, Loading
+from shellform.reliability.branch import Here
+from shellform.reliability.path_of_one import STEP, Loading
 from shellform.structure.answers.sensitivity import by_rest_length, by_stiffness
 from shellform.structure.answers.stability import modes
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length

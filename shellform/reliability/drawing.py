@@ -9,11 +9,16 @@ order and on however many threads.
 What errors do to the stress-free state. Marks: with errors e_0 .. e_q along a rod, the segment between two
 marks is longer by e_{i+1} - e_i, its elements in proportion; the rod stays straight, so that no frame
 changes. A rod's own arc of rise b L has the curvature k = 8 b / L; clamps are tightened on rods held straight
-in the flat grid, so that connectors keep their frames and the ends of the rod's elements are turned
-(bent_beams.py). A shape v (n, 6) of amplitude 1 imposed without stress: with the unloaded state of the
-perfect structure moved along v, every element keeps its deformations,
+in the flat grid, so that connectors keep their frames and the axes at the ends of the rod's elements are
+turned: with the curvature k (a vector across the axis, in the axes of the stress-free state) an element of
+length l has its ends turned by -k l / 2 and k l / 2 against its chord when nothing bends it, so that
 
-    l0' = l0 + l' - l,   H_a' = Q_a'⁻¹ G Q_a H_a,
+    F_a' = R(k l / 2) F_a,   F_b' = R(-k l / 2) F_b.
+
+A shape v (n, 6) of amplitude 1 imposed without stress: with the unloaded state of the perfect structure moved
+along v, every element keeps its deformations,
+
+    l0' = l0 + l' - l,   F_a' = Q_a'⁻¹ G Q_a F_a,
 
 G the turn of its chord, so that its forces there are those of the perfect structure, turned with it.
 """
@@ -28,12 +33,10 @@ import numpy as np
 from shellform.arrays import Reals, reals
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.bent_beams import BentBeams, curved
 from shellform.reliability.members import Members
 from shellform.structure.elements import rotation
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
-from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State, moved
 
 SHAPES = 3  # softest modes in which the shape is off
@@ -136,10 +139,10 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
     )
 
 
-def built_beams(nominal: Beams, errors: Errors, imperfections: Imperfections | None = None) -> Part:
-    """The beams with the errors; straight ones stay `Beams`."""
+def built_beams(nominal: Beams, errors: Errors, imperfections: Imperfections | None = None) -> Beams:
+    """The beams with the errors."""
     factor = errors.beam_stiffness
-    straight = replace(
+    built = replace(
         nominal,
         axial=nominal.axial * factor,
         torsion=nominal.torsion * factor,
@@ -147,11 +150,11 @@ def built_beams(nominal: Beams, errors: Errors, imperfections: Imperfections | N
         bending_z=nominal.bending_z * factor,
         rest_length=nominal.rest_length + errors.beam_length,
     )
-    bent: Beams | BentBeams = straight
     if errors.beam_curvature.any():
-        axes = nominal.frames[:, 0, :, 1:]
-        bent = curved(straight, np.einsum("eij,ej->ei", axes, errors.beam_curvature))
-    return bent if imperfections is None or not errors.shape.any() else _shaped(bent, errors, imperfections)
+        curvature = np.einsum("eij,ej->ei", nominal.frames[:, 0, :, 1:], errors.beam_curvature)
+        half = 0.5 * built.rest_length[:, None] * curvature
+        built = _turned_ends(built, rotation.from_vectors(half), rotation.from_vectors(-half))
+    return built if imperfections is None or not errors.shape.any() else _shaped(built, errors, imperfections)
 
 
 def built_cables(
@@ -188,12 +191,15 @@ def _off(errors: Errors, imperfections: Imperfections) -> State:
     return moved(imperfections.state, step)
 
 
-def _shaped(beams: Beams | BentBeams, errors: Errors, imperfections: Imperfections) -> BentBeams:
-    straight = beams.straight if isinstance(beams, BentBeams) else beams
-    count = len(straight.ends)
-    turns = beams.turns if isinstance(beams, BentBeams) else np.tile(rotation.identity(1)[0], (count, 2, 1))
+def _turned_ends(beams: Beams, first: Reals, second: Reals) -> Beams:
+    """The beams with the axes at their ends turned by quaternions (m, 4)."""
+    turns = np.stack([rotation.matrices(first), rotation.matrices(second)], axis=1)
+    return replace(beams, frames=turns @ beams.frames)
+
+
+def _shaped(beams: Beams, errors: Errors, imperfections: Imperfections) -> Beams:
     before, after = imperfections.state, _off(errors, imperfections)
-    a, b = straight.ends.T
+    a, b = beams.ends.T
     chord, moved_chord = (state.positions[b] - state.positions[a] for state in (before, after))
     length, other = np.linalg.norm(chord, axis=1), np.linalg.norm(moved_chord, axis=1)
     # The turn of the chord, and along it the mean of what the ends spin.
@@ -204,14 +210,11 @@ def _shaped(beams: Beams | BentBeams, errors: Errors, imperfections: Imperfectio
         np.ascontiguousarray(spun[:, None] * unit), _between(chord / length[:, None], unit)
     )
     ends = []
-    for k, node in enumerate((a, b)):
-        old = rotation.product(before.quaternions[node], np.ascontiguousarray(turns[:, k]))
+    for node in (a, b):
         back = after.quaternions[node] * np.array([1.0, -1.0, -1.0, -1.0])
-        ends.append(rotation.product(back, rotation.product(turn, old)))
-    longer = replace(
-        straight, rest_length=reals("rest_length", straight.rest_length + other - length, (None,))
-    )
-    return BentBeams(longer, np.stack(ends, axis=1))
+        ends.append(rotation.product(back, rotation.product(turn, before.quaternions[node])))
+    longer = reals("rest_length", beams.rest_length + other - length, (None,))
+    return _turned_ends(replace(beams, rest_length=longer), *ends)
 
 
 def _between(unit: Reals, other: Reals) -> Reals:

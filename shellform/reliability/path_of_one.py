@@ -9,9 +9,8 @@ from typing import cast
 
 import numpy as np
 
-from shellform.arrays import Reals
 from shellform.errors import NotConverged
-from shellform.reliability.bent_beams import BentBeams
+from shellform.reliability.branch import ON_THE_WAY, Branch, Here
 from shellform.reliability.drawing import (
     Errors,
     built_beams,
@@ -22,10 +21,9 @@ from shellform.reliability.perfect import Perfect
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.state import State, moved
-from shellform.structure.solve.assembly import Assembly, Balance
-from shellform.structure.solve.equilibrium import TOLERANCE, TURN, find_equilibrium
-from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
-from shellform.structure.solve.residual import ResidualNorm, held
+from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.factorisation import NotPositiveDefinite
 
 LIMIT_POINT, BIFURCATION, BORNE, UNLOADED = "limit point", "bifurcation", "none", "no unloaded state"
 ENDED = "not looked into"
@@ -34,14 +32,10 @@ _ALIGNED = (
 )
 
 FAR = 0.05  # of the span from the perfect structure
-STRAY = 0.01  # of the span from where a step was expected to end: the state belongs to another branch
-STEP = 0.5  # of the load
+STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
-_PATIENCE = 10  # factorisations of one step
 _RELAXING = 15  # of the unloaded state, before it is sought from the target instead
-_ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
 _PASSES = 2  # of bringing beams to their length
-_FAR_OFF = 5.0  # rad, a step that leads nowhere
 
 
 @dataclass(frozen=True)
@@ -70,33 +64,17 @@ class Limit:
     factorisations: int
 
 
-@dataclass(frozen=True)
-class Here:
-    """A state on the stable branch with its balance and its tangent's factor, good until the next one is
-    made.
-    """
-
-    state: State
-    balance: Balance
-    factor: Factor
-
-
-class Loading:
+class Loading(Branch):
     """One structure under way."""
 
     def __init__(self, nominal: Perfect, assembly: Assembly, errors: Errors, number: int) -> None:
         self.nominal, self.errors, self.number = nominal, errors, number
         network = nominal.network
         shape = nominal.imperfections
-        self.assembly = assembly.with_parts(
-            (
-                built_beams(network.beams, errors, shape),
-                built_cables(network.cables, nominal.present, errors, shape),
-            )
-        )
-        self.load = built_load(nominal.load, errors)
-        self.measure = ResidualNorm(self.assembly)
-        self.spent = 0
+        beams = built_beams(network.beams, errors, shape)
+        cables = built_cables(network.cables, nominal.present, errors, shape)
+        own = assembly.with_parts((beams, cables))
+        super().__init__(own, built_load(nominal.load, errors), nominal.members.span)
 
     def outcome(self, step: float, smallest: float) -> DrawnOutcome:
         nominal = self.nominal
@@ -111,24 +89,14 @@ class Loading:
         stands = far <= FAR * nominal.members.span
         return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent)
 
-    def followed(self, most: float, step: float, smallest: float) -> tuple[Here | None, float]:
+    def followed(
+        self, most: float, step: float, smallest: float, *, begin: tuple[float, State] | None = None
+    ) -> tuple[Here | None, float]:
         """The last state on the stable branch and its load factor, `most` where the branch goes on; None
-        where there is no unloaded state."""
-        here = self._unloaded()
-        factor, width, good = 0.0, step, 0
-        while here is not None and factor < most:
-            goal = most if factor + width > most - 1e-12 else factor + width
-            there = self.step(here, goal, last=goal == most)
-            if there is None:
-                width, good = 0.5 * width, 0
-                here = self.at(here.state)  # its factor was replaced
-                if width < smallest:
-                    break
-                continue
-            here, factor, good = there, goal, good + 1
-            if good == 2:
-                width, good = min(2.0 * width, step), 0
-        return here, factor
+        where there is no unloaded state. With `begin` from a state at a load factor that is known to lie on
+        the branch."""
+        factor, here = (0.0, self._unloaded()) if begin is None else (begin[0], self.at(begin[1]))
+        return (None, factor) if here is None else self.along(here, factor, most, step, smallest)
 
     def kind(self, here: Here) -> str:
         """What ends the branch just beyond the state: at a limit point the path's tangent turns into the
@@ -159,7 +127,7 @@ class Loading:
             pass
         begin = moved(start, self.assembly.chords.corrected(start, step.reshape(-1, 6)))
         begin = self._to_length(begin)
-        found = self._newton(begin, none, limit=_RELAXING, tolerance=_ON_THE_WAY)
+        found = self.newton(begin, none, limit=_RELAXING, tolerance=ON_THE_WAY)
         if found is not None:
             return found
         try:
@@ -168,15 +136,14 @@ class Loading:
             self.spent += error.iterations
             return None
         self.spent += relaxed.factorisations
-        return self._newton(relaxed.state, none, limit=2, tolerance=_ON_THE_WAY)
+        return self.newton(relaxed.state, none, limit=2, tolerance=ON_THE_WAY)
 
     def _to_length(self, state: State) -> State:
         """The state with its nodes moved so that the beams have the perfect structure's axial strains: rods
         are so stiff along their axis that what a linear motion leaves would buckle them. The nearest motion
         in the sense of least squares weighted by EA / l0, as in chords.py."""
         beams = self.nominal.network.beams
-        built = self.assembly.parts[0]
-        rest = (built.straight if isinstance(built, BentBeams) else cast(Beams, built)).rest_length
+        rest = cast(Beams, self.assembly.parts[0]).rest_length
         a, b = beams.ends.T
         before = self.nominal.unloaded.positions
         goal = rest / beams.rest_length * np.linalg.norm(before[b] - before[a], axis=1)
@@ -192,57 +159,3 @@ class Loading:
             for nodes, group, factor in chords.axes:
                 positions[np.ix_(nodes, group)] += factor.solve(right[np.ix_(nodes, group)])
         return State(positions, state.quaternions)
-
-    def step(self, here: Here, goal: float, *, last: bool) -> Here | None:
-        """From a state on the branch to the load factor `goal`."""
-        load = goal * self.load
-        change = self._solved(here, load)
-        if change is None:
-            return None
-        begin = moved(here.state, self.assembly.chords.corrected(here.state, change))
-        tolerance = TOLERANCE if last else _ON_THE_WAY
-        found = self._newton(begin, load, limit=_PATIENCE, tolerance=tolerance)
-        if found is None:
-            return None
-        stray = float(np.abs(found.state.positions - begin.positions).max())
-        return found if stray <= STRAY * self.nominal.members.span else None
-
-    def _newton(self, begin: State, load: Reals, *, limit: int, tolerance: float) -> Here | None:
-        """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent positive
-        definite, the last one included; None where one isn't."""
-        own, state, before = self.assembly, begin, np.inf
-        for _ in range(limit):
-            here = self.at(state)
-            if here is None:
-                return None
-            residual = self.measure.residual(here.balance, load)
-            noise = self.measure.rounding(here.balance, state, load) if residual > 0.1 * before else 0.0
-            if residual <= max(tolerance, noise):
-                return here
-            before = residual
-            change = self._solved(here, load)
-            if change is None:
-                return None
-            state = moved(state, own.chords.corrected(state, change))
-        return None
-
-    def at(self, state: State) -> Here | None:
-        """The state with its tangent's factor; None where that isn't positive definite."""
-        balance = self.assembly.evaluate(state)
-        self.spent += 1
-        try:
-            factor = self.assembly.matrix.factor(held(self.assembly, balance))
-        except NotPositiveDefinite:
-            return None
-        return Here(state, balance, factor)
-
-    def _solved(self, here: Here, load: Reals) -> Reals | None:
-        """Newton's step (n, 6), no spin beyond TURN; None where it leads nowhere."""
-        step = np.zeros(6 * self.assembly.count)
-        free = self.assembly.free
-        step[free] = here.factor.solve((load - here.balance.force).ravel()[free])
-        change = step.reshape(-1, 6)
-        spin = float(np.abs(change[:, 3:]).max())
-        if not spin <= _FAR_OFF:
-            return None
-        return change * (TURN / spin) if spin > TURN else change

@@ -10,6 +10,7 @@ import numpy as np
 from shellform.arrays import Flags, Reals, flags
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.reliability.branch import Branch
 from shellform.reliability.drawing import (
     SHAPES,
     Imperfections,
@@ -20,7 +21,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.model import Model
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.structure.solve.loading import apply_load
+from shellform.structure.solve.loading import SMALLEST
 
 _NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structure's path to the next
 
@@ -90,15 +91,13 @@ def _perfect(
     none = np.zeros_like(load)
     unloaded = find_equilibrium(assembly, target, none)
     kept: list[tuple[float, State]] = [(0.0, unloaded.state)]
-    reached = apply_load(
-        assembly,
-        unloaded.state,
-        none,
-        load,
-        step=_NOMINAL_STEP,
-        stay=True,
-        report=lambda share, found: kept.append((share, found.state)),
-    )
+    branch = Branch(assembly, load, members.span)
+    here = branch.at(unloaded.state)
+    reached = 0.0
+    if here is not None:
+        _, reached = branch.along(
+            here, 0.0, 1.0, _NOMINAL_STEP, SMALLEST, lambda factor, state: kept.append((factor, state))
+        )
     soft = modes(assembly, kept[-1][1], shapes).shapes if shapes else np.zeros((0, *load.shape))
     return Perfect(
         network,
@@ -108,6 +107,6 @@ def _perfect(
         target,
         np.array([share for share, _ in kept]),
         tuple(state for _, state in kept),
-        reached.on_branch,
+        reached == 1.0,
         Imperfections(unloaded.state, soft),
     )

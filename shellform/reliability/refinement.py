@@ -173,7 +173,9 @@ def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
     workshop = Workshop(nominal)
     members = members_of_model(model)
     none = errors_of(members, Tolerances(), variables(members, 0, 0))
-    return workshop, workshop.limit(none, most=sought, step=_STEP, resolution=_RESOLUTION)
+    known = nominal.factors <= sought
+    begin = float(nominal.factors[known][-1]), nominal.states[int(known.sum()) - 1]
+    return workshop, workshop.limit(none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=begin)
 
 
 def _numbers(

@@ -30,6 +30,7 @@ from shellform.reliability.drawing import (
 from shellform.reliability.path_of_one import BORNE, ENDED, STEP, UNLOADED, DrawnOutcome, Limit, Loading
 from shellform.reliability.perfect import Perfect, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
+from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
@@ -95,12 +96,13 @@ class Workshop:
         step: float = STEP,
         resolution: float = 1 / 64,
         tell: bool = True,
+        begin: tuple[float, State] | None = None,
     ) -> Limit:
-        """Where the structure with the errors loses stability under its growing load; what ends its path is
-        looked into only to `tell` it."""
+        """Where the structure with the errors loses stability under its growing load, which with `begin` is
+        known to bear a factor of it in a state; what ends its path is looked into only to `tell` it."""
 
         def ended(loading: Loading) -> Limit:
-            here, factor = loading.followed(most, step, resolution)
+            here, factor = loading.followed(most, step, resolution, begin=begin)
             if here is None:
                 return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
             kind = BORNE if factor >= most else (loading.kind(here) if tell else ENDED)

@@ -2,12 +2,9 @@
 of the elements' energies, exact.
 
 For motions l_k, r_k of the nodes at fixed l, r the tangent K gives B = sum of l_k'K r_k; l = r = a mode is
-that mode's stiffness, l the multipliers of linear answers r what a robust design derives. For beams the
-derivative of B by the state comes from the compiled tangent itself, evaluated at complex positions x + i h
-e_j: the imaginary part over h is the derivative to the last digit, since nothing is subtracted (Squire and
-Trapp 1998). The degrees of freedom of an element are taken one after the other, all elements at once, so that
-it costs twelve assemblies. A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q,
-has
+that mode's stiffness, l the multipliers of linear answers r what a robust design derives. B is linear in the
+sum of l_k r_k', so that any number of motions costs what one does. Of beams it is derived in one compiled pass
+(beam_thirds.py). A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q, has
 
     B = EA/l0 (p·q - (l0/l) (p·q - a b)),
     dB/d(x_b - x_a) = EA/l² ((p·q - a b) e + a (q - b e) + b (p - a e)).
@@ -15,29 +12,16 @@ has
 
 from __future__ import annotations
 
-from typing import Protocol, runtime_checkable
-
 import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.structure.elements.beam import Beams
-from shellform.structure.elements.beam_kernels import evaluate
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State
-from shellform.structure.elements.threads import share
 from shellform.structure.solve.assembly import Assembly
 
-_STEP = 1e-30  # of the complex shift: its square vanishes beside 1
 _CHUNK = 200  # elements whose products of motions are summed at a time
-
-
-@runtime_checkable
-class _BeamLike(Protocol):
-    """Beams, or what follows their kernel with ends of its own."""
-
-    def dofs(self) -> Indices: ...
-    def apart(self, state: State) -> tuple[Beams, State]: ...
 
 
 def bilinear(part: Part, state: State, left: Reals, right: Reals) -> float:
@@ -52,14 +36,16 @@ def bilinear(part: Part, state: State, left: Reals, right: Reals) -> float:
 
 def bilinear_by_dof(assembly: Assembly, state: State, left: Reals, right: Reals) -> Reals:
     """Derivative (6 n,), N and N·m, of the sum of l_k'K r_k by every node's translations and rotation
-    increments, for beams (bent ones too) and cables.
+    increments, for beams and cables.
     """
     total = np.zeros(6 * assembly.count)
     for part in assembly.parts:
         if isinstance(part, Cables):
             _add_cables(part, state, left, right, total)
-        elif isinstance(part, _BeamLike):
-            _add_beams(part.dofs(), *part.apart(state), left, right, total)
+        elif isinstance(part, Beams):
+            dofs = part.dofs()
+            slope = part.tangent_by_dof(state, _packed_products(dofs, left, right))
+            np.add.at(total, dofs, slope)
     return total
 
 
@@ -74,43 +60,6 @@ def bilinear_by_rest_length(cables: Cables, state: State, left: Reals, right: Re
         p, q = (_relative(cables.ends[chosen], each) for each in (left, right))
         whole[chosen] = (p * q).sum(axis=2).sum(axis=1)
     return np.where(taut, -cables.stiffness * whole / cables.rest_length**2, 0.0)
-
-
-def _add_beams(dofs: Indices, beams: Beams, state: State, left: Reals, right: Reals, total: Reals) -> None:
-    """One complex pass for each of the twelve degrees of freedom `dofs` (m, 12), every element with ends of
-    its own."""
-    count = len(beams.ends)
-    if not count:
-        return
-    weights = _packed_products(dofs, left, right)
-    place, turn = state.positions, state.quaternions
-    stiffness = np.column_stack([beams.axial, beams.torsion, beams.bending_y, beams.bending_z])
-    energy, force = np.empty(count, complex), np.empty((count, 12), complex)
-    blocks, none = np.empty((count, 78), complex), np.empty((0, 7), complex)
-    for dof in range(12):
-        node, axis = divmod(dof, 6)
-        positions, quaternions = place.astype(complex), turn.astype(complex)
-        if axis < 3:
-            positions[node::2, axis] += 1j * _STEP
-        else:
-            quaternions[node::2] += 0.5j * _STEP * _turned_about(axis - 3, turn[node::2])
-        share(
-            evaluate,
-            count,
-            positions,
-            quaternions,
-            beams.ends,
-            beams.frames,
-            beams.rest_length,
-            stiffness,
-            energy,
-            force,
-            blocks,
-            none,
-            none,
-            np.empty(count),
-        )
-        np.add.at(total, dofs[:, dof], (blocks.imag * weights).sum(axis=1) / _STEP)
 
 
 def _add_cables(cables: Cables, state: State, left: Reals, right: Reals, total: Reals) -> None:
@@ -149,10 +98,3 @@ def _packed_products(dofs: Indices, left: Reals, right: Reals) -> Reals:
         whole = left[own] @ right[own].transpose(0, 2, 1)
         result[first : first + _CHUNK] = 0.5 * (whole + whole.transpose(0, 2, 1))[:, row, column] * times
     return result
-
-
-def _turned_about(axis: int, quaternions: Reals) -> Reals:
-    """The product of the unit imaginary quaternion about an axis and each quaternion (k, 4)."""
-    w, x, y, z = quaternions.T
-    rows = {0: (-x, w, -z, y), 1: (-y, z, w, -x), 2: (-z, -y, x, w)}
-    return np.column_stack(rows[axis])

@@ -35,7 +35,7 @@ Sign: theta_y and M_y follow the paper's (12), which counts turns about the loca
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,6 +43,7 @@ from numpy.typing import ArrayLike
 from shellform.arrays import Flags, Indices, Reals, indices, reals
 from shellform.errors import InputError
 from shellform.structure.elements.beam_kernels import evaluate, local_by_dof
+from shellform.structure.elements.beam_thirds import contracted
 from shellform.structure.elements.parts import Evaluation
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
@@ -107,12 +108,6 @@ class Beams:
         share(evaluate, count, *self._kernel_input(state), energy, force, blocks, _NOTHING, _NOTHING, turn)
         return Evaluation(energy, force, blocks if tangent else None, float(turn.max(initial=0.0)))
 
-    def apart(self, state: State) -> tuple[Beams, State]:
-        """The same beams, each between two nodes of its own (2 i and 2 i + 1), and the state of those."""
-        flat = self.ends.ravel()
-        ends = np.arange(len(flat)).reshape(-1, 2)
-        return replace(self, ends=ends), State(state.positions[flat], state.quaternions[flat])
-
     def local_forces(self, state: State) -> Reals:
         """Equation (16): N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam, (m, 7), N and N·m."""
         return self._local(state)[0]
@@ -128,6 +123,14 @@ class Beams:
         count = len(self.ends)
         result = np.empty((count, 7, 12))
         share(local_by_dof, count, *self._kernel_input(state), result)
+        return result
+
+    def tangent_by_dof(self, state: State, weights: Reals) -> Reals:
+        """Derivatives (m, 12) of the sum of each beam's packed tangent times `weights` (m, 78), by the
+        translations and rotation increments of both ends."""
+        count = len(self.ends)
+        result = np.empty((count, 12))
+        share(contracted, count, *self._kernel_input(state), np.ascontiguousarray(weights), result)
         return result
 
     def _local(self, state: State) -> tuple[Reals, Reals]:
