@@ -25,7 +25,7 @@ from shellform.records.as_built import EQUAL
 from shellform.records.checks import BUILT
 from shellform.records.drawn import DrawnPath
 from shellform.records.progress import Event, Kind
-from shellform.records.summary import FailureRecord, StandingRecord, Summary, write_summary
+from shellform.records.summary import DesignRecord, FailureRecord, StandingRecord, Summary, write_summary
 from shellform.records.verdict import failed, open_checks, to_build
 from shellform.reliability.failure import explained
 from shellform.reliability.path_of_one import SOUGHT
@@ -39,6 +39,7 @@ from shellform.run.folder import Run, read_run
 from shellform.run.judged import judged, run_checks
 from shellform.run.sampling import Clock, drawn_of
 from shellform.run.workspace import Workspace
+from shellform.structure.elements.threads import side_by_side
 from shellform.written import write_arrays
 
 _BEYOND = 1.5  # times the factor asked for, up to which a path is followed at least
@@ -62,10 +63,14 @@ def examine(workspace: Workspace) -> Summary:
     run = read_run(workspace.folder)
     entry = workspace.case.safety
     every = [_of_run(run, name) for name in run.designs]
-    summary = run.summary.unexamined()
-    for each in every:
-        workspace.say("safety", f"critical factors of the {each.name} design", Kind.BEGAN)
-        summary = _critical(workspace.case, each, summary)
+    summary = fresh = run.summary.unexamined()
+    workspace.say("safety", f"critical factors of {len(every)} designs", Kind.BEGAN)
+
+    def examined(each: _Examined) -> DesignRecord:
+        return _critical(workspace.case, each, fresh.designs[each.name])
+
+    for each, record in zip(every, side_by_side(examined, every), strict=True):
+        summary = summary.with_design(each.name, record)
     write_summary(workspace.folder, summary)
     sampled = [each for each in every if each.name != "unbraced"]
     routes = len(paths(run.loads))
@@ -94,9 +99,9 @@ def _of_run(run: Run, name: str) -> _Examined:
     return _Examined(name, shell, run.designs[name], run.loads, case_tolerances(run.case, shell))
 
 
-def _critical(case: Case, each: _Examined, summary: Summary) -> Summary:
-    """With the critical factors of a design, and what its numbers are off by the mesh."""
-    record, asked = summary.designs[each.name], critical_factors_asked(case)
+def _critical(case: Case, each: _Examined, record: DesignRecord) -> DesignRecord:
+    """The record of a design with its critical factors, and what its numbers are off by the mesh."""
+    asked = critical_factors_asked(case)
     rows = dict(record.loads)
     for largest, shares in paths(each.loads).items():
         followed = "design" if "design" in shares else largest
@@ -107,8 +112,7 @@ def _critical(case: Case, each: _Examined, summary: Summary) -> Summary:
         for name, least in asked.items()
         if name in rows
     )
-    record = replace(record, loads=rows, critical_factor_kept=kept if asked else None)
-    return summary.with_design(each.name, record)
+    return replace(record, loads=rows, critical_factor_kept=kept if asked else None)
 
 
 def _ends(
