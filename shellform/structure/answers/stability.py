@@ -37,6 +37,7 @@ from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import ResidualNorm, held
 
 _LANCZOS = 200  # restarts; an eigenvalue that stands out takes a few
+_SHARP = 1e-9  # relative, of a mode's stiffness; its shape is as good
 _DENSE = 12  # degrees of freedom up to which Lanczos vectors don't fit
 
 
@@ -168,7 +169,16 @@ def _lowest(tangent: sp.csc_array, solve, mass: sp.csc_array, count: int) -> tup
         return values[nearest], root[:, None] * vectors[:, nearest]
     inverse = LinearOperator((size, size), matvec=solve, dtype=float)
     try:
-        values, vectors = eigsh(tangent, count, M=mass, sigma=0.0, OPinv=inverse, v0=_start(size))
+        values, vectors = eigsh(
+            tangent,
+            count,
+            M=mass,
+            sigma=0.0,
+            OPinv=inverse,
+            v0=_start(size),
+            ncv=min(size, max(_DENSE, 2 * count + 8)),
+            tol=_SHARP,
+        )
     except ArpackError as error:
         raise NotConverged(
             f"The modes were not found: {error}",
