@@ -3,7 +3,8 @@
 The cost of a net is the mean over its rods of (curvature × spacing)² / 2 and over its crossings of 0.1 × (90°
 - angle)² / 2, the elastic energy of a segment in EI/s as the pull has it. First the compass nets of angles
 all round are compared, which cost little; the best of them, apart from each other, are then pulled, and the
-best of those with other offsets, in processes of their own if asked for.
+best of those with other offsets, in processes of their own if asked for. Two elements a segment tell nets
+apart.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from shellform.surface.shape.target import Surface
 
 _ANGLES = 12  # compass nets, over a quarter turn: u and v are alike
 _BEST = 4  # angles that are pulled
+_ELEMENTS = 2  # of a segment
 _TAILS = (0, 2)  # segments; longer rods where at no angle a compass net covers the surface
 _OFFSETS = ((0.0, 0.0), (0.5, 0.0), (0.0, 0.5), (0.5, 0.5))
 
@@ -171,6 +173,7 @@ def _run(job: Job) -> TriedNet:
 def _try(surface: Surface, settings: dict[str, Any], job: Job) -> TriedNet:
     angle, offset, method, tail = job
     changed = {**settings, "angle": angle, "offset": offset, "method": method}
+    changed["elements"] = min(settings.get("elements", _ELEMENTS), _ELEMENTS)
     try:
         net = pull_net(surface, **changed, tuning=NetTuning(tail=tail))
     except ShellformError as error:
