@@ -1,13 +1,16 @@
 """Tables that leave the house: CSV files, and one workbook of them; the door to openpyxl.
 
 Values are in SI units, said in the column's head: "length [m]". An empty cell means that the value isn't
-known.
+known. Words that a spreadsheet would take for a formula, which may run programs, begin with an apostrophe: then
+it takes them for words.
 """
 
 from __future__ import annotations
 
 import csv
 import io
+import re
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +20,8 @@ from shellform.errors import InputError
 from shellform.written import whole, write_text
 
 Value = str | float | int | None
+_TIME, _EPOCH = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"), b"1980-01-01T00:00:00Z"
+_FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 @dataclass(frozen=True)
@@ -53,12 +58,17 @@ def table_text(table: Table, *, exact: bool = False, line_end: str = "\n") -> st
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator=line_end)
-    writer.writerow(table.columns)
+    writer.writerow([_harmless(head) for head in table.columns])
     for row in table.rows:
         writer.writerow(
-            [f"{value:.6f}" if isinstance(value, float) and not exact else value for value in row]
+            [f"{value:.6f}" if isinstance(value, float) and not exact else _harmless(value) for value in row]
         )
     return text.getvalue()
+
+
+def _harmless(value: Value) -> Value:
+    """A value that no spreadsheet takes for a formula."""
+    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
 def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:
@@ -71,9 +81,23 @@ def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:
         files.append(Path(folder) / f"{table.name}.csv")
         write_text(files[-1], table_text(table))
     files.append(Path(folder) / "schedules.xlsx")
+    content = io.BytesIO()
+    _workbook(tables).save(content)
     with whole(files[-1]) as partial:
-        _workbook(tables).save(partial)
+        partial.write_bytes(_timeless(content))
     return files
+
+
+def _timeless(book: io.BytesIO) -> bytes:
+    """A workbook's content with the same times each time: openpyxl writes those at which it was saved."""
+    content = io.BytesIO()
+    with zipfile.ZipFile(book) as old, zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            part = old.read(name)
+            if name == "docProps/core.xml":
+                part = _TIME.sub(_EPOCH, part)
+            new.writestr(zipfile.ZipInfo(name), part, zipfile.ZIP_DEFLATED)
+    return content.getvalue()
 
 
 def _workbook(tables: Sequence[Table]) -> Any:
@@ -86,15 +110,15 @@ def _workbook(tables: Sequence[Table]) -> Any:
     for table in tables:
         sheet = book.create_sheet(table.name[:31])
         for line in table.notes:
-            sheet.append([line])
+            sheet.append([_harmless(line)])
         head = len(table.notes) + 1
-        sheet.append(list(table.columns))
+        sheet.append([_harmless(head) for head in table.columns])
         for cell in sheet[head]:
             cell.font = Font(bold=True)
             cell.fill = PatternFill("solid", fgColor="DDE7EE")
             cell.alignment = Alignment(wrap_text=True, vertical="top")
         for row in table.rows:
-            sheet.append(list(row))
+            sheet.append([_harmless(value) for value in row])
         for number, name in enumerate(table.columns, 1):
             letter = get_column_letter(number)
             decimals = "0.0000" if "[m]" in name else "0.00"

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import os
+import re
 import signal
 import sys
 import threading
@@ -34,6 +36,9 @@ except (ImportError, OSError) as error:  # a shared library that gmsh's wheel ne
 _AGREES = (
     0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
 )
+_STEP_TIME = re.compile(r"(?<=')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?=')")
+_STEP_FILE = re.compile(r"(Open CASCADE STEP translator [\d.]+) \d+")
+_STEP_PART = re.compile(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+'")
 _SAMPLES = 33  # points on a curve that tell its extent
 _SAME = 1e-9  # of the extent of a curve: ends so near close it
 
@@ -86,7 +91,8 @@ def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
 
 def write_curves(path: Path, curves: Sequence[Reals]) -> None:
     """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), closed where
-    the last is the first, a straight line where there are two.
+    the last is the first, a straight line where there are two. The same curves give the same bytes: of the
+    time, and of how many files OpenCASCADE has written before, nothing is told.
     """
     with session(), errors(path, "gmsh can't write the curves", "Choose another folder."):
         occ = gmsh.model.occ
@@ -103,8 +109,20 @@ def write_curves(path: Path, curves: Sequence[Reals]) -> None:
         occ.synchronize()
         with silence():
             gmsh.write(str(path))
-    if not path.is_file():  # which gmsh doesn't say
+    text = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else ""
+    if not text.rstrip().endswith("END-ISO-10303-21;"):  # which gmsh doesn't say
         raise InputError("can't be written", where=str(path), remedy="Choose another folder.")
+    path.write_text(_timeless(text), encoding="utf-8", errors="surrogateescape", newline="")
+
+
+def _timeless(text: str) -> str:
+    """A STEP file's text without the time, and numbered as the process's first: OpenCASCADE goes on counting
+    files and parts.
+    """
+    numbers = itertools.count(1)
+    text = _STEP_TIME.sub("1970-01-01T00:00:00", text, count=1)
+    text = _STEP_FILE.sub(r"\1 1", text)
+    return _STEP_PART.sub(lambda _: f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('{next(numbers)}'", text)
 
 
 @contextlib.contextmanager

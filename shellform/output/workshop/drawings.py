@@ -9,7 +9,8 @@ on the sheets: layout.py.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from math import cos, pi, sin
 from pathlib import Path
@@ -64,7 +65,25 @@ def write_drawings(folder: str | Path, built: Built, cutting: Cutting) -> list[P
 
 
 def write_dxf(path: str | Path, sheet: Sheet) -> Path:
-    """Writes the sheet's drawing in mm at real scale. Raises InputError where the file can't be written."""
+    """Writes the sheet's drawing in mm at real scale, with no time of day and no number of chance: the same
+    sheet gives the same bytes. Raises InputError where the file can't be written.
+    """
+    with _timeless():
+        return _saved(Path(path), sheet)
+
+
+@contextmanager
+def _timeless() -> Iterator[None]:
+    """ezdxf's drawings without dates and identifiers of chance."""
+    usual = ezdxf.options.write_fixed_meta_data_for_testing
+    ezdxf.options.write_fixed_meta_data_for_testing = True
+    try:
+        yield
+    finally:
+        ezdxf.options.write_fixed_meta_data_for_testing = usual
+
+
+def _saved(target: Path, sheet: Sheet) -> Path:
     document = ezdxf.new("R2010", setup=["linetypes"], units=units.MM)
     document.header["$LTSCALE"] = sheet.lettering
     document.styles.new("LETTERS", dxfattribs={"font": "arial.ttf"})
@@ -87,7 +106,6 @@ def write_dxf(path: str | Path, sheet: Sheet) -> Path:
     space = document.modelspace()
     for mark in sheet.marks:
         _draw(space, mark)
-    target = Path(path)
     with whole(target, ".dxf") as partial:
         document.saveas(partial)
     return target

@@ -16,6 +16,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+from uuid import UUID, uuid5
 
 import numpy as np
 import rhino3dm
@@ -30,6 +31,7 @@ _METRES = {
     "Kilometers": 1e3,
     "Inches": 0.0254, "Feet": 0.3048, "Yards": 0.9144,
 }  # fmt: skip
+_OURS = UUID("5c6f4b1e-6b0e-5a53-9f0d-6a1f8b7d2c11")  # under which what is written has its identifiers
 _DEEPEST = 16  # blocks within blocks
 _SUBDIVISIONS = 3
 _ON_EDGE = 1e-4  # of the size: a trim nearer to the patch's own edge than that doesn't cut it
@@ -49,8 +51,8 @@ class Item:
 
 
 def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -> None:
-    """Writes the items in metres, each layer in its colour (#rrggbb). Raises OSError where the file can't be
-    written.
+    """Writes the items in metres, each layer in its colour (#rrggbb), with the same identifiers each time; the
+    date within is the day's. Raises OSError where the file can't be written.
     """
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
@@ -59,9 +61,11 @@ def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -
     for name, colour in colours.items():
         layer = rhino3dm.Layer()
         layer.Name, layer.Color = name, (*bytes.fromhex(colour[1:]), 255)
+        layer.Id = uuid5(_OURS, f"layer {name}")
         layers[name] = model.Layers.Add(layer)
-    for item in items:
+    for number, item in enumerate(items):
         own = rhino3dm.ObjectAttributes()
+        own.Id = uuid5(_OURS, f"object {number}")
         own.Name, own.LayerIndex = item.name, layers[item.layer]
         for key, value in item.strings.items():
             own.SetUserString(key, value)
