@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shellform.arrays import Indices
+from shellform.arrays import Flags, Indices
 from shellform.optimiser.proposal import propose
 from shellform.optimiser.search_state import (
     Iterate,
@@ -20,6 +20,8 @@ from shellform.optimiser.search_state import (
     merit,
     noted,
     restiffened,
+    stiff,
+    stiffness_of,
     taut_count,
     tell,
     violation,
@@ -42,18 +44,21 @@ from shellform.problem.evaluation import Linearisation
 _TINY = -1e-300  # a predicted change that isn't one
 # of the objective, gained by a turn, for which another is made where thinning is to end with what stands
 _WORTH = 0.05
-_MANY = 1 / 12  # of the taut cables: where smaller batches break limits, the stiffness kept is eased
+_STIFFER = 0.01  # of the stiffness: less is no gain
+_SAME = 1e-6  # relative: stiffnesses that count as equal
 
 
 def run(search: Search, it: Iterate) -> Iterate:
     """First the branch up to the further loads, then the objective alone, then thinning."""
     if it.phase == "climb":
         it = replace(_climb(search, it), phase="descend")
-    if it.phase == "descend":
-        it = _last_standing(search, _descend(search, it))
+    while it.phase == "descend":
+        it = _last_sound(search, _descend(search, it))
         each_cable = any(block.of_each_cable for block in search.problem.variables)
         if it.accepted and search.solver.thin and each_cable:
-            it = _ready_to_thin(search, it)
+            it = _stiffened(search, it)
+        else:
+            it = replace(_last_standing(search, it), phase="descended")
     if it.phase == "thin":
         it = _thin(search, it)
     return _confirmed(search, it)
@@ -78,10 +83,7 @@ def _confirmed(search: Search, it: Iterate) -> Iterate:
 
 
 def _last_standing(search: Search, it: Iterate) -> Iterate:
-    """Back to the last accepted design that its documented path leads to and, by bisection, that stands as
-    built.
-    """
-    it = _last_sound(search, it)
+    """Back, by bisection, to the last accepted design that stands as built."""
     if search.asked is None or not it.accepted:
         return it
     holds, it = standing(search, it, it.accepted[-1].built)
@@ -182,13 +184,88 @@ def _descend(search: Search, it: Iterate) -> Iterate:
 def _settled(search: Search, it: Iterate, predicted: float) -> str:
     """The criterion of convergence that the point meets, in words; empty where none is met."""
     solver = search.solver
-    if it.stage < 1.0 or violation(search, it.point) > 0.0:
+    if it.stage < 1.0:
         return ""
-    if -predicted < solver.settled * it.point.objective and it.window >= search.tension:
+    kept = violation(search, it.point) <= 0.0
+    if kept and -predicted < solver.settled * it.point.objective and it.window >= search.tension:
         return f"the model predicts less than {solver.settled:.1%} improvement"
     if it.window < solver.smallest * search.tension:
-        return "the objective has no better design within the smallest window"
+        return (
+            "the objective has no better design within the smallest window"
+            if kept
+            else "no design within the smallest window breaks its limits less"
+        )
     return ""
+
+
+def _stiffened(search: Search, it: Iterate) -> Iterate:
+    """Ready to thin at a design with as much stiffness as makes it stand as built: the objective alone leaves
+    no more than it has to. Where there is none near it, ready to descend again from the last design that
+    stands, more stiffness kept; and the second time ready to thin that one."""
+    begun = _ready_to_thin(search, it)
+    if search.asked is None:
+        return begun
+    found, other = _made_to_stand(search, replace(begun, tensioned=_tensioned(search, it)), it.point)
+    if found is not None:
+        return _ready_to_thin(search, accepted(search, other, found))
+    it = _last_standing(search, replace(it, fallen=other.fallen))
+    kept = stiffness_of(search, it.point)
+    if it.again or search.left() <= 0:
+        return _ready_to_thin(search, restiffened(search, it, max(it.stiffness, kept)))
+    it = restiffened(search, it, max(search.solver.stiffer**2 * it.stiffness, kept))
+    none = np.zeros_like(it.tensioned)
+    return replace(
+        it, guarded=search.always_guarded, tensioned=none, before=np.inf, refused=False, again=True
+    )
+
+
+def _made_to_stand(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation | None, Iterate]:
+    """The trial where it breaks no limit more than the iterate does and stands as built; where it only
+    falls, one near it, for which more stiffness is asked, and repaired for, until it stands. None, and the
+    iterate with the stiffness that it kept, where it comes to nothing.
+
+    Where designs are judged as built, the stiffness to keep is no limit but what repairs aim for: it comes
+    down to what a trial that stands has, and not below the solver's own.
+    """
+    solver, begun = search.solver, it
+    for more in reversed(range(solver.stiffenings + 1)):
+        trial, it = _aiming_lower(search, it, trial)
+        if violation(search, trial) > max(violation(search, begun.point), 0.0):
+            break
+        found = sound(search, accepted_design(search, trial))
+        if found is None:
+            break
+        holds, it = standing(search, it, accepted_design(search, found).built)
+        if holds:
+            return found, it
+        before = stiffness_of(search, found)
+        if not more or before <= 0.0 or search.left() <= 0:
+            break
+        it = restiffened(search, replace(it, point=found), solver.stiffer * before)
+        trial, it = _repaired(search, it, it.point)
+        if stiffness_of(search, trial) < (1.0 + _STIFFER) * before:
+            break
+    search.evaluator.problem = stiff(search.inner, begun.stiffness)
+    return None, replace(begun, fallen=it.fallen, fell=it.fell)
+
+
+def _aiming_lower(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation, Iterate]:
+    """With no more stiffness to keep than the trial has, where it is judged as built."""
+    lower = _aiming_for(search, replace(it, point=trial), min(it.stiffness, stiffness_of(search, trial)))
+    return lower.point, lower
+
+
+def _aiming_for(search: Search, it: Iterate, stiffness: float) -> Iterate:
+    """With another stiffness to keep, N/m, not below the solver's own, where designs are judged as built."""
+    aim = max(stiffness, search.solver.stiffness * search.softest)
+    if search.asked is None or it.stiffness <= 0.0 or abs(aim - it.stiffness) <= _SAME * it.stiffness:
+        return it
+    return replace(restiffened(search, it, aim), window=it.window)
+
+
+def _tensioned(search: Search, it: Iterate) -> Flags:
+    """Which of the present cables (c,) pull under the design load."""
+    return np.asarray(search.models.at(it.point).origin[: len(it.tensioned)] > 0.0)
 
 
 def _ready_to_thin(search: Search, it: Iterate) -> Iterate:
@@ -208,8 +285,9 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     """Takes away cables that the shell can do without (thinning.py), in batches, and lets the others make up
     for them.
 
-    Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear, or
-    that costs too much of the objective, is cut; a single cable that can't go is kept for good.
+    Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear,
+    that breaks a limit more than before, or that costs too much of the objective, is cut; a single cable that
+    can't go is kept for good.
     """
     solver = search.solver
     most = solver.most_cables
@@ -221,35 +299,29 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         model = search.models.at(it.point)
         leaving = _leaving(search, it, model)
         if not len(leaving):
-            eased = _eased(search, it)
-            if eased is not None:
-                it = eased
-                continue
             return replace(it, status=f"{it.status}, and every cable that is left is needed for stability")
-        tensioned = model.origin[: len(it.tensioned)] > 0.0
+        tensioned = _tensioned(search, it)
         tensioned[leaving] = False
         it = replace(it, tensioned=tensioned)
         trial = attempt_without(search, it, model, leaving)
         # constraints that it breaks are the repair's business
         if trial is not None and trial.objective < 2.0 * budget:
             trial, it = _repaired(search, it, trial)
-        fits = trial is not None and merit(search, trial) <= budget and violation(search, trial) <= 0.0
-        found = sound(search, accepted_design(search, trial)) if trial is not None and fits else None
-        bound = found is None  # by a limit, not by what stands
-        if found is not None:
-            holds, it = standing(search, it, accepted_design(search, found).built)
-            found, it = (found, it) if holds else (None, replace(it, fell=True))
+        found, it = None, replace(it, fell=False)
+        if trial is not None and trial.objective <= budget:
+            found, it = _made_to_stand(search, it, trial)
         if found is None:
             it = noted(search, it, trial or it.point, False)
             alone = len(leaving) == 1
             needed = it.needed.copy()
             needed[leaving] = alone
             it = replace(it, needed=needed, failures=it.failures + alone, batch=max(1, len(leaving) // 3))
-            if it.failures >= solver.failures or (bound and it.batch < _MANY * taut_count(search, it.point)):
-                it = _eased(search, it) or it
+            if it.fell:  # a repair mayn't spend what made the present design stand
+                it = _aiming_for(search, it, stiffness_of(search, it.point))
             continue
         it = accepted(search, it, found)
-        it = replace(it, failures=0, batch=int(1.3 * it.batch) + 1, fell=False)
+        it = replace(it, failures=0, batch=int(1.3 * it.batch) + 1)
+        it = _aiming_for(search, it, solver.softer * stiffness_of(search, it.point))
     status = it.status + (
         ", and no further cable can be taken away"
         if it.failures >= solver.failures
@@ -258,24 +330,6 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     if most is not None and taut_count(search, it.point) > most:
         status += f"; no design with {most} cables was found that keeps every limit"
     return replace(it, status=status)
-
-
-def _eased(search: Search, it: Iterate) -> Iterate | None:
-    """With less stiffness to keep, where designs stand as built with room to spare: None where one fell since
-    it was last eased, or where it can't be less."""
-    solver = search.solver
-    least = solver.stiffness * search.softest
-    if search.asked is None or it.fell or it.stiffness <= least:
-        return None
-    it = restiffened(search, it, max(solver.softened * it.stiffness, least))
-    return replace(
-        it,
-        window=0.1 * search.tension,
-        failures=0,
-        batch=max(1, taut_count(search, it.point) // solver.batch),
-        needed=np.zeros_like(it.needed),
-        fell=False,
-    )
 
 
 def _without_slack(search: Search, it: Iterate) -> Iterate:
@@ -308,7 +362,8 @@ def _repaired(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linear
         model = search.models.at(it.point)
         y, _ = propose(task(search, it, model))
         better, it = attempt(search, it, model, y)
-        if better is None or merit(search, better) >= merit(search, it.point):
+        dear = better is not None and better.objective > max(it.thrifty, it.point.objective)
+        if better is None or dear or merit(search, better) >= merit(search, it.point):
             it = replace(it, window=it.window * solver.shrink)
         else:
             it = replace(it, window=it.window * solver.grow, point=better)

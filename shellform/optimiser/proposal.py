@@ -82,12 +82,8 @@ def propose(task: Task) -> tuple[Reals, float]:
         )
     elif task.guards:
         u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
-        if (
-            u is None
-        ):  # more is asked for than a step can give: constraints and guards may keep what they have
-            u = minimise_quadratic(
-                scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high
-            )
+        if u is None:
+            u = _as_far_as_can_be(task, scaled_curvature, scaled_slope, scaled_rows, values, low, high)
         if u is None:
             u = np.clip(np.zeros(len(width)), low, high)
     else:
@@ -104,6 +100,29 @@ def propose(task: Task) -> tuple[Reals, float]:
     if task.groups is None:
         y[:count][y[:count] < _NONE * task.tension] = 0.0
     return y, evaluate(u)[0]
+
+
+def _as_far_as_can_be(
+    task: Task, curvature: Reals, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
+) -> Reals | None:
+    """The model's optimum in windows (y,) where more is asked for than a step can give. Of what constraints
+    are broken by a share t remains, of what guards ask for another, 0 <= t <= 1, each at a price that
+    outweighs the objective as it does in judging trials."""
+    size, count = len(slope), len(task.model.point.constraints)
+    broken = np.zeros((len(values), 2))
+    broken[:count, 0] = np.maximum(values[:count], 0.0)
+    broken[count:, 1] = np.maximum(values[count:], 0.0)
+    bent = np.zeros((size + 2, size + 2))
+    bent[:size, :size] = curvature
+    found = minimise_quadratic(
+        bent,
+        np.append(slope, task.solver.penalty * broken.max(axis=0)),
+        np.hstack([rows, -broken]),
+        values,
+        np.append(low, np.zeros(2)),
+        np.append(high, np.ones(2)),
+    )
+    return None if found is None else found[:size]
 
 
 def _curvature(model: StepModel) -> Reals | float:

@@ -103,8 +103,8 @@ class Iterate:
     constraints' `excess` (k,), 1/N², over their linear models at the last trial per square of the window; the
     `status`. Descending: whether the last trial was `refused`; the objective `before` this turn. Thinning:
     the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables
-    `needed` (c,). As built: structures that have `fallen`, the last ones first; whether a design `fell` since
-    the last batch went.
+    `needed` (c,). As built: structures that have `fallen`, the last ones first; whether the last design
+    judged `fell`; whether this is the descent `again`, with more stiffness.
     """
 
     point: Linearisation
@@ -128,6 +128,7 @@ class Iterate:
     needed: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
     fallen: tuple[int, ...] = ()
     fell: bool = False
+    again: bool = False
 
 
 _ARRAYS = ("tensioned", "excess", "needed")
@@ -152,13 +153,16 @@ class Models:
         return self._model
 
     def guards(self, point: Linearisation) -> list[Guard]:
-        """Of the point's cables below the reach, N, under each further load."""
+        """Of the point's cables below the reach, N, under each further load; without load they may be slack."""
         if self._guards is None or self._guards[0] is not point:
             evaluator = self.evaluator
             shell, design = evaluator.shell, point.design
             rates = [shell.beams_by_radius(design.radius)] if evaluator.blocks.moves_radius else []
             assembly, cables = evaluator.assembly(design), shell.cables(design)
-            names = [name for name in evaluator.problem.used() if name != evaluator.base]
+            loads = evaluator.problem.loads
+            names = [
+                name for name in evaluator.problem.used() if name != evaluator.base and loads[name].any()
+            ]
             self._guards = (
                 point,
                 [guard(assembly, point.states[name], cables, self.reach, *rates) for name in names],
@@ -189,6 +193,16 @@ def restiffened(search: Search, it: Iterate, least: float) -> Iterate:
     point = search.evaluator.seed(it.point.design, it.point.states, it.stage)
     excess = np.zeros(len(point.constraints))
     return replace(it, stiffness=least, point=point, excess=excess, window=search.first_window)
+
+
+def stiffness_of(search: Search, point: Linearisation) -> float:
+    """What the softest modes keep under the further loads at the point, N/m; 0 where nothing is asked of
+    them, or where a mode is unstable."""
+    problem, count = search.evaluator.problem, len(search.inner.constraints)
+    added = zip(problem.constraints[count:], problem.places()[count:], strict=True)
+    # residuals are limit / scale - value / scale, value and limit squares
+    squares = [part.lower - part.scale * float(point.constraints[own].max()) for part, own in added]
+    return float(np.sqrt(max(min(squares, default=0.0), 0.0)))
 
 
 def tensions(search: Search, point: Linearisation) -> Reals:

@@ -61,8 +61,9 @@ class SequentialConvex:
     - `repairs`: steps after each batch.
 
     Designs as built:
-    - `softened`: of the stiffness, which thinning goes on with where it ended and designs stand, down to
-      `stiffness`.
+    - `stiffer`: times the stiffness of a design that falls, which is asked for next, at the most
+      `stiffenings` times in a row.
+    - `softer`: of the stiffness of a design that stands, which the next batch is asked to keep.
 
     The step's problem:
     - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA.
@@ -96,7 +97,9 @@ class SequentialConvex:
     idle: float = 0.2
     repairs: int = 2
 
-    softened: float = 0.6
+    stiffer: float = 1.1
+    stiffenings: int = 3
+    softer: float = 0.95
 
     model_evaluations: int = 2000
 
@@ -128,6 +131,7 @@ _MAY_BE_NONE = (
     "idle",
     "kept",
     "least_tension",
+    "stiffenings",
 )
 
 # A polished design serves the shape alone and is near: smaller windows, and of the stiffness kept before it

@@ -98,7 +98,7 @@ def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]
     search.evaluator.factorisations += found.factorisations
     fallen = [number for own in found.fallen.values() for number in own]
     fallen = list(dict.fromkeys([*fallen, *it.fallen]))
-    return found.stands, replace(it, fallen=tuple(fallen))
+    return found.stands, replace(it, fallen=tuple(fallen), fell=not found.stands)
 
 
 def confirmed(search: Search, built: Design) -> bool:

@@ -1,0 +1,122 @@
+"""What thinning does where limits are broken or designs fall: steps, repairs, judgements."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.optimiser import phases, trials
+from shellform.optimiser.optimise import begin
+from shellform.optimiser.phases import _made_to_stand, _thin
+from shellform.optimiser.proposal import _as_far_as_can_be
+from shellform.optimiser.search_state import stiffness_of, violation
+from shellform.reliability.trial_structures import Demand, JudgedTrial, Required
+
+ASKED = sf.Safety(sf.Tolerances(cable_length=1e-4), critical_factor=None, tried=1)
+
+
+@pytest.fixture(scope="module")
+def dome(vault):
+    """The vault with wide cells and two elements a segment."""
+    net = sf.pull_net(vault, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    rod = sf.Rod.round(young=40e9, radius=0.0012, strength=255e6)
+    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
+    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=vault)
+
+
+def searched(dome, rms, *, stiffness=0.5, evaluations=6, asked=None):
+    """A search that is ready to thin from all cables, the rods' radius free and the root mean square distance
+    under more load limited to `rms`, m."""
+    wet = dome.point_load(4.5, every=2)
+    problem = sf.Problem(
+        dome,
+        sf.LoadCase("wet", wet),
+        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
+        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(rms, sf.RmsMisfit("wetter"))],
+        [sf.LoadCase("wetter", 1.2 * wet)],
+        variables=[sf.RestLengths(), sf.FreeRadius(most=0.0015)],
+    )
+    search, it = begin(
+        problem,
+        dome.design(),
+        sf.SequentialConvex(),
+        lambda softest: stiffness * softest,
+        evaluations,
+        asked=asked,
+    )
+    return search, phases._ready_to_thin(search, it)
+
+
+def demanded(loads):
+    one = Required(ASKED, loads, "wet", dict.fromkeys(loads, 0))
+    return Demand(one, one)
+
+
+def told(stands):
+    return JudgedTrial({"wet": () if stands else (0,)}, True, stands, 0)
+
+
+def test_a_step_that_is_asked_for_more_than_it_can_give_gives_all_that_it_can():
+    task = SimpleNamespace(
+        solver=sf.SequentialConvex(), model=SimpleNamespace(point=SimpleNamespace(constraints=np.ones(1)))
+    )
+    # u in [-1, 1] falls by the objective; the constraint 1 - u / 2 <= 0 can come down to a half, and the
+    # guard of the other variable, 0.3 - v <= 0, to nothing
+    u = _as_far_as_can_be(
+        task,
+        np.eye(2),
+        np.array([1.0, 1.0]),
+        np.array([[-0.5, 0.0], [0.0, -1.0]]),
+        np.array([1.0, 0.3]),
+        -np.ones(2),
+        np.ones(2),
+    )
+    np.testing.assert_allclose(u, [1.0, 0.3], atol=1e-6)
+
+
+def test_a_start_that_breaks_a_limit_is_thinned_and_breaks_it_no_more_than_before(dome):
+    search, it = searched(dome, 2e-4)  # the start is off by several times that
+    before = violation(search, it.point)
+    assert before > 0.0
+    thinned = _thin(search, replace(it, thrifty=np.inf))
+    assert thinned.point.design.present.sum() <= it.point.design.present.sum()
+    assert thinned.accepted[-1].taut.sum() < it.accepted[0].taut.sum()
+    assert violation(search, thinned.point) <= before
+
+
+def test_a_design_that_falls_is_made_stiffer_until_it_stands(dome, monkeypatch):
+    wet = dome.point_load(4.5, every=2)
+    search, it = searched(dome, 0.005, asked=demanded({"wet": wet}))
+    before = stiffness_of(search, it.point)
+    answers = iter([False, True])
+    monkeypatch.setattr(trials, "stands", lambda *_, **__: told(next(answers)))
+    found, after = _made_to_stand(search, replace(it, thrifty=np.inf), it.point)
+    assert found is not None
+    assert stiffness_of(search, found) > 1.01 * before
+    assert after.stiffness > it.stiffness
+
+
+def test_where_nothing_stands_the_stiffness_asked_for_is_as_before(dome, monkeypatch):
+    wet = dome.point_load(4.5, every=2)
+    search, it = searched(dome, 0.005, asked=demanded({"wet": wet}))
+    monkeypatch.setattr(trials, "stands", lambda *_, **__: told(False))
+    found, after = _made_to_stand(search, replace(it, thrifty=np.inf), it.point)
+    assert found is None
+    assert after.stiffness == it.stiffness
+    np.testing.assert_array_equal(after.point.constraints, it.point.constraints)
+
+
+def test_a_design_that_stands_may_have_less_stiffness_than_was_aimed_for(dome, monkeypatch):
+    wet = dome.point_load(4.5, every=2)
+    search, it = searched(dome, 0.005, stiffness=5.0, asked=demanded({"wet": wet}))
+    assert violation(search, it.point) > 0.0
+    monkeypatch.setattr(trials, "stands", lambda *_, **__: told(True))
+    found, after = _made_to_stand(search, it, it.point)
+    assert found is not None
+    assert violation(search, found) <= 0.0
+    # the smooth least of several modes, whose sharpness goes with the stiffness asked for
+    assert after.stiffness == pytest.approx(stiffness_of(search, found), rel=1e-4)
+    without = replace(search, asked=None)
+    assert _made_to_stand(without, replace(it, point=it.point), it.point)[0] is not None  # no worse than it
