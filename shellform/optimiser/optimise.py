@@ -17,13 +17,13 @@ order and with Gauss-Newton curvature; NLopt's MMA solves it within a window rou
 - then cables that the shell can do without are taken away in batches, the others kept taut.
 
 Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures,
-the same for each (trial_structures.py): after the descent, and each time cables have been taken away. From
-then on the stiffness is no limit but a means. A design that falls is asked for more of it, and steps towards
-that follow, until it stands; a batch without which the rest can't keep it is judged by what stands, and where
-that does, thinning goes on with the stiffness that is left. Where no design near one that falls stands, the
-search goes back to the last one that does, or takes fewer cables away. At the end a fresh sample judges, for
-the search has chosen its designs by their luck with the first one. The cables that are left keep a tension
-that errors don't use up.
+the same for each (trial_structures.py): after the descent, and each time cables have been taken away, before
+the others are optimised again: that serves the objective with what makes a design stand. From then on the
+stiffness is no limit but a means. A design that falls is asked for more of it, and steps towards that follow,
+until it stands; where one with less than was asked for stands, thinning goes on from there. Where no design
+near one that falls stands, the search goes back to the last one that does, or takes fewer cables away. At the
+end a fresh sample judges, for the search has chosen its designs by their luck with the first one. The cables
+that are left keep a tension that errors don't use up.
 
 A limit that the start breaks stops neither: no batch may break it more.
 

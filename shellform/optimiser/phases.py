@@ -52,13 +52,13 @@ def run(search: Search, it: Iterate) -> Iterate:
     """First the branch up to the further loads, then the objective alone, then thinning."""
     if it.phase == "climb":
         it = replace(_climb(search, it), phase="descend")
-    while it.phase == "descend":
+    if it.phase == "descend":
         it = _last_sound(search, _descend(search, it))
         each_cable = any(block.of_each_cable for block in search.problem.variables)
         if it.accepted and search.solver.thin and each_cable:
             it = _stiffened(search, it)
         else:
-            it = replace(_last_standing(search, it), phase="descended")
+            it = _last_standing(search, it)
     if it.phase == "thin":
         it = _thin(search, it)
     return _confirmed(search, it)
@@ -200,8 +200,7 @@ def _settled(search: Search, it: Iterate, predicted: float) -> str:
 
 def _stiffened(search: Search, it: Iterate) -> Iterate:
     """Ready to thin at a design with as much stiffness as makes it stand as built: the objective alone leaves
-    no more than it has to. Where there is none near it, ready to descend again from the last design that
-    stands, more stiffness kept; and the second time ready to thin that one."""
+    no more than it has to. Where there is none near it, at the last one that stands, with what it has."""
     begun = _ready_to_thin(search, it)
     if search.asked is None:
         return begun
@@ -209,14 +208,7 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
     if found is not None:
         return _ready_to_thin(search, accepted(search, other, found))
     it = _last_standing(search, replace(it, fallen=other.fallen))
-    kept = stiffness_of(search, it.point)
-    if it.again or search.left() <= 0:
-        return _ready_to_thin(search, restiffened(search, it, max(it.stiffness, kept)))
-    it = restiffened(search, it, max(search.solver.stiffer**2 * it.stiffness, kept))
-    none = np.zeros_like(it.tensioned)
-    return replace(
-        it, guarded=search.always_guarded, tensioned=none, before=np.inf, refused=False, again=True
-    )
+    return _ready_to_thin(search, _aiming_for(search, it, max(it.stiffness, stiffness_of(search, it.point))))
 
 
 def _made_to_stand(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation | None, Iterate]:
@@ -285,9 +277,9 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     """Takes away cables that the shell can do without (thinning.py), in batches, and lets the others make up
     for them.
 
-    Those left are kept taut while their tensions are optimised again. A batch that the shell doesn't bear,
-    that breaks a limit more than before, or that costs too much of the objective, is cut; a single cable that
-    can't go is kept for good.
+    Those left are kept taut while their tensions are optimised again; where designs are judged as built only
+    if it takes that to keep the limits. A batch that the shell doesn't bear, that breaks a limit more than
+    before, or that costs too much of the objective, is cut; a single cable that can't go is kept for good.
     """
     solver = search.solver
     most = solver.most_cables
@@ -302,14 +294,17 @@ def _thin(search: Search, it: Iterate) -> Iterate:
             return replace(it, status=f"{it.status}, and every cable that is left is needed for stability")
         tensioned = _tensioned(search, it)
         tensioned[leaving] = False
-        it = replace(it, tensioned=tensioned)
-        trial = attempt_without(search, it, model, leaving)
-        # constraints that it breaks are the repair's business
-        if trial is not None and trial.objective < 2.0 * budget:
-            trial, it = _repaired(search, it, trial)
-        found, it = None, replace(it, fell=False)
-        if trial is not None and trial.objective <= budget:
+        it = replace(it, tensioned=tensioned, fell=False)
+        trial, found = attempt_without(search, it, model, leaving), None
+        if search.asked is not None and trial is not None and trial.objective <= budget:
             found, it = _made_to_stand(search, it, trial)
+        # constraints that it breaks are the repair's business; but repairs serve the objective too, with what
+        # made a design stand
+        if found is None and not it.fell and trial is not None:
+            if trial.objective < 2.0 * budget:
+                trial, it = _repaired(search, it, trial)
+            if trial.objective <= budget:
+                found, it = _made_to_stand(search, it, trial)
         if found is None:
             it = noted(search, it, trial or it.point, False)
             alone = len(leaving) == 1

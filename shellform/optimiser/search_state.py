@@ -104,7 +104,7 @@ class Iterate:
     `status`. Descending: whether the last trial was `refused`; the objective `before` this turn. Thinning:
     the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables
     `needed` (c,). As built: structures that have `fallen`, the last ones first; whether the last design
-    judged `fell`; whether this is the descent `again`, with more stiffness.
+    judged `fell`.
     """
 
     point: Linearisation
@@ -128,7 +128,6 @@ class Iterate:
     needed: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
     fallen: tuple[int, ...] = ()
     fell: bool = False
-    again: bool = False
 
 
 _ARRAYS = ("tensioned", "excess", "needed")
