@@ -21,6 +21,7 @@ import sys
 from pathlib import Path
 
 from shellform.case.case import load_case
+from shellform.case.entries import LimitsEntry
 from shellform.errors import InputError, NotConverged
 from shellform.records.progress import Event
 from shellform.run.folder import Run, read_run
@@ -87,7 +88,9 @@ def write(
         run_case(load_case(case, settings), folder, report=tell)
         if method is None:
             method = folder.with_name(f"{folder.name}_paper")
-            run_case(load_case(case, [*settings, "optimise.method=paper"]), method, report=tell)
+            # the paper knows its own bounds and constraints, and no engineer's limits
+            asked = load_case(case, [*settings, "optimise.method=paper"])
+            run_case(asked.model_copy(update={"limits": LimitsEntry()}), method, report=tell)
     run = read_run(folder)
     if published.study_of(run) != study:
         other = published.study_of(run)
