@@ -5,6 +5,7 @@ method).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import cast
 
 import numpy as np
@@ -23,7 +24,7 @@ from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import find_equilibrium
-from shellform.structure.solve.factorisation import NotPositiveDefinite
+from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite, Symmetric
 
 LIMIT_POINT, BIFURCATION, BORNE, UNLOADED = "limit point", "bifurcation", "none", "no unloaded state"
 ENDED = "not looked into"
@@ -64,16 +65,36 @@ class Limit:
     factorisations: int
 
 
+class Bench:
+    """Where one structure after the other is loaded: an `assembly` with a factor of its own."""
+
+    def __init__(self, nominal: Perfect, assembly: Assembly) -> None:
+        self.nominal, self.assembly = nominal, assembly
+
+    @cached_property
+    def unloaded(self) -> Factor | None:
+        """The factor of the unloaded perfect structure's tangent, from which each drawn one begins; None where
+        it isn't positive definite, which it is to within the friction of numbers that `held` adds."""
+        matrix = self.assembly.matrix
+        values = self.assembly.evaluate(self.nominal.unloaded).tangent
+        assert values is not None
+        try:
+            return Symmetric(matrix.indptr, matrix.indices).factor(values)
+        except NotPositiveDefinite:
+            return None
+
+
 class Loading(Branch):
     """One structure under way."""
 
-    def __init__(self, nominal: Perfect, assembly: Assembly, errors: Errors, number: int) -> None:
-        self.nominal, self.errors, self.number = nominal, errors, number
+    def __init__(self, bench: Bench, errors: Errors, number: int) -> None:
+        nominal = bench.nominal
+        self.bench, self.nominal, self.errors, self.number = bench, nominal, errors, number
         network = nominal.network
         shape = nominal.imperfections
         beams = built_beams(network.beams, errors, shape)
         cables = built_cables(network.cables, nominal.present, errors, shape)
-        own = assembly.with_parts((beams, cables))
+        own = bench.assembly.with_parts((beams, cables))
         super().__init__(own, built_load(nominal.load, errors), nominal.members.span)
 
     def outcome(self, step: float, smallest: float) -> DrawnOutcome:
@@ -114,17 +135,13 @@ class Loading(Branch):
         moved."""
         nominal, none = self.nominal, np.zeros_like(self.load)
         start, offset = nominal.unloaded, self.errors.supports
-        perfect = self.assembly.with_parts((nominal.network.beams, nominal.network.cables))
         pull = -self.assembly.evaluate(start, tangent=False).force
         if offset.any():
-            pull -= perfect.force_along(start, offset)
+            pull -= self.bench.assembly.force_along(start, offset)
         step = offset.ravel().copy()
         free = self.assembly.free
-        try:
-            self.spent += 1
-            step[free] = perfect.factor(start).solve(pull.ravel()[free])
-        except NotPositiveDefinite:  # held by the friction of its numbers: below what `held` adds
-            pass
+        if self.bench.unloaded is not None:
+            step[free] = self.bench.unloaded.solve(pull.ravel()[free])
         begin = moved(start, self.assembly.chords.corrected(start, step.reshape(-1, 6)))
         begin = self._to_length(begin)
         found = self.newton(begin, none, limit=_RELAXING, tolerance=ON_THE_WAY)

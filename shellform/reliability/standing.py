@@ -1,10 +1,10 @@
 """Structures as built, each loaded from nothing on its own path: does it stand?
 
-A structure is relaxed without load from where the perfect one rests, and then loaded step by step (loading.py
-has the path of a single structure). A step begins along the tangent of the path, whose factor is at hand, and
-goes on by whole steps of Newton's. It counts only where every tangent on the way is positive definite and no
-node lands farther than `STRAY` of the span from where the path's tangent led; else it is halved, as on any
-path. So the large steps lead along the same branch as small ones do.
+A structure is relaxed without load from where the perfect one rests, and then loaded (path_of_one.py), with the
+whole load at first. A step (branch.py) begins along the tangent of the path, whose factor is at hand, and goes
+on by whole steps of Newton's. It counts only where every tangent on the way is positive definite and no node
+lands farther than `STRAY` of the span from where the path's tangent led; else it is halved, as on any path. So
+the large steps lead along the same branch as small ones do.
 
 A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther
 than `FAR` of the span from the perfect structure's; one that loses stability on the way has fallen, whatever
@@ -27,13 +27,21 @@ from shellform.reliability.drawing import (
     errors_of,
     variables,
 )
-from shellform.reliability.path_of_one import BORNE, ENDED, STEP, UNLOADED, DrawnOutcome, Limit, Loading
+from shellform.reliability.path_of_one import (
+    BORNE,
+    ENDED,
+    STEP,
+    UNLOADED,
+    Bench,
+    DrawnOutcome,
+    Limit,
+    Loading,
+)
 from shellform.reliability.perfect import Perfect, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
-from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.loading import SMALLEST
 
 Found = TypeVar("Found")
@@ -79,8 +87,8 @@ class Workshop:
         self.nominal = nominal
         self._first = assemble(nominal.network)
         self._first.chords  # noqa: B018  made once, and shared by all that are copied from it
-        self._idle: SimpleQueue[Assembly] = SimpleQueue()
-        self._idle.put(self._first)
+        self._idle: SimpleQueue[Bench] = SimpleQueue()
+        self._idle.put(Bench(nominal, self._first))
 
     def load(
         self, errors: Errors, *, number: int = 0, step: float = STEP, smallest: float = SMALLEST
@@ -114,7 +122,7 @@ class Workshop:
         """What `work` finds of the structure with the errors, on an assembly that is its own meanwhile."""
         own = self._taken()
         try:
-            return work(Loading(self.nominal, own, errors, number))
+            return work(Loading(own, errors, number))
         finally:
             self._idle.put(own)
 
@@ -130,10 +138,10 @@ class Workshop:
 
         return side_by_side(one, list(numbers))
 
-    def _taken(self) -> Assembly:
+    def _taken(self) -> Bench:
         try:
             return self._idle.get_nowait()
         except Empty:
             other = assemble(self.nominal.network)
             other.__dict__["chords"] = self._first.chords
-            return other
+            return Bench(self.nominal, other)
