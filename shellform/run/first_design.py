@@ -210,7 +210,7 @@ class _Search:
                     nearest = replace(nearest, thickness=asked)
                     raise refused(self.surface, nearest, self.wish, bears=thinner)
                 return result
-            failure = result
+            failure, placed = result, result.placed or placed
             if failure.why is Why.NET:
                 break
         raise refused(self.surface, nearest, self.wish)
@@ -263,54 +263,67 @@ class _Search:
     ) -> FirstDesign | Obstacle:
         """The design, where it stands with the gap that follows its rods too."""
         parts = FirstParts(choice, bundle, rest_ratio_for(self.surface, spacing))
+        parts, tried, failure = self._solved(placed, parts, spacing, thickness)
+        what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
+        if placed.net.edges:
+            what += f", edge beams of {bundle}"
+        gap = following(Rod(choice.section)).gap
+        if failure is None and not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
+            try:
+                placed = self._with_gap(placed, spacing, gap)
+            except (NoNet, Stalled) as error:
+                return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
+            parts, tried, failure = self._solved(placed, parts, spacing, thickness)
+        self.say(
+            f"{what}: stands up to {tried.factor:.2f} × its load, rods at {tried.stress:.0%} of their strength"
+        )
+        if failure is not None:
+            return self._keep(failure)
+        standing = drawn_standing(placed.net, self.surface, parts, thickness)
+        self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the design load")
+        if standing < DRAWN:
+            return self._keep(
+                Obstacle(
+                    Why.SCATTER, spacing, thickness, tried.factor, choice, placed, tried.where, tried.stress
+                )
+            )
+        material = choice.section.material
+        allowed = placed.net.max_radius(young=material.young, strength=material.strength)
+        return FirstDesign(
+            spacing, self.reason, placed, choice, rope_for(spacing), bundle, parts.rest_ratio, thickness, tried,
+            standing, DRAWN, allowed, tuple(self.told),
+        )  # fmt: skip
+
+    def _solved(
+        self, placed: Placed, parts: FirstParts, spacing: float, thickness: float
+    ) -> tuple[FirstParts, Followed, Obstacle | None]:
+        """The parts with cables below their limit, what the design came to, and what it fails by, if it does."""
         tried = followed(placed.net, self.surface, parts, thickness)
         if tried.factor >= NEEDED and tried.pull > PULLED:
             parts = parts.eased(tried.pull)
             tried = followed(placed.net, self.surface, parts, thickness)
-        failure = Obstacle(
-            Why.STABILITY, spacing, thickness, tried.factor, choice, placed, tried.where, tried.stress
-        )
-        what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
-        if placed.net.edges:
-            what += f", edge beams of {bundle}"
-        self.say(
-            f"{what}: stands up to {tried.factor:.2f} × its load, rods at {tried.stress:.0%} of their strength"
-        )
+        why = None
         if tried.factor < NEEDED:
-            return self._keep(failure)
-        if tried.stress > _STRESSED:
-            return self._keep(replace(failure, why=Why.STRENGTH))
-        if tried.edge > _STRESSED:
-            return self._keep(replace(failure, why=Why.EDGES, stress=tried.edge))
-        gap = following(Rod(choice.section)).gap
-        settings: dict[str, Any] = {"spacing": spacing, "gap": gap, "elements": ELEMENTS}
-        if not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
-            try:
-                net, given = climbed_net(
-                    self.surface,
-                    settings,
-                    angle=math.radians(placed.angle),
-                    offset=placed.offset,
-                    progress=self._say,
-                )
-            except (NoNet, Stalled) as error:
-                return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
-            placed = Placed(stand(net, self.surface), math.degrees(given.angle), given.offset)
-            if erection_stress(placed.net, choice.section) > choice.section.material.strength:
-                return self._keep(replace(failure, why=Why.STRENGTH, placed=placed, stress=1.0))
-            tried = followed(placed.net, self.surface, parts, thickness)
-            if tried.factor < NEEDED:
-                return self._keep(replace(failure, factor=tried.factor, placed=placed))
-        standing = drawn_standing(placed.net, self.surface, parts, thickness)
-        self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the design load")
-        if standing < DRAWN:
-            return self._keep(replace(failure, why=Why.SCATTER, factor=tried.factor, placed=placed))
-        material = choice.section.material
-        allowed = placed.net.max_radius(young=material.young, strength=material.strength)
-        return FirstDesign(
-            spacing, self.reason, placed, choice, rope_for(spacing), bundle, parts.rest_ratio, thickness, tried, standing, DRAWN,
-            allowed, tuple(self.told),
+            why = Why.STABILITY
+        elif max(tried.stress, tried.edge) > _STRESSED:
+            why = Why.STRENGTH if tried.stress > _STRESSED else Why.EDGES
+        if why is None:
+            return parts, tried, None
+        stress = tried.edge if why is Why.EDGES else tried.stress
+        return parts, tried, Obstacle(
+            why, spacing, thickness, tried.factor, parts.choice, placed, tried.where, stress
         )  # fmt: skip
+
+    def _with_gap(self, placed: Placed, spacing: float, gap: float) -> Placed:
+        """The net pulled anew with another gap. Raises NoNet or Stalled."""
+        net, given = climbed_net(
+            self.surface,
+            {"spacing": spacing, "gap": gap, "elements": ELEMENTS},
+            angle=math.radians(placed.angle),
+            offset=placed.offset,
+            progress=self._say,
+        )
+        return Placed(stand(net, self.surface), math.degrees(given.angle), given.offset)
 
     def _too_curved(self, placed: Placed, spacing: float, thickness: float) -> Obstacle:
         """The failure of a net on which every section breaks, or is too deep for the spacing."""
