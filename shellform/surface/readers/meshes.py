@@ -71,6 +71,11 @@ def write_mesh(path: str | Path, surface: Surface) -> None:
         ) from error
 
 
+def write_values(path: Path, surface: Surface, values: Mapping[str, Reals]) -> None:
+    """Writes the triangles, in metres, as an unstructured grid (.vtu) with `values` (v,) at the vertices."""
+    meshio.Mesh(surface.vertices, [("triangle", surface.triangles)], dict(values)).write(path, "vtu")
+
+
 def write_lines(
     path: Path,
     points: Reals,

@@ -1,0 +1,312 @@
+"""The nearest surface that is curved nowhere more than a cap: creases rounded, curvature bounded by the least
+change.
+
+A surface x = v + d D is sought, v the vertices as given, D directions across it, that solves
+
+    minimise ½ ∫ d² dA   subject to   |κ₁|, |κ₂| ≤ 1/R   everywhere inside,
+
+since no rod on it, whichever way it runs, is then bent across the surface to less than R. In a vertex' frame
+(u, v, n) the second fundamental form is that of the quadratic that fits its two rings of neighbours best,
+
+    II_i = Σ_j C_ij n_i · (x_j - x_i) = II_i(v) + (L d)_i,   L_ij = C_ij n_i · D_j,
+
+linear in d while the frames stay. With Z = II(v) + L d, whose eigenvalues are to be capped, this is a
+projection, solved by the alternating direction method of multipliers (Boyd et al. 2011, section 5.2):
+
+    (M + ρ Lᵀ W L) d = ρ Lᵀ W (Z - U - II(v)),   Z = capped(II + U),   U += II - Z
+
+with the areas M and the areas W of the forms' components, II_uv twice. The matrix is sparse and factored once for
+fixed frames; frames follow in a few rounds. ρ = R⁴ makes both terms of one size at the length R, where the change
+happens.
+
+D are normals smoothed over R, so that neighbours on both sides of a crease don't cross. Vertices on the
+ground stay on their level, and move in plan only where a crease runs into it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.errors import InputError, NotConverged
+from shellform.surface.shape.target import Surface, make_surface, rough_normals
+
+_MESH = 0.3  # of R: edges that aren't longer show its curvature
+_MOST = 40_000  # vertices of the refined mesh
+_ROUNDS, _STEPS = 12, 60  # of frames, and of multipliers in each
+_BETTER, _VAIN = 0.98, 2  # of the least so far; rounds in a row that don't come below it end the search
+_MARGIN = 0.96  # of the cap, at which forms are capped
+_HEAVY = 10.0  # times their area: vertices on the ground
+_GROUND = 0.02  # of the rise: edges within it of the lowest stand on the ground
+_RELAXED = 1.6  # over-relaxation
+
+
+@dataclass(frozen=True)
+class Faired:
+    """A `surface` curved at most to a radius, the surface as it was, `before`, on the same triangles, and how
+    far each vertex moved, `change` (v,) m."""
+
+    surface: Surface
+    before: Surface
+    change: Reals
+
+
+def faired(surface: Surface, radius: float) -> Faired:
+    """The surface nearest to the given one that is curved nowhere inside to less than `radius`, m; coarse
+    meshes are refined to show it.
+
+    Raises InputError for a radius that isn't positive, larger than the surface or too small for a mesh of
+    reasonable size, and NotConverged where no near surface keeps it.
+    """
+    if not (radius > 0.0 and np.isfinite(radius)):
+        raise InputError("must be positive and finite", where="fair", value=radius)
+    side = float(surface.size[:2].max())
+    if radius > side:
+        raise InputError(
+            f"is more than the surface's size of {side:.3g} m: rounded so far it would be another one",
+            where="fair",
+            value=radius,
+            remedy="Give a smaller radius, or draw the surface anew.",
+        )
+    start = _refined(surface, _MESH * radius)
+    fit = _Fit(start)
+    cap, at, place = 1.0 / radius, start.vertices, np.zeros(len(start.vertices))
+    toward, weight = _directions(start, radius), _weights(start)
+    if fit.most(at, rough_normals(at, start.triangles)) <= cap:
+        return Faired(start, start, place)
+    multiplier = np.zeros((len(fit.inner), 3))
+    best, vain = np.inf, 0
+    for _ in range(_ROUNDS):
+        place, multiplier = _round(fit, start, toward, weight, place, multiplier, radius)
+        at = start.vertices + place[:, None] * toward
+        most = fit.most(at, rough_normals(at, start.triangles))
+        if most <= cap:
+            _refuse_folds(start, at, radius)
+            result = make_surface(at, start.triangles, source=surface.source)
+            return Faired(result, start, np.abs(place) * np.linalg.norm(toward, axis=1))
+        vain = 0 if most < _BETTER * best else vain + 1
+        best = min(best, most)
+        if vain == _VAIN or np.abs(place).max() > radius:
+            break
+    left = 1.0 / best
+    raise NotConverged(
+        f"No surface near this one was found that is curved to {radius:.3g} m or more everywhere: {left:.3g} m "
+        "is left at one place",
+        residual=radius / left - 1.0,
+        iterations=_ROUNDS * _STEPS,
+        remedy="Give a smaller radius, or cut the surface into pieces along its creases.",
+    )
+
+
+def _round(
+    fit: _Fit,
+    start: Surface,
+    toward: Reals,
+    weight: Reals,
+    place: Reals,
+    multiplier: Reals,
+    radius: float,
+) -> tuple[Reals, Reals]:
+    """The displacements (v,) and multipliers (i, 3) after a number of steps in the frames at `place`."""
+    at = start.vertices + place[:, None] * toward
+    frames = fit.frames(rough_normals(at, start.triangles))
+    own, rate = fit.forms(at, frames), fit.by_distance(at, frames, toward)
+    given = own - (rate @ place).reshape(-1, 3)
+    scale = radius**4 * np.repeat(weight[fit.inner], 3) * np.tile([1.0, 2.0, 1.0], len(fit.inner))
+    weighted = sp.diags_array(scale) @ rate
+    factor = _factored(sp.diags_array(weight) + rate.T @ weighted)
+    most = _MARGIN / radius
+    form, capped = own, _capped(own + multiplier, most)
+    for _ in range(_STEPS):
+        place = factor.solve(weighted.T @ (capped - multiplier - given).ravel())
+        form = given + (rate @ place).reshape(-1, 3)
+        mixed = _RELAXED * form + (1.0 - _RELAXED) * capped
+        capped = _capped(mixed + multiplier, most)
+        multiplier = multiplier + mixed - capped
+    return place, multiplier
+
+
+class _Fit:
+    """Quadratics through the neighbours of the vertices `inner` (i,): how their second derivatives follow from
+    places."""
+
+    def __init__(self, surface: Surface) -> None:
+        count, faces = len(surface.vertices), surface.triangles
+        pairs = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+        ones = np.ones(len(pairs))
+        next_to = sp.csr_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))
+        next_to = sp.csr_array(next_to + next_to.T)
+        near = sp.csr_array(next_to @ next_to + next_to)
+        near.setdiag(0.0)
+        near.eliminate_zeros()
+        inside = np.ones(count, dtype=bool)
+        inside[np.concatenate(surface.boundary)] = False
+        size = np.diff(near.indptr)
+        self.inner: Indices = np.flatnonzero(inside & (size >= 6))
+        self.count = count
+        # Vertices with equally many neighbours are fitted together.
+        self._groups = [
+            (which, near.indices[near.indptr[self.inner[which]][:, None] + np.arange(k)])
+            for k in np.unique(size[self.inner])
+            if len(which := np.flatnonzero(size[self.inner] == k))
+        ]
+
+    def frames(self, normals: Reals) -> Reals:
+        """Axes (i, 3, 3) u, v, n as rows at the inner vertices, from the normals (v, 3) of all."""
+        n = normals[self.inner]
+        least = np.eye(3)[np.argmin(np.abs(n), axis=1)]
+        u = np.cross(least, n)
+        u /= np.linalg.norm(u, axis=1)[:, None]
+        return np.stack([u, np.cross(n, u), n], axis=1)
+
+    def forms(self, at: Reals, frames: Reals) -> Reals:
+        """II_uu, II_uv, II_vv (i, 3), 1/m, of places (v, 3)."""
+        result = np.empty((len(self.inner), 3))
+        for which, near in self._groups:
+            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[self.inner[which], None])
+            result[which] = np.einsum("ick,ik->ic", _second(own), own[..., 2])
+        return result
+
+    def by_distance(self, at: Reals, frames: Reals, toward: Reals) -> sp.csr_array:
+        """Their derivatives (3 i, v) by distances that vertices move along `toward` (v, 3), at fixed frames."""
+        rows, columns, values = [], [], []
+        for which, near in self._groups:
+            here = self.inner[which]
+            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[here, None])
+            fit = _second(own)
+            risen = np.einsum("ib,ikb->ik", frames[which, 2], toward[near])
+            self_risen = np.einsum("ib,ib->i", frames[which, 2], toward[here])
+            row = 3 * which[:, None] + np.arange(3)
+            rows += [np.broadcast_to(row[:, :, None], fit.shape).ravel(), row.ravel()]
+            columns += [np.broadcast_to(near[:, None, :], fit.shape).ravel(), np.repeat(here, 3)]
+            values += [(fit * risen[:, None, :]).ravel(), (-fit.sum(axis=2) * self_risen[:, None]).ravel()]
+        entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
+        return sp.csr_array(entries, shape=(3 * len(self.inner), self.count))
+
+    def most(self, at: Reals, normals: Reals) -> float:
+        """The largest principal curvature, 1/m."""
+        mean, apart = _principal(self.forms(at, self.frames(normals)))
+        return float((np.abs(mean) + apart).max(initial=0.0))
+
+
+def _second(own: Reals) -> Reals:
+    """C (i, 3, k): II_uu, II_uv, II_vv of the best quadratic from the heights of neighbours at own
+    coordinates (i, k, 3)."""
+    reach = np.abs(own[..., :2]).max(axis=(1, 2))[:, None]
+    x, y = own[..., 0] / reach, own[..., 1] / reach
+    columns = np.stack([x, y, 0.5 * x * x, x * y, 0.5 * y * y], axis=2)
+    return np.linalg.pinv(columns, rcond=1e-6)[:, 2:] / reach[:, :, None] ** 2
+
+
+def _principal(forms: Reals) -> tuple[Reals, Reals]:
+    """Mean of the two principal curvatures (i,) and half their difference."""
+    mean = 0.5 * (forms[:, 0] + forms[:, 2])
+    return mean, np.hypot(0.5 * (forms[:, 0] - forms[:, 2]), forms[:, 1])
+
+
+def _capped(forms: Reals, most: float) -> Reals:
+    """The nearest forms (i, 3) whose eigenvalues are between -most and most."""
+    mean, apart = _principal(forms)
+    high, low = np.clip(mean + apart, -most, most), np.clip(mean - apart, -most, most)
+    share = 0.5 * (high - low) / np.maximum(apart, 1e-300)
+    half = 0.5 * (forms[:, 0] - forms[:, 2])
+    middle = 0.5 * (high + low)
+    return np.column_stack([middle + share * half, share * forms[:, 1], middle - share * half])
+
+
+def _directions(surface: Surface, radius: float) -> Reals:
+    """Unit directions (v, 3) across the surface: normals smoothed over the radius; level on the ground."""
+    points, faces = surface.vertices, surface.triangles
+    normals, area = rough_normals(points, faces), _areas(surface)
+    corner = points[faces]
+    count = len(points)
+    stiff = sp.csr_array((count, count))
+    for k in range(3):
+        b, c = faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        p, q = corner[:, (k + 1) % 3] - corner[:, k], corner[:, (k + 2) % 3] - corner[:, k]
+        half = 0.5 * np.sum(p * q, axis=1) / np.linalg.norm(np.cross(p, q), axis=1)
+        half = np.maximum(half, 0.0)  # of blunt triangles too: directions only have to be smooth
+        rows, columns = np.concatenate([b, c, b, c]), np.concatenate([b, c, c, b])
+        entries = np.concatenate([half, half, -half, -half])
+        stiff = stiff + sp.csr_array((entries, (rows, columns)), shape=(count, count))
+    smooth = _factored(sp.diags_array(area) + radius**2 * stiff).solve(area[:, None] * normals)
+    smooth[_on_ground(surface), 2] = 0.0
+    size = np.linalg.norm(smooth, axis=1)[:, None]
+    return np.where(size > 0.1, smooth / np.maximum(size, 1e-300), 0.0)
+
+
+def _factored(matrix: sp.sparray) -> Any:
+    """A symmetric positive definite matrix, factored."""
+    return splu(
+        sp.csc_matrix(matrix),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+
+
+def _weights(surface: Surface) -> Reals:
+    """Areas (v,), m², at the vertices, those on the ground heavier."""
+    area = _areas(surface)
+    area[_on_ground(surface)] *= _HEAVY
+    return area
+
+
+def _areas(surface: Surface) -> Reals:
+    corner = surface.vertices[surface.triangles]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 6.0
+    result = np.zeros(len(surface.vertices))
+    np.add.at(result, surface.triangles, area[:, None])
+    return result
+
+
+def _on_ground(surface: Surface) -> Flags:
+    """Which vertices (v,) of the edge stand on the ground."""
+    level = surface.vertices[:, 2]
+    result = np.zeros(len(level), dtype=bool)
+    result[np.concatenate(surface.boundary)] = True
+    return result & (level <= level.min() + _GROUND * np.ptp(level))
+
+
+def _refined(surface: Surface, longest: float) -> Surface:
+    """The surface with triangles cut in four until no edge is longer, m."""
+    points, faces = surface.vertices, surface.triangles
+    while True:
+        pairs = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+        edges, number = np.unique(pairs, axis=0, return_inverse=True)
+        if np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1).max() <= longest:
+            return (
+                surface if faces is surface.triangles else make_surface(points, faces, source=surface.source)
+            )
+        if len(points) + len(edges) > _MOST:
+            raise InputError(
+                f"needs triangles of {longest:.3g} m, more than {_MOST} vertices",
+                where="fair",
+                remedy="Give a larger radius, or a surface with a mesh as even as can be.",
+            )
+        a, b, c = faces.T
+        ab, bc, ca = (len(points) + each for each in number.reshape(3, -1))
+        points = np.vstack([points, 0.5 * (points[edges[:, 0]] + points[edges[:, 1]])])
+        faces = np.vstack(
+            [np.column_stack(each) for each in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))]
+        )
+
+
+def _refuse_folds(start: Surface, at: Reals, radius: float) -> None:
+    """Raises NotConverged where triangles turned over."""
+    old, new = (
+        np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        for p in (start.vertices[start.triangles], at[start.triangles])
+    )
+    if (np.sum(old * new, axis=1) <= 0.0).any():
+        raise NotConverged(
+            f"Rounded to {radius:.3g} m the surface folds over",
+            residual=float("nan"),
+            iterations=_ROUNDS * _STEPS,
+            remedy="Give a smaller radius, or cut the surface into pieces along its creases.",
+        )

@@ -1,0 +1,105 @@
+"""The nearest surface that is curved no more than a cap."""
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError, NotConverged
+from shellform.surface.shape.fairing import faired
+from shellform.surface.shape.target import curvature, make_surface
+from tests.net.edge_shells import oculus, sail
+
+
+def sheet(height, size=8.0, count=25):
+    """z = height(x, y) over a square, m."""
+    x, y = (
+        each.ravel() for each in np.meshgrid(*2 * [np.linspace(-size / 2, size / 2, count)], indexing="ij")
+    )
+    i = np.arange(count * count).reshape(count, count)
+    a, b, c, d = (each.ravel() for each in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    return make_surface(np.column_stack([x, y, height(x, y)]), faces)
+
+
+def gable(x, y):
+    """A roof of 30° on both sides of the y axis."""
+    return 2.4 - np.abs(x) / np.sqrt(3.0)
+
+
+def inside(surface):
+    keep = np.ones(len(surface.vertices), dtype=bool)
+    keep[np.concatenate(surface.boundary)] = False
+    return keep
+
+
+@pytest.mark.parametrize(
+    ("height", "radius"),
+    [(gable, 1.5), (lambda x, y: 4.0 - np.abs(x), 2.0), (lambda x, y: 3.0 - 0.7 * np.maximum(abs(x), abs(y)), 1.5)],
+    ids=["gable", "steep", "pyramid"],
+)  # fmt: skip
+def test_creases_are_rounded_to_the_radius_as_the_package_measures_it(height, radius):
+    """Jets fit cubics where the cap is kept by quadratics: a sixth is granted to the tip of a pyramid."""
+    surface = sheet(height)
+    found = faired(surface, radius)
+    bent = np.abs(curvature(found.surface)).max(axis=1)[inside(found.surface)]
+    assert bent.max() <= 1.0 / radius * 1.2
+    assert np.percentile(bent, 99) <= 1.0 / radius * 1.1
+    away = np.linalg.norm(found.surface.vertices - found.before.vertices, axis=1)
+    np.testing.assert_allclose(found.change, away, atol=1e-12)
+    assert found.change.max() < 0.6 * radius
+
+
+def test_a_crease_changes_less_than_an_arc_that_touches_both_sides_would():
+    """Of a fold by 30° on each side the arc of radius R leaves it by R (1 / cos 30° - sqrt(1 - s²) - s tan 30°)
+    at R s from the ridge, upright; one of all surfaces that keep the cap, so that the least change is less."""
+    radius = 1.5
+    found = faired(sheet(gable), radius)
+    x = found.before.vertices[:, 0]
+    s = np.minimum(np.abs(x) / radius, 0.5)
+    arc = (
+        radius * (1.0 / np.cos(np.pi / 6) - np.sqrt(1.0 - s * s) - s * np.tan(np.pi / 6)) * np.cos(np.pi / 6)
+    )
+    arc -= arc[np.argmax(np.abs(x))]
+    assert 0.0 < np.sqrt((found.change**2).mean()) < np.sqrt((arc**2).mean())
+    assert found.change[np.abs(x) > 3.5].max() < 0.05 * found.change.max()
+
+
+def test_ground_keeps_its_level():
+    found = faired(sheet(gable), 1.5)
+    low = found.before.vertices[:, 2] < found.before.vertices[:, 2].min() + 1e-9
+    assert low.sum() > 10
+    np.testing.assert_allclose(
+        found.surface.vertices[low, 2], found.before.vertices[low, 2], rtol=0.0, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("surface", [sail(), oculus()], ids=["sail", "oculus"])
+def test_what_keeps_the_cap_stays_as_it_is(surface):
+    found = faired(surface, 0.2)
+    assert not found.change.any()
+    np.testing.assert_array_equal(found.surface.vertices, found.before.vertices)
+
+
+def test_a_coarse_mesh_is_refined_until_it_shows_the_radius():
+    coarse = make_surface(
+        [[-4, -4, 0], [-4, 4, 0], [0, -4, 2], [0, 4, 2], [4, -4, 0], [4, 4, 0]],
+        [[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]],
+    )
+    found = faired(coarse, 2.0)
+    assert len(found.surface.vertices) > 500
+    bent = np.abs(curvature(found.surface)).max(axis=1)[inside(found.surface)]
+    assert np.percentile(bent, 99) <= 0.5 * 1.1
+
+
+@pytest.mark.parametrize(
+    ("radius", "said"),
+    [(0.0, "positive"), (np.inf, "positive"), (100.0, "size of 8 m"), (1e-4, "more than 40000 vertices")],
+)
+def test_radii_that_make_no_sense_are_refused(radius, said):
+    with pytest.raises(InputError, match=said):
+        faired(sheet(gable), radius)
+
+
+def test_a_crumpled_sheet_is_refused_rather_than_flattened_in_silence():
+    chance = np.random.default_rng(4)
+    with pytest.raises((NotConverged, InputError)):
+        faired(sheet(lambda x, y: chance.normal(size=x.shape)), 7.5)
