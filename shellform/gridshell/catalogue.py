@@ -20,7 +20,7 @@ import numpy as np
 
 from shellform.errors import InputError
 from shellform.gridshell.edge_beams import Bundle
-from shellform.gridshell.gridshell import Design, Gridshell, Rod, erection_stress
+from shellform.gridshell.gridshell import Design, Gridshell, Rod, TooCurved, erection_stress
 from shellform.gridshell.layers import TwoLayers
 from shellform.net.net import Net
 from shellform.structure.elements.sections import (
@@ -187,13 +187,14 @@ def allowed(catalogue: Catalogue, net: Net) -> tuple[Section, ...]:
     )
     if not found:
         least = min(catalogue.sections, key=lambda section: erection_stress(net, section))
-        raise InputError(
+        raise TooCurved(
             f"none of the sections of the catalogue {catalogue.title!r} bears the net's curvature of "
             f"{net.quality.curvature_max:.3g} 1/m: "
             f"{label(least)} would be stressed to {erection_stress(net, least) / 1e6:.3g} of "
             f"{least.material.strength / 1e6:.3g} MPa",
             where="rod.catalogue",
             remedy="Choose thinner or stronger rods, another angle of the net, or a flatter surface.",
+            radius=erection_stress(net, least) / least.material.strength / net.quality.curvature_max,
         )
     return found
 

@@ -260,6 +260,14 @@ class Gridshell:
         return rod_bending_stress(section, beams, beams.local_forces(state)) / section.material.strength
 
 
+class TooCurved(InputError):
+    """A net whose curvature its rods don't bear: `radius`, m, is the smallest to which they can be bent."""
+
+    def __init__(self, what: str, *, where: str, value: object = None, remedy: str, radius: float) -> None:
+        self.radius = radius
+        super().__init__(what, where=where, value=value, remedy=remedy)
+
+
 def erection_stress(net: Net, section: Section) -> float:
     """The largest bending stress, Pa, of rods bent into the net: σ = E κ c at the outermost fibre (equation
     1).
@@ -306,7 +314,7 @@ def brace(
         )
     bearable = max_radius(net, rod)
     if rod.radius > bearable * (1.0 + 1e-9):
-        raise InputError(
+        raise TooCurved(
             f"the net bends rods to {net.quality.curvature_max:.3g} 1/m; with the outermost fibre more than "
             f"{bearable:.4g} m from the "
             "axis they break (equation 1)",
@@ -314,6 +322,7 @@ def brace(
             value=rod.radius,
             remedy="Choose a thinner rod, a stronger material, another angle of the net, or a flatter "
             "surface.",
+            radius=rod.radius / bearable / net.quality.curvature_max,
         )
     corners = cells(net.grid)
     pairs = [corners[:, [0, 2]], corners[:, [1, 3]]]

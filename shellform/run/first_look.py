@@ -18,7 +18,9 @@ from shellform.case.case import SurfaceEntry, load_case
 from shellform.errors import InputError
 from shellform.gridshell.joints import usual_gap
 from shellform.net.edges import stand
+from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
+from shellform.net.refusal import NoNet, Stalled
 from shellform.net.saved import net_document, save_net
 from shellform.records import stages
 from shellform.records.files import plain
@@ -26,8 +28,9 @@ from shellform.records.progress import Event, Kind, Report
 from shellform.records.summary import Summary, SurfaceRecord, write_summary
 from shellform.run.figures import pictures_possible
 from shellform.run.folder import refuse_overwriting
+from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.surface.readers.reading import FORMATS, kind_of
-from shellform.surface.shape.target import largest_curvature
+from shellform.surface.shape.target import Surface, largest_curvature
 from shellform.written import folder as made
 from shellform.written import write_text
 
@@ -173,9 +176,17 @@ def net_alone(
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
     report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
     settings = {"spacing": spacing, "gap": gap or usual_gap(spacing)}
-    net, found, offset = oriented_net(
-        surface, settings, angle=_angle(angle), progress=lambda text: report(Event("net", text))
-    )
+
+    def say(text: str) -> None:
+        report(Event("net", text))
+
+    def pulled(target: Surface) -> tuple[Net, float, tuple[float, float]]:
+        return oriented_net(target, settings, angle=_angle(angle), progress=say)
+
+    try:
+        net, found, offset = pulled(surface)
+    except (NoNet, Stalled) as error:
+        raise with_way_out(error, surface, COVERED * spacing, folder / BUILDABLE, pulled, say) from error
     net = stand(net, surface)
     made(folder)
     save_net(folder / "net.npz", net)

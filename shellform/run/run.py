@@ -22,10 +22,11 @@ from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
 from shellform.case.case import Case, check_script, dump_case
 from shellform.errors import InputError, NotConverged
-from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.gridshell import Gridshell, TooCurved
 from shellform.gridshell.joints import doubts as joint_doubts
 from shellform.gridshell.tolerances import default_tolerances
 from shellform.net.net import Net
+from shellform.net.refusal import NoNet, Stalled
 from shellform.net.saved import load_net, net_document, save_net
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.stages import SHOWING, STAGES, StagesDone, read_stages, write_stages
@@ -38,6 +39,7 @@ from shellform.run.judged import judged
 from shellform.run.keys import stage_keys
 from shellform.run.log import logged
 from shellform.run.pages import FILE, write_page
+from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.run.workspace import Workspace
 from shellform.surface.shape.target import Surface
 from shellform.written import folder as made_folder
@@ -208,18 +210,46 @@ def _surface(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
 def _net(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
     if keep:
         return _Ended(replace(parts, net=load_net(workspace.path("net.npz"))), summary)
-    net, angle, offset = net_of(
-        workspace.case, _there(parts.surface), progress=lambda text: workspace.say("net", text)
-    )
+    case, surface = workspace.case, _there(parts.surface)
+
+    def pulled(target: Surface) -> tuple[Net, float, tuple[float, float]]:
+        return net_of(case, target, progress=lambda text: workspace.say("net", text))
+
+    try:
+        net, angle, offset = pulled(surface)
+    except (NoNet, Stalled) as error:
+        radius = COVERED * case.net.spacing
+        raise _with_way_out(workspace, "net", error, surface, radius, pulled) from error
     save_net(workspace.path("net.npz"), net)
     write_text(workspace.path("net.json"), json.dumps(net_document(net)))
-    record = net_record(net, angle=angle, offset=offset, rods=rod_limits(workspace.case.rod, net))
+    record = net_record(net, angle=angle, offset=offset, rods=rod_limits(case.rod, net))
     return _Ended(replace(parts, net=net), replace(summary, net=record))
 
 
+def _with_way_out(
+    workspace: Workspace,
+    stage: str,
+    error: InputError | NotConverged,
+    surface: Surface,
+    radius: float,
+    again: Callable[[Surface], object],
+) -> InputError | NotConverged:
+    def say(text: str) -> None:
+        workspace.say(stage, text)
+
+    return with_way_out(error, surface, radius, workspace.path(BUILDABLE), again, say)
+
+
 def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
-    case = workspace.case
-    shell, loads = gridshell(case, _there(parts.net), _there(parts.surface))
+    case, surface = workspace.case, _there(parts.surface)
+
+    def made(target: Surface) -> None:
+        gridshell(case, net_of(case, target)[0], target)
+
+    try:
+        shell, loads = gridshell(case, _there(parts.net), surface)
+    except TooCurved as error:
+        raise _with_way_out(workspace, "initial", error, surface, error.radius, made) from error
     parts = replace(parts, shell=shell, loads=loads)
     write_text(workspace.path("case.toml"), dump_case(case, default_tolerances(shell)))
     net = with_rods(_there(summary.net), rod_limits(case.rod, shell.net))

@@ -15,13 +15,26 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.layers import layers_of
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.sizes import DesignWish, Placed, RodChoice, least_spacing
+from shellform.run.way_out import COVERED
 from shellform.surface.shape.target import Surface, curvature
 
 SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
+_RATHER = 1.5  # times the least radius, where that alone isn't the reason
+_SPARE = 1.05  # times the radius that rods just bear
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
+
+
+class Unbuildable(InputError):
+    """A surface that no net of the `spacing`, m, covers, or that no rod follows there; rounded to the
+    `radius`, m, it may be built."""
+
+    def __init__(self, what: str, *, where: str, remedy: str, spacing: float, radius: float) -> None:
+        self.spacing, self.radius = spacing, radius
+        super().__init__(what, where=where, remedy=remedy)
 
 
 class Why(Enum):
@@ -102,11 +115,14 @@ def refused(
         error = None if failure is None else failure.error
         most, radius = _most_curved(surface)
         spacing = 0.0 if failure is None else failure.spacing
-        return InputError(
+        needed = max(COVERED * spacing, _RATHER * radius)
+        return Unbuildable(
             f"reason: {Why.NET.value}. No net of {spacing:g} m covers it{'' if error is None else f' ({_said(error)})'}; it is "
             f"curved most at {_at(most)}, to a radius of {radius:.3g} m",
             where="net.spacing",
-            remedy=f"Round the surface there to {3.0 * max(spacing, radius):.2g} m or more, or cut it into pieces along its creases.",
+            remedy=f"Round the surface there to {needed:.2g} m or more, or cut it into pieces along its creases.",
+            spacing=spacing,
+            radius=needed,
         )
     choice, stress = failure.choice, failure.stress
     assert choice is not None
@@ -118,13 +134,17 @@ def refused(
             remedy=f"Give --spacing {least_spacing(choice):g} or more, or thinner rods with --rod.",
         )
     if failure.why is Why.CURVATURE or (failure.why is Why.STRENGTH and bears is None):
-        return InputError(
+        placed = failure.placed
+        bends = 0.0 if placed is None else 1.0 / max(placed.net.quality.curvature_max, 1e-12)
+        return Unbuildable(
             f"reason: {failure.why.value}. {choice.label} of {choice.catalogue} would be stressed to {stress:.0%} of its "
             f"strength{place}, at a spacing of {failure.spacing:g} m",
             where="rod",
             remedy=_thinner_rods(wish)
             if wish.rod
             else f"Round the surface there: {max(stress, 1.0):.2g} times its radius is needed.",
+            spacing=failure.spacing,
+            radius=_SPARE * max(stress, 1.0) * bends,
         )
     what = (
         f"reason: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
@@ -132,7 +152,8 @@ def refused(
         f"where 1.5 is needed, its rods at {stress:.0%} of their strength, and gives way first{place}"
     )
     if bears is not None:
-        remedy = f"A single layer of rods bears --thickness {bears:g}: pour that first, and the rest when it has hardened."
+        layer = "A single layer of rods bears" if layers_of(choice.section) == 1 else "Rods in two layers bear"
+        remedy = f"{layer} --thickness {bears:g}: pour that first, and the rest when it has hardened."
     else:
         remedy = "Give the surface more rise: buckling grows with the square of its curvature."
     return NotConverged(what, residual=math.nan, iterations=0, remedy=remedy)

@@ -20,9 +20,10 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
+from matplotlib.tri import Triangulation
 from numpy.typing import ArrayLike, NDArray
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.output.pictures.legend import Ramp, Word
 from shellform.written import door, whole
@@ -281,6 +282,22 @@ def _columns(
             )
         lines[name] = np.where(np.isfinite(line), line, np.nan)
     return at, lines
+
+
+def plan_map(
+    path: str | Path, plan: Reals, triangles: Indices, values: Reals, *, title: str, label: str
+) -> None:
+    """Values (v,) at the vertices (v, 2), m, of triangles seen from above; a ring where they are largest."""
+    figure = Figure(figsize=(8.0, 6.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(aspect="equal", xlabel="x, m", ylabel="y, m")
+    axes.set_title(title, fontsize=9)
+    seen = Triangulation(plan[:, 0], plan[:, 1], triangles)
+    drawn = axes.tripcolor(seen, values, shading="gouraud", cmap="viridis")
+    worst = plan[int(np.argmax(values))]
+    axes.plot(*worst, marker="o", markersize=14, markerfacecolor="none", color="#b00020")
+    figure.colorbar(drawn, label=label)
+    _write(figure, door(path, *FORMATS), 120)
 
 
 def _figure() -> tuple[Figure, Axes]:

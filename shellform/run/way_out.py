@@ -1,0 +1,115 @@
+"""A way out for surfaces that can't be built: the nearest one that can, tried before it is offered.
+
+Creases are rounded and curvature is capped by the least change (surface/shape/fairing.py), to the radius that is
+asked for and, where that isn't enough, more; what is offered went through the very step that refused the
+surface as given. Beside it stands a map of the change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from shellform.errors import InputError, NotConverged
+from shellform.net.refusal import NoNet, Stalled
+from shellform.surface.readers.reading import read_surface
+from shellform.surface.shape.fairing import Faired, faired
+from shellform.surface.shape.target import Surface
+from shellform.written import folder as made
+
+SURFACE = "surface.obj"
+BUILDABLE = "buildable"  # folder in a run's
+COVERED = 3.0  # spacings: a radius of curvature that nets cover
+_MORE = (1.0, 1.5, 2.2)  # times the radius asked for
+_SLENDER = 1e-9  # m: less is no change
+
+
+def with_way_out(
+    refusal: InputError | NotConverged,
+    surface: Surface,
+    radius: float,
+    folder: Path,
+    again: Callable[[Surface], object],
+    say: Callable[[str], None] = lambda text: None,
+) -> InputError | NotConverged:
+    """The refusal of a surface with the nearest buildable one as its remedy, written into `folder` as
+    surface.obj, surface.step, change.vtu and change.png; as it was, where none is found.
+
+    `radius`, m, to which the surface must be rounded at least; `again` does with a surface what was refused
+    and raises InputError or NotConverged where it is refused again; `say` hears what is tried.
+    """
+    from shellform.surface.readers.meshes import write_mesh
+
+    for share in _MORE:
+        wanted = share * radius
+        try:
+            found = faired(surface, wanted)
+            if float(found.change.max()) > _SLENDER:
+                with TemporaryDirectory() as place:
+                    trial = Path(place) / SURFACE
+                    write_mesh(trial, found.surface)
+                    again(read_surface(trial))  # the very file that is offered
+                return _renewed(refusal, _offer(found, wanted, folder))
+        except (InputError, NotConverged) as error:
+            say(f"rounded to {wanted:.3g} m: {error}")
+        else:
+            say(f"it is rounded to {wanted:.3g} m already")
+    return refusal
+
+
+def _offer(found: Faired, radius: float, folder: Path) -> str:
+    """Writes the surface and the map of its change; what to say of them."""
+    from shellform.output.pictures.plots import plan_map
+    from shellform.surface.readers.meshes import write_mesh, write_values
+
+    made(folder)
+    write_mesh(folder / SURFACE, found.surface)
+    cad = _step(folder / "surface.step", found.surface)
+    write_values(folder / "change.vtu", found.surface, {"change [m]": found.change})
+    most = int(np.argmax(found.change))
+    place = "(" + ", ".join(f"{x:.3g}" for x in found.before.vertices[most]) + ") m"
+    off = f"{found.change[most]:.3g} m off at most, at {place}, {found.change.mean():.2g} m in the mean"
+    plan_map(
+        folder / "change.png",
+        found.surface.vertices[:, :2],
+        found.surface.triangles,
+        found.change,
+        title=f"Nearest buildable surface: {off}",
+        label="change, m",
+    )
+    return (
+        f"The nearest surface with which this goes on is {folder / SURFACE}{cad} (in metres): creases rounded to "
+        f"{radius:.3g} m, {off} (change.png)"
+    )
+
+
+def _step(path: Path, surface: Surface) -> str:
+    """Writes the surface as STEP too, where one B-spline can be fitted; what to say of it."""
+    from shellform.surface.cad import write_fitted
+
+    try:
+        write_fitted(path, surface)
+    except (InputError, NotConverged):  # openings, or no gmsh: the mesh is there all the same
+        path.unlink(missing_ok=True)
+        return ""
+    return f", {path.name}"
+
+
+def _renewed(refusal: InputError | NotConverged, offer: str) -> InputError | NotConverged:
+    """The same refusal with the offer before its remedy."""
+    remedy = f"{offer}. {f'Or: {refusal.remedy}' if refusal.remedy else ''}".strip()
+    if isinstance(refusal, NoNet):
+        return NoNet(refusal.reason, refusal.what, where=refusal.where, value=refusal.value, remedy=remedy)
+    if isinstance(refusal, InputError):
+        return InputError(refusal.what, where=refusal.where, value=refusal.value, remedy=remedy)
+    kind = Stalled if isinstance(refusal, Stalled) else NotConverged
+    return kind(
+        refusal.what,
+        state=refusal.state,
+        residual=refusal.residual,
+        iterations=refusal.iterations,
+        remedy=remedy,
+    )

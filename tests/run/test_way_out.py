@@ -1,0 +1,71 @@
+"""What can't be built is said with the nearest surface that can be, and that one can."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.net.refusal import NoNet, Stalled
+from shellform.records.progress import unheard
+from shellform.run.first_look import net_alone
+from shellform.run.propose import propose_case
+from shellform.run.sizes import DesignWish
+from shellform.run.way_out import with_way_out
+from shellform.surface.readers.reading import read_surface
+from tests.run.test_propose import as_obj
+from tests.surface.test_fairing import gable, sheet
+
+
+def pulled(surface):
+    return sf.pull_net(surface, spacing=1.0, gap=0.02, angle=np.pi / 4, elements=2)
+
+
+def named(refusal):
+    """The surface file that a refusal names."""
+    return Path(re.search(r"goes on is (\S+\.obj)", refusal.remedy).group(1))
+
+
+def test_a_crease_that_no_net_covers_is_rounded_and_the_net_goes_on(tmp_path):
+    surface = sheet(gable)
+    with pytest.raises((NoNet, Stalled)) as refused:
+        pulled(surface)
+    heard = []
+    told = with_way_out(refused.value, surface, 3.0, tmp_path / "out", pulled, heard.append)
+    assert type(told) is type(refused.value)
+    assert told.what == refused.value.what
+    assert told.remedy.endswith(refused.value.remedy)
+    assert re.search(r" off at most, at \(0, \S+, 2.4\) m", told.remedy)
+    file = named(told)
+    assert {each.name for each in file.parent.iterdir()} >= {"surface.obj", "change.vtu", "change.png"}
+    pulled(read_surface(file))
+    cad = file.with_suffix(".step")
+    if cad.exists():
+        assert read_surface(cad).area == pytest.approx(read_surface(file).area, rel=0.01)
+
+
+def test_a_refusal_stays_as_it_was_where_rounding_helps_nothing(tmp_path):
+    def never(surface):
+        raise InputError("no", where="net")
+
+    refusal = InputError("is no shell", where="surface", remedy="Draw another.")
+    heard = []
+    assert with_way_out(refusal, sheet(gable), 1.5, tmp_path / "out", never, heard.append) is refusal
+    assert len(heard) == 3
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_net_and_new_name_a_surface_with_which_they_go_on(tmp_path):
+    file = as_obj(tmp_path / "gable.obj", sheet(gable))
+    settings = {"spacing": 1.0, "angle": "45", "gap": None, "allow_scripts": False, "report": unheard}
+    with pytest.raises((NoNet, Stalled)) as refused:
+        net_alone(file, tmp_path / "net", {}, **settings)
+    net_alone(named(refused.value), tmp_path / "again", {}, **settings)
+    wish = DesignWish(spacing=1.0, angle=45.0)
+    with pytest.raises(InputError, match="reason: spacing and curvature") as refused:
+        propose_case(file, tmp_path / "case.toml", {}, allow_scripts=False, wish=wish)
+    propose_case(named(refused.value), tmp_path / "case.toml", {}, allow_scripts=False, wish=wish)
+    assert (tmp_path / "case.toml").is_file()
