@@ -1,6 +1,8 @@
 """Files appear whole or not at all: each is written beside its place and then moved there.
 
 So an interrupted run leaves nothing half-written, and a full disc or a closed folder is told in one sentence.
+Beside its place a file has a name of its own that can't be foreseen and nothing had before: two processes
+never write to the same one, and no symbolic link in a folder that somebody else made leads a writer elsewhere.
 """
 
 from __future__ import annotations
@@ -8,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import os
+import secrets
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -23,7 +26,11 @@ _REMEDIES = {
     errno.EACCES: "Choose a folder that you may write to.",
     errno.EPERM: "Choose a folder that you may write to.",
     errno.EROFS: "Choose a folder that you may write to.",
+    errno.ELOOP: "Delete the symbolic link: links in a folder are not followed.",
+    errno.ENOENT: "Was the folder deleted meanwhile? Run the same command again.",
 }
+_PART = ".part-"
+_STEM = 100  # characters of a file's name that its partial one has too
 
 
 @contextlib.contextmanager
@@ -38,9 +45,10 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
         raise InputError(
             "has another ending", where=str(target), value=target.suffix, remedy=f"Use {ending}."
         )
-    partial = target.with_name(f"{target.stem}.part{target.suffix}")
+    partial = target.with_name(f"{target.stem[:_STEM]}{_PART}{secrets.token_hex(8)}{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
+        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # follows no link
         yield partial
         os.replace(partial, target)
     except OSError as error:
@@ -48,6 +56,18 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     finally:
         with contextlib.suppress(OSError):
             partial.unlink(missing_ok=True)
+
+
+def is_partial(file: Path) -> bool:
+    """Whether a file is one that `whole` is writing, or was when its process was killed."""
+    return _PART in file.name
+
+
+def clear(place: Path) -> None:
+    """Deletes what writers that were killed left in a folder where nobody writes now."""
+    for file in place.glob(f"*{_PART}*"):
+        with contextlib.suppress(OSError):
+            file.unlink()
 
 
 def write_text(path: str | Path, text: str, ending: str = "") -> None:

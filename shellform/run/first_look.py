@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,11 +28,10 @@ from shellform.records.files import plain
 from shellform.records.progress import Event, Kind, Report
 from shellform.records.summary import Summary, SurfaceRecord, write_summary
 from shellform.run.figures import pictures_possible
-from shellform.run.folder import refuse_overwriting
+from shellform.run.folder import alone, refuse_overwriting
 from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.surface.readers.reading import FORMATS, kind_of
 from shellform.surface.shape.target import Surface, largest_curvature
-from shellform.written import folder as made
 from shellform.written import write_text
 
 YOUNG, STRENGTH = 40e9, 255e6  # Pa, of the paper's GFRP rods
@@ -188,15 +188,15 @@ def net_alone(
     except (NoNet, Stalled) as error:
         raise with_way_out(error, surface, COVERED * spacing, folder / BUILDABLE, pulled, say) from error
     net = stand(net, surface)
-    made(folder)
-    save_net(folder / "net.npz", net)
-    write_text(folder / "net.json", json.dumps(net_document(net)))
     summary = Summary(
         shellform=shellform.__version__,
         surface=surface_record(surface, str(file)),
         net=net_record(net, angle=found, offset=offset),
     )
-    write_summary(folder, summary)
+    with alone(folder):
+        save_net(folder / "net.npz", net)
+        write_text(folder / "net.json", json.dumps(net_document(net)))
+        write_summary(folder, summary)
     if pictures_possible(report):
         from shellform.output.pictures.net_maps import draw_net
 
@@ -209,6 +209,9 @@ def _angle(text: str) -> float | Literal["auto"]:
     if text == "auto":
         return "auto"
     try:
-        return float(np.deg2rad(float(text)))
+        angle = float(np.deg2rad(float(text)))
     except ValueError as error:
         raise InputError("must be degrees or auto", where="--angle", value=text) from error
+    if not math.isfinite(angle):
+        raise InputError("must be degrees or auto", where="--angle", value=text)
+    return angle

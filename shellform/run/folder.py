@@ -1,35 +1,52 @@
 """The run folder (contracts/run-folder.md): what the stages leave in it, and how it is read back.
 
 Every file is written whole or not at all. `read_run` gives the nouns that pictures, drawings and the page are
-made from.
+made from. Whoever makes a run is `alone` in its folder, and no symbolic link in a folder is followed: it may
+come from somebody else.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import os
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import shellform
-from shellform.arrays import Reals, read_arrays
+from shellform.arrays import Reals, read_arrays, reals
 from shellform.case.build_gridshell import gridshell, rounding_catalogue
 from shellform.case.case import Case, load_case
-from shellform.errors import InputError
+from shellform.errors import Damaged, InputError
 from shellform.gridshell.catalogue import named
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.net.net import Net
 from shellform.net.saved import load_net
 from shellform.records import stages
+from shellform.records.files import ANEW
 from shellform.records.summary import Summary, read_summary, summary_version
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
-from shellform.written import write_arrays
+from shellform.written import clear, refusal, write_arrays
+from shellform.written import folder as made_folder
 
+LOCK = "lock"
 DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished")
 WRITTEN = (
     "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
-    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt",
+    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", LOCK,
 )  # fmt: skip
+
+
+_PARTS = (
+    "",
+    "designs",
+    "states",
+    "figures",
+    "drawings",
+    "schedules",
+    "models",
+)  # folders that files stand in
 
 
 class NoRunFolder(InputError):
@@ -83,9 +100,11 @@ class Run:
 def read_run(folder: str | Path) -> Run:
     """A run with at least one design, finished or not: what the summary tells of is there.
 
-    Raises InputError for another folder, a damaged one, one without designs, and one of a newer version.
+    Raises InputError for another folder, a damaged one, one without designs, one of a newer version, and one
+    with symbolic links.
     """
     place = Path(folder)
+    refuse_links(place)
     if not (place / "case.toml").is_file():
         raise NoRunFolder("is no run folder", where=str(place), remedy="Make one with shellform design.")
     summary = read_summary(place)
@@ -107,7 +126,8 @@ def read_run(folder: str | Path) -> Run:
             )
     case = load_case(place / "case.toml")
     surface = load_surface(place / "surface.npz")
-    shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
+    with _undamaged(place / "net.npz"):
+        shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
     designs, states = {}, {}
     for name in ready:
         data = read_arrays(place / f"designs/{name}.npz")
@@ -118,25 +138,84 @@ def read_run(folder: str | Path) -> Run:
             *(f"{each}_{what}" for each in loads for what in ("positions", "quaternions")),
         ]
         missing = [each for each in wanted if each not in data]
-        if missing or len(data["present"]) != len(shell.cable_ends):
+        if missing or data["present"].shape != (len(shell.cable_ends),):
             raise InputError(
                 "belongs to another state of the case: the run is half-finished",
                 where=str(place / f"designs/{name}.npz"),
                 remedy="Run shellform design on it again: it goes on.",
             )
-        designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
-        states[name] = {each: State(data[f"{each}_positions"], data[f"{each}_quaternions"]) for each in loads}
+        with _undamaged(data.path):
+            designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
+            states[name] = {
+                each: State(
+                    reals("positions", data[f"{each}_positions"], (shell.node_count, 3)),
+                    reals("quaternions", data[f"{each}_quaternions"], (shell.node_count, 4)),
+                )
+                for each in loads
+            }
     return Run(place, case, surface, shell, loads, designs, states, summary)
+
+
+@contextlib.contextmanager
+def alone(place: Path, *, wait: bool = False) -> Iterator[None]:
+    """Holds the lock of a folder, which is made and cleared of what killed writers left; the lock ends with
+    its process, whatever becomes of that.
+
+    Raises InputError where another process holds it (or waits until it doesn't), and where the folder can't
+    be written.
+    """
+    made_folder(place)
+    try:
+        held = os.open(place / LOCK, os.O_CREAT | os.O_RDWR | getattr(os, "O_NOFOLLOW", 0), 0o666)
+    except OSError as error:
+        raise refusal(place / LOCK, error) from error
+    try:
+        _lock(held, place, wait)
+        for part in _PARTS:
+            clear(place / part)
+        yield
+    finally:
+        os.close(held)
+
+
+def _lock(held: int, place: Path, wait: bool) -> None:
+    try:
+        import fcntl
+    except ImportError:  # no such locks on Windows
+        return
+    try:
+        fcntl.flock(held, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except BlockingIOError as error:
+        raise InputError(
+            "another shellform is at work in it",
+            where=str(place),
+            remedy="Wait until it has ended, or choose another --output.",
+        ) from error
+    except OSError as error:
+        raise refusal(place / LOCK, error) from error
+
+
+def refuse_links(place: Path) -> None:
+    """Raises InputError where something in a run folder is a symbolic link, which could lead a reader or
+    writer anywhere."""
+    for name in WRITTEN:
+        if (place / name).is_symlink():
+            raise InputError(
+                "is a symbolic link, which isn't followed",
+                where=str(place / name),
+                remedy="Delete it, or put in its place what it leads to.",
+            )
 
 
 def refuse_overwriting(place: Path) -> None:
     """Raises InputError for a folder in which files that shellform didn't write would be overwritten, or
-    those of a newer version.
+    those of a newer version, or where links would lead.
     """
     if not place.exists():
         return
     if not place.is_dir():
         raise InputError("is a file, not a folder", where=str(place), remedy="Choose another --output.")
+    refuse_links(place)
     version = summary_version(place)
     if version:
         if _number(version) > _number(shellform.__version__):
@@ -147,13 +226,18 @@ def refuse_overwriting(place: Path) -> None:
                 remedy="Install that version, choose another --output, or let --fresh overwrite it.",
             )
         return
-    there = [] if (place / stages.FILE).is_file() else [name for name in WRITTEN if (place / name).exists()]
+    there = [] if (place / stages.FILE).is_file() else _strangers(place)
     if there:
         raise NoRunFolder(
             f"is no run folder, and {', '.join(there)} in it would be overwritten",
             where=str(place),
             remedy="Choose another --output, or let --fresh overwrite it.",
         )
+
+
+def _strangers(place: Path) -> list[str]:
+    """What stands in a folder under the names that a run writes; a lock may stem from one that was refused."""
+    return [name for name in WRITTEN if name != LOCK and (place / name).exists()]
 
 
 def _number(version: str) -> tuple[int, ...]:
@@ -166,6 +250,18 @@ def save_surface(path: Path, surface: Surface) -> None:
 
 
 def load_surface(path: Path, source: str = "") -> Surface:
-    """A saved surface."""
+    """A saved surface. Raises InputError where the file is missing or damaged."""
     data = read_arrays(path)
-    return Surface(data["vertices"], data["triangles"], data["normals"], source)
+    with _undamaged(path):
+        return Surface(data["vertices"], data["triangles"], data["normals"], source)
+
+
+@contextlib.contextmanager
+def _undamaged(path: Path) -> Iterator[None]:
+    """Raises Damaged naming the file where what it holds makes no sense: somebody altered it."""
+    try:
+        yield
+    except Damaged:
+        raise
+    except (InputError, ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
+        raise Damaged(f"is damaged: {error}", where=str(path), remedy=ANEW) from error

@@ -17,10 +17,10 @@ from shellform.records.history import read_history
 from shellform.records.progress import Event, Report, unheard
 from shellform.records.stages import read_stages
 from shellform.records.verdict import verdict
-from shellform.run.folder import DESIGNS, Run, read_run
+from shellform.run.folder import DESIGNS, LOCK, Run, read_run
 from shellform.run.judged import broken_off, run_checks
 from shellform.run.keys import stage_keys
-from shellform.written import write_text
+from shellform.written import is_partial, write_text
 
 FILE = "report.html"
 _BUDGET = 9_000_000  # bytes of pictures in a page, before they become text, which adds a third
@@ -82,7 +82,7 @@ def shown_run(run: Run, budget: int = _BUDGET) -> ShownRun:
         files=sorted(
             file.relative_to(run.folder).as_posix()
             for file in run.folder.rglob("*")
-            if file.is_file() and ".part" not in file.name
+            if file.is_file() and file.name != LOCK and not is_partial(file)
         ),
     )
 

@@ -34,7 +34,7 @@ from shellform.records.summary import ModelRecord, Summary, read_summary, write_
 from shellform.run import designs
 from shellform.run.checkpoint import drop_checkpoint
 from shellform.run.figures import draw_everything
-from shellform.run.folder import load_surface, read_run, refuse_overwriting, save_surface
+from shellform.run.folder import alone, load_surface, read_run, refuse_links, refuse_overwriting, save_surface
 from shellform.run.judged import judged
 from shellform.run.keys import stage_keys
 from shellform.run.log import logged
@@ -75,12 +75,13 @@ def run_case(
     until: str = STAGES[-1],
     fresh: bool = False,
     allow_scripts: bool = False,
+    wait: bool = False,
     report: Report = unheard,
 ) -> Summary:
     """Runs the case's stages up to `until` in `folder` and returns the summary.
 
-    Raises InputError for bad input and NotConverged where a stage finds no result; what was computed stays in
-    the folder. Where pictures, documents or the page fail, the others are still made, `failed` in the summary
+    Raises InputError for bad input, and where another process is at work in the folder unless it is to `wait`
+    for it; NotConverged where a stage finds no result; what was computed stays in the folder. Where pictures, documents or the page fail, the others are still made, `failed` in the summary
     says what was wrong, and then the first error is raised.
     """
     folder = Path(folder)
@@ -91,23 +92,41 @@ def run_case(
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
     keys = stage_keys(case)
-    if not fresh:
-        refuse_overwriting(folder)
-    done = StagesDone() if fresh else read_stages(folder)
     began = time.perf_counter()
     parts = Parts()
-    if not done.has(
-        "surface", keys["surface"]
-    ):  # before anything is written: most bad input is a bad surface
+    if not _done(folder, fresh).has("surface", keys["surface"]):
+        # before anything is written: most bad input is a bad surface
         report(Event("surface", f"reading {file}"))
         parts = Parts(surface=surface_of(case.surface, allow_scripts=allow_scripts))
         report(Event("surface", f"size {size_text(_there(parts.surface).size)}", Kind.NOTE))
+    with alone(folder, wait=wait):
+        return _run_alone(Workspace(case, folder, logged(folder, report), keys), until, fresh, parts, began)
+
+
+def _done(folder: Path, fresh: bool) -> StagesDone:
+    """What is done in a folder, and may be kept."""
+    if fresh:
+        refuse_links(folder)
+        return StagesDone()
+    refuse_overwriting(folder)
+    return read_stages(folder)
+
+
+def _run_alone(workspace: Workspace, until: str, fresh: bool, parts: Parts, began: float) -> Summary:
+    """As `run_case`, in a folder where nobody else is at work."""
+    folder, keys = workspace.folder, workspace.keys
+    done = _done(folder, fresh)
+    if parts.surface is None and not done.has("surface", keys["surface"]):
+        raise InputError(
+            "was changed by another shellform meanwhile",
+            where=str(folder),
+            remedy="Run the same command again.",
+        )
     summary = replace(
         read_summary(folder) if done.keys else Summary(), shellform=shellform.__version__, failed={}
     )
     for part in ("designs", "states", "figures", "schedules"):
         made_folder(folder / part)
-    workspace = Workspace(case, folder, logged(folder, report), keys)
     workspace.say(
         "run", f"shellform {shellform.__version__}, Python {platform.python_version()}, up to {until}"
     )
@@ -118,7 +137,7 @@ def run_case(
         summary, done = _outdated(summary, first), done.before(first)
         write_stages(folder, done)
         write_summary(folder, summary)
-    write_text(folder / "case.toml", dump_case(case))
+    write_text(folder / "case.toml", dump_case(workspace.case))
     return _stages(workspace, until, parts, summary, done, began)
 
 

@@ -136,10 +136,13 @@ def test_without_gmsh_s_libraries_everything_but_the_step_file_is_written(
     ]
 
 
-def test_what_a_library_can_not_write_is_said_plainly(built, vault, tmp_path):
-    (tmp_path / "model.part.3dm").mkdir()  # rhino3dm says no without a reason
-    with pytest.raises(InputError, match="can't be written"):
-        exports.write_3dm(tmp_path / "model.3dm", built, vault)
-    (tmp_path / "model.part.step").mkdir()
+def test_what_a_library_can_not_write_is_said_plainly(tmp_path):
+    from shellform.surface.occ import write_curves
+    from shellform.surface.readers.rhino import Item, write_rhino
+
+    (tmp_path / "model.3dm").mkdir()  # rhino3dm says no without a reason
+    with pytest.raises((InputError, OSError), match="can't write"):
+        write_rhino(tmp_path / "model.3dm", [Item("rods u", "U0", np.eye(3))], {"rods u": "#000000"})
+    (tmp_path / "model.step").mkdir()
     with pytest.raises(InputError, match=r"can't (write the curves|be written)"):
-        exports.write_step(tmp_path / "model.step", built)
+        write_curves(tmp_path / "model.step", [np.eye(3)])

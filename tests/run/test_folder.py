@@ -3,11 +3,8 @@ sentence.
 """
 
 import json
-import os
 import resource
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,21 +12,13 @@ import pytest
 
 from shellform.case.case import load_case
 from shellform.errors import InputError
-from shellform.run.folder import read_run, refuse_overwriting
+from shellform.run.folder import alone, read_run, refuse_overwriting
 from shellform.run.pages import write_report
 from shellform.run.run import run_case
-from tests.run.small_run import begin, finish
+from tests.command import ROOT, shellform, shellform_process
+from tests.run.small_run import begin, finish, small_case
 
-ROOT = Path(__file__).parent.parent.parent
 CASE = ROOT / "scripts/scale_model.toml"
-
-
-def shellform(*arguments, env=None, before=None):
-    return subprocess.run(
-        [sys.executable, "-m", "shellform", *map(str, arguments)],
-        capture_output=True, text=True, timeout=300, cwd=ROOT, env={**os.environ, **(env or {})},
-        preexec_fn=before, check=False,
-    )  # fmt: skip
 
 
 @pytest.fixture
@@ -124,6 +113,61 @@ def test_files_that_shellform_did_not_write_are_not_overwritten_without_fresh(tm
     assert "shellform-summary" in (tmp_path / "summary.json").read_text(encoding="utf-8")
 
 
+def test_two_runs_do_not_work_in_one_folder_and_the_lock_ends_with_its_holder(copy):
+    case = load_case(CASE)
+    with alone(copy):
+        for refused in (
+            lambda: run_case(case, copy, until="surface"),
+            lambda: run_case(case, copy, until="surface", fresh=True),
+        ):
+            with pytest.raises(InputError, match=r"another shellform is at work in it.*Wait"):
+                refused()
+        net = shellform("net", "surfaces/hypar.obj", "--spacing", 0.5, "--output", copy.parent)
+        assert net.returncode == 0, net.stderr
+    run_case(case, copy, until="surface")
+
+
+def test_what_killed_writers_left_is_cleared_away_by_the_next_run(copy):
+    left = [copy / "net.part-0123456789abcdef.npz", copy / "figures/deviations.part-0123456789abcdef.png"]
+    for file in left:
+        file.touch()
+    run_case(load_case(CASE), copy, until="surface")
+    assert not any(file.exists() for file in left)
+    assert (copy / "net.npz").is_file()
+
+
+@pytest.mark.parametrize("name", ["log.txt", "report.html", "case.toml", "figures", "lock"])
+def test_symbolic_links_in_a_run_folder_lead_nobody_elsewhere(copy, tmp_path, name):
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "mine.txt").write_text("mine", encoding="utf-8")
+    if (copy / name).is_dir():
+        shutil.rmtree(copy / name)
+        (copy / name).symlink_to(outside)
+    else:
+        (copy / name).unlink(missing_ok=True)
+        (copy / name).symlink_to(outside / "mine.txt")
+    for refused in (
+        lambda: run_case(load_case(CASE), copy, until="surface"),
+        lambda: run_case(load_case(CASE), copy, until="surface", fresh=True),
+        lambda: read_run(copy),
+        lambda: write_report([copy]),
+    ):
+        with pytest.raises(InputError, match=rf"{name}: is a symbolic link.*Delete it"):
+            refused()
+    assert [file.read_text(encoding="utf-8") for file in outside.iterdir()] == ["mine"]
+
+
+def test_a_run_folder_deleted_meanwhile_is_told(tmp_path):
+    def delete(event):
+        if event.stage == "net":
+            shutil.rmtree(tmp_path / "run")
+
+    case = load_case(CASE, ["net.spacing=0.11", "surface.size=0.03"])
+    with pytest.raises(InputError, match=r"can't be written: No such file.*deleted meanwhile"):
+        run_case(case, tmp_path / "run", until="net", report=delete)
+
+
 def test_a_folder_with_other_files_may_take_a_run_and_a_run_may_go_on(tmp_path, copy):
     (tmp_path / "notes.txt").write_text("mine", encoding="utf-8")
     refuse_overwriting(tmp_path)
@@ -149,13 +193,13 @@ def test_a_disc_that_fills_up_is_told_in_one_line_and_leaves_no_broken_file(tmp_
     def small():
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
-    result = shellform(
+    result = shellform_process(
         "net", "surfaces/hypar.obj", "--spacing", 0.25, "--output", tmp_path / "run", before=small
     )
     assert result.returncode == 2, result.stderr
     assert "net.npz: can't be written: File too large" in result.stderr
     assert "Traceback" not in result.stderr
-    assert [path.name for path in (tmp_path / "run").iterdir()] == []
+    assert [path.name for path in (tmp_path / "run").iterdir()] == ["lock"]
 
 
 # OSMesa is asked for where it isn't installed, which leaves VTK with what it has on a machine without GL
@@ -164,27 +208,28 @@ WITHOUT = {"VTK_DEFAULT_OPENGL_WINDOW": "vtkOSOpenGLRenderWindow"}
 
 
 def test_without_opengl_one_line_names_the_packages_and_everything_else_is_made(tmp_path, copy):
-    result = shellform(
+    result = shellform_process(
         "net", "surfaces/hypar.obj", "--spacing", 0.5, "--output", tmp_path / "net", env=WITHOUT
     )
     assert result.returncode == 0, result.stderr
     assert len([line for line in result.stderr.splitlines() if "apt-get install libegl1" in line]) == 1
     assert sorted(path.name for path in (tmp_path / "net").iterdir()) == [
+        "lock",
         "net.json",
         "net.npz",
         "summary.json",
     ]
-    refused = shellform("render", copy, env=WITHOUT)
+    refused = shellform_process("render", copy, env=WITHOUT)
     assert refused.returncode == 2
     assert "apt-get install libegl1" in refused.stderr
-    lines = shellform(
+    lines = shellform_process(
         "render", copy, "--design", "initial", "--load", "design", "--format", "svg", env=WITHOUT
     )
     assert lines.returncode == 0, lines.stderr
     assert (copy / "figures/initial-design.svg").is_file()
 
 
-def test_pictures_that_could_not_be_made_are_made_by_the_next_run(copy, monkeypatch):
+def test_pictures_that_could_not_be_made_are_made_by_the_next_run(tmp_path, monkeypatch):
     from shellform.output.pictures import scene
     from shellform.run import run
 
@@ -192,16 +237,17 @@ def test_pictures_that_could_not_be_made_are_made_by_the_next_run(copy, monkeypa
         raise InputError("VTK lacks a library")
 
     told = []
+    case, folder = small_case(ROOT, "safety.drawn=2", "safety.compared=2"), tmp_path / "run"
     monkeypatch.setattr(run, "_optimise", lambda workspace, parts, summary, keep: run._Ended(parts, summary))
     with monkeypatch.context() as without:
         without.setattr(scene, "require", missing)
-        run_case(load_case(CASE), copy, report=lambda event: told.append(event.text))
+        run_case(case, folder, report=lambda event: told.append(event.text))
     assert "no pictures: VTK lacks a library" in told
-    assert (copy / "states/initial-design.vtp").stat().st_size > 1000
-    assert "figures" not in json.loads((copy / "stages.json").read_text(encoding="utf-8"))
-    run_case(load_case(CASE), copy, report=lambda event: told.append(event.text))
-    assert (copy / "figures/deviations.png").is_file()
-    assert "figures" in json.loads((copy / "stages.json").read_text(encoding="utf-8"))
+    assert (folder / "states/initial-design.vtp").stat().st_size > 1000
+    assert "figures" not in json.loads((folder / "stages.json").read_text(encoding="utf-8"))
+    run_case(case, folder, report=lambda event: told.append(event.text))
+    assert (folder / "figures/deviations.png").is_file()
+    assert "figures" in json.loads((folder / "stages.json").read_text(encoding="utf-8"))
 
 
 def test_a_script_runs_a_case_by_the_public_names(tmp_path):
