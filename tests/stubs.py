@@ -5,6 +5,7 @@ import signal
 import time
 from pathlib import Path
 
+from shellform.study.jobs import Overtime, ended_where_it_hangs
 from shellform.study.outcome import Outcome, Status, flat
 from shellform.written import write_text
 
@@ -80,6 +81,17 @@ def deadly(job, before=None):
         first.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return quick(job, before)
+
+
+def stuck(job, before=None):
+    """As `quick`; one design hangs within a step."""
+    if job.case.cable.stiffness != 666.0:
+        return quick(job, before)
+    try:
+        with ended_where_it_hangs(Path(job.folder), 0.1):
+            time.sleep(600.0)
+    except Overtime as error:
+        return Outcome(job.key, Status.OVERTIME, str(error))
 
 
 def read_json_number(file):

@@ -25,6 +25,9 @@ def study(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler, whose workers see the folder too.")
     ] = None,
+    dashboard: Annotated[
+        bool, typer.Option("--dashboard", help="Dask's, open to everybody on this machine.")
+    ] = False,
     allow_scripts: Scripts = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -39,7 +42,13 @@ def study(
         )
     with Live(quiet=quiet) as live:
         found = run_study(
-            file, output, workers=workers, scheduler=scheduler, allow_scripts=allow_scripts, show=live
+            file,
+            output,
+            workers=workers,
+            scheduler=scheduler,
+            dashboard=dashboard,
+            allow_scripts=allow_scripts,
+            show=live,
         )
     for name in () if quiet else found.empty:
         print(

@@ -10,6 +10,7 @@ given up.
 
 from __future__ import annotations
 
+import asyncio
 import itertools
 import logging
 import math
@@ -28,6 +29,7 @@ from shellform.study.outcome import Outcome, Status
 Work = Callable[[Job, Outcome | None], Outcome]
 _DEATHS = 2  # that a job survives
 _AHEAD = 2  # jobs handed out for each thread
+_ANSWERS = 5.0  # seconds in which a scheduler has to
 _RECOUNT = 1.0  # seconds after which the cluster's threads are counted anew
 _ONE_THREAD = {
     name: "1"
@@ -52,7 +54,7 @@ for name in ("distributed", "distributed.worker", "distributed.nanny"):
 
 @dataclass(frozen=True)
 class Engine:
-    """A running cluster: Dask's client and the address of its dashboard."""
+    """A running cluster: Dask's client and the address of its dashboard, "" where it has none."""
 
     client: Any
     dashboard: str
@@ -60,13 +62,18 @@ class Engine:
 
 @contextmanager
 def engine(
-    *, workers: int | None = None, scheduler: str | None = None, processes: bool = True
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    processes: bool = True,
+    dashboard: bool = False,
 ) -> Iterator[Engine]:
     """`workers` processes on this machine (default: one a core), or the cluster whose `scheduler` has that
     address.
 
-    Scheduler, workers and dashboard of this machine listen on its loopback address alone; the first two speak
-    to nobody without the certificate that is made for each cluster. With `processes` False the workers are
+    Scheduler and workers of this machine listen on its loopback address alone and speak to nobody without the
+    certificate that is made for each cluster. Its `dashboard` answers everybody on the machine, so that it has
+    to be asked for. With `processes` False the workers are
     threads, to try out the engine. Raises InputError where a cluster doesn't answer.
     """
     try:
@@ -96,9 +103,10 @@ def engine(
         "distributed.worker.memory.spill": False,
         "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
         "distributed.comm.timeouts.connect": "30s",
-    }
+    } | ({} if dashboard else {"distributed.scheduler.http.routes": []})
     with dask.config.set(settings):
         if scheduler is not None:
+            _reach(scheduler)
             try:
                 client = Client(scheduler, timeout="10s", set_as_default=False)
             except (OSError, ValueError, ImportError) as error:
@@ -120,15 +128,37 @@ def engine(
             or None,  # certificates of its own, in memory: nobody else on the machine can send it work
             dashboard_address="127.0.0.1:0",
             worker_dashboard_address=None,
+            scheduler_kwargs={"dashboard": dashboard},
         )
         try:
             client = Client(cluster, set_as_default=False)
             try:
-                yield Engine(client, cluster.dashboard_link)
+                yield Engine(client, cluster.dashboard_link if dashboard else "")
             finally:
                 _close(client)
         finally:
             _close(cluster)
+
+
+def _reach(address: str) -> None:
+    """Raises InputError where no scheduler answers at an address: Dask's client would go on asking in the
+    background, and say so at the end of the process.
+    """
+    from distributed import Security
+    from distributed.comm import connect
+
+    async def call() -> None:
+        (await connect(address, timeout=_ANSWERS, **Security().get_connection_args("client"))).abort()
+
+    try:
+        asyncio.run(asyncio.wait_for(call(), _ANSWERS))
+    except (OSError, ValueError, TypeError, ImportError, RuntimeError, OverflowError) as error:
+        raise InputError(
+            f"doesn't answer{f': {error}' if str(error) else f' within {_ANSWERS:g} s'}",
+            where="--scheduler",
+            value=address,
+            remedy="Give the address that its scheduler tells, like tcp://10.0.0.1:8786.",
+        ) from error
 
 
 def _close(part: Any) -> None:

@@ -2,7 +2,8 @@
 
 An expression is data: its syntax tree is walked here, node by node, and only numbers, names of entries, + - *
 / // % **, comparisons, `a if c else b` and the functions below mean anything. Nothing is compiled or run;
-every number is a float, so that no power grows without end; length and depth are bounded.
+every number on the way is a float, what a comparison gives too, so that no power grows without end; length and
+depth are bounded.
 """
 
 from __future__ import annotations
@@ -60,7 +61,7 @@ def evaluate(text: str, where: str, entry: Callable[[str], float]) -> float:
         raise InputError(f"is longer than {_LONGEST} characters", where=where)
     try:
         tree = ast.parse(text.strip(), mode="eval")
-        value = float(_value(tree.body, where, entry))
+        value = _value(tree.body, where, entry)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         if isinstance(error, InputError):
             raise
@@ -72,7 +73,7 @@ def evaluate(text: str, where: str, entry: Callable[[str], float]) -> float:
     return value
 
 
-def _value(node: ast.AST, where: str, entry: Callable[[str], float]) -> Any:
+def _value(node: ast.AST, where: str, entry: Callable[[str], float]) -> float:
     if isinstance(node, ast.Constant) and type(node.value) in (int, float):
         return float(node.value)  # type: ignore[arg-type]
     if isinstance(node, ast.Name | ast.Attribute):
@@ -86,11 +87,10 @@ def _value(node: ast.AST, where: str, entry: Callable[[str], float]) -> Any:
         found = _BINARY[type(node.op)](_value(node.left, where, entry), _value(node.right, where, entry))
         if isinstance(found, complex):
             raise ValueError("the root of a negative number")
-        return found
+        return float(found)
     elif isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _COMPARE:
-        return _COMPARE[type(node.ops[0])](
-            _value(node.left, where, entry), _value(node.comparators[0], where, entry)
-        )
+        left, right = _value(node.left, where, entry), _value(node.comparators[0], where, entry)
+        return float(_COMPARE[type(node.ops[0])](left, right))
     elif isinstance(node, ast.IfExp):
         return _value(node.body if _value(node.test, where, entry) else node.orelse, where, entry)
     elif (

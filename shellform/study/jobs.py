@@ -2,36 +2,53 @@
 with others.
 
 Whatever happens ends as an outcome with a status. A full disk is no property of a design: its status stops
-the study.
+the study. A design that takes too long is stopped at its next step; one that hangs within a step is ended with
+its process, and found out by the trace which that leaves in the folder when the design is handed out again.
 """
 
 from __future__ import annotations
 
 import errno
+import faulthandler
 import shutil
 import socket
+import threading
 import time
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
+from multiprocessing import parent_process
 from pathlib import Path
 
 from shellform.case.case import Case
 from shellform.errors import Damaged, InputError, NotConverged
 from shellform.records import stages, summary
+from shellform.records.progress import Event
 from shellform.records.summary import Summary, document, read_summary
+from shellform.run.folder import LOCK, NoRunFolder, alone
 from shellform.study.outcome import Outcome, Status, flat
+from shellform.written import folder as made_folder
+from shellform.written import is_partial, whole
 
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
 _SHARED = (stages.FILE, summary.FILE)
 _NOT_FOUND = ("format", "version", "seconds")  # by the design: the same for all, or different each time
 
 
+_TRACE = "overtime.txt"
+_HANGS = 2.0  # times the time that is allowed, after which a process is ended
+
+
+class Overtime(Exception):
+    """A design that takes longer than it may."""
+
+
 @dataclass(frozen=True)
 class Job:
-    """A case to be run in `folder` until a stage, after the jobs `before`, each of which begins the next with
-    its files.
+    """A case to be run in `folder` until a stage, in at most so many seconds (`longest`), after the jobs
+    `before`, each of which begins the next with its files.
     """
 
     key: str
@@ -40,6 +57,7 @@ class Job:
     folder: str
     before: tuple[Job, ...] = ()
     allow_scripts: bool = False
+    longest: float = float("inf")
 
 
 def work(job: Job, before: Outcome | None = None) -> Outcome:
@@ -53,10 +71,13 @@ def work(job: Job, before: Outcome | None = None) -> Outcome:
     status, reason = Status.DONE, ""
     found = Summary()
     try:
-        with _alone(folder):
+        with ended_where_it_hangs(folder, job.longest):
             if job.before:
-                _begin(folder, Path(job.before[-1].folder))
+                with alone(folder, wait=True):
+                    _begin(folder, Path(job.before[-1].folder))
             found = _run(job, folder)
+    except Overtime as error:
+        status, reason = Status.OVERTIME, str(error)
     except NotConverged as error:
         status, reason = Status.NO_RESULT, str(error)
     except MemoryError:
@@ -83,16 +104,48 @@ def work(job: Job, before: Outcome | None = None) -> Outcome:
 
 
 def _run(job: Job, folder: Path) -> Summary:
+    """The job's stages, alone in their folder: a process whose study was killed may still be at its last
+    step there.
+    """
     from shellform.compiled import set_num_threads
-    from shellform.run import run
-    from shellform.run.folder import NoRunFolder
+    from shellform.run.run import run_case
+
+    began = time.perf_counter()
+
+    def watch(event: Event) -> None:
+        if time.perf_counter() - began > job.longest:
+            raise Overtime(f"took longer than {job.longest:g} s: was at {event.stage}, {event.text}")
 
     set_num_threads(1)
+    run = partial(
+        run_case, job.case, folder, until=job.until, allow_scripts=job.allow_scripts, wait=True, report=watch
+    )
     try:
-        return run.run_case(job.case, folder, until=job.until, allow_scripts=job.allow_scripts)
+        return run()
     except (Damaged, NoRunFolder):
         # By a machine switched off while it wrote, or killed before its first stage was done.
-        return run.run_case(job.case, folder, until=job.until, allow_scripts=job.allow_scripts, fresh=True)
+        return run(fresh=True)
+
+
+@contextmanager
+def ended_where_it_hangs(folder: Path, longest: float) -> Iterator[None]:
+    """Ends a worker's process, whatever it is at, where the block takes far longer than it may. Raises
+    Overtime where that has happened.
+    """
+    trace = made_folder(folder) / _TRACE
+    if trace.is_file() and trace.stat().st_size:
+        trace.unlink()
+        raise Overtime(f"took longer than {longest:g} s, and its worker had to be ended")
+    if parent_process() is None or longest == float("inf"):  # nobody would begin another process
+        yield
+        return
+    with open(trace, "w") as told:
+        faulthandler.dump_traceback_later(min(_HANGS * longest, threading.TIMEOUT_MAX), exit=True, file=told)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+    trace.unlink()
 
 
 def _kept(folder: Path) -> Summary:
@@ -108,14 +161,12 @@ def _begin(folder: Path, source: Path) -> None:
     if (folder / "stages.json").exists():
         return
     for file in sorted(source.rglob("*")):
-        place = folder / file.relative_to(source)
-        if file.is_file() and file.name not in (*_SHARED, "lock") and ".part" not in file.name:
-            place.parent.mkdir(parents=True, exist_ok=True)
-            shutil.copyfile(file, place)
+        if file.is_file() and file.name not in (*_SHARED, LOCK) and not is_partial(file):
+            with whole(folder / file.relative_to(source)) as copy:
+                shutil.copyfile(file, copy)
     for name in reversed(_SHARED):
-        partial = folder / f"{name}.part"
-        shutil.copyfile(source / name, partial)
-        partial.replace(folder / name)
+        with whole(folder / name) as copy:
+            shutil.copyfile(source / name, copy)
 
 
 def disk_is_full(error: BaseException | None) -> bool:
@@ -125,28 +176,3 @@ def disk_is_full(error: BaseException | None) -> bool:
             return True
         error = error.__cause__ or error.__context__
     return False
-
-
-@contextmanager
-def _alone(folder: Path) -> Iterator[None]:
-    """Waits until no other process works in a folder: one whose study was killed may still be at its last
-    step.
-    """
-    folder.mkdir(parents=True, exist_ok=True)
-    with locked(folder / "lock", wait=True):
-        yield
-
-
-@contextmanager
-def locked(file: Path, *, wait: bool) -> Iterator[None]:
-    """Holds a lock, which ends with the process whatever becomes of it. Raises BlockingIOError where another
-    holds it.
-    """
-    with open(file, "wb") as opened:
-        try:
-            import fcntl
-        except ImportError:  # no such locks on Windows
-            yield
-            return
-        fcntl.flock(opened, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        yield

@@ -12,16 +12,20 @@ Value = bool | int | float | str
 
 class Status(StrEnum):
     """How a design ended: `REFUSED` its input, `NO_RESULT` no equilibrium or no memory, `ERROR` a fault of
-    shellform's; `CRASHED` took its worker down and is tried again by a later call; `NO_ROOM` stops the study;
-    `MISSING` is not computed yet."""
+    shellform's; `CRASHED` took its worker down and `OVERTIME` more time than the study allows, and both are
+    tried again by a later call; `NO_ROOM` stops the study; `MISSING` is not computed yet."""
 
     DONE = "done"
     REFUSED = "refused"
     NO_RESULT = "no result"
     ERROR = "error"
     CRASHED = "crashed"
+    OVERTIME = "overtime"
     NO_ROOM = "no room"
     MISSING = "missing"
+
+
+TRIED_AGAIN = (Status.CRASHED, Status.OVERTIME)
 
 
 @dataclass(frozen=True)

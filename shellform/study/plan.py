@@ -46,6 +46,7 @@ from shellform.study.expressions import evaluate
 from shellform.study.outcome import Value
 
 _MOST = 1_000_000  # designs
+_LONGEST = 31e6  # s, a year
 _LEAVES = {"values", "low", "high", "count", "scale", "whole", "files"}
 _COLUMNS = {
     "misfit": "designs.best.loads.design.deviation_rms",
@@ -104,6 +105,7 @@ class Study(_Entry):
     count: int | None = Field(None, ge=1, le=_MOST, description="of designs, for all methods but grid")
     population: int = Field(24, ge=2, le=10_000, description="of a search's generation")
     seed: int = Field(1, ge=0, lt=2**32)
+    longest: float = Field(21600.0, gt=0.0, le=_LONGEST, description="time for one design, s")
     set: dict[str, Any] = Field({}, description="entries for all designs")
     vary: dict[str, VaryEntry] = Field({}, description="entries that vary")
     designs: list[dict[str, Any]] = Field(

@@ -20,12 +20,15 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from pydantic import TypeAdapter, ValidationError
+
 from shellform.errors import InputError, not_installed
 from shellform.records.files import plain
-from shellform.study.outcome import ListedDesign, Outcome, Status, Value
+from shellform.study.outcome import TRIED_AGAIN, ListedDesign, Outcome, Value
 from shellform.tables import Table, table_text
-from shellform.written import write_text
+from shellform.written import whole, write_text
 
+_OUTCOME = TypeAdapter(Outcome)
 _GROUP = 4096  # rows of a row group, and all that are in memory at once
 _KINDS = {"bool": 0, "int": 1, "float": 2, "str": 3}
 _BUILT = ("polished", "rounded", "optimised", "initial")
@@ -41,7 +44,7 @@ class Log:
         self.file = file
         self.kinds: dict[str, int] = {}
         self._places: dict[str, int] = {}
-        self._crashed: set[str] = set()
+        self._unsettled: set[str] = set()
         try:
             self._open = open(file, "a+b", buffering=0)  # noqa: SIM115 (it is open as long as the log)
         except OSError as error:
@@ -79,14 +82,14 @@ class Log:
 
     def __contains__(self, key: object) -> bool:
         """Whether there is a result that stands."""
-        return key in self._places and key not in self._crashed
+        return key in self._places and key not in self._unsettled
 
     def old(self, key: str) -> bool:
         """Whether there was a result that stands when the log was opened."""
         return key in self and self._places[key] < self._begin
 
     def get(self, key: str) -> Outcome | None:
-        """A design's outcome, crashed ones too."""
+        """A design's outcome, one that is tried again too."""
         if key not in self._places:
             return None
         with open(self.file, "rb") as file:
@@ -125,7 +128,7 @@ class Log:
     def _enter(self, outcome: Outcome, place: int) -> None:
         key = outcome.key
         self._places[key] = place
-        (self._crashed.add if outcome.status is Status.CRASHED else self._crashed.discard)(key)
+        (self._unsettled.add if outcome.status in TRIED_AGAIN else self._unsettled.discard)(key)
         for name, value in outcome.values.items():
             kind = _KINDS[type(value).__name__]
             known = self.kinds.get(name, kind)
@@ -143,18 +146,11 @@ def _outcome(line: bytes) -> Outcome | None:
     if not line.endswith(b"\n") or line[8:9] != b" " or line[:8] != b"%08x" % zlib.crc32(line[9:-1]):
         return None
     try:
-        found = json.loads(line[9:])
-        return Outcome(
-            key=found["key"],
-            status=Status(found["status"]),
-            reason=found["reason"],
-            values=found["values"],
-            seconds=found["seconds"],
-            worker=found["worker"],
-        )
-    except (ValueError, KeyError, TypeError) as error:
+        return _OUTCOME.validate_json(line[9:], strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
         raise InputError(
-            f"is no line of a study's results: {error}",
+            f"is no line of a study's results: {'.'.join(map(str, first['loc']))}: {first['msg']}",
             where="results.jsonl",
             remedy="Choose another --output.",
         ) from error
@@ -217,18 +213,17 @@ def write_table(folder: Path, log: Log, columns: Mapping[str, str]) -> int:
     heads = tuple(name for name, _ in fields[: 4 + len(own) + len(picks)])
     short: list[tuple[Any, ...]] = []
     spent: list[tuple[Any, ...]] = []
-    partial = folder / "table.parquet.part"
-    with pq.ParquetWriter(partial, schema, compression="zstd") as writer:
-        for group in _groups(folder, log, columns):
-            arrays = [_array(pa, group, name, kind, types[kind]) for name, kind in fields]
-            writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
-            for row in group:
-                short.append(tuple(_cell(row.get(name), kind) for name, kind in fields[: len(heads)]))
-                who = row["number"], row["key"], row["worker"]
-                spent += [(*who, stage, seconds) for stage, seconds in row["seconds"].items()]
-    with open(partial, "rb") as written:
-        os.fsync(written.fileno())
-    os.replace(partial, folder / "table.parquet")
+    with whole(folder / "table.parquet") as partial:
+        with pq.ParquetWriter(partial, schema, compression="zstd") as writer:
+            for group in _groups(folder, log, columns):
+                arrays = [_array(pa, group, name, kind, types[kind]) for name, kind in fields]
+                writer.write_table(pa.Table.from_arrays(arrays, schema=schema))
+                for row in group:
+                    short.append(tuple(_cell(row.get(name), kind) for name, kind in fields[: len(heads)]))
+                    who = row["number"], row["key"], row["worker"]
+                    spent += [(*who, stage, seconds) for stage, seconds in row["seconds"].items()]
+        with open(partial, "rb") as written:
+            os.fsync(written.fileno())
     write_text(folder / "table.csv", table_text(Table("table", heads, tuple(short)), exact=True))
     columns_of_seconds = ("number", "key", "worker", "stage", "seconds")
     seconds_table = Table("seconds", columns_of_seconds, tuple(spent))

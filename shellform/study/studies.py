@@ -20,8 +20,9 @@ import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,16 +30,21 @@ import shellform
 from shellform.case.case import Case, check_script
 from shellform.errors import InputError, NotConverged
 from shellform.records.stages import STAGES
+from shellform.run.folder import alone
 from shellform.run.keys import stage_keys
 from shellform.study.engine import Engine, Work, engine, sweep
 from shellform.study.front import Front, signed
-from shellform.study.jobs import Job, disk_is_full, locked, work
+from shellform.study.jobs import Job, disk_is_full, work
 from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
 from shellform.study.page_of_study import write_study_page
 from shellform.study.plan import Plan, changes, length, read_study, resolved
 from shellform.study.store import Log, arrow, designs_of, line_of, picked, write_table
+from shellform.written import folder as made_folder
 from shellform.written import write_text
 
+WRITTEN = (
+    "study.toml", "designs.jsonl", "results.jsonl", "table.parquet", "table.csv", "seconds.csv", "runs", "stages", "study.html",
+)  # fmt: skip
 _SHARE_OF_TIME = 0.02  # that is spent on bringing the table up to date while the study runs
 _LATEST = 12  # rows shown
 _SHORT = 32  # hexadecimal digits of a key: 128 bits
@@ -102,6 +108,7 @@ def run_study(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    dashboard: bool = False,
     allow_scripts: bool = False,
     show: Show = lambda progress: None,
     work: Work = work,
@@ -109,29 +116,27 @@ def run_study(
     """Runs the designs of a study file in `folder` that aren't there yet, and writes its table and page.
 
     `workers` processes on this machine, or those of a Dask `scheduler`, which have to see the folder by the
-    same name. `show` is called with the progress. Raises InputError for a bad study, NotConverged where the
-    disk is full or no design has a result.
+    same name. Dask's `dashboard` is open to everybody on this machine. `show` is called with the progress.
+    Raises InputError for a bad study, NotConverged where the disk is full or no design has a result.
     """
     plan = read_study(file)
     arrow()  # before hours are spent on designs
     place = Path(folder).resolve()
+    for part in WRITTEN:
+        if (place / part).is_symlink():
+            raise InputError(
+                "is a symbolic link, which isn't followed", where=str(place / part), remedy="Delete it."
+            )
     try:
-        for part in ("runs", "stages"):
-            (place / part).mkdir(parents=True, exist_ok=True)
-        write_text(place / "study.toml", Path(file).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(
-            f"can't be written: {error}", where=str(place), remedy="Choose another --output."
-        ) from error
-    try:
-        with locked(place / "lock", wait=False), Log(place / "results.jsonl") as log:
+        with alone(place), Log(place / "results.jsonl") as log:
+            for part in ("runs", "stages"):
+                made_folder(place / part)
+            write_text(place / "study.toml", Path(file).read_text(encoding="utf-8"))
             front = Front(signed(plan.study.objective), plan.study.limit)
             study = _Studying(plan, place, log, front, StudyProgress(total=length(plan)), show, allow_scripts)
             _tidy(study)
-            _go(study, work, workers, scheduler)
+            _go(study, work, partial(engine, workers=workers, scheduler=scheduler, dashboard=dashboard))
             return _finish(study)
-    except BlockingIOError as error:
-        raise InputError("another study is at work here", where=str(place)) from error
     except OSError as error:
         what = "There is no room on the disk" if disk_is_full(error) else "The study was broken off"
         raise NotConverged(
@@ -139,8 +144,8 @@ def run_study(
         ) from error
 
 
-def _go(study: _Studying, work: Work, workers: int | None, scheduler: str | None) -> None:
-    """Batch after batch: one, or a search's generations."""
+def _go(study: _Studying, work: Work, begin: Callable[[], AbstractContextManager[Engine]]) -> None:
+    """Batch after batch: one, or a search's generations; the engine begins with the first that needs it."""
     searching = study.plan.study.method == "search"
     if searching:
         from shellform.study.search import generations
@@ -154,7 +159,7 @@ def _go(study: _Studying, work: Work, workers: int | None, scheduler: str | None
         while batch is not None:
             keys, shared, fresh = _list(study, batch, listed)
             if fresh and opened is None:
-                opened = stack.enter_context(engine(workers=workers, scheduler=scheduler))
+                opened = stack.enter_context(begin())
                 study.progress.dashboard = opened.dashboard
             if fresh and opened is not None:
                 _compute(study, opened, _jobs(study, batch, shared), work)
@@ -224,6 +229,7 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
 def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]:
     """The designs of a batch that have no result yet, with the stages that they share with others."""
     until, seen = study.plan.study.until, set()
+    shared_by_all = study.allow_scripts, study.plan.study.longest
     stages = STAGES[: STAGES.index(until)]
     for own in batch():
         design = _identify(study, own)
@@ -237,15 +243,9 @@ def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]
             if counts[k] > 1 and counts[k] > (counts[k + 1] if k + 1 < len(counts) else 1):
                 key = design.keys[stage][:_SHORT]
                 folder = str(study.folder / "stages" / key)
-                before = (*before, Job(key, design.case, stage, folder, before, study.allow_scripts))
-        yield Job(
-            design.key,
-            design.case,
-            until,
-            str(study.folder / "runs" / design.key),
-            before,
-            study.allow_scripts,
-        )
+                before = (*before, Job(key, design.case, stage, folder, before, *shared_by_all))
+        folder = str(study.folder / "runs" / design.key)
+        yield Job(design.key, design.case, until, folder, before, *shared_by_all)
 
 
 def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) -> None:

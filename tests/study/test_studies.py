@@ -6,9 +6,13 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
+import urllib.error
+import urllib.request
+import zlib
 from dataclasses import replace
 
 import pytest
@@ -16,14 +20,14 @@ import pytest
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.run import run
-from shellform.run.folder import read_run
+from shellform.run.folder import alone, read_run
 from shellform.study.engine import engine, sweep
 from shellform.study.front import Front
 from shellform.study.jobs import Job, work
 from shellform.study.outcome import Outcome, Row, Status, flat
 from shellform.study.store import Log, read_table
 from shellform.study.studies import run_study
-from tests.stubs import ROOT, deadly, quick, study_file
+from tests.stubs import ROOT, deadly, quick, stuck, study_file
 
 GRID = """
 [vary]
@@ -165,6 +169,24 @@ def test_a_design_that_kills_its_workers_is_recorded_and_the_rest_goes_on(tmp_pa
     assert table(clean) == table(tmp_path / "out")
 
 
+def test_a_design_that_hangs_is_ended_with_its_worker_and_the_rest_goes_on(tmp_path, on_two):
+    file = study_file(tmp_path, "[vary]\ncable.stiffness = [100, 666, 187]\n")
+    found = run_study(file, tmp_path / "out", work=stuck)
+    assert (found.designs, found.failed) == (3, 1)
+    told = rows(tmp_path / "out")
+    assert [row["status"] for row in told] == ["done", "overtime", "done"]
+    assert "took longer than 0.1 s, and its worker had to be ended" in told[1]["reason"]
+    found = run_study(file, tmp_path / "out", work=quick)  # the next call tries again
+    assert (found.failed, found.found) == (0, 2)
+
+
+def test_a_design_that_takes_too_long_is_stopped_at_its_next_step(tmp_path):
+    case = load_case(study_file(tmp_path, "").with_name("dome.toml"))
+    told = work(Job("k", case, "net", str(tmp_path / "r"), longest=1e-9))
+    assert told.status is Status.OVERTIME
+    assert "took longer than 1e-09 s: was at surface, reading" in told.reason
+
+
 def study_process(file, folder, work):
     code = (
         "import sys\nfrom tests import stubs\nfrom shellform.study.studies import run_study\n"
@@ -253,6 +275,36 @@ def test_the_log_cuts_off_what_a_kill_left_and_refuses_damage_before_it(tmp_path
         Log(file)
 
 
+@pytest.mark.parametrize(
+    "line",
+    [
+        b'{"key":"a","status":"done","reason":"","values":[1],"seconds":{},"worker":""}',
+        b'{"key":"a","status":"done","reason":"","values":{"x":null},"seconds":{},"worker":""}',
+        b'{"key":"a","status":"well","reason":"","values":{},"seconds":{},"worker":""}',
+        b'{"key":7,"status":"done","reason":"","values":{},"seconds":{"net":"long"},"worker":""}',
+        b"[]",
+        b"7",
+        b"{",
+    ],
+)
+def test_a_whole_line_that_is_no_result_is_refused(tmp_path, line):
+    (tmp_path / "results.jsonl").write_bytes(b"%08x %s\n" % (zlib.crc32(line), line))
+    with pytest.raises(InputError, match=r"is no line of a study's results.*Choose another"):
+        Log(tmp_path / "results.jsonl")
+
+
+def test_no_cell_of_a_table_is_a_formula(tmp_path, on_two):
+    text = (
+        "[vary]\nnet.spacing = [0.1, 0.3]\n[column]\n"
+        '"=cmd|\' /c calc\'!A0" = "designs.best.cables"\n"@sum" = "net.spacing"\n'
+    )
+    run_study(study_file(tmp_path, text), tmp_path / "out", work=quick)
+    with open(tmp_path / "out/table.csv", newline="") as file:
+        cells = [cell for row in csv.reader(file) for cell in row]
+    assert "'=cmd|' /c calc'!A0" in cells
+    assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
+
+
 def test_a_full_disk_leaves_no_part_of_a_row(tmp_path, monkeypatch):
     row = Outcome("a", Status.DONE)
     with Log(tmp_path / "results.jsonl") as log:
@@ -288,15 +340,21 @@ def test_a_study_stops_where_the_disk_is_full_and_goes_on_once_there_is_room(tmp
 
 
 def test_two_studies_do_not_work_in_one_folder(tmp_path, on_two):
-    from shellform.study.jobs import locked
-
     file = study_file(tmp_path, GRID)
-    (tmp_path / "out").mkdir()
     with (
-        locked(tmp_path / "out/lock", wait=False),
-        pytest.raises(InputError, match="another study is at work here"),
+        alone(tmp_path / "out"),
+        pytest.raises(InputError, match="another shellform is at work in it"),
     ):
         run_study(file, tmp_path / "out", work=quick)
+
+
+def test_links_in_a_study_s_folder_are_not_followed(tmp_path, on_two):
+    (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/designs.jsonl").symlink_to(tmp_path / "mine.txt")
+    with pytest.raises(InputError, match=r"designs\.jsonl: is a symbolic link"):
+        run_study(study_file(tmp_path, GRID), tmp_path / "out", work=quick)
+    assert (tmp_path / "mine.txt").read_text() == "mine"
 
 
 def test_columns_that_no_summary_has_are_named(tmp_path, on_two):
@@ -361,8 +419,27 @@ def test_summaries_become_columns():
     assert flat(tree) == {"a.b": 1, "a.c.0": 1.0, "a.c.1": 2.0, "d": "x; y", "g": True}
 
 
-def test_dashboard_and_scheduler_listen_on_loopback_alone(two):
-    assert two.dashboard.startswith("http://127.0.0.1:")
+def test_the_dashboard_which_answers_everybody_on_the_machine_has_to_be_asked_for(two):
+    assert two.dashboard == ""
+    port = two.client.scheduler_info()["services"]["dashboard"]  # of the server that Dask always has
+    for page in ("", "/status", "/info/main/workers.html", "/health"):
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            urllib.request.urlopen(f"http://127.0.0.1:{port}{page}", timeout=30)
+    with engine(workers=1, processes=False, dashboard=True) as asked:
+        assert asked.dashboard.endswith("/status")
+
+
+def test_a_scheduler_that_does_not_answer_is_refused_at_once_and_asked_no_more():
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        for address in ("nonsense", "http://127.0.0.1:9", f"tcp://127.0.0.1:{silent.getsockname()[1]}"):
+            with (
+                pytest.raises(InputError, match=r"--scheduler: doesn't answer.*tcp://"),
+                engine(scheduler=address),
+            ):
+                pass
+
+
+def test_the_scheduler_and_its_workers_listen_on_loopback_alone(two):
     addresses = [two.client.scheduler.address, *two.client.scheduler_info()["workers"]]
     assert all(address.startswith("tls://127.0.0.1:") for address in addresses)
     plain = addresses[0].replace("tls", "tcp")

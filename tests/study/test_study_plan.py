@@ -44,6 +44,7 @@ def test_arithmetic_means_what_it_says(text, value):
         "(x := 1)",
         "1 if",
         "9 ** 9 ** 9 ** 9",
+        "(" + "+".join(["(1 < 2)"] * 9) + ") ** 9 ** 9 ** 9",  # comparisons, which Python takes for integers
         "1 / 0",
         "sqrt(-1)",
         "(-8) ** 0.5",
