@@ -45,6 +45,20 @@ def test_the_script_holds_the_network_the_start_and_the_load(shell):
     assert sum(row[3] for row in told["LOAD"]) == pytest.approx(load[:, 2].sum())
 
 
+def test_the_script_begins_without_load_and_compares_with_what_the_load_moves(built):
+    shell, design = built.shell, built.design
+    network = shell.network(design)
+    before, after = built.states["none"], built.states["additional"]
+    load = shell.point_load(6.9, every=2)
+    told = lists(opensees_script(network, [before, after], load, title="", name="", case="additional"))
+    np.testing.assert_allclose(np.array(told["START"])[:, :3], before.positions - network.nodes)
+    np.testing.assert_allclose(np.array(told["MOVED"]), after.positions - before.positions)
+    cable = network.cables.ends[-1].tolist()
+    assert list(told["CABLES"][-1][:3]) == [*cable, 187.0]
+    node = int(np.flatnonzero(load.any(axis=1))[0])
+    assert told["LOAD"][0] == (node, *load[node].tolist())
+
+
 def test_a_bow_bent_from_a_shorter_rod_is_refused(shell):
     network = shell.network(shell.design())
     beams = replace(network.beams, rest_length=0.9 * network.beams.rest_length)

@@ -1,6 +1,7 @@
 """Cut list, nesting, cable schedule and setting-out, read back from their files and compared with the net."""
 
 import csv
+import itertools
 from dataclasses import replace
 
 import binpacking
@@ -312,3 +313,48 @@ def test_tables_and_states_that_do_not_fit_are_refused(built):
         tables.Table("a", ("x",), ((1,),)).column("y")
     with pytest.raises(InputError, match="state without load"):
         replace(built, states={"design": built.hung})
+
+
+def test_each_support_s_bearing_and_rise_lead_along_its_rod_into_the_shell(built):
+    table, place = schedules.supports(built), built.shell.target.positions
+    bearing, rise = (
+        np.array(table.column(f"{name} of the rod [rad]"), dtype=float) for name in ("bearing", "rise")
+    )
+    feet = np.column_stack([table.column(f"{axis} [m]") for axis in "xyz"]).astype(float)
+    leads = np.column_stack([np.cos(rise) * np.cos(bearing), np.cos(rise) * np.sin(bearing), np.sin(rise)])
+    for name, foot, lead in zip(table.column("rod"), feet, leads, strict=True):
+        nodes = place[built.grid.rods[int(name[1:])].nodes]
+        away = nodes - foot
+        apart = np.linalg.norm(away, axis=1)
+        beside = np.argsort(apart)[1]  # the rod's node next to the foot
+        np.testing.assert_allclose(lead, away[beside] / apart[beside], atol=1e-9)
+    assert (rise > 0.0).all()
+
+
+def test_each_piece_begins_a_saw_cut_after_the_one_before_it(built):
+    cutting = nesting.cut(built.grid, stock=3.0, kerf=0.004)
+    table = schedules.bars(built, cutting)
+    rows = list(zip(*(table.column(head) for head in table.columns), strict=True))
+    beside = [(a, b) for a, b in itertools.pairwise(rows) if a[0] == b[0]]
+    assert len(beside) > 5
+    for (*_, length, at, _, _), following in beside:
+        assert following[5] == pytest.approx(at + length + 0.004, abs=1e-9)
+    assert all(row[5] == 0.0 for row in rows if row[1] == 1)
+    last = [row for row in rows if row[7] is not None]
+    assert len(last) == len(cutting.bars)
+    for *_, length, at, _, offcut in last:
+        assert offcut == pytest.approx(max(0.0, 3.0 - at - length - 0.004), abs=1e-9)
+
+
+def test_turnbuckles_reach_from_the_length_hung_in_to_the_rest_length_and_two_percent_beyond(built):
+    table, shell = schedules.cables(built), built.shell
+    ends = shell.cable_ends[built.design.present]
+    a, b = (built.hung.positions[ends[:, side]] for side in range(2))
+    hung = np.sqrt(((b - a) ** 2).sum(axis=1))
+    wanted = np.linalg.norm(shell.target.positions[ends[:, 0]] - shell.target.positions[ends[:, 1]], axis=1)
+    assert np.abs(hung - wanted).max() > 1e-4, "else either could stand in the table"
+    rest = built.design.rest_length[built.design.present]
+    told = {name: np.array(table.column(name), dtype=float) for name in table.columns if name.endswith("[m]")}
+    np.testing.assert_allclose(told["hung in at [m]"], hung)
+    np.testing.assert_allclose(told["turnbuckle shortest [m]"], 0.98 * np.minimum(rest, hung))
+    np.testing.assert_allclose(told["turnbuckle longest [m]"], 1.02 * np.maximum(rest, hung))

@@ -62,6 +62,24 @@ def test_each_check_fails_alone_where_its_number_is_past_the_limit(shell, design
     assert fails(shell, designs, load, **changes) == [name]
 
 
+@pytest.mark.parametrize(
+    ("load", "changes"),
+    [
+        ("none", {"cable_force_max": 30.0}),  # (5) speaks of the design load and those beyond it
+        ("none", {"deviation_rms": 0.05}),  # (6) of those beyond it
+        ("design", {"deviation_rms": 0.05}),
+        ("additional", {"deviation_rms": 0.005}),  # each limit itself is kept
+        ("none", {"rod_utilisation_max": 1.0}),
+        ("design", {"cable_force_max": 20.0}),
+        ("design", {"residual": 1e-6}),
+    ],
+)
+def test_nothing_fails_at_a_limit_or_where_a_constraint_does_not_speak_of_the_load(
+    shell, designs, load, changes
+):
+    assert fails(shell, designs, load, **changes) == []
+
+
 def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, designs):
     values = {
         "cable_force": -0.65,
