@@ -7,19 +7,19 @@ import shellform as sf
 
 
 @pytest.fixture(scope="module")
+def shell(dome):
+    """A small one."""
+    return dome
+
+
+@pytest.fixture(scope="module")
 def problem(shell):
-    openings = [
-        [[x + r * np.cos(k * np.pi / 6), y + r * np.sin(k * np.pi / 6)] for k in range(12)]
-        for x, y, r in [(0.47, 0.0, 0.132), (-0.47, -0.02, 0.132), (0.02, 0.29, 0.152), (-0.05, -0.29, 0.152)]
-    ]
-    wet = 1.1 * shell.point_load(
-        6.9, every=2, openings=openings
-    )  # whose 1.2 times the start doesn't bear: the search climbs first
+    wet = shell.point_load(5.4, every=2)  # whose 1.2 times the start doesn't bear: the search climbs first
     return sf.Problem(
         shell,
         sf.LoadCase("wet", wet),
         [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+        [sf.AtMost(9.0, sf.CableForces("wet")), sf.AtMost(0.0015, sf.RmsMisfit("wetter"))],
         [sf.LoadCase("wetter", 1.2 * wet)],
     )
 
@@ -43,15 +43,15 @@ def assert_resumed_alike(problem, start, kept, whole, **settings):
     )
 
 
-def test_a_search_resumed_climbing_or_descending_ends_with_the_same_design_and_history_to_the_bit(
+def test_a_search_broken_off_in_any_phase_or_at_its_last_evaluation_ends_with_the_same_design_to_the_bit(
     shell, problem
 ):
     kept = []
-    whole = sf.optimise(problem, shell.design(), evaluations=18, keep=kept.append)
+    whole = sf.optimise(problem, shell.design(), evaluations=16, keep=kept.append)
     phases = [each.numbers["phase"] for each in kept]
     wary = next(k for k, each in enumerate(kept) if phases[k] == "descend" and each.arrays["excess"].any())
-    for place in (phases.index("climb"), wary):
-        assert_resumed_alike(problem, shell.design(), kept[place], whole, evaluations=18)
+    for place in (phases.index("climb"), wary, len(kept) - 1):
+        assert_resumed_alike(problem, shell.design(), kept[place], whole, evaluations=16)
 
 
 def test_a_search_resumed_thinning_ends_with_the_same_design_and_history_to_the_bit(shell, problem):
