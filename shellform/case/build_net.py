@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.case.build_gridshell import RodLimits
-from shellform.case.case import Case, check_script
+from shellform.case.case import Case, check_script, shipped_surfaces
 from shellform.case.entries import NetEntry, SurfaceEntry
 from shellform.errors import InputError
 from shellform.net.edges import Edges, Place, stand
@@ -26,11 +26,7 @@ def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
     file = Path(entry.file)
     check_script(file, allow_scripts=allow_scripts)
     if file.suffix.lower() == ".py":
-        from shellform.surface import cad
-
-        return cad.build_surface(
-            file, size=_builder_size(file, entry.size, entry.dimensions), **entry.dimensions
-        )
+        return _built(file, entry)
     if entry.dimensions:
         raise InputError(
             "only builder scripts have dimensions", where="surface.dimensions", value=entry.dimensions
@@ -51,6 +47,18 @@ def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
     )
 
 
+def _built(file: Path, entry: SurfaceEntry) -> Surface:
+    """What a builder script makes; a stranger's, which may hang or crash, in a process of its own."""
+    from shellform.surface import cad, occ
+    from shellform.surface.readers.foreign import read_foreign
+
+    if shipped_surfaces() in file.resolve().parents:
+        draft = cad.read_script(file, size=entry.size, dimensions=entry.dimensions)
+    else:
+        draft = read_foreign(file, "script", {"size": entry.size, "dimensions": entry.dimensions})
+    return occ.made(draft.points, draft.triangles, draft.normals, str(file))
+
+
 def surface_record(surface: Surface, source: str) -> SurfaceRecord:
     """The `surface` part of summary.json."""
     x, y, z = surface.size.tolist()
@@ -68,14 +76,6 @@ def size_text(size: Sequence[float] | Reals) -> str:
     """The extents (3,), m, in words, so that a wrong unit is seen."""
     x, y, z = size
     return f"{x:.4g} × {y:.4g} × {z:.4g} m (is the unit right?)"
-
-
-def _builder_size(file: Path, size: float | None, dimensions: Mapping[str, float] | None) -> float:
-    if size is not None:
-        return size
-    from shellform.surface import cad
-
-    return max({**cad.dimensions_of(file), **(dimensions or {})}.values()) / 90.0
 
 
 def net_of(

@@ -147,7 +147,7 @@ def read_toml(file: Path) -> dict[str, Any]:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"can't be read: {error}", where=str(file)) from error
-    except tomllib.TOMLDecodeError as error:
+    except ValueError as error:  # TOMLDecodeError, and Python's for a number of thousands of digits
         raise InputError(f"isn't valid TOML: {error}", where=str(file)) from error
     except RecursionError as error:
         raise InputError("isn't valid TOML: it is nested too deeply", where=str(file)) from error
@@ -265,7 +265,7 @@ def _set(data: dict[str, Any], setting: str) -> None:
         )
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except ValueError:
         value = text  # a bare word stands for itself
     set_entry(data, key.strip(), value, where="--set")
 

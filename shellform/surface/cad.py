@@ -17,7 +17,7 @@ its bisector.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # target.py loads numba, which a reader's process does withou
 
 FORMATS = {".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep"}
 _DEFAULT_EDGES = 60.0  # along the longer plan extent
+_BUILT_EDGES = 90.0  # along the largest dimension of a builder script
 _SAMPLES = 33  # points on a curve that tell its extent
 # of the size: edges of neighbouring faces nearer than that are one, as CAD programs leave them apart
 _SEWN = 1e-6
@@ -51,17 +52,24 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
     Raises InputError for a script that can't be read or fails, and for dimensions it doesn't have.
     """
     path = Path(script)
+    draft = read_script(path, size=size, dimensions=dimensions)
+    return made(draft.points, draft.triangles, draft.normals, str(path))
+
+
+def read_script(path: Path, *, size: float | None, dimensions: Mapping[str, float]) -> Draft:
+    """What `build_surface` makes a surface of; `size` left out: a part of the largest dimension."""
     module = load_script(path)
     build = function_of(module, "build", path)
-    named = named_dimensions(build, dimensions, path)
+    named = named_dimensions(build, dict(dimensions), path)
+    mesh = max(named.values(), default=0.0) / _BUILT_EDGES if size is None else size
     form = getattr(module, "form", None)
     with session(), errors(path, "the script fails", "Check the script and its dimensions."):
         build(gmsh, **named)
         gmsh.model.occ.synchronize()
-        points, triangles, normals = mesh_faces(size, path)
+        points, triangles, normals = mesh_faces(mesh, path)
         if form is not None:
             points, normals = form(points, triangles, _on_edge(triangles, len(points)), **named), None
-    return made(points, triangles, normals, str(path))
+    return Draft(np.asarray(points, dtype=float), triangles, normals, 1.0)
 
 
 def dimensions_of(script: str | Path) -> dict[str, float]:

@@ -108,7 +108,7 @@ def read_sections(path: str | Path) -> dict[str, Section]:
     file = Path(path)
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, RecursionError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"can't be read: {error}", where=str(file)) from error
     return {kind: _section(table, f"{file}: [{kind}]") for kind, table in tables.items()}
 

@@ -1,25 +1,25 @@
-"""Readers of foreign libraries and of nested formats in a process of their own, so that a crash, a hang or a
-flood of memory in them becomes a message.
+"""Readers of foreign libraries and of nested formats, and builder scripts, in a process of their own, so that a
+crash, a hang or a flood of memory in them becomes a message.
 
-The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.7 s), reads, and leaves its
-arrays in a file.
+The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.7 s), reads, and hands its
+arrays back through a pipe: no file is needed for that.
 """
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from shellform.errors import InputError, ShellformError
+from shellform.errors import InputError, NotConverged, ShellformError
 from shellform.surface.readers.draft import Choice, Draft
 
 _LONGEST = 600.0  # seconds for one file
@@ -27,7 +27,7 @@ _MEMORY = 0.8  # of the machine's, for the reader
 _ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
 _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
-    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader",
+    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader", "script": "the script",
 }  # fmt: skip
 KINDS = tuple(_LIBRARIES)
 
@@ -36,55 +36,61 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
     """What the reader of `kind` makes of a file. Raises InputError for what it refuses, and where it crashes,
     hangs or fills the memory.
 
-    `settings` are `unit`, `size`, `up`, `layer`, `name` and `face`, as `read_surface` has them.
+    `settings` are `unit`, `size`, `up`, `layer`, `name` and `face`, as `read_surface` has them; of a builder
+    script `size` and `dimensions`. Raises NotConverged where a script finds no form.
     """
-    with tempfile.TemporaryDirectory(prefix="shellform-") as folder:
-        answer = Path(folder) / "answer.npz"
-        request = json.dumps(
-            {"file": str(file), "kind": kind, "answer": str(answer), "settings": dict(settings)}
+    request = json.dumps({"file": str(file), "kind": kind, "settings": dict(settings)})
+    package = str(Path(__file__).parents[3])
+    path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+    try:
+        child = subprocess.run(
+            [sys.executable, "-P", "-m", "shellform.surface.readers.foreign"],
+            input=request.encode(),
+            capture_output=True,
+            timeout=longest,
+            env={**os.environ, "PYTHONPATH": path},
+            check=False,
         )
-        package = str(Path(__file__).parents[3])
-        path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
-        try:
-            child = subprocess.run(
-                [sys.executable, "-P", "-m", "shellform.surface.readers.foreign"],
-                input=request,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                text=True,
-                errors="replace",
-                timeout=longest,
-                env={**os.environ, "PYTHONPATH": path},
-                check=False,
-            )
-        except subprocess.TimeoutExpired as error:
-            raise InputError(
-                f"{_LIBRARIES[kind]} hadn't read it after {longest:g} s", where=str(file), remedy=_ANEW
-            ) from error
-        if child.returncode < 0:
-            name = signal.Signals(-child.returncode).name
-            raise InputError(f"{_LIBRARIES[kind]} crashed on it ({name})", where=str(file), remedy=_ANEW)
-        if not answer.is_file():
-            said = (child.stderr.strip().splitlines() or ["without a word"])[-1]
-            raise InputError(f"{_LIBRARIES[kind]} failed on it: {said}", where=str(file), remedy=_ANEW)
-        with np.load(answer, allow_pickle=False) as data:
-            answer = json.loads(str(data["answer"]))
-            if "refused" in answer:
-                raise InputError(**answer["refused"])
-            normals = data.get("normals")
-            return Draft(
-                data["points"],
-                data["triangles"],
-                normals,
-                answer["metres"],
-                answer["up"],
-                tuple(answer["notes"]),
-            )
+    except subprocess.TimeoutExpired as error:
+        raise InputError(
+            f"{_LIBRARIES[kind]} hadn't read it after {longest:g} s", where=str(file), remedy=_ANEW
+        ) from error
+    if child.returncode < 0:
+        name = signal.Signals(-child.returncode).name
+        raise InputError(f"{_LIBRARIES[kind]} crashed on it ({name})", where=str(file), remedy=_remedy())
+    if child.returncode or not child.stdout:
+        said = (child.stderr.decode(errors="replace").strip().splitlines() or ["without a word"])[-1]
+        raise InputError(f"{_LIBRARIES[kind]} failed on it: {said}", where=str(file), remedy=_remedy())
+    with np.load(io.BytesIO(child.stdout), allow_pickle=False) as data:
+        answer = json.loads(str(data["answer"]))
+        if "refused" in answer:
+            raise InputError(**answer["refused"])
+        if "no result" in answer:
+            raise NotConverged(**answer["no result"])
+        normals = data.get("normals")
+        return Draft(
+            data["points"],
+            data["triangles"],
+            normals,
+            answer["metres"],
+            answer["up"],
+            tuple(answer["notes"]),
+        )
+
+
+def _remedy() -> str:
+    """What to do about a library that failed: where memory is limited, that may be why."""
+    if _allowed() is None:
+        return _ANEW
+    return f"Raise the limit on memory (ulimit -v): it may be too small for the library. Else: {_ANEW}"
 
 
 def _serve() -> None:
     """The child's whole life: one request from standard input, one answer."""
     request = json.loads(sys.stdin.read())
+    pipe = os.dup(1)
+    with open(os.devnull, "wb") as nowhere:  # libraries write to standard output past Python
+        os.dup2(nowhere.fileno(), 1)
     _limit_memory()
     arrays: dict[str, Any] = {}
     try:
@@ -104,13 +110,22 @@ def _serve() -> None:
         answer = {
             "refused": {"what": error.what, "where": error.where, "value": value, "remedy": error.remedy}
         }
+    except NotConverged as error:  # a script that looks for a form
+        answer = {"no result": {"what": error.what, "remedy": error.remedy}}
     except MemoryError:
-        what = "needs more memory to read than this machine has"
+        what = "needs more memory to read than this machine has, or than is allowed (ulimit -v)"
         answer = {"refused": {"what": what, "where": request["file"], "remedy": "Export a coarser mesh."}}
-    np.savez(request["answer"], answer=np.array(json.dumps(answer)), **arrays)
+    content = io.BytesIO()
+    np.savez(content, answer=np.array(json.dumps(answer)), **arrays)
+    with os.fdopen(pipe, "wb") as out:
+        out.write(content.getbuffer())
 
 
 def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
+    if kind == "script":
+        from shellform.surface import cad
+
+        return cad.read_script(file, size=settings["size"], dimensions=settings["dimensions"])
     choice = Choice(settings["layer"], settings["name"])
     if _LIBRARIES[kind] == "gmsh":
         from shellform.surface import cad
@@ -152,8 +167,19 @@ def _limit_memory() -> None:
     except ImportError:  # not on Windows, where the system's own limit has to do
         return
     most = int(_MEMORY * os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    most = min(most, _allowed() or most)
     resource.setrlimit(resource.RLIMIT_AS, (most, most))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _allowed() -> int | None:
+    """The bytes of memory that this process may have (ulimit -v); None where there is no limit."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    soft = resource.getrlimit(resource.RLIMIT_AS)[0]
+    return None if soft == resource.RLIM_INFINITY else soft
 
 
 if __name__ == "__main__":
