@@ -207,6 +207,19 @@ def test_what_is_shown_can_be_switched_turned_and_scaled(visit, file):
     assert changed(now, picture(page)) > 0.01, "a drag turns the shell"
 
 
+def test_the_colours_fit_the_design_and_its_cables_are_saved_as_shown(visit, file, tmp_path):
+    page = visit(file)
+    off = float(re.search(r"([\d.]+) mm off at most", page.locator(".told").text_content())[1])
+    end = float(page.locator(".rods-legend .ticks span").last.text_content().removeprefix("≥ "))
+    assert off <= 1.01 * end <= 2.6 * off
+    with page.expect_download() as begun:
+        page.locator("[data-save=cables]").click()
+    begun.value.save_as(tmp_path / "cables.csv")
+    head, *rows = (tmp_path / "cables.csv").read_text(encoding="utf-8").splitlines()
+    assert head.startswith("Cable,From crossing,To crossing,Rest length [mm]")
+    assert [row.split(",")[0] for row in rows] == cells(page, "cables", 1)
+
+
 def test_tables_are_sorted_and_searched(visit, file):
     page = visit(file)
     sort = page.get_by_role("button", name="Sort by Force [N]")

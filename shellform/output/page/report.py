@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import base64
 import json
+import math
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -40,8 +41,6 @@ from shellform.surface.shape.target import Surface
 GENERATOR = "shellform report"  # in the page's head, so that it is known again
 _SCRIPTS = ("solid.js", "view.js", "tables.js", "page.js")
 _MOST_TRIANGLES = 30_000  # of the surface in the view; more are merged
-# of the case's colour scale: where the deviation is larger than this, the view begins with a scale of its own
-_BEYOND = 2.0
 _MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 
 
@@ -105,7 +104,6 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
     summary = run.summary
     rows = [(name, words.design_title(name), summary.designs[name]) for name in run.designs]
     best = summary.designs[run.best]
-    main = best.loads.get("design")
     return {
         "id": f"run{number}",
         "title": run.title,
@@ -147,8 +145,19 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "rod": label(run.shell.rod.resized(run.designs[run.best].radius).section),
         "row": best,
         "limit": 1e3 * run.limit,
-        "beyond": main is not None and main.deviation_max > _BEYOND * run.limit,
+        "fitting": _fitting(run),
     }
+
+
+def _fitting(run: ShownRun) -> float:
+    """The end of a scale, mm, that the design to build fills under its design load: 1, 2 or 5 times a power of
+    ten."""
+    main = run.summary.designs[run.best].loads.get("design")
+    largest = 1e3 * (run.limit if main is None else main.deviation_max)
+    power = 10.0 ** math.floor(math.log10(max(largest, 1e-6)))
+    return float(
+        next(step * power for step in (1.0, 2.0, 5.0, 10.0) if largest <= step * power * (1.0 + 1e-9))
+    )
 
 
 def _as_built(run: ShownRun, load: str) -> Cell | None:
@@ -234,6 +243,7 @@ def _drawn(run: ShownRun) -> dict[str, Any]:
     return {
         "title": run.title,
         "limit": 1e3 * run.limit,
+        "fitting": _fitting(run),
         "radius": shell.rod.radius,
         "spacing": shell.net.spacing,
         "strength": bool(np.isfinite(shell.rod.strength)),

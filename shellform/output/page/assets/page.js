@@ -26,8 +26,12 @@ class Panel {
       { title: "Length [mm]", number: true, value: (row) => row.length, text: (row) => this.mm(row.length) },
       { title: "Crossings", number: true, value: (row) => row.crossings, text: (row) => String(row.crossings) },
       { title: "Off at most [mm]", number: true, value: (row) => row.off, text: (row) => row.off.toFixed(2) },
-      ...(this.run.strength ? [{ title: "Bending stress over strength [%]", number: true, value: (row) => row.used, text: (row) => (100 * row.used).toFixed(0) }] : []),
+      ...(this.run.strength ? [{ title: "Bending stress over strength [%]", number: true, value: (row) => 100 * row.used, text: (row) => (100 * row.used).toFixed(0) }] : []),
     ], (key) => this.pick({ kind: "rod", index: key }));
+    for (const button of this.article.querySelectorAll("[data-save]")) {
+      const table = button.dataset.save;
+      button.addEventListener("click", () => this[table].save(`${table} ${this.show.design} ${this.show.load}`));
+    }
     if (!this.run.strength) find("option[value=stress]").remove();
     find(".controls").addEventListener("change", (event) => { this.show[event.target.name] = event.target.value; this.update(); });
     find(".options").addEventListener("input", (event) => {
@@ -107,7 +111,7 @@ class Panel {
     };
     const digits = (end) => Math.max(0, 2 - Math.floor(Math.log10(end / 4 + 1e-12)) - 1), { scale, forceScale } = this.view, stress = this.show.colour === "stress";
     this.find(".rods-legend figcaption").textContent = stress ? "Rods: bending stress over strength [%]" : "Rods: deviation from the target [mm]";
-    ticks(".rods-legend", scale, digits(scale), stress || this.show.scale === "case");
+    ticks(".rods-legend", scale, digits(scale), stress || this.show.scale !== "state");
     this.find(".cables-legend").hidden = !this.design.cables.length;
     ticks(".cables-legend", forceScale, digits(forceScale), false);
   }

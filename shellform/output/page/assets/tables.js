@@ -76,6 +76,17 @@ class LiveTable {
     this.mark(this.picked);
   }
 
+  save(name) { // all rows as a CSV file
+    const quoted = (value) => (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value);
+    const line = (cells) => cells.map((cell) => quoted(String(cell ?? ""))).join(",");
+    const text = [line(this.columns.map((column) => column.title)), ...this.rows.map((row) => line(this.columns.map((column) => (column.number ? column.value(row) : column.text(row)))))];
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([`${text.join("\n")}\n`], { type: "text/csv" }));
+    link.download = `${name}.csv`;
+    link.click();
+    URL.revokeObjectURL(link.href);
+  }
+
   mark(key, show = false) { // which row is picked
     this.picked = key;
     const lines = [...this.body.rows], own = lines.find((line) => Number(line.dataset.key) === key);

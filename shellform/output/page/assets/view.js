@@ -51,11 +51,11 @@ class View {
 
   get scale() { // end of the colours: mm, or % of the strength
     if (this.show.colour === "stress") return 100;
-    return this.show.scale === "case" ? this.run.limit : Math.max(largest(this.deviation), 1e-6);
+    return { design: this.run.fitting, case: this.run.limit }[this.show.scale] || Math.max(largest(this.deviation), 1e-6);
   }
 
-  get forceScale() { // N: one for all loads of a design
-    return Math.max(...Object.values(this.design.states).map((state) => largest(state.force)), 1e-9);
+  get forceScale() { // N: one for all designs and loads, as in the pictures
+    return Math.max(...this.run.designs.flatMap((each) => Object.values(each.states).map((state) => largest(state.force))), 1e-9);
   }
 
   node(k) { // where a node is drawn
