@@ -32,8 +32,11 @@ GENERATED = {"reference/commands.md", "reference/case.md", "reference/python.md"
 # In place of the command: the package as it stands here, and small settings, which a case of any kind takes.
 SHIM = """#!/usr/bin/env bash
 small=()
-case "$1" in design) small=(--set net.elements=2 --set optimise.evaluations=3 --set optimise.polish=0 --set surface.size=0.02
-  --set optimise.unloaded=false --set cable.without=false --set safety.drawn=10 --set safety.compared=2) ;; esac
+case "$1 $2" in
+  design*) small=(--set net.elements=2 --set optimise.evaluations=2 --set optimise.polish=0 --set surface.size=0.03
+    --set optimise.unloaded=false --set cable.without=false --set safety.drawn=4 --set safety.compared=1) ;;&
+  "design scale_model"*) small+=(--set net.spacing=0.11 --set load.force=2.0) ;;
+esac
 PYTHONPATH="$ROOT" exec "$PYTHON" -m shellform "$@" "${small[@]}"
 """
 
