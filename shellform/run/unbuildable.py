@@ -152,7 +152,9 @@ def refused(
         f"where 1.5 is needed, its rods at {stress:.0%} of their strength, and gives way first{place}"
     )
     if bears is not None:
-        layer = "A single layer of rods bears" if layers_of(choice.section) == 1 else "Rods in two layers bear"
+        layer = (
+            "A single layer of rods bears" if layers_of(choice.section) == 1 else "Rods in two layers bear"
+        )
         remedy = f"{layer} --thickness {bears:g}: pour that first, and the rest when it has hardened."
     else:
         remedy = "Give the surface more rise: buckling grows with the square of its curvature."
