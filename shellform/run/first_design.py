@@ -58,7 +58,7 @@ from shellform.run.sizes import (
     rope_for,
     wished,
 )
-from shellform.run.unbuildable import Obstacle, Why, refuse_flat, refuse_size, refused
+from shellform.run.unbuildable import Obstacle, Why, refuse_flat, refuse_size, refuse_tipping, refused
 from shellform.surface.shape.target import Surface
 
 BUNDLES = (19, 37)  # rods of an edge beam
@@ -235,7 +235,9 @@ class _Search:
             f"net at {best.angle:g}° and {spacing:g} m: {len(best.net.grid.lattice)} crossings, "
             f"rods bend to a radius of {_radius(best.net):.3g} m"
         )
-        return replace(best, net=stand(best.net, self.surface))
+        placed = replace(best, net=stand(best.net, self.surface))
+        refuse_tipping(placed.net)
+        return placed
 
     def _pulled(self, settings: dict[str, Any], angle: float, offset: tuple[float, float]) -> Placed | None:
         """The net at that angle, degrees, and offset; None where there is none."""

@@ -16,6 +16,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.layers import layers_of
+from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.sizes import DesignWish, Placed, RodChoice, least_spacing
 from shellform.run.way_out import COVERED
@@ -25,6 +26,7 @@ SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _RATHER = 1.5  # times the least radius, where that alone isn't the reason
 _SPARE = 1.05  # times the radius that rods just bear
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
+_IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
 _UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 
 
@@ -104,6 +106,22 @@ def refuse_flat(surface: Surface) -> None:
             where="surface",
             remedy=f"Give it a rise: a tenth of its span, {0.1 * side:.3g} m, is usual for shells.",
         )
+
+
+def refuse_tipping(net: Net) -> None:
+    """Raises InputError for a net whose supports lie in a line in plan, about which it tips."""
+    feet = net.target.positions[net.supports][:, :2]
+    away = np.linalg.svd(feet - feet.mean(axis=0), full_matrices=False)[1]
+    apart = float(np.ptp(net.target.positions[:, :2], axis=0).max())
+    if len(feet) > 2 and away[1] > _IN_A_LINE * apart:
+        return
+    raise InputError(
+        f"reason: supports. Its edge comes to the ground at {_at(net.target.positions[net.supports[0]])} and "
+        f"{_at(net.target.positions[net.supports[-1]])} only, in one line, about which it tips",
+        where="edges",
+        remedy="Bring its edge down to the ground elsewhere too, or write a case that says in [[edges.stretch]] what else "
+        "holds it.",
+    )
 
 
 def refused(

@@ -1,6 +1,7 @@
 """`shellform new`: what it proposes stands, and what can't be built is said with a way out that works."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ from shellform.run.sizes import (
     rope_for,
     wished,
 )
-from shellform.run.unbuildable import refuse_flat, refuse_size
+from shellform.run.unbuildable import refuse_flat, refuse_size, refuse_tipping
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.target import make_surface
 from tests.net.edge_shells import barrel, sail
@@ -175,6 +176,13 @@ def test_sections_are_real_ones_that_the_net_and_the_spacing_allow(net):
         assert max(each.section.fibres) <= net.max_radius(
             young=each.section.material.young, strength=each.section.material.strength
         ) * (1 + 1e-9)
+
+
+def test_a_shell_whose_feet_lie_in_a_line_is_refused_since_it_tips_and_one_on_three_is_not(net):
+    feet = net.supports[np.argsort(net.target.positions[net.supports] @ [1.0, 1.0, 0.0])]
+    with pytest.raises(InputError, match="tips"):
+        refuse_tipping(replace(net, supports=feet[[0, -1]]))
+    refuse_tipping(net)
 
 
 def test_a_size_that_no_shell_has_is_refused_and_the_unit_named_makes_it_one(tmp_path):
