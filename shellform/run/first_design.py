@@ -67,6 +67,7 @@ _ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
 _STRESSED = 0.95  # of the strength, at the most, under the additional load
+_AIMED = 0.92  # of it, for which concrete is thinned
 _STEPS = 4  # sections tried on one net
 _THINNER = 8  # thicknesses tried
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
@@ -199,7 +200,7 @@ class _Search:
             if other is choice:  # else the load is kept, and rods that leave more of their strength are tried
                 share = min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
                 if failure.why is Why.STRENGTH:
-                    share = min(max(load_borne(placed.net, choice, failure.stress, _STRESSED), 0.5), 0.9)
+                    share = min(max(load_borne(placed.net, choice, failure.stress, _AIMED), 0.5), 0.9)
                 thinner = _whole_mm(share * thinner)
             choice = other
             if thinner < 0.002:
@@ -305,8 +306,8 @@ class _Search:
             parts = parts.eased(tried.pull)
             tried = followed(placed.net, self.surface, parts, thickness)
         why = None
-        if tried.factor < NEEDED:
-            why = Why.STABILITY
+        if tried.factor < NEEDED:  # what breaks before any load has no stability to speak of
+            why = Why.STRENGTH if tried.factor == 0.0 and tried.stress > 1.0 else Why.STABILITY
         elif max(tried.stress, tried.edge) > _STRESSED:
             why = Why.STRENGTH if tried.stress > _STRESSED else Why.EDGES
         if why is None:
