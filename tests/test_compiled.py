@@ -23,3 +23,21 @@ def test_compiling_is_announced_once_but_not_to_who_wants_quiet_and_what_the_cac
         )
     assert told[0].count("compiling its loops") == 1
     assert told[1:] == ["", ""]
+
+
+def test_where_no_place_for_a_cache_can_be_written_loops_are_compiled_all_the_same(tmp_path):
+    code = (
+        "import numba.core.caching as caching\n"
+        "caching.CacheImpl._locator_classes = [caching._UserProvidedCacheLocator]\n" + CODE + "import os\n"
+        "print(os.environ['NUMBA_CACHE_DIR'])\n"
+    )
+    variables = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**variables, "TMPDIR": str(tmp_path)},
+    )
+    assert done.stdout.startswith(str(tmp_path))
+    assert list(tmp_path.iterdir()) == [], "it goes with the process"

@@ -170,6 +170,40 @@ def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
     assert again.stderr.count("kept") == 2
 
 
+def test_ctrl_c_while_python_still_loads_the_program_ends_with_130(tmp_path):
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt", encoding="utf-8")
+    early = shellform_process("check", "surfaces/hypar.obj", env={"PYTHONPATH": f"{tmp_path}:{ROOT}"})
+    assert (early.returncode, early.stderr) == (130, "shellform: stopped\n")
+
+
+def test_letters_that_a_terminal_does_not_know_become_question_marks():
+    told = shellform_process("check", "surfaces/hypar.obj", env={"PYTHONIOENCODING": "ascii"})
+    assert told.returncode == 0, told.stderr
+    assert "5 ? 5 ? 3 m" in told.stdout
+
+
+def test_a_number_of_five_thousand_digits_is_refused(tmp_path):
+    (tmp_path / "case.toml").write_text(f"[net]\nspacing = {'9' * 5000}\n", encoding="utf-8")
+    refused(shellform("check", tmp_path / "case.toml"), "isn't valid TOML", "digits")
+    refused(
+        shellform(
+            "design",
+            "scripts/scale_model.toml",
+            "--output",
+            tmp_path / "run",
+            "--set",
+            f"net.spacing={'9' * 5000}",
+        ),
+        "net.spacing",
+    )
+
+
+def test_an_angle_that_is_no_number_is_refused(tmp_path):
+    arguments = ["net", "surfaces/hypar.obj", "--spacing", 0.5, "--output", tmp_path / "net", "--angle"]
+    for angle in ("nan", "inf", "steep"):
+        refused(shellform(*arguments, angle), "--angle: must be degrees or auto")
+
+
 def test_ctrl_c_within_compiled_code_stops_as_anywhere_else(monkeypatch, capsys):
     def interrupted(standalone_mode):
         with pytest.raises(KeyboardInterrupt):

@@ -29,3 +29,11 @@ def test_a_checkpoint_of_another_case_or_a_damaged_one_is_not_taken_up(tmp_path)
     for size in (0, 10, len(whole) // 2, len(whole) - 30):
         (tmp_path / FILE).write_bytes(whole[:size])
         assert load_checkpoint(tmp_path, "key") is None
+
+
+def test_a_checkpoint_whose_arrays_were_altered_is_not_taken_up(tmp_path):
+    save_checkpoint(tmp_path, "key", KEPT)
+    with np.load(tmp_path / FILE) as data:
+        altered = {**data, "braces": np.array([True])}
+    np.savez(tmp_path / FILE, **altered)
+    assert load_checkpoint(tmp_path, "key") is None

@@ -12,7 +12,9 @@ import pytest
 
 from shellform.case.case import load_case
 from shellform.errors import InputError
+from shellform.records.progress import Event, unheard
 from shellform.run.folder import alone, read_run, refuse_overwriting
+from shellform.run.log import logged
 from shellform.run.pages import write_report
 from shellform.run.run import run_case
 from tests.command import ROOT, shellform, shellform_process
@@ -158,14 +160,14 @@ def test_symbolic_links_in_a_run_folder_lead_nobody_elsewhere(copy, tmp_path, na
     assert [file.read_text(encoding="utf-8") for file in outside.iterdir()] == ["mine"]
 
 
-def test_a_run_folder_deleted_meanwhile_is_told(tmp_path):
-    def delete(event):
-        if event.stage == "net":
-            shutil.rmtree(tmp_path / "run")
-
-    case = load_case(CASE, ["net.spacing=0.11", "surface.size=0.03"])
-    with pytest.raises(InputError, match=r"can't be written: No such file.*deleted meanwhile"):
-        run_case(case, tmp_path / "run", until="net", report=delete)
+def test_a_run_folder_deleted_meanwhile_and_a_log_that_leads_elsewhere_are_told(tmp_path):
+    with pytest.raises(InputError, match=r"log\.txt: can't be written: No such file.*deleted meanwhile"):
+        logged(tmp_path / "gone", unheard)(Event("net", "begun"))
+    (tmp_path / "mine.txt").touch()
+    (tmp_path / "log.txt").symlink_to(tmp_path / "mine.txt")
+    with pytest.raises(InputError, match=r"log\.txt: can't be written.*Delete the symbolic link"):
+        logged(tmp_path, unheard)(Event("net", "begun"))
+    assert (tmp_path / "mine.txt").read_text(encoding="utf-8") == ""
 
 
 def test_a_folder_with_other_files_may_take_a_run_and_a_run_may_go_on(tmp_path, copy):

@@ -4,6 +4,10 @@ readers can't take us down.
 
 import json
 import os
+import re
+import resource
+import subprocess
+import sys
 from pathlib import Path
 
 import meshio
@@ -252,7 +256,7 @@ def test_files_beyond_the_stated_limits_are_refused_before_they_are_read(tmp_pat
             ["can't be read as MSH", "Unable to allocate"],
         ),
         ("raise MemoryError", ["needs more memory"]),
-        ("import time; time.sleep(60)", ["meshio hadn't read it after 2 s"]),
+        ("import time; time.sleep(60)", ["meshio hadn't come to an end after 2 s"]),
     ],
 )
 def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(
@@ -271,6 +275,38 @@ def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(
         or "Check that" in caught.value.remedy
         or "coarser" in caught.value.remedy
     )
+
+
+@pytest.mark.parametrize(
+    ("code", "longest", "words"),
+    [
+        ("while True: pass", 2.0, "the builder script hadn't come to an end after 2 s. Check the script."),
+        ("import os; os.abort()", 60.0, "the builder script crashed on it (SIGABRT). Check the script."),
+    ],
+)
+def test_a_stranger_s_builder_script_hangs_or_crashes_in_a_process_of_its_own(tmp_path, code, longest, words):
+    (tmp_path / "own.py").write_text(f"{code}\ndef build(gmsh, *, width=1.0): pass\n")
+    with pytest.raises(InputError, match=re.escape(words)):
+        foreign.read_foreign(
+            tmp_path / "own.py", "script", {"size": None, "dimensions": {"width": 1.0}}, longest=longest
+        )
+
+
+def test_a_file_is_read_without_room_for_temporary_ones_and_within_limits_of_memory_and_file_size():
+    def narrow():
+        for kind, most in ((resource.RLIMIT_FSIZE, 0), (resource.RLIMIT_AS, 4 * 1024**3)):
+            resource.setrlimit(kind, (most, most))
+
+    code = f"from shellform.surface.readers.reading import read_surface\nread_surface({str(DATA / 'dome_mm.step')!r})"
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "TMPDIR": "/proc", "PYTHONPATH": str(ROOT)},
+        preexec_fn=narrow,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
 
 
 def test_a_refusal_in_the_reader_s_process_comes_back_whole():

@@ -27,7 +27,7 @@ _MEMORY = 0.8  # of the machine's, for the reader
 _ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
 _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
-    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader", "script": "the script",
+    "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader", "script": "the builder script",
 }  # fmt: skip
 KINDS = tuple(_LIBRARIES)
 
@@ -53,14 +53,16 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
         )
     except subprocess.TimeoutExpired as error:
         raise InputError(
-            f"{_LIBRARIES[kind]} hadn't read it after {longest:g} s", where=str(file), remedy=_ANEW
+            f"{_LIBRARIES[kind]} hadn't come to an end after {longest:g} s",
+            where=str(file),
+            remedy=_remedy(kind),
         ) from error
     if child.returncode < 0:
         name = signal.Signals(-child.returncode).name
-        raise InputError(f"{_LIBRARIES[kind]} crashed on it ({name})", where=str(file), remedy=_remedy())
+        raise InputError(f"{_LIBRARIES[kind]} crashed on it ({name})", where=str(file), remedy=_remedy(kind))
     if child.returncode or not child.stdout:
         said = (child.stderr.decode(errors="replace").strip().splitlines() or ["without a word"])[-1]
-        raise InputError(f"{_LIBRARIES[kind]} failed on it: {said}", where=str(file), remedy=_remedy())
+        raise InputError(f"{_LIBRARIES[kind]} failed on it: {said}", where=str(file), remedy=_remedy(kind))
     with np.load(io.BytesIO(child.stdout), allow_pickle=False) as data:
         answer = json.loads(str(data["answer"]))
         if "refused" in answer:
@@ -78,11 +80,12 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
         )
 
 
-def _remedy() -> str:
-    """What to do about a library that failed: where memory is limited, that may be why."""
+def _remedy(kind: str) -> str:
+    """What to do about a reader that failed: where memory is limited, that may be why."""
+    usual = "Check the script." if kind == "script" else _ANEW
     if _allowed() is None:
-        return _ANEW
-    return f"Raise the limit on memory (ulimit -v): it may be too small for the library. Else: {_ANEW}"
+        return usual
+    return f"Raise the limit on memory (ulimit -v): it may be too small for the library. Else: {usual}"
 
 
 def _serve() -> None:
