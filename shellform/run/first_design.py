@@ -5,7 +5,7 @@ solved under its growing load, for the rods with which the estimate says to begi
 where it falls, two layers where the stiffest that equation (1) allows falls, finer spacings, and thinner
 concrete last.
 What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
-a dozen structures are drawn and loaded (first_trial.py). Edge beams are bundles, of more rods where few of
+sixteen structures are drawn and loaded (first_trial.py). Edge beams are bundles, of more rods where few of
 them are stressed too much or the shell nearly stands.
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
@@ -283,7 +283,7 @@ class _Search:
         if failure is not None:
             return self._keep(failure)
         standing = drawn_standing(placed.net, self.surface, parts, thickness)
-        self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the design load")
+        self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the additional load")
         if standing < DRAWN:
             return self._keep(
                 Obstacle(

@@ -35,7 +35,7 @@ from shellform.surface.shape.target import Surface
 ELEMENTS = 2
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
-DRAWN, SEED, ENLARGED = 12, 1, 1.25
+DRAWN, SEED, ENLARGED = 16, 1, 1.25
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
 COMPOSITE = 0.5  # how far the rods of an edge beam act together
 _SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
@@ -103,12 +103,12 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
 
 
 def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> int:
-    """How many of `DRAWN` structures stand under the design load."""
+    """How many of `DRAWN` structures stand under the additional load."""
     shell, load = _shell(net, surface, parts, thickness)
     drawn = sample(
         shell,
         shell.design(rest_ratio=parts.rest_ratio),
-        load,
+        ADDITIONAL * load,
         enlarged(default_tolerances(shell), ENLARGED),
         count=DRAWN,
         seed=SEED,

@@ -73,7 +73,7 @@ def propose_case(
         "rods": f"{design.choice.label} of {design.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",
         "cables": f"⌀ {1e3 * design.rope.diameter:g} mm",
         "concrete": f"{1e3 * design.thickness:g} mm",
-        "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures with {_BUILT}",
+        "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures under 1.2 × its load with {_BUILT}",
         "edges": edges,
         "case": str(output),
     }
@@ -153,8 +153,8 @@ thickness = {design.thickness!r}     # m: {_thickness_told(design, wish)}
 kind = "rods"
 
 [[load]]
-name = "design"      # the initial design stands up to {design.tried.factor:.2f} × this or more ({NEEDED:g} is asked), and {design.standing} of {design.drawn} structures \
-with {_BUILT} do
+name = "design"      # the initial design stands up to {design.tried.factor:.2f} × this or more ({NEEDED:g} is asked), and under 1.2 × it \
+{design.standing} of {design.drawn} structures with {_BUILT} do
 factors = {{ concrete = 1.0, rods = 1.0 }}
 
 [[load]]
