@@ -44,10 +44,7 @@ def standing_checks(
         return []
     found = []
     for load in loads:
-        share = safety.design
-        if load != "design":
-            share = _initial_share(rows, load, safety) if safety.other is None else safety.other
-        fallen = allowed(share, safety.drawn)
+        fallen = _most_fallen(rows, load, safety)
         cells = {
             name: _drawn(rows[name], load, rods[name], fallen, safety) if name in rows else UNASKED
             for name in rods
@@ -55,6 +52,21 @@ def standing_checks(
         limit = f"at least {safety.drawn - fallen} of {safety.drawn}" if safety.required else "told only"
         found.append(Check(f"As built under {load_title(load, factors[load])}", limit, cells))
     return found
+
+
+def falls(rows: Mapping[str, DesignRecord], name: str, safety: AsBuilt) -> bool:
+    """Whether more of a design's drawn structures have fallen under a load than may."""
+    return any(
+        row.stands is not None and row.stands.drawn - row.stands.standing > _most_fallen(rows, load, safety)
+        for load, row in rows[name].loads.items()
+    )
+
+
+def _most_fallen(rows: Mapping[str, DesignRecord], load: str, safety: AsBuilt) -> int:
+    share = safety.design
+    if load != "design":
+        share = _initial_share(rows, load, safety) if safety.other is None else safety.other
+    return allowed(share, safety.drawn)
 
 
 def _initial_share(rows: Mapping[str, DesignRecord], load: str, safety: AsBuilt) -> float:

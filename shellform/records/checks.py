@@ -54,7 +54,7 @@ def checks(
     factors = {load: row.loads[load].factor for row in rows.values() for load in row.loads}
     largest = {name: max_radius(shells[name].net, shells[name].rod) for name in designs}
     spacing = None if summary.net is None else summary.net.spacing
-    rods = {name: RodsOf(designs[name].radius, largest[name], spacing) for name in designs}
+    rods = {name: RodsOf(designs[name].radius, largest[name], spacing, summary.thicker) for name in designs}
 
     def under(
         title: str, limit: str, cell: Callable[[LoadRecord, RodsOf], Cell], chosen: Sequence[str]

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.words import number
 
 _CLOSER = 0.8  # of the spacing, where rods may not become thicker
@@ -19,14 +20,21 @@ _MOST = 100.0  # times the load: what lacks so much isn't mended by thicker rods
 @dataclass(frozen=True)
 class RodsOf:
     """The rods of a design: their `radius`, the `largest` that the net allows by equation (1), and its
-    `spacing`, m (None: not known)."""
+    `spacing`, m (None: not known); `thicker` ones with which the initial design was seen to stand."""
 
     radius: float
     largest: float
     spacing: float | None
+    thicker: ThickerRodsRecord | None = None
 
     def stronger(self, times: float) -> str:
-        """To bear so many times what they bear."""
+        """To bear so many times what they bear; rods that were drawn say more than any rule."""
+        if self.thicker is not None:
+            found = self.thicker
+            return (
+                f"Take rods of {_up(1e3 * found.radius)} mm radius (rod.radius = {_up(found.radius)}): with all "
+                f"cables {found.standing} of {found.drawn} drawn structures stand with them."
+            )
         if not 1.0 < times < _MOST:
             return self._closer()
         wanted = self.radius * math.sqrt(times)
@@ -57,6 +65,11 @@ def allow(entry: str, value: float, *, or_else: str = "") -> str:
 def allow_count(cables: int) -> str:
     """To let so many cables be."""
     return f"Allow optimise.cables_max = {cables}."
+
+
+def rounded_up(value: float) -> float:
+    """To two digits, up."""
+    return float(_up(value))
 
 
 def _up(value: float) -> str:

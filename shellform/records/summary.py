@@ -14,6 +14,7 @@ from typing import Any
 from shellform.errors import Damaged, InputError
 from shellform.records.files import ANEW, plain, read_record, text_of
 from shellform.records.scattering import RobustRecord
+from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.written import write_text
 
 FILE = "summary.json"
@@ -294,6 +295,7 @@ class Summary:
     sections: tuple[SectionRecord, ...] | None = None
     robust: RobustRecord | None = None
     failure: FailureRecord | None = None
+    thicker: ThickerRodsRecord | None = None
     documents: DocumentsRecord | None = None
     verdict: VerdictRecord | None = None
     failed: Mapping[str, str] = field(default_factory=dict, metadata={"if_any": True})
@@ -305,7 +307,9 @@ class Summary:
     def without_designs(self, names: Sequence[str]) -> Summary:
         """Without these designs, and without what is told of designs made from the optimised one."""
         kept = {name: design for name, design in self.designs.items() if name not in names}
-        return replace(self, designs=kept, sections=None, robust=None, failure=None, verdict=None)
+        return replace(
+            self, designs=kept, sections=None, robust=None, failure=None, thicker=None, verdict=None
+        )
 
     def unexamined(self) -> Summary:
         """Without what the stage "safety" finds."""
@@ -317,7 +321,7 @@ class Summary:
             )
             for name, design in self.designs.items()
         }
-        return replace(self, designs=designs, failure=None)
+        return replace(self, designs=designs, failure=None, thicker=None)
 
     def with_seconds(self, stage: str, spent: float) -> Summary:
         """With the time of a stage, s."""

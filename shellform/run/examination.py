@@ -4,7 +4,7 @@ For every load case the critical factor of the perfect structure, on the design'
 halved, and how many of its structures as built stand. Load cases that are shares of a larger one lie on its
 path, and are judged on it. Designs to compare with are drawn a few times (`safety.compared`); of those that
 may be built, from the last one on, each that isn't known to fail is drawn in full until one holds. Of the one
-to build the most likely failure is told.
+to build the most likely failure is told, and where it falls too often, which rods would stand (thicker.py).
 """
 
 from __future__ import annotations
@@ -21,11 +21,18 @@ from shellform.case.case import Case
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.records.as_built import EQUAL
+from shellform.records.as_built import EQUAL, falls
 from shellform.records.checks import BUILT
 from shellform.records.drawn import DrawnPath
 from shellform.records.progress import Event, Kind
-from shellform.records.summary import DesignRecord, FailureRecord, StandingRecord, Summary, write_summary
+from shellform.records.summary import (
+    DesignRecord,
+    FailureRecord,
+    StandingRecord,
+    Summary,
+    write_summary,
+)
+from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, open_checks, to_build
 from shellform.reliability.failure import explained
 from shellform.reliability.path_of_one import SOUGHT
@@ -36,8 +43,9 @@ from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
 from shellform.run.figures import FAILURE
 from shellform.run.folder import Run, read_run
-from shellform.run.judged import judged, run_checks
+from shellform.run.judged import asked_as_built, judged, run_checks
 from shellform.run.sampling import Clock, drawn_of
+from shellform.run.thicker import rods_that_stand
 from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import side_by_side
 from shellform.written import write_arrays
@@ -91,7 +99,17 @@ def examine(workspace: Workspace) -> Summary:
     if best != "unbraced":
         summary = _stand(workspace, chosen, entry.drawn, summary, clock)
         summary = replace(summary, failure=_failure(workspace, chosen, entry.drawn))
+        if falls(summary.designs, best, asked_as_built(workspace.case)):
+            summary = replace(summary, thicker=_thicker(workspace, run))
     return replace(summary, verdict=judged(replace(run, summary=summary)))
+
+
+def _thicker(workspace: Workspace, run: Run) -> ThickerRodsRecord | None:
+    """Rods with which the initial design stands as often as is asked."""
+    workspace.say("safety", "which rods stand", Kind.BEGAN)
+    initial, asked = _of_run(run, "initial"), asked_as_built(workspace.case)
+    seed = workspace.case.safety.seed
+    return rods_that_stand(initial.shell, initial.design, initial.loads, initial.tolerances, asked, seed=seed)
 
 
 def _of_run(run: Run, name: str) -> _Examined:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from shellform.case.build_safety import critical_factors_asked, is_required
+from shellform.case.case import Case
 from shellform.records.as_built import AsBuilt
 from shellform.records.check import Check
 from shellform.records.checks import Bounds, checks
@@ -17,7 +18,7 @@ from shellform.run.folder import Run
 
 def run_checks(run: Run) -> list[Check]:
     """Every check of the run's designs."""
-    limits, safety = run.case.limits, run.case.safety
+    limits = run.case.limits
     bounds = Bounds(
         force=run.case.cable.force_max,
         misfit=run.case.optimise.misfit_rms_additional,
@@ -27,11 +28,15 @@ def run_checks(run: Run) -> list[Check]:
         slack=limits.slack_min,
         slack_loads=tuple(limits.slack_loads),
         critical=critical_factors_asked(run.case),
-        safety=AsBuilt(
-            safety.probability_design, safety.probability_additional, safety.drawn, is_required(run.case)
-        ),
+        safety=asked_as_built(run.case),
     )
     return checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
+
+
+def asked_as_built(case: Case) -> AsBuilt:
+    """How many drawn structures the case asks to stand."""
+    safety = case.safety
+    return AsBuilt(safety.probability_design, safety.probability_additional, safety.drawn, is_required(case))
 
 
 def judged(run: Run) -> VerdictRecord:
