@@ -21,6 +21,7 @@ from shellform.written import whole, write_text
 
 Value = str | float | int | None
 _TIME, _EPOCH = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ"), b"1980-01-01T00:00:00Z"
+_NUMBER = re.compile(r"[+-]\d+(\.\d*)?")
 _FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
@@ -67,8 +68,10 @@ def table_text(table: Table, *, exact: bool = False, line_end: str = "\n") -> st
 
 
 def _harmless(value: Value) -> Value:
-    """A value that no spreadsheet takes for a formula."""
-    return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+    """A value that no spreadsheet takes for a formula; "-3" is a number."""
+    if not isinstance(value, str) or not value.startswith(_FORMULA) or _NUMBER.fullmatch(value):
+        return value
+    return f"'{value}"
 
 
 def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:

@@ -17,7 +17,7 @@ import math
 import os
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
@@ -116,6 +116,7 @@ def engine(
             finally:
                 _close(client)
             return
+        before = {name: os.environ.get(name) for name in _ONE_THREAD}
         cluster = LocalCluster(
             n_workers=workers or _cores(),
             threads_per_worker=1,
@@ -138,6 +139,15 @@ def engine(
                 _close(client)
         finally:
             _close(cluster)
+            _restore(before)  # Dask leaves its processes' environment in this one
+
+
+def _restore(variables: Mapping[str, str | None]) -> None:
+    for name, value in variables.items():
+        if value is None:
+            os.environ.pop(name, None)
+        else:
+            os.environ[name] = value
 
 
 def _reach(address: str) -> None:

@@ -20,7 +20,7 @@ from tests.surface.test_fairing import gable, sheet
 
 
 def pulled(surface):
-    return sf.pull_net(surface, spacing=1.0, gap=0.02, angle=np.pi / 4, elements=2)
+    return sf.pull_net(surface, spacing=0.8, gap=0.02, angle=np.pi / 4, elements=2)
 
 
 def named(refusal):
@@ -60,11 +60,11 @@ def test_a_refusal_stays_as_it_was_where_rounding_helps_nothing(tmp_path):
 @pytest.mark.slow
 def test_net_and_new_name_a_surface_with_which_they_go_on(tmp_path):
     file = as_obj(tmp_path / "gable.obj", sheet(gable))
-    settings = {"spacing": 1.0, "angle": "45", "gap": None, "allow_scripts": False, "report": unheard}
+    settings = {"spacing": 0.8, "angle": "45", "gap": None, "allow_scripts": False, "report": unheard}
     with pytest.raises((NoNet, Stalled)) as refused:
         net_alone(file, tmp_path / "net", {}, **settings)
     net_alone(named(refused.value), tmp_path / "again", {}, **settings)
-    wish = DesignWish(spacing=1.0, angle=45.0)
+    wish = DesignWish(spacing=0.8, angle=45.0)
     with pytest.raises(InputError, match="reason: spacing and curvature") as refused:
         propose_case(file, tmp_path / "case.toml", {}, allow_scripts=False, wish=wish)
     propose_case(named(refused.value), tmp_path / "case.toml", {}, allow_scripts=False, wish=wish)
