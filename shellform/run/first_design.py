@@ -194,6 +194,8 @@ class _Search:
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
         for _ in range(_THINNER):
+            if failure.factor == 0.0:  # it doesn't stand without any concrete
+                break
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
                 other = possible[_next(placed.net, possible, possible.index(choice), failure)]

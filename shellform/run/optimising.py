@@ -160,6 +160,8 @@ def _polished(
     """The last design polished, followed under the loads; or None, and why."""
     from shellform.optimiser import optimise as optimiser
 
+    if not last.design.present.any():
+        return None, "no cable is left"
     workspace.say("optimise", "polishing the cables that are left")
     try:
         polished = optimiser.polish(last, evaluations=workspace.case.optimise.polish, groups=groups)
