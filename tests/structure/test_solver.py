@@ -1,6 +1,7 @@
 """Rotations, factorisation, equilibrium and loading."""
 
 import threading
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -16,9 +17,9 @@ from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve import factorisation
-from shellform.structure.solve.equilibrium import LostBranch, find_equilibrium
+from shellform.structure.solve.equilibrium import LostBranch, find_equilibrium, newton
 from shellform.structure.solve.loading import apply_load, limit_factor
-from shellform.verification import chain
+from shellform.verification.models import CLAMP, chain, line, load_at, no_cables
 
 small = st.floats(-3.0, 3.0)
 
@@ -240,3 +241,53 @@ def test_what_is_solved_on_kept_freedoms_is_the_whole_solution_there_and_needs_a
     ):  # among the others, and on the kept
         with pytest.raises(factorisation.NotPositiveDefinite):
             symmetric.solve_kept(broken, kept, right[kept])
+
+
+def half_stiff(ratio, elements=20):
+    """A cantilever whose outer half is stiffer by a ratio, and a load of 2 across its tip."""
+    points = line(elements)
+    stiffness = np.where(np.arange(elements) < elements // 2, 1.0, ratio)
+    ends = np.column_stack([np.arange(elements), np.arange(1, elements + 1)])
+    beams = make_beams(
+        points, ends, axial=1e6 * stiffness, torsion=stiffness, bending_y=stiffness, bending_z=stiffness
+    )
+    fixed = np.zeros((elements + 1, 6), dtype=bool)
+    fixed[0] = CLAMP
+    network = Network(points, beams, no_cables(), fixed, np.zeros((elements + 1, 6)))
+    return network, load_at(network, elements, [0.0, 0.0, -2.0])
+
+
+@pytest.mark.parametrize("find", [find_equilibrium, newton])
+@pytest.mark.parametrize("ratio", [1e8, 1e12])
+def test_a_part_far_stiffer_than_the_rest_moves_as_a_rigid_body(ratio, find):
+    network, load = half_stiff(ratio)
+    found = find(assemble(network), at_rest(network.nodes), load)
+    # Between 1e6 and 1e8 it moves by 2e-7 only.
+    assert found.state.positions[-1, 2] == pytest.approx(-0.46325, abs=1e-5)
+    assert found.stable
+    assert found.residual < 1e-8
+    assert np.abs(network.beams.local_forces(found.state)[:, 0]).max() < 2.0
+
+
+def test_a_rod_of_a_micrometre_between_two_of_a_metre_is_a_rigid_corner():
+    def tip(short):
+        corner = np.array([1.0, 0.0, 0.0])
+        begin = corner + np.array([1.0, 0.0, -1.0]) * short * np.sqrt(0.5)
+        points = np.vstack([np.linspace(0.0 * corner, corner, 5), np.linspace(begin, begin - [0, 0, 1.0], 5)])
+        network = chain(points, (1e6, 1.0, 1.0, 1.0), {0: CLAMP})
+        found = find_equilibrium(assemble(network), at_rest(points), load_at(network, 9, [1.0, 0.0, 0.0]))
+        assert found.residual < 1e-8
+        return found.state.positions[-1] - points[-1]
+
+    np.testing.assert_allclose(tip(1e-6), tip(1e-3), atol=1e-3)
+    assert tip(1e-6)[0] > 0.6
+
+
+def test_what_rounding_hides_is_refused_and_the_elements_are_named():
+    network, load = half_stiff(1.0)
+    beams = replace(network.beams, axial=np.where(np.arange(20) == 7, 1e30, network.beams.axial))
+    stiff = replace(network, beams=beams)
+    turned = at_rest(network.nodes @ rotation.matrices(rotation.from_vectors(np.array([[0.1, 0.2, 0.3]])))[0])
+    with pytest.raises(NotConverged, match=r"Rounding hides the load.*beams\[7\].*softer") as caught:
+        find_equilibrium(assemble(stiff), turned, 1e-6 * load)
+    assert caught.value.state is not None

@@ -25,6 +25,7 @@ from shellform.structure.model import Model
 from shellform.structure.network import Network, assemble, doubts
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
+from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.loading import Drive, advance
 from shellform.structure.solve.path import follow
 
@@ -98,7 +99,7 @@ def analyse(
         if critical_to is not None:
             critical = critical_load(assembly, origin, walk.drive, goal=critical_to, tolerance=tolerance)
         if mode_count:
-            softest = modes(assembly, walk.state, mode_count)
+            softest = modes(fit_for(assembly, walk.state), walk.state, mode_count)
     except NotConverged as error:
         converged, message = False, str(error)
         walk.keep(error)
@@ -235,8 +236,9 @@ class _Analysis:
 
     def measured(self, state: State, residual: float) -> Equilibrium:
         """A state that isn't an equilibrium, with its energy and stability."""
-        balance = self.assembly.evaluate(state)
-        stable, negative = stability(self.assembly, balance)
+        assembly = fit_for(self.assembly, state)
+        balance = assembly.evaluate(state)
+        stable, negative = stability(assembly, balance)
         return Equilibrium(state, balance.energy, residual, self.spent, stable, negative)
 
     def _increment(self, factor: float, spent: int) -> dict[str, Any]:

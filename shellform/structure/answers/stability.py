@@ -31,6 +31,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium
+from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.loading import Drive
 from shellform.structure.solve.path import follow
@@ -146,10 +147,12 @@ def critical_load(
                 "the start isn't stable", where="critical_load", remedy="Start from a stable equilibrium."
             )
         if point.event or not found.stable:
-            shape = modes(assembly, found.state, 1).shapes[0]
+            shape = modes(fit_for(assembly, found.state), found.state, 1).shapes[0]
             return Critical(point.factor, point.event or "bifurcation", found, shape, linearised)
         if before is not None and not np.isfinite(linearised):
-            linearised = linearised_factor(assembly, before[1], found.state, (before[0], point.factor))
+            linearised = linearised_factor(
+                fit_for(assembly, found.state), before[1], found.state, (before[0], point.factor)
+            )
         before = (point.factor, found.state)
     return None
 

@@ -44,12 +44,14 @@ from shellform.arrays import Flags, Indices, Reals, indices, reals
 from shellform.errors import InputError
 from shellform.structure.elements.beam_kernels import evaluate, local_by_dof
 from shellform.structure.elements.beam_thirds import contracted
+from shellform.structure.elements.double_double import beam_deformations, beam_tangents
 from shellform.structure.elements.parts import Evaluation
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
 
 _NOTHING = np.empty((0, 78))
+_NO_MODES = np.empty((0, 6, 9, 2))
 _PARALLEL_TO_Z = 1e-6  # rad; nearer to global z than this, the default z axis is global x (model-file.md)
 
 
@@ -91,6 +93,12 @@ class Beams:
         """Degrees of freedom (m, 12) of each element in the order of x^e below equation (20)."""
         return (6 * self.ends[:, :, None] + np.arange(6)).reshape(-1, 12)
 
+    def stiffest(self) -> Reals:
+        """The largest stiffness (m,), N/m, of each beam against a displacement of one end."""
+        length = self.rest_length
+        bending = 12.0 * np.maximum(self.bending_y, self.bending_z) / length**3
+        return np.maximum(self.axial / length, bending)
+
     def of_kind(self, kind: str) -> Flags:
         """Which beams (m,) are of a kind; none where there is no such kind."""
         if kind not in self.kinds:
@@ -104,9 +112,25 @@ class Beams:
         count = len(self.ends)
         energy, force = np.empty(count), np.empty((count, 12))
         blocks = _NOTHING if not tangent else np.empty((count, 78)) if into is None else into
-        turn = np.empty(count)
-        share(evaluate, count, *self._kernel_input(state), energy, force, blocks, _NOTHING, _NOTHING, turn)
+        turn, given = np.empty(count), self._given(state)
+        inputs = self._kernel_input(state)
+        share(evaluate, count, *inputs, given, 1.0, energy, force, blocks, _NOTHING, _NOTHING, turn)
         return Evaluation(energy, force, blocks if tangent else None, float(turn.max(initial=0.0)))
+
+    def evaluate_extended(self, state: State, *, tangent: bool) -> Evaluation:
+        """As `evaluate` at a state with a tail, tangents (m, 78, 2) with all their digits."""
+        assert state.tail is not None
+        count = len(self.ends)
+        energy, force, turn = np.empty(count), np.empty((count, 12)), np.empty(count)
+        given, modes = np.empty((count, 7)), np.empty((count if tangent else 0, 6, 9, 2))
+        blocks = np.empty((count, 78)) if tangent else _NOTHING
+        inputs = self._kernel_input(state)
+        share(beam_deformations, count, *inputs[:2], state.tail, *inputs[2:5], given, modes)
+        share(evaluate, count, *inputs, given, 0.0, energy, force, blocks, _NOTHING, _NOTHING, turn)
+        result = np.empty((len(blocks), 78, 2))
+        if tangent:
+            share(beam_tangents, count, modes, *inputs[4:], turn, blocks, result)
+        return Evaluation(energy, force, result if tangent else None, float(turn.max(initial=0.0)))
 
     def local_forces(self, state: State) -> Reals:
         """Equation (16): N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam, (m, 7), N and N·m."""
@@ -138,8 +162,18 @@ class Beams:
         forces, deformations = np.empty((count, 7)), np.empty((count, 7))
         inputs = self._kernel_input(state)
         energy, force, turn = np.empty(count), np.empty((count, 12)), np.empty(count)
-        share(evaluate, count, *inputs, energy, force, _NOTHING, forces, deformations, turn)
+        given = self._given(state)
+        share(evaluate, count, *inputs, given, 1.0, energy, force, _NOTHING, forces, deformations, turn)
         return forces, deformations
+
+    def _given(self, state: State) -> Reals:
+        """Deformations for the kernel where they are known better than double coordinates tell them."""
+        if state.tail is None:
+            return _NOTHING
+        given = np.empty((len(self.ends), 7))
+        inputs = self._kernel_input(state)
+        share(beam_deformations, len(given), *inputs[:2], state.tail, *inputs[2:5], given, _NO_MODES)
+        return given
 
     def _kernel_input(self, state: State) -> tuple[Reals | Indices, ...]:
         stiffness = np.column_stack([self.axial, self.torsion, self.bending_y, self.bending_z])

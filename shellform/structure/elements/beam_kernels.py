@@ -36,6 +36,8 @@ def evaluate(  # type: ignore[no-untyped-def]
     frames,
     rest_length,
     stiffness,
+    given,
+    material,
     energy,
     force,
     blocks,
@@ -47,6 +49,8 @@ def evaluate(  # type: ignore[no-untyped-def]
     where they have rows, `turn` (m,) with the largest of the ends' local rotations and the twist from one to the
     other, rad, where an end is turned farther than equation (12) measures (local_rotation.py), else 0.
 
+    `given` (m, 7): stretch and sines of the local rotations where they are known better than from double
+    precision, else no rows (double_double.py); `material`: 1, or 0 to leave the material part out of the tangent.
     Positions and quaternions may be complex, for derivatives by complex steps (third_derivatives.py).
     """
     dtype = positions.dtype
@@ -91,6 +95,11 @@ def evaluate(  # type: ignore[no-untyped-def]
             0.5 * (B[2, 0] - B[0, 2]),
             0.5 * (B[1, 0] - B[0, 1]),
         )
+        stretch = l - l0
+        if given.shape[0] > 0:
+            stretch = given[e, 0] + 0.0 * stretch
+            for k in range(6):
+                theta[k] = given[e, 1 + k]
         for k in range(6):
             sine[k] = theta[k]
             cosine[k] = np.sqrt(1.0 - sine[k] * sine[k])
@@ -106,20 +115,20 @@ def evaluate(  # type: ignore[no-untyped-def]
             turn[e] = max(turn[e], abs((theta[0] - theta[3]).real))
         if by_z and (A[1, 1] + B[1, 1]).real < _UPRIGHT:
             turn[e] = np.pi  # neither pair of axes tells how the element is rolled
-        N = EA * (l - l0) / l0
+        N = EA * stretch / l0
         moment[0] = GJ * (theta[0] - theta[3]) / l0
         moment[1] = EIy * (4.0 * theta[1] + 2.0 * theta[4]) / l0
         moment[2] = EIz * (4.0 * theta[2] + 2.0 * theta[5]) / l0
         moment[3] = -moment[0]
         moment[4] = EIy * (2.0 * theta[1] + 4.0 * theta[4]) / l0
         moment[5] = EIz * (2.0 * theta[2] + 4.0 * theta[5]) / l0
-        U = N * (l - l0)
+        U = N * stretch
         for k in range(6):
             U += moment[k] * theta[k]
             c[k] = 0.5 * moment[k] / cosine[k]
         energy[e] = 0.5 * U
         if local_force.shape[0] > 0:
-            local_force[e, 0], local_deformation[e, 0] = N, l - l0
+            local_force[e, 0], local_deformation[e, 0] = N, stretch
             for k in range(6):
                 local_force[e, 1 + k], local_deformation[e, 1 + k] = moment[k], theta[k]
             if by_z:
@@ -196,6 +205,8 @@ def evaluate(  # type: ignore[no-untyped-def]
             s = 0.5 / cosine[k + 2]
             h[k + 2, 0], h[k + 2, 1], h[k + 2, 2] = -s * T[2, 0], -s * T[2, 1], s * (T[0, 0] + T[1, 1])
 
+        if material == 0.0 and turn[e] == 0.0:
+            EA, GJ, EIy, EIz = 0.0, 0.0, 0.0, 0.0
         near_a[0], near_a[1], near_a[2] = GJ / l0, 4.0 * EIy / l0, 4.0 * EIz / l0
         far[0], far[1], far[2] = -GJ / l0, 2.0 * EIy / l0, 2.0 * EIz / l0
         for k in range(3):

@@ -28,6 +28,7 @@ def contracted(start, stop, positions, quaternions, ends, frames, rest_length, s
     energy, force = np.empty(_AT_ONCE, np.complex128), np.empty((_AT_ONCE, 12), np.complex128)
     blocks, none = np.empty((_AT_ONCE, 78), np.complex128), np.empty((0, 7), np.complex128)
     angle = np.empty(_AT_ONCE)
+    given = np.empty((0, 7))  # deformations are those of the places and turns
     for first in range(start, stop, _AT_ONCE):
         last = min(first + _AT_ONCE, stop)
         count = last - first
@@ -42,7 +43,7 @@ def contracted(start, stop, positions, quaternions, ends, frames, rest_length, s
                 _shift(place[2 * e + end], turn[2 * e + end], axis, 1j * _STEP)
             evaluate(
                 0, count, place, turn, pairs, frames[first:last], rest_length[first:last],
-                stiffness[first:last], energy, force, blocks, none, none, angle,
+                stiffness[first:last], given, 1.0, energy, force, blocks, none, none, angle,
             )  # fmt: skip
             for e in range(count):
                 total = 0.0

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.compiled import njit
 from shellform.errors import InputError
+from shellform.structure.elements.double_double import cable_evaluation
 from shellform.structure.elements.parts import Evaluation
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
@@ -52,12 +53,29 @@ class Cables:
         """Translations (c, 6) of the two ends."""
         return (6 * self.ends[:, :, None] + np.arange(3)).reshape(-1, 6)
 
+    def stiffest(self) -> Reals:
+        """The stiffness (c,), N/m, of each cable where it is taut."""
+        return self.stiffness / self.rest_length
+
     def lengths(self, state: State) -> Reals:
         """Lengths (c,), m, at the state (14)."""
         return np.linalg.norm(self._chord(state), axis=1)
 
+    def evaluate_extended(self, state: State, *, tangent: bool) -> Evaluation:
+        """As `evaluate` at a state with a tail, tangents (c, 21, 2) with all their digits."""
+        assert state.tail is not None
+        count = len(self.ends)
+        energy, force = np.empty(count), np.empty((count, 6))
+        blocks = np.empty((count if tangent else 0, 21, 2))
+        elastic = self.ends, self.rest_length, self.stiffness
+        share(cable_evaluation, count, state.positions, state.tail, *elastic, energy, force, blocks)
+        return Evaluation(energy, force, blocks if tangent else None)
+
     def tension(self, state: State) -> Reals:
         """Tension (c,), N; exactly zero in slack cables."""
+        if state.tail is not None:
+            force = self.evaluate_extended(state, tangent=False).force
+            return np.linalg.norm(force[:, :3], axis=1)
         return self.stiffness * np.maximum(self.lengths(state) - self.rest_length, 0.0) / self.rest_length
 
     def tension_by_rest_length(self, state: State) -> Reals:
@@ -86,6 +104,8 @@ class Cables:
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy (c,) J, forces (c, 6) N on the ends, packed lower tangents (c, 21) N/m, filled `into`."""
         count = len(self.ends)
+        if state.tail is not None and not tangent:
+            return self.evaluate_extended(state, tangent=False)
         energy, force = np.empty(count), np.empty((count, 6))
         blocks = _NOTHING if not tangent else np.empty((count, 21)) if into is None else into
         share(

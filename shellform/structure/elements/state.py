@@ -9,19 +9,27 @@ from numpy.typing import ArrayLike
 
 from shellform.arrays import Reals, reals
 from shellform.structure.elements import rotation
+from shellform.structure.elements.double_double import moved_on, quaternions_of
 
 
 @dataclass(frozen=True)
 class State:
-    """Positions (n, 3), m, and total rotations from the stress-free state, unit quaternions (n, 4)."""
+    """Positions (n, 3), m, and total rotations from the stress-free state, unit quaternions (n, 4).
+
+    `tail` (n, 7): what positions and quaternions have beyond double precision where stiffnesses lie so far apart
+    that it takes part (double_double.py), else None.
+    """
 
     positions: Reals
     quaternions: Reals
+    tail: Reals | None = None
 
     def __post_init__(self) -> None:
         positions = reals("positions", self.positions, (None, 3))
         object.__setattr__(self, "positions", positions)
         object.__setattr__(self, "quaternions", reals("quaternions", self.quaternions, (len(positions), 4)))
+        if self.tail is not None:
+            object.__setattr__(self, "tail", reals("tail", self.tail, (len(positions), 7)))
 
     @property
     def rotations(self) -> Reals:
@@ -47,4 +55,17 @@ def moved(state: State, step: Reals) -> State:
     """The state after `step` (n, 6): translations, m, and rotation increments about global axes, rad
     (equation 9).
     """
+    if state.tail is not None:
+        turns = quaternions_of(np.ascontiguousarray(step[:, 3:]))
+        place, tail = moved_on(state.positions, state.quaternions, state.tail, step, turns)
+        return State(place[:, :3], place[:, 3:], tail)
     return State(state.positions + step[:, :3], rotation.turned(step[:, 3:], state.quaternions))
+
+
+def extended(state: State) -> State:
+    """The same state, its digits beyond double precision carried on from here."""
+    return (
+        state
+        if state.tail is not None
+        else State(state.positions, state.quaternions, np.zeros((len(state.positions), 7)))
+    )

@@ -18,6 +18,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals
 from shellform.compiled import njit
 from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
@@ -45,7 +46,10 @@ class Assembly:
     """Parts on `count` nodes with held degrees of freedom `fixed` (count, 6). `free` (f,) lists the free
     degrees of freedom in order, `number` (6 count,) the place of each degree of freedom among them, -1 where
     it is held or has no stiffness; `arms` (count,), m: the mean rest length of each node's beams; `clock`
-    adds up the seconds spent on assembly, factorisation and solve."""
+    adds up the seconds spent on assembly, factorisation and solve; `last_digit`: how exactly, relative to 1,
+    coordinates are told."""
+
+    last_digit: float = float(np.finfo(float).eps)
 
     def __init__(self, count: int, parts: Sequence[Part], fixed: Flags) -> None:
         self.count = count
@@ -83,6 +87,11 @@ class Assembly:
         """The parts that are beams."""
         return [part for part in self.parts if isinstance(part, Beams)]
 
+    @property
+    def cables(self) -> list[Cables]:
+        """The parts that are cables."""
+        return [part for part in self.parts if isinstance(part, Cables)]
+
     @cached_property
     def turns(self) -> Indices:
         """Places of the free rotations' diagonal entries among the tangent's values."""
@@ -105,7 +114,7 @@ class Assembly:
             result = part.evaluate(state, tangent=tangent, into=block)
             energy += float(result.energy.sum())
             turned = max(turned, result.turned)
-            largest = max(largest, _add_forces(dofs, self.reach, result.force, force))
+            largest = max(largest, add_forces(dofs, self.reach, result.force, force))
         values = None
         if tangent:
             values = np.empty(len(self.matrix.indices))
@@ -244,7 +253,7 @@ def _gather(start, stop, first, places, sources, entries, values):  # type: igno
 
 
 @njit(cache=True)
-def _add_forces(dofs, reach, element, total):  # type: ignore[no-untyped-def]
+def add_forces(dofs, reach, element, total):  # type: ignore[no-untyped-def]
     """Adds the elements' end forces to the nodes' and returns the largest component, moments over the node's
     arm.
     """

@@ -29,10 +29,19 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
-from shellform.structure.elements.state import State, moved
+from shellform.structure.elements.state import State, extended, moved
 from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
-from shellform.structure.solve.residual import ResidualNorm, Turning, check_turned, held, overturned
+from shellform.structure.solve.residual import (
+    Drowned,
+    ResidualNorm,
+    Turning,
+    check_turned,
+    drowned,
+    held,
+    overturned,
+)
 
 # unbalanced over largest force; rounding leaves about 1e-10 for rods of EA/l = 1e7 N/m and 10 N loads
 TOLERANCE = 1e-8
@@ -97,8 +106,30 @@ def find_equilibrium(
     `progress(factorisations, residual)` is called at every step. Raises NotConverged with the last state,
     LostBranch where `on_branch` is set and definiteness is lost.
     """
-    walk = _Relaxation(assembly, start, load, reach)
-    while walk.residual > tolerance and walk.residual > walk.rounding():
+    try:
+        return _relaxed(assembly, start, load, tolerance, limit, reach, on_branch, progress)
+    except Drowned as error:
+        precise = with_twice_the_digits(assembly)
+        if precise is None or not isinstance(error.state, State):
+            raise
+        return _relaxed(precise, extended(error.state), load, tolerance, limit, reach, on_branch, progress)
+
+
+def _relaxed(
+    assembly: Assembly,
+    start: State,
+    load: Reals,
+    tolerance: float,
+    limit: int,
+    reach: float,
+    on_branch: bool,
+    progress: Progress | None,
+) -> Equilibrium:
+    """The relaxation with the digits that the assembly has. Raises Drowned where they aren't enough."""
+    walk = _Relaxation(assembly, start, load, reach, tolerance)
+    if walk.drowns():
+        raise drowned(assembly, start, walk.residual, 0)
+    while not walk.balanced():
         if progress is not None:
             progress(walk.factorisations, walk.residual)
         if walk.factorisations >= limit:
@@ -131,6 +162,11 @@ def newton(
     with the state of the smallest residual after `limit` factorisations, or where a step isn't finite.
     """
     measure, turning = ResidualNorm(assembly), Turning(assembly, load)
+    if measure.drowns(assembly.evaluate(start), start, load, tolerance):
+        precise = with_twice_the_digits(assembly)
+        if precise is None:
+            raise drowned(assembly, start, np.inf, 0)
+        return newton(precise, extended(start), load, tolerance=tolerance, limit=limit, progress=progress)
     state, best, least, before = start, start, np.inf, np.inf
     for spent in range(limit + 1):
         now = assembly.evaluate(state)
@@ -139,9 +175,8 @@ def newton(
             progress(spent, residual)
         if residual < least:
             best, least = state, residual
-        noise = measure.rounding(now, state, load) if residual > _STAGNANT * before else 0.0
-        before = residual
-        if residual <= max(tolerance, noise):
+        stagnant, before = residual > _STAGNANT * before, residual
+        if measure.balanced(residual, now, state, load, tolerance, stagnant):
             check_turned(assembly, state, now, spent)
             stable, negative = stability(assembly, now)
             return Equilibrium(state, now.energy, residual, spent, stable, negative)
@@ -180,8 +215,9 @@ def stability(assembly: Assembly, balance: Balance) -> tuple[bool, int]:
 class _Relaxation:
     """The moving state of one relaxation."""
 
-    def __init__(self, assembly: Assembly, start: State, load: Reals, reach: float) -> None:
+    def __init__(self, assembly: Assembly, start: State, load: Reals, reach: float, tolerance: float) -> None:
         self.assembly, self.load, self.state, self.reach = assembly, load, start, reach
+        self.tolerance = tolerance
         self.now = assembly.evaluate(start)
         self.measure = ResidualNorm(assembly)
         self.mass_shape = self.measure.mass_shape
@@ -216,8 +252,9 @@ class _Relaxation:
         while True:
             shifted = values
             if self.mass > 0.0:
-                shifted = values.copy()
-                shifted[self.assembly.matrix.diagonal] += self.mass * self.mass_shape
+                shifted = self.assembly.matrix.raised(
+                    values, self.assembly.matrix.diagonal, self.mass * self.mass_shape
+                )
             self.factorisations += 1
             try:
                 return self.assembly.matrix.factor(shifted)
@@ -234,21 +271,24 @@ class _Relaxation:
 
     def _heaviest(self) -> float:
         """The mass at which a step leads nowhere; 0 where the tangent isn't finite."""
-        assert self.now.tangent is not None
-        largest = float(np.abs(self.now.tangent[self.assembly.matrix.diagonal]).max(initial=0.0))
+        largest = float(self._diagonal().max(initial=0.0))
         return _HEAVY * max(largest, 1.0) if np.isfinite(largest) else 0.0
 
+    def _diagonal(self) -> Reals:
+        """The sizes (f,) of the tangent's diagonal."""
+        assert self.now.tangent is not None
+        return np.abs(self.assembly.matrix.leading(self.now.tangent)[self.assembly.matrix.diagonal])
+
     def _raise_mass(self) -> None:
-        diagonal = (
-            np.abs(self.now.tangent[self.assembly.matrix.diagonal])
-            if self.now.tangent is not None
-            else np.ones(1)
-        )
-        least = 1e-7 * float(np.mean(diagonal[self.assembly.free % 6 < 3]))
+        least = 1e-7 * float(np.mean(self._diagonal()[self.assembly.free % 6 < 3]))
         self.mass = max(
             _GROWTH * self.mass, least if least > 0.0 else max(float(np.abs(self.load).max()), 1.0)
         )
         if not self.mass <= self._heaviest():
+            if self.residual < _CLOSE and self._noise() > self.measure.most(
+                self.now, self.load, self.tolerance
+            ):
+                raise drowned(self.assembly, self.state, self.residual, self.factorisations)
             raise NotConverged(
                 f"The relaxation stalled (residual {self.residual:.1e})",
                 state=self.state,
@@ -315,19 +355,27 @@ class _Relaxation:
 
     def _lower_mass(self) -> None:
         self.mass *= _DECAY
-        if self.mass > 0.0 and self.now.tangent is not None:
-            diagonal = np.abs(self.now.tangent[self.assembly.matrix.diagonal])
-            if self.mass < 1e-10 * float(diagonal.mean()):
-                self.mass = 0.0
+        if self.mass > 0.0 and self.mass < 1e-10 * float(self._diagonal().mean()):
+            self.mass = 0.0
 
     @property
     def turns(self) -> bool:
         """Whether moments turn nodes in space: the potential is a guide then, not a measure."""
         return len(self.turning.nodes) > 0
 
-    def rounding(self) -> float:
-        """The residual that rounding leaves, once steps have stopped to bring more than that; 0 before."""
-        return self._noise() if self.residual > _STAGNANT * self.before else 0.0
+    def balanced(self) -> bool:
+        """Whether the state is in equilibrium. Raises Drowned where rounding doesn't let it come nearer."""
+        stagnant = self.residual > _STAGNANT * self.before
+        known = self.measure.balanced(
+            self.residual, self.now, self.state, self.load, self.tolerance, stagnant
+        )
+        if not known and stagnant and self.residual <= self._noise():
+            raise drowned(self.assembly, self.state, self.residual, self.factorisations)
+        return known
+
+    def drowns(self) -> bool:
+        """Whether rounding hides what there is to find from the start."""
+        return self.measure.drowns(self.now, self.state, self.load, self.tolerance)
 
     def _noise(self) -> float:
         return self.measure.rounding(self.now, self.state, self.load)

@@ -210,6 +210,16 @@ class Symmetric:
         cholmod.solve(symbolic, solution)
         return np.array(solution)[:, 0], untouched
 
+    def leading(self, values: Reals) -> Reals:
+        """The values (nnz,) in double precision: themselves."""
+        return values
+
+    def raised(self, values: Reals, places: Indices, by: Reals) -> Reals:
+        """A copy of the values with those at `places` larger by `by`."""
+        result = values.copy()
+        result[places] += by
+        return result
+
     def _indefinite(self, values: Reals) -> tuple[Any, Reals]:
         """CHOLMOD's simplicial LDLᵀ and the pivots D (n,)."""
         lower = self._lower(values)

@@ -22,6 +22,7 @@ from shellform.errors import NotConverged
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium
+from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.residual import held, overturned
 
@@ -213,7 +214,8 @@ def _carried(assembly: Assembly, state: State, drive: Drive, change: float) -> t
     pull = -assembly.force_along(state, motion).ravel()[assembly.free]
     step = motion.ravel().copy()
     try:
-        step[assembly.free] = assembly.matrix.factor(held(assembly, assembly.evaluate(state))).solve(pull)
+        own = fit_for(assembly, state)
+        step[assembly.free] = own.matrix.factor(held(own, own.evaluate(state))).solve(pull)
     except NotPositiveDefinite:
         then = _with_supports(state, drive, change)
     else:

@@ -31,12 +31,13 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, NotConverged
-from shellform.structure.elements.state import State, moved
+from shellform.structure.elements.state import State, extended, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
+from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.factorisation import Indefinite
 from shellform.structure.solve.loading import Drive
-from shellform.structure.solve.residual import ResidualNorm, Turning, held, overturned
+from shellform.structure.solve.residual import OF_LOAD, ResidualNorm, Turning, held, overturned
 
 FIRST = 0.1  # of the goal, the first step's change of the factor
 MOST = 500  # points
@@ -79,6 +80,10 @@ def follow(
     located and given as points of their own. Raises NotConverged with the last state where no step succeeds
     or the points run out, InputError for a held degree of freedom as lead.
     """
+    precise = with_twice_the_digits(assembly)
+    load, measure = drive.at(goal), ResidualNorm(assembly)
+    if precise is not None and measure.drowns(assembly.evaluate(start), start, load, tolerance):
+        assembly, start = precise, extended(start)
     walk = _Path(assembly, start, drive, tolerance)
     led = None if lead is None else walk.number(lead)
     here = walk.point(start, 0.0, 0)
@@ -211,9 +216,7 @@ class _Path:
             gap = size - done[led] if led is not None else size * size - float(done @ done)
             size_kept = abs(gap) <= 1e-6 * (abs(size) if led is not None else size * size)
             residual = self.measure.residual(balance, self.drive.at(factor))
-            if size_kept and residual <= max(
-                self.tolerance, self.measure.rounding(balance, state, self.drive.at(factor))
-            ):
+            if size_kept and self._balanced(residual, balance, state, factor):
                 return self._settled(here, state, factor, iteration)
             if not residual < 1e12:
                 raise _Missed
@@ -239,7 +242,7 @@ class _Path:
         for iteration in range(1, _ITERATIONS + 1):
             balance = self.assembly.evaluate(state)
             residual = self.measure.residual(balance, self.drive.at(goal))
-            if residual <= max(self.tolerance, self.measure.rounding(balance, state, self.drive.at(goal))):
+            if self._balanced(residual, balance, state, goal):
                 return self._settled(here, state, goal, iteration)
             if not residual < 1e12:
                 break
@@ -289,6 +292,15 @@ class _Path:
             raise _Missed
         onward = float(np.sign(found.tangent[self.moving] @ self.between(here.state, state))) or 1.0
         return replace(found, rate=onward * abs(found.rate))
+
+    def _balanced(self, residual: float, balance: Balance, state: State, factor: float) -> bool:
+        """Whether a state of the path is in equilibrium, to the tolerance of the load at the goal: it may fall to
+        nothing on the way.
+        """
+        load = self.drive.at(factor)
+        if residual <= self.tolerance:
+            return True
+        return residual <= min(self.measure.rounding(balance, state, load), OF_LOAD)
 
     def _factor(self, balance: Balance) -> Indefinite:
         self.spent += 1

@@ -18,7 +18,10 @@ HOLDS = np.radians(
     170.0
 )  # the largest local rotation that is accepted: at 180 degrees its measure turns back
 _UNTOLD = np.radians(90.0)  # of twist, up to which it is not told
+OF_LOAD = 1e-6  # of the load, the largest residual that is ever told to be none
+_NO_STRESS = 1e-3  # of the largest internal force: above, what rounding leaves is all there is of it
 _HELD = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
+_HELD_EXTENDED = 1e-22  # with twice the digits, where soft rods must not feel how stiff ones are held
 
 
 class ResidualNorm:
@@ -32,6 +35,7 @@ class ResidualNorm:
         self.free = assembly.free
         self.arms = assembly.arms
         self._reach = assembly.reach
+        self._last_digit = assembly.last_digit
         turns = self.free % 6 >= 3
         self.mass_shape = np.ones(len(self.free))
         self.mass_shape[turns] = self.arms[self.free[turns] // 6] ** 2
@@ -56,9 +60,37 @@ class ResidualNorm:
         """
         assert balance.tangent is not None
         stiffest = float(balance.tangent.max(initial=0.0))  # on the diagonal
-        last_bit = 4.0 * np.finfo(float).eps * float(np.abs(state.positions).max(initial=0.0))
+        last_bit = 4.0 * self._last_digit * float(np.abs(state.positions).max(initial=0.0))
         scale = self.scale(balance, load)
         return stiffest * last_bit / scale if scale > 0.0 else 0.0
+
+    def most(self, balance: Balance, load: Reals, tolerance: float) -> float:
+        """The largest residual of what is told to be an equilibrium: 1e-6, or the `tolerance` where it is looser, of
+        the load; where there is none, of the largest internal force.
+        """
+        applied, scale = float(_largest(load.ravel(), self._reach)), self.scale(balance, load)
+        share = max(OF_LOAD, tolerance)
+        return share * applied / scale if applied > 0.0 else share
+
+    def balanced(
+        self, residual: float, balance: Balance, state: State, load: Reals, tolerance: float, stagnant: bool
+    ) -> bool:
+        """Whether the residual of a state counts as none: within the tolerance or, where steps have stopped to
+        bring anything (`stagnant`), within what rounding leaves, and never above `most`. A structure without load
+        whose forces are all rounding is without stress.
+        """
+        most = self.most(balance, load, tolerance)
+        if residual <= min(tolerance, most):
+            return True
+        if not stagnant:
+            return False
+        noise = self.rounding(balance, state, load)
+        return residual <= min(noise, most) or (noise > _NO_STRESS and residual <= noise and not load.any())
+
+    def drowns(self, balance: Balance, state: State, load: Reals, tolerance: float) -> bool:
+        """Whether rounding leaves more than the largest residual that may be told to be none."""
+        noise = self.rounding(balance, state, load)
+        return bool(noise > self.most(balance, load, tolerance) and (load.any() or noise <= _NO_STRESS))
 
 
 def overturned(assembly: Assembly, before: State, was: float, after: State, turned: float) -> bool:
@@ -92,14 +124,43 @@ def check_turned(assembly: Assembly, state: State, balance: Balance, spent: int)
     )
 
 
+class Drowned(NotConverged):
+    """The load can't be told from what rounding leaves of stiff elements' forces."""
+
+
+def drowned(assembly: Assembly, state: State, residual: float, spent: int) -> Drowned:
+    """The refusal that names the stiffest elements."""
+    names, values = [], []
+    for kind, parts in (("beams", assembly.beams), ("cables", assembly.cables)):
+        for part in parts:
+            own = part.stiffest()
+            values.append(own)
+            names += [f"{kind}[{k}]" for k in range(len(own))]
+    stiffness = np.concatenate(values)
+    order = np.argsort(-stiffness, kind="stable")
+    those = order[stiffness[order] > 1e-2 * stiffness[order[0]]]
+    more = f" and {len(those) - 3} more" if len(those) > 3 else ""
+    return Drowned(
+        f"Rounding hides the load beside the stiffness of {', '.join(names[k] for k in those[:3])}{more}, up to "
+        f"{stiffness[order[0]]:.1e} N/m (residual {residual:.1e})",
+        state=state,
+        residual=residual,
+        iterations=spent,
+        remedy="Make them softer or longer, or the others stiffer.",
+    )
+
+
 def held(assembly: Assembly, balance: Balance) -> Reals:
     """The tangent's lower values with rotations held by 1e-10 of their own stiffness.
 
     A pinned straight rod can spin about its axis without any force; that much stiffness makes the matrix
     regular and is far below what rounding leaves of the softest mode that matters.
     """
-    assert balance.tangent is not None
-    return np.asarray(_stiffened(balance.tangent, assembly.turns, _HELD))
+    values = balance.tangent
+    assert values is not None
+    if values.ndim == 1:
+        return np.asarray(_stiffened(values, assembly.turns, _HELD))
+    return assembly.matrix.raised(values, assembly.turns, _HELD_EXTENDED * np.abs(values[assembly.turns, 0]))
 
 
 @njit(cache=True)

@@ -1,0 +1,103 @@
+"""Numbers of twice the digits, against exact fractions, and what is built from them."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from shellform.structure.elements import double_double
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import extended as with_tail
+from shellform.structure.elements.state import from_vectors, moved
+from shellform.structure.solve.extended import ExtendedSymmetric
+from shellform.structure.solve.factorisation import NotPositiveDefinite
+from tests.structure.test_solver import family, random_matrix
+
+NODES = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.1]])
+
+
+def exactly(number):
+    return Fraction(number[0]) + Fraction(number[1])
+
+
+@pytest.mark.parametrize(
+    ("operation", "expected"),
+    [
+        (double_double.plus, lambda a, b: a + b),
+        (double_double.minus, lambda a, b: a - b),
+        (double_double.times, lambda a, b: a * b),
+        (double_double.over, lambda a, b: a / b),
+        (lambda a, b: double_double.root(double_double.times(b, b)), lambda a, b: abs(b)),
+    ],
+)
+def test_thirty_digits_come_back(operation, expected):
+    chance = np.random.default_rng(0)
+    for _ in range(50):
+        a, b = (double_double.two_sum(x, 1e-17 * y) for x, y in chance.normal(size=(2, 2)))
+        wanted = expected(exactly(a), exactly(b))
+        assert abs((exactly(operation(a, b)) - wanted) / wanted) < Fraction(1, 10**29)
+
+
+def test_elements_are_those_of_double_precision_where_that_is_enough():
+    chance = np.random.default_rng(1)
+    state = from_vectors(NODES + 0.05 * chance.normal(size=(2, 3)), 0.3 * chance.normal(size=(2, 3)))
+    for part in (
+        make_beams(NODES, [[0, 1]], axial=50.0, torsion=2.0, bending_y=3.0, bending_z=5.0, z_axis=[[0.1, 0.2, 1.0]]),
+        make_cables([[0, 1]], rest_length=0.9, stiffness=7.0),
+        make_cables([[0, 1]], rest_length=1.9, stiffness=7.0),
+    ):  # fmt: skip
+        plain, precise = (
+            part.evaluate(state, tangent=True),
+            part.evaluate_extended(with_tail(state), tangent=True),
+        )
+        np.testing.assert_allclose(precise.force, plain.force, atol=1e-13)
+        np.testing.assert_allclose(precise.tangent[:, :, 0], plain.tangent, atol=1e-13)
+        np.testing.assert_allclose(precise.energy, plain.energy, rtol=1e-13)
+
+
+def test_a_stiff_rod_turned_as_a_whole_feels_what_thirty_digits_leave():
+    state, steps = with_tail(from_vectors(NODES, np.zeros((2, 3)))), np.zeros((2, 6))
+    rod = make_beams(NODES, [[0, 1]], axial=1e16, torsion=1e16, bending_y=1e16, bending_z=1e16)
+    before = rod.local_forces(state)
+    for turn in ([0.3, -0.2, 0.1], [0.05, 0.1, 0.4]):
+        steps[:, 3:] = turn
+        there = moved(with_tail(from_vectors(np.zeros((1, 3)), np.zeros((1, 3)))), steps[:1])
+        # The chord turns by the same rotation, column by column with all digits.
+        chord = np.zeros((3, 2))
+        double_double._triad(there.quaternions[0], there.tail[0], np.eye(3), axes := np.empty((3, 3, 2)))
+        for i in range(3):
+            total = (0.0, 0.0)
+            for j in range(3):
+                part = double_double.times(
+                    (axes[j, i, 0], axes[j, i, 1]), (state.positions[1, j], state.tail[1, j])
+                )
+                total = double_double.plus(total, part)
+            chord[i] = total
+        state = moved(state, steps)
+        positions, tail = state.positions.copy(), state.tail.copy()
+        positions[1], tail[1, :3] = chord.T
+        state = type(state)(positions, state.quaternions, tail)
+    np.testing.assert_allclose(rod.local_forces(state), before, atol=1e-9)
+
+
+def test_the_factor_solves_counts_and_refuses_as_the_ordinary_ones_do():
+    right = np.arange(60.0).reshape(30, 2)
+    for shift in (30.0, 0.0):
+        whole = random_matrix(shift)
+        plain, values = family(whole)
+        matrix, both = ExtendedSymmetric(plain), np.column_stack([values, 0.0 * values])
+        factor = matrix.factor_indefinite(both)
+        np.testing.assert_allclose(factor.solve(right), np.linalg.solve(whole, right), rtol=1e-11)
+        assert factor.negative == (np.linalg.eigvalsh(whole) < 0.0).sum()
+        assert matrix.newton(both, right[:, 0])[1] == (factor.negative == 0)
+    with pytest.raises(NotPositiveDefinite):
+        matrix.factor(both)
+
+
+def test_a_nearly_singular_matrix_keeps_its_small_eigenvalue():
+    stiff = 1e20  # beside which 1 is lost in double precision
+    plain, values = family(np.array([[stiff, -stiff], [-stiff, stiff]]))
+    matrix = ExtendedSymmetric(plain)
+    both = matrix.raised(np.column_stack([values, 0.0 * values]), np.array([2]), np.array([1.0]))
+    np.testing.assert_allclose(matrix.factor(both).solve(np.array([0.0, 1.0])), [1.0, 1.0], rtol=1e-9)
