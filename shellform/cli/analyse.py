@@ -20,7 +20,12 @@ def analyse(
     increments: Annotated[int, typer.Option(help="Equal increments.")] = 1,
     tolerance: Annotated[float, typer.Option(help="Unbalanced over largest force.")] = 1e-8,
     output: Annotated[Path | None, typer.Option(help="Result file; left out: standard output.")] = None,
-    method: Annotated[str, typer.Option(help="relaxation or newton.")] = "relaxation",
+    method: Annotated[
+        str,
+        typer.Option(
+            help="relaxation (Newton's with a vanishing mass), dynamic (with velocity and time step) or newton."
+        ),
+    ] = "relaxation",
     path: Annotated[
         bool, typer.Option("--path", help="Follow the path through limit points by its length.")
     ] = False,

@@ -138,7 +138,7 @@ def test_bad_requests_are_refused():
         ({}, "several load cases"),
         ({"load": "push", "increments": 0}, "increments"),
         ({"load": "push", "tolerance": 2.0}, "tolerance"),
-        ({"load": "push", "method": "magic"}, "relaxation, newton, path"),
+        ({"load": "push", "method": "magic"}, "relaxation, dynamic, newton, path"),
         ({"load": "push", "limit": 0}, "limit"),
         ({"load": "push", "method": "path", "lead": (99, 0, 1.0)}, "axis 0 to 2"),
     ]:

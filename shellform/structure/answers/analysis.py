@@ -1,10 +1,11 @@
 """The analysis of a model: how it comes to its load, and what there is to tell of it then
 (contracts/model-file.md).
 
-Three ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the
+Four ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the
 stable branch and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole
-increments without help. A path goes through limit points, loads falling and rising, to where the factor first
-comes to its goal or a led displacement to its own (path.py).
+increments without help, dynamic relaxation lets the network move until it comes to rest (dynamic.py). A path goes
+through limit points, loads falling and rising, to where the factor first comes to its goal or a led displacement
+to its own (path.py).
 """
 
 from __future__ import annotations
@@ -17,21 +18,27 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import NotConverged
+from shellform.structure.answers.request import (
+    check_imposed_turns,
+    check_request,
+    chosen_load,
+    with_supports_moved,
+)
 from shellform.structure.answers.stability import Critical, Modes, critical_load, modes
-from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State, at_rest, moved
 from shellform.structure.model import Model
-from shellform.structure.network import Network, assemble, doubts
+from shellform.structure.network import assemble, doubts
 from shellform.structure.solve.assembly import Assembly
+from shellform.structure.solve.dynamic import dynamic
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.loading import Drive, advance
 from shellform.structure.solve.path import follow
+from shellform.structure.solve.residual import Turning
 
 LIMIT = 1000  # factorisations of one relaxation
 
-METHODS = ("relaxation", "newton", "path")
 Progress = Callable[[float, int], None]
 """Called with the load factor and the factorisations so far."""
 
@@ -42,7 +49,8 @@ class Analysis:
 
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
     `converged`; `increments` as the contract has them, each with the `steps` it took; `modes` and `critical`
-    where they were asked for; `warnings`, a sentence each.
+    where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable branch
+    from the start; None where the method (Newton's) doesn't tell.
     """
 
     model: Model
@@ -57,6 +65,7 @@ class Analysis:
     modes: Modes | None = None
     critical: Critical | None = None
     critical_sought: float = 0.0
+    on_branch: bool | None = None
 
 
 def analyse(
@@ -83,8 +92,8 @@ def analyse(
     no equilibrium is found the last one is kept and `converged` is false. Raises InputError for bad requests.
     """
     began = time.perf_counter()
-    chosen = _chosen(model, load)
-    _check(factor, increments, tolerance, method, lead, limit, len(model.network.nodes))
+    chosen = chosen_load(model, load)
+    check_request(factor, increments, tolerance, method, lead, limit, len(model.network.nodes))
     assembly = assemble(model.network)
     walk = _Analysis(model, assembly, chosen, factor, tolerance, limit, progress)
     message, converged = "", True
@@ -116,10 +125,11 @@ def analyse(
         tuple(walk.documented),
         _seconds(assembly, time.perf_counter() - began),
         message,
-        tuple(doubts(model.network)),
+        (*doubts(model.network), *walk.warnings()),
         softest,
         critical,
         critical_to or 0.0,
+        walk.on_branch,
     )
 
 
@@ -138,17 +148,22 @@ class _Analysis:
     reached: float = 0.0
     documented: list[dict[str, Any]] = field(default_factory=list)
     found: Equilibrium | None = None
+    on_branch: bool | None = True
+    left_at: float | None = None  # the factor at which the stable branch ended
 
     def __post_init__(self) -> None:
         network = self.model.network
         none = np.zeros_like(self.load)
         # Rotations that are imposed turn the node as a whole.
-        _check_turns(network)
+        check_imposed_turns(network)
         imposed = none if self.model.start is not None else np.where(network.fixed, network.imposed, 0.0)
         self.drive = Drive(self.load, imposed, none)
         self.loaded = np.flatnonzero(self.load.any(axis=1))
+        self.turns = len(Turning(self.assembly, self.load).nodes) > 0
         self.state = (
-            at_rest(network.nodes) if self.model.start is None else _imposed(network, self.model.start)
+            at_rest(network.nodes)
+            if self.model.start is None
+            else with_supports_moved(network, self.model.start)
         )
 
     def begin(self) -> None:
@@ -170,9 +185,10 @@ class _Analysis:
         for k in range(1, count + 1):
             before, after = (k - 1) / count * self.factor, k / count * self.factor
             steps: list[dict[str, Any]] = []
-            if method == "newton":
+            if method in ("newton", "dynamic"):
                 start = moved(self.state, (after - before) * self.drive.imposed)
-                found = newton(
+                solve = newton if method == "newton" else dynamic
+                found = solve(
                     self.assembly,
                     start,
                     self.drive.at(after),
@@ -180,6 +196,7 @@ class _Analysis:
                     progress=self._watch(after),
                 )
                 spent = found.factorisations
+                self.on_branch = None
             else:
                 arrived = advance(
                     self.assembly,
@@ -191,6 +208,8 @@ class _Analysis:
                     limit=self.limit,
                     report=self._reporter(steps, before, after),
                 )
+                if not arrived.on_branch:
+                    self._left(before + arrived.share * (after - before))
                 found, spent = arrived.equilibrium, arrived.factorisations
             self.accept(found, after, spent)
             self.documented.append(self._increment(after, spent) | {"steps": steps})
@@ -214,11 +233,33 @@ class _Analysis:
             spent = point.equilibrium.factorisations
             if point.factor == 0.0 and not self.documented:
                 continue
+            if point.event or not point.equilibrium.stable:
+                self._left(point.factor)
             self.accept(point.equilibrium, point.factor, spent - before)
             self.documented.append(
                 self._increment(point.factor, spent - before) | {"rate": point.rate, "event": point.event}
             )
             before = spent
+
+    def _left(self, factor: float) -> None:
+        """Takes down where the stable branch first ended."""
+        self.on_branch = False
+        self.left_at = factor if self.left_at is None else self.left_at
+
+    def warnings(self) -> list[str]:
+        """What has to be said of how the state was reached, a sentence each."""
+        said = []
+        if self.left_at is not None:
+            said.append(
+                f"The stable branch from the start ends near load factor {self.left_at:.6g}: the state lies "
+                "beyond, past a snap-through or a bifurcation."
+            )
+        if self.turns:
+            said.append(
+                "Moments about fixed axes turn nodes in space and have no potential: stability is that of the "
+                "tangent's symmetric part, as under semi-tangential moments."
+            )
+        return said
 
     def accept(self, found: Equilibrium, factor: float, spent: int) -> None:
         """Takes an equilibrium over as the last one."""
@@ -268,70 +309,6 @@ class _Analysis:
             return None
         tell = self.progress
         return lambda factorisations, residual: tell(factor, self.spent + factorisations)
-
-
-def _check(
-    factor: float,
-    increments: int,
-    tolerance: float,
-    method: str,
-    lead: tuple[int, int, float] | None,
-    limit: int,
-    count: int,
-) -> None:
-    if increments < 1:
-        raise InputError("must be at least 1", where="--increments", value=increments)
-    if not (np.isfinite(factor) and 0.0 < tolerance < 1.0):
-        raise InputError("--factor must be finite and --tolerance between 0 and 1", value=(factor, tolerance))
-    if method not in METHODS:
-        raise InputError(
-            "unknown method", where="--method", value=method, remedy=f"Known: {', '.join(METHODS)}."
-        )
-    if limit < 1:
-        raise InputError("must be at least 1", where="--limit", value=limit)
-    if lead is not None and not (
-        0 <= lead[0] < count and lead[1] in (0, 1, 2) and np.isfinite(lead[2]) and lead[2] != 0.0
-    ):
-        raise InputError(
-            "must be a node, an axis 0 to 2 and a displacement other than 0", where="--lead", value=lead
-        )
-
-
-def _imposed(network: Network, state: State) -> State:
-    """The state with held degrees of freedom where the supports want them at load factor 1."""
-    positions, quaternions = state.positions.copy(), state.quaternions.copy()
-    held = network.fixed[:, :3]
-    positions[held] = (network.nodes + network.imposed[:, :3])[held]
-    turned = network.fixed[:, 3:].all(axis=1)
-    quaternions[turned] = rotation.from_vectors(network.imposed[turned, 3:])
-    return State(positions, quaternions)
-
-
-def _check_turns(network: Network) -> None:
-    partly = (
-        network.fixed[:, 3:].any(axis=1)
-        & ~network.fixed[:, 3:].all(axis=1)
-        & network.imposed[:, 3:].any(axis=1)
-    )
-    if partly.any():
-        raise InputError(
-            "a rotation can be imposed only where all three rotations are fixed",
-            where=f"supports at node {int(np.argmax(partly))}",
-        )
-
-
-def _chosen(model: Model, name: str | None) -> Reals:
-    if name is None:
-        if len(model.loads) > 1:
-            raise InputError(
-                "the model has several load cases",
-                remedy=f"Choose one with --load: {', '.join(model.loads)}.",
-            )
-        return next(iter(model.loads.values()), np.zeros((len(model.network.nodes), 6)))
-    if name not in model.loads:
-        known = ", ".join(model.loads) or "none"
-        raise InputError("there is no such load case", where="--load", value=name, remedy=f"Known: {known}.")
-    return model.loads[name]
 
 
 def _seconds(assembly: Assembly, total: float) -> dict[str, float]:

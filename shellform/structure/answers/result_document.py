@@ -16,7 +16,7 @@ from shellform.structure.elements.sections import Section
 
 
 def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None) -> dict[str, Any]:
-    """The result document of the contract, and besides it `warnings`, `beam_twists`, `cable_elongations`,
+    """The result document of the contract, and besides it `on_branch`, `warnings`, `beam_twists`, `cable_elongations`,
     `energy_by_kind`, with `sections` by kind of beam `stresses` (Pa, at both ends) and `utilisation`, and
     where asked for `modes` and `critical`."""
     network, found = analysis.model.network, analysis.equilibrium
@@ -26,6 +26,7 @@ def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None)
     document = {
         "converged": analysis.converged,
         "stable": found.stable,
+        "on_branch": analysis.on_branch,
         "negative_pivots": found.negative,
         "iterations": found.factorisations,
         "residual": found.residual if np.isfinite(found.residual) else None,

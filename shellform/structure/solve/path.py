@@ -31,6 +31,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, NotConverged
+from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State, extended, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
@@ -163,6 +164,7 @@ class _Path:
         self.measure = ResidualNorm(assembly)
         self.turning = Turning(assembly, drive.load + drive.base)
         self.moving = assembly.free % 6 < 3
+        self.by_turns = False
         self.spent = 0
 
     def number(self, lead: tuple[int, int, float]) -> int:
@@ -178,7 +180,13 @@ class _Path:
         return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
 
     def between(self, before: State, after: State) -> Reals:
-        """Translations (t,) of the free degrees of freedom from one state to the other."""
+        """Translations (t,) of the free degrees of freedom from one state to the other; rotation vectors where
+        nothing else moves.
+        """
+        if self.by_turns:
+            back = before.quaternions * [1.0, -1.0, -1.0, -1.0]
+            turned = rotation.to_vectors(rotation.product(after.quaternions, back))
+            return turned.ravel()[self._flat()]
         return (after.positions - before.positions).ravel()[self._flat()]
 
     def point(self, state: State, factor: float, iterations: int) -> _Here:
@@ -190,6 +198,9 @@ class _Path:
             state, balance.energy, residual, self.spent, matrix.negative == 0, matrix.negative
         )
         speed = float(np.linalg.norm(tangent[self.moving]))
+        if speed == 0.0 and not self.spent > 1:  # twisted, a straight rod has no other path than its turns
+            self.moving, self.by_turns = self.assembly.free % 6 >= 3, True
+            speed = float(np.linalg.norm(tangent[self.moving]))
         if speed == 0.0:
             raise InputError(
                 "nothing moves under this load", where="path", remedy="Choose a load that acts on free nodes."
@@ -323,4 +334,4 @@ class _Path:
 
     def _flat(self) -> Indices:
         free = self.assembly.free[self.moving]
-        return 3 * (free // 6) + free % 6
+        return 3 * (free // 6) + free % 3

@@ -1,0 +1,85 @@
+"""What an analysis is asked for, checked, and the state that it starts from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import InputError
+from shellform.structure.elements import rotation
+from shellform.structure.elements.state import State
+from shellform.structure.model import Model
+from shellform.structure.network import Network
+
+METHODS = ("relaxation", "dynamic", "newton", "path")
+
+
+def check_request(
+    factor: float,
+    increments: int,
+    tolerance: float,
+    method: str,
+    lead: tuple[int, int, float] | None,
+    limit: int,
+    count: int,
+) -> None:
+    """Raises InputError for numbers, methods and leads that make no sense on `count` nodes."""
+    if increments < 1:
+        raise InputError("must be at least 1", where="--increments", value=increments)
+    if not (np.isfinite(factor) and 0.0 < tolerance < 1.0):
+        raise InputError("--factor must be finite and --tolerance between 0 and 1", value=(factor, tolerance))
+    if method not in METHODS:
+        raise InputError(
+            "unknown method", where="--method", value=method, remedy=f"Known: {', '.join(METHODS)}."
+        )
+    if limit < 1:
+        raise InputError("must be at least 1", where="--limit", value=limit)
+    if lead is not None and not (
+        0 <= lead[0] < count and lead[1] in (0, 1, 2) and np.isfinite(lead[2]) and lead[2] != 0.0
+    ):
+        raise InputError(
+            "must be a node, an axis 0 to 2 and a displacement other than 0", where="--lead", value=lead
+        )
+
+
+def with_supports_moved(network: Network, state: State) -> State:
+    """The state with held degrees of freedom where the supports want them at load factor 1."""
+    positions, quaternions = state.positions.copy(), state.quaternions.copy()
+    held = network.fixed[:, :3]
+    positions[held] = (network.nodes + network.imposed[:, :3])[held]
+    turned = network.fixed[:, 3:].all(axis=1)
+    quaternions[turned] = rotation.from_vectors(network.imposed[turned, 3:])
+    return State(positions, quaternions)
+
+
+def check_imposed_turns(network: Network) -> None:
+    """Raises InputError for a turn imposed on a node that may turn about another axis."""
+    partly = (
+        network.fixed[:, 3:].any(axis=1)
+        & ~network.fixed[:, 3:].all(axis=1)
+        & network.imposed[:, 3:].any(axis=1)
+    )
+    if partly.any():
+        raise InputError(
+            "a rotation can be imposed only where all three rotations are fixed",
+            where=f"supports at node {int(np.argmax(partly))}",
+        )
+
+
+def chosen_load(model: Model, name: str | None) -> Reals:
+    """The load (n, 6) of the case `name`; where there is none, that of the only case, or none. "none" is the structure
+    without load unless a case has that name. Raises InputError.
+    """
+    if name is None:
+        if len(model.loads) > 1:
+            raise InputError(
+                "the model has several load cases",
+                remedy=f"Choose one with --load: {', '.join(model.loads)}.",
+            )
+        return next(iter(model.loads.values()), np.zeros((len(model.network.nodes), 6)))
+    if name == "none" and name not in model.loads:
+        return np.zeros((len(model.network.nodes), 6))
+    if name not in model.loads:
+        known = ", ".join(model.loads) or "none"
+        raise InputError("there is no such load case", where="--load", value=name, remedy=f"Known: {known}.")
+    return model.loads[name]

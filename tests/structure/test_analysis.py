@@ -1,0 +1,78 @@
+"""What an analysis tells of how it came to its state, and the ways in which it gets there."""
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError, NotConverged
+from shellform.structure.answers.analysis import analyse
+from shellform.structure.answers.result_document import result
+from shellform.structure.elements.state import at_rest
+from shellform.structure.model import Model
+from shellform.structure.network import assemble
+from shellform.structure.solve.dynamic import dynamic
+from shellform.verification import exact
+from shellform.verification.models import CLAMP, PIN, chain, in_plane, line, load_at, order, polyline
+
+
+def toggle():
+    """A shallow toggle that snaps through at about a fifteenth of its load case."""
+    points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.0]], 8)
+    network = in_plane(chain(points, (1e4, 1.0, 0.2, 0.2), {0: PIN, 16: PIN}))
+    return Model(network, {"down": load_at(network, 8, [0.0, 0.0, -5.0])}, None, (0, 16))
+
+
+def test_a_snap_through_is_told():
+    beyond = analyse(toggle())
+    assert result(beyond)["on_branch"] is False
+    assert "stable branch from the start ends near load factor 0.06" in beyond.warnings[-1]
+    before = analyse(toggle(), factor=0.05)
+    assert result(before)["on_branch"] is True
+    assert before.warnings == ()
+
+
+def test_newton_doesn_t_tell_whether_it_stayed_on_the_branch_and_a_path_does():
+    assert analyse(toggle(), factor=0.05, method="newton").on_branch is None
+    assert analyse(toggle(), factor=0.05, method="path").on_branch is True
+    assert analyse(toggle(), method="path").on_branch is False
+
+
+def test_none_is_the_structure_without_load():
+    found = analyse(toggle(), load="none")
+    assert not found.load.any()
+    assert found.equilibrium.state.positions == pytest.approx(toggle().network.nodes, abs=1e-12)
+    with pytest.raises(InputError, match="no such load case"):
+        analyse(toggle(), load="nothing")
+
+
+def test_moments_that_turn_nodes_in_space_are_told_to_have_no_potential():
+    network = chain(line(4), (1e6, 1.0, 1.0, 1.0), {0: CLAMP})
+    model = Model(network, {"moment": load_at(network, 4, [0, 0, 0, 0, 0, 0.1])}, None, (0,))
+    assert "semi-tangential" in analyse(model).warnings[-1]
+
+
+def test_dynamic_relaxation_comes_to_rest_on_the_elastica_with_and_without_damping():
+    network = in_plane(chain(line(40), (1e7, 1.0, 1.0, 1.0), {0: CLAMP}))
+    load = load_at(network, 40, [0.0, 0.0, 10.0])
+    for damping in (0.0, 1e-3):
+        tip = dynamic(assemble(network), at_rest(network.nodes), load, damping=damping).state.positions[-1]
+        assert (1.0 - tip[0], tip[2]) == pytest.approx(exact.cantilever(10.0), rel=2e-4)
+    with pytest.raises(NotConverged, match=r"come to rest in 3 factorisations.*more increments"):
+        dynamic(assemble(network), at_rest(network.nodes), load, limit=3)
+
+
+def test_dynamic_is_a_method_of_an_analysis():
+    found = analyse(toggle(), factor=0.05, method="dynamic")
+    relaxed = analyse(toggle(), factor=0.05).equilibrium.state.positions
+    np.testing.assert_allclose(found.equilibrium.state.positions, relaxed, atol=1e-8)
+
+
+def test_a_torque_alone_has_a_critical_factor_that_comes_to_greenhill_s():
+    reference, found = exact.clamped_twist(), []
+    for count in (20, 40):
+        held = {0: CLAMP, count: [False, True, True, False, True, True]}
+        network = chain(line(count), (1e6, 1.0, 1.0, 1.0), held)
+        model = Model(network, {"torque": load_at(network, count, [0, 0, 0, 1.0, 0, 0])}, None, (0, count))
+        critical = analyse(model, critical_to=12.0).critical
+        assert critical is not None
+        found.append(critical.factor)
+    assert order(np.array(found) - reference) == pytest.approx(2.0, abs=0.2)
