@@ -13,7 +13,7 @@ import sys
 
 from shellform import lazy
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 __getattr__, __dir__ = lazy.public(__name__)
 
 _PICTURES = {
