@@ -19,6 +19,8 @@ HOLDS = np.radians(
 )  # the largest local rotation that is accepted: at 180 degrees its measure turns back
 _UNTOLD = np.radians(90.0)  # of twist, up to which it is not told
 OF_LOAD = 1e-6  # of the load, the largest residual that is ever told to be none
+_OF_STRESS = 1e-5  # of the largest internal force, the same where there is no load
+_OWN_STRESS = 1e-2  # of the largest internal force, below which a load isn't what has to be balanced
 _NO_STRESS = 1e-3  # of the largest internal force: above, what rounding leaves is all there is of it
 _HELD = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
 _HELD_EXTENDED = 1e-22  # with twice the digits, where soft rods must not feel how stiff ones are held
@@ -36,6 +38,7 @@ class ResidualNorm:
         self.arms = assembly.arms
         self._reach = assembly.reach
         self._last_digit = assembly.last_digit
+        self._extended = assembly.last_digit < np.finfo(float).eps
         turns = self.free % 6 >= 3
         self.mass_shape = np.ones(len(self.free))
         self.mass_shape[turns] = self.arms[self.free[turns] // 6] ** 2
@@ -66,11 +69,15 @@ class ResidualNorm:
 
     def most(self, balance: Balance, load: Reals, tolerance: float) -> float:
         """The largest residual of what is told to be an equilibrium: 1e-6, or the `tolerance` where it is looser, of
-        the load; where there is none, of the largest internal force.
+        the load, or of a hundredth of the largest internal force where that is more: a structure under stress of
+        its own has more to balance than a small load (with twice the digits it can do both). Without any load, 1e-5
+        of the largest internal force.
         """
         applied, scale = float(_largest(load.ravel(), self._reach)), self.scale(balance, load)
         share = max(OF_LOAD, tolerance)
-        return share * applied / scale if applied > 0.0 else share
+        if applied == 0.0:
+            return max(_OF_STRESS, share)
+        return share * max(applied / scale, 0.0 if self._extended else _OWN_STRESS)
 
     def balanced(
         self, residual: float, balance: Balance, state: State, load: Reals, tolerance: float, stagnant: bool
