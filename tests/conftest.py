@@ -25,11 +25,16 @@ def net(vault):
     return sf.pull_net(vault, spacing=0.055, gap=0.002, angle=np.deg2rad(45.0))
 
 
-@pytest.fixture(scope="session")
-def shell(vault, net):
+def braced(net, surface):
+    """A net with the paper's rods, connectors and cables."""
     rod = sf.Rod.round(young=40e9, radius=0.001, strength=255e6)
     joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
-    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=vault)
+    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=surface)
+
+
+@pytest.fixture(scope="session")
+def shell(vault, net):
+    return braced(net, vault)
 
 
 @pytest.fixture(scope="session")
@@ -37,9 +42,7 @@ def dome():
     """The vault with wide cells and two elements a segment: solved in a twentieth of the time."""
     surface = sf.cad.build_surface(ROOT / "surfaces/vault.py", size=0.02)
     net = sf.pull_net(surface, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
-    rod = sf.Rod.round(young=40e9, radius=0.001, strength=255e6)
-    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
-    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=surface)
+    return braced(net, surface)
 
 
 @pytest.fixture(scope="session")

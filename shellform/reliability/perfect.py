@@ -51,12 +51,13 @@ class Perfect:
         return self.states[0]
 
 
-def perfect(shell: Gridshell, design: Design, load: Reals, *, shapes: int = SHAPES) -> Perfect:
-    """The perfect structure of a design and its path under the dead `load` (n, 6). Raises NotConverged where
-    it has no unloaded equilibrium."""
-    return _perfect(
-        shell.network(design), members_of(shell), np.asarray(design.present), load, shell.target, shapes
-    )
+def perfect(
+    shell: Gridshell, design: Design, load: Reals, *, shapes: int = SHAPES, followed: bool = True
+) -> Perfect:
+    """The perfect structure of a design and its path under the dead `load` (n, 6), unless that isn't to be
+    `followed`: drawn structures begin at its unloaded state. Raises NotConverged where there is none."""
+    network, present = shell.network(design), np.asarray(design.present)
+    return _perfect(network, members_of(shell), present, load, shell.target, shapes, followed)
 
 
 def perfect_of(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
@@ -79,20 +80,25 @@ def perfect_of(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
     fixed = network.fixed[:, :3]
     positions[fixed] = (network.nodes + network.imposed[:, :3])[fixed]
     every = np.ones(len(network.cables.ends), dtype=bool)
-    return _perfect(
-        network, members, every, model.loads[load], State(positions, model.start.quaternions), shapes
-    )
+    start = State(positions, model.start.quaternions)
+    return _perfect(network, members, every, model.loads[load], start, shapes, followed=True)
 
 
 def _perfect(
-    network: Network, members: Members, present: np.ndarray, load: Reals, target: State, shapes: int
+    network: Network,
+    members: Members,
+    present: np.ndarray,
+    load: Reals,
+    target: State,
+    shapes: int,
+    followed: bool,
 ) -> Perfect:
     assembly = assemble(network)
     none = np.zeros_like(load)
     unloaded = find_equilibrium(assembly, target, none)
     kept: list[tuple[float, State]] = [(0.0, unloaded.state)]
     branch = Branch(assembly, load, members.span)
-    here = branch.at(unloaded.state)
+    here = branch.at(unloaded.state) if followed else None
     reached = 0.0
     if here is not None:
         _, reached = branch.along(

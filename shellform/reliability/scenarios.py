@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Indices, Reals
+from shellform.arrays import Indices
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
@@ -21,38 +21,36 @@ from shellform.problem.problem import LoadCase
 from shellform.problem.terms import LoadedDesign, Measurement, Term
 from shellform.reliability.borne import BorneFactor, borne
 from shellform.reliability.drawing import Errors, Imperfections, built_beams, errors_of, variables
-from shellform.reliability.members import members_of
 from shellform.reliability.path_of_one import Loading
-from shellform.reliability.perfect import Perfect, perfect
+from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
-from shellform.structure.solve.equilibrium import find_equilibrium
 
 _STIFFNESS_LEFT = 0.1  # of the unloaded perfect structure's
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A drawn structure: its `number` under a seed, its `errors` and the `imperfections` of its shape."""
+    """A drawn structure: its `number` under a seed, and its `errors`."""
 
     number: int
     errors: Errors
-    imperfections: Imperfections
 
 
 @dataclass(frozen=True)
 class FactorsAsBuilt(Term):
-    """The factors of the load `case` up to which the `scenarios` keep the stiffness `left`, N/m, none
-    followed beyond `most`: one value a scenario. Each has an equilibrium of its own, so that the term needs
-    none of the perfect structure's."""
+    """The factors of the load `case` up to which the `scenarios`, whose shapes have these `imperfections`, keep
+    the stiffness `left`, N/m, none followed beyond `most`: one value a scenario. Each has an equilibrium of
+    its own, so that the term needs none of the perfect structure's."""
 
     name = "factor_as_built"
     stabilises = True
     case: LoadCase
     scenarios: tuple[Scenario, ...]
+    imperfections: Imperfections
     left: float
     most: float = 1.5
     load: str = ""
@@ -98,13 +96,11 @@ def scenarios(
     left = _STIFFNESS_LEFT * float(modes(assemble(nominal.network), nominal.unloaded, 1).stiffness[0])
     drawn = tuple(
         Scenario(
-            int(number),
-            errors_of(nominal.members, tolerances, variables(nominal.members, seed, int(number))),
-            nominal.imperfections,
+            int(number), errors_of(nominal.members, tolerances, variables(nominal.members, seed, int(number)))
         )
         for number in numbers
     )
-    return FactorsAsBuilt(case, drawn, left, most)
+    return FactorsAsBuilt(case, drawn, nominal.imperfections, left, most)
 
 
 def borne_factors(
@@ -112,29 +108,15 @@ def borne_factors(
 ) -> list[BorneFactor]:
     """The factor of each scenario and its derivatives by the rest lengths and by variables on which the
     beams' stiffness depends at one of the `rates`. Raises NotConverged."""
-    nominal = _unloaded_only(shell, design, asked.case.force)
-    workshops: dict[int, Workshop] = {}
-    for scenario in asked.scenarios:
-        shape = scenario.imperfections
-        workshops.setdefault(id(shape), Workshop(replace(nominal, imperfections=shape)))
+    shape = asked.imperfections
+    nominal = perfect(shell, design, asked.case.force, shapes=0, followed=False)
+    workshop = Workshop(replace(nominal, imperfections=shape))
 
     def one(scenario: Scenario) -> BorneFactor:
         def followed(loading: Loading) -> BorneFactor:
-            built = tuple(built_beams(rate, scenario.errors, scenario.imperfections) for rate in rates)
+            built = tuple(built_beams(rate, scenario.errors, shape) for rate in rates)
             return borne(loading, left=asked.left, most=asked.most, rates=built)
 
-        workshop = workshops[id(scenario.imperfections)]
         return workshop.with_structure(scenario.errors, followed, number=scenario.number)
 
     return side_by_side(one, list(asked.scenarios))
-
-
-def _unloaded_only(shell: Gridshell, design: Design, load: Reals) -> Perfect:
-    """The perfect structure as far as drawn ones need it to begin."""
-    network = shell.network(design)
-    state = find_equilibrium(assemble(network), shell.target, np.zeros_like(load)).state
-    none = Imperfections(state, np.zeros((0, *load.shape)))
-    present = np.asarray(design.present)
-    return Perfect(
-        network, members_of(shell), present, load, shell.target, np.zeros(1), (state,), False, none
-    )

@@ -113,7 +113,7 @@ def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: flo
         count=DRAWN,
         seed=SEED,
     )
-    return sum(each.stands for each in drawn.outcomes)
+    return drawn.standing.standing
 
 
 def _shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> tuple[Gridshell, Reals]:

@@ -17,9 +17,8 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.records.as_built import AsBuilt
 from shellform.records.remedies import rounded_up
 from shellform.records.thicker_rods import ThickerRodsRecord
-from shellform.reliability.perfect import perfect
 from shellform.reliability.safety import allowed, paths
-from shellform.reliability.standing import Workshop
+from shellform.reliability.standing import sample
 
 DRAWN = 40  # structures of each size of rods
 _THICKER = 1.1  # times as thick as the ones before
@@ -53,12 +52,11 @@ def _standing(
 ) -> int:
     """How many structures stand under every load, the least of them; the largest of those on one path is the
     hardest."""
-    fewest = DRAWN
-    for largest in paths(loads):
-        try:
-            workshop = Workshop(perfect(shell, design, loads[largest]))
-        except NotConverged:
-            return 0  # without an unloaded state none stands
-        found = workshop.drawn(tolerances, seed=seed, numbers=range(DRAWN))
-        fewest = min(fewest, sum(each.stands for each in found))
-    return fewest
+    try:
+        found = [
+            sample(shell, design, loads[largest], tolerances, count=DRAWN, seed=seed).standing.standing
+            for largest in paths(loads)
+        ]
+    except NotConverged:
+        return 0  # without an unloaded state none stands
+    return min(found, default=DRAWN)

@@ -13,12 +13,11 @@ from shellform.reliability.path_of_one import BIFURCATION, BORNE, LIMIT_POINT
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.refinement import Refined, critical_factor, critical_of, halved, mesh_error
 from shellform.reliability.standing import Workshop
-from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
-from shellform.structure.network import Network
 from shellform.verification import exact
+from shellform.verification.buckling import braced_column
 from shellform.verification.models import PIN, chain, in_plane, line, load_at
 
 LARGE = Tolerances(cable_length=3e-4, supports=3e-4, marks=3e-4, load_each=0.1, load_all=0.05, connectors=0.1)
@@ -113,16 +112,11 @@ def test_eulers_column_buckles_at_its_load_though_its_straight_path_goes_on():
 
 
 def test_a_column_braced_by_prestressed_cables_buckles_at_timoshenkos_load():
-    points = np.vstack([line(24), [[0.5, 0.0, 1.0], [0.5, 0.0, -1.0]]])
-    fixed = np.zeros((27, 6), dtype=bool)
-    fixed[:, [1, 3, 5]] = True
-    fixed[0, :3] = fixed[24, 2] = fixed[25:, :3] = True
-    ends = np.column_stack([np.arange(24), np.arange(1, 25)])
-    beams = make_beams(points, ends, axial=1e6, torsion=1.0, bending_y=1.0, bending_z=1.0)
-    cables = make_cables([[12, 25], [12, 26]], rest_length=0.95, stiffness=25.0)
-    network = Network(points, beams, cables, fixed, np.zeros((27, 6)))
+    network = braced_column(24, 0.95)
     reference = exact.braced_column(50.0 / 0.95)
-    model = Model(network, {"load": load_at(network, 24, [-8.0, 0.0, 0.0])}, at_rest(points), (0, 24, 25, 26))
+    model = Model(
+        network, {"load": load_at(network, 24, [-8.0, 0.0, 0.0])}, at_rest(network.nodes), (0, 24, 25, 26)
+    )
     end = critical_of(model)
     assert 8.0 * end.factor == pytest.approx(reference, rel=5e-3)
     assert end.kind == BIFURCATION
