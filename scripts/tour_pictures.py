@@ -1,7 +1,7 @@
-"""Makes the README's pictures from a finished run of scripts/scale_model.toml, small enough to be kept beside
+"""Makes the README's pictures from a finished run of scripts/scale_model_radius.toml, small enough to be kept beside
 the code.
 
-scripts/shellform design scripts/scale_model.toml --output runs/scale_model
+scripts/shellform design scripts/scale_model_radius.toml --output runs/scale_model
 python scripts/tour_pictures.py runs/scale_model
 """
 
