@@ -43,9 +43,10 @@ SOURCES: Final[Mapping[str, str]] = {
     "carries",
     "load_all": "JCSS Probabilistic Model Code part 2.1: concrete's density 0.04, with the mean thickness "
     "0.05 together",
-    "load_uneven": "EN 12812, 8.2.5: concrete is placed unevenly; one half 5 % more and the other 5 % less",
+    "load_uneven": "EN 12812, 8.2.5: concrete is placed unevenly; one half 5 % more and the other 5 % less; "
+    "scale model: weights are hung crossing by crossing, 1 %",
     "shape": "EN 1993-1-6, 8.7: imperfections in the shape of the softest modes; half of L/1000, what other "
-    "causes don't hold",
+    "causes don't hold; scale model: what callipers leave, 0.1 mm in a metre",
 }
 
 
@@ -116,8 +117,8 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
         connectors=0.1,
         load_each=0.1,
         load_all=0.05,
-        load_uneven=0.05,
-        shape=0.0005,
+        load_uneven=0.01 if model else 0.05,
+        shape=1e-4 if model else 5e-4,
     )
 
 

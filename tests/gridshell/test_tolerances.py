@@ -21,6 +21,9 @@ def test_the_scale_model_is_built_more_closely_than_a_shell_of_eighteen_metres(s
     assert large.cable_length == pytest.approx(2.4e-3)
     assert large.supports == 5e-3
     assert large.marks == pytest.approx(3.15e-3)
+    # weights hung one by one, a shape set by callipers; concrete placed unevenly, a shape as in EN 1993-1-6
+    assert (small.load_uneven, small.shape) == (0.01, 1e-4)
+    assert (large.load_uneven, large.shape) == (0.05, 5e-4)
 
 
 def test_a_longer_rod_is_marked_less_closely():
