@@ -92,7 +92,7 @@ class SequentialConvex:
 
     batch: int = 8
     kept: float = 0.4
-    thrift: float = 1.5
+    thrift: float = 1.1
     failures: int = 6
     idle: float = 0.2
     repairs: int = 2
