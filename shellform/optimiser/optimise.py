@@ -20,8 +20,9 @@ Designs that are to stand as built keep more of that stiffness at first, and are
 the same for each (trial_structures.py): after the descent, and each time cables have been taken away, before
 the others are optimised again: that serves the objective with what makes a design stand. From then on the
 stiffness is no limit but a means. A design that falls is asked for more of it, and steps towards that follow,
-until it stands; where one with less than was asked for stands, thinning goes on from there. Where no design
-near one that falls stands, the search goes back to the last one that does, or takes fewer cables away. At the
+until it stands; where one with less than was asked for stands, thinning goes on from there. Where that
+leads to none after the descent, the structures that fall are kept in mind and lead it (minding.py). Where no
+design near one that falls stands, the search goes back to the last one that does, or takes fewer cables away. At the
 end a fresh sample judges, for the search has chosen its designs by their luck with the first one. The cables
 that are left keep a tension that errors don't use up.
 
@@ -48,6 +49,7 @@ from shellform.gridshell.grouping import averaged
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes, minimise_directly
 from shellform.optimiser.optimum import Checkpoint, Optimum
 from shellform.optimiser.phases import run
+from shellform.optimiser.resuming import resumed
 from shellform.optimiser.search_state import (
     Iterate,
     Keep,
@@ -57,7 +59,6 @@ from shellform.optimiser.search_state import (
     accepted_design,
     finish,
     record,
-    resumed,
     stiff,
 )
 from shellform.optimiser.solver import POLISHING, SequentialConvex

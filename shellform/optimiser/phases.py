@@ -12,18 +12,20 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices
+from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
+from shellform.optimiser.minding import joined, led, missed_without, ready_to_lead, remembering
 from shellform.optimiser.proposal import propose
+from shellform.optimiser.resuming import tell
 from shellform.optimiser.search_state import (
     Iterate,
     Search,
     accepted_design,
+    aimed,
     merit,
     noted,
     restiffened,
-    stiff,
     stiffness_of,
     taut_count,
-    tell,
     violation,
 )
 from shellform.optimiser.step_model import StepModel
@@ -32,7 +34,6 @@ from shellform.optimiser.trials import (
     accepted,
     attempt,
     attempt_without,
-    confirmed,
     reach,
     sound,
     staged,
@@ -53,73 +54,17 @@ def run(search: Search, it: Iterate) -> Iterate:
     if it.phase == "climb":
         it = replace(_climb(search, it), phase="descend")
     if it.phase == "descend":
-        it = _last_sound(search, _descend(search, it))
+        it = last_sound(search, _descend(search, it))
         each_cable = any(block.of_each_cable for block in search.problem.variables)
         if it.accepted and search.solver.thin and each_cable:
             it = _stiffened(search, it)
         else:
-            it = _last_standing(search, it)
+            it = last_standing(search, it)
+    if it.phase == "lead":
+        it = _led(search, it)
     if it.phase == "thin":
         it = _thin(search, it)
-    return _confirmed(search, it)
-
-
-def _confirmed(search: Search, it: Iterate) -> Iterate:
-    """Back to the last accepted design of which a fresh sample agrees that it stands, in steps of 1, 2, 4,
-    ...: the search has chosen its designs by their luck with the structures it tried."""
-    if search.asked is None or not it.accepted:
-        return it
-    back = 0
-    while back < len(it.accepted):
-        own = it.accepted[: len(it.accepted) - back]
-        if confirmed(search, own[-1].built):
-            if back == 0:
-                return it
-            found = _last_sound(search, replace(it, accepted=own))
-            if found.accepted and len(found.accepted) == len(own):
-                return replace(found, status=f"{it.status}; the last design that a fresh sample confirms")
-        back = 2 * back + 1
-    return replace(it, status=f"{it.status}; a fresh sample doesn't confirm that it stands as built")
-
-
-def _last_standing(search: Search, it: Iterate) -> Iterate:
-    """Back, by bisection, to the last accepted design that stands as built."""
-    if search.asked is None or not it.accepted:
-        return it
-    holds, it = standing(search, it, it.accepted[-1].built)
-    if holds:
-        return it
-    stood, fell = -1, len(it.accepted) - 1  # whether the start stands is found out at last
-    while fell - stood > 1:
-        middle = max((stood + fell) // 2, 0)
-        holds, it = standing(search, it, it.accepted[middle].built)
-        stood, fell = (middle, fell) if holds else (stood, middle)
-    back = replace(it, accepted=it.accepted[: stood + 1])
-    found = _last_sound(search, back) if back.accepted else back
-    if not found.accepted:  # none stands: the search goes on with what it has, and whoever judges says so
-        return replace(it, status=f"{it.status}; no design was found that stands as built")
-    return found
-
-
-def _last_sound(search: Search, it: Iterate) -> Iterate:
-    """Back to the last accepted design that its documented path leads to."""
-    while it.accepted:
-        found = sound(search, it.accepted[-1])
-        if found is not None:
-            last = accepted_design(search, found)
-            it = replace(it, accepted=(*it.accepted[:-1], last))
-            return _at(search, it, found)
-        it = replace(it, accepted=it.accepted[:-1])
-    return it
-
-
-def _at(search: Search, it: Iterate, point: Linearisation) -> Iterate:
-    """At the point, whose design may have other cables than the present one."""
-    if np.array_equal(point.design.present, it.point.design.present):
-        return replace(it, point=point)
-    count = int(point.design.present.sum())
-    every = np.full(count, search.always_guarded)
-    return replace(it, point=point, tensioned=every, needed=np.zeros(count, dtype=bool))
+    return last_confirmed(search, it)
 
 
 def _climb(search: Search, it: Iterate) -> Iterate:
@@ -207,7 +152,24 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
     found, other = _made_to_stand(search, replace(begun, tensioned=_tensioned(search, it)), it.point)
     if found is not None:
         return _ready_to_thin(search, accepted(search, other, found))
-    it = _last_standing(search, replace(it, fallen=other.fallen))
+    fell = it.accepted[-1].built
+    it = last_standing(search, replace(it, fallen=other.fallen))
+    leading = ready_to_lead(search, it, fell) if it.accepted else None
+    return leading or _ready_as_it_is(search, it)
+
+
+def _led(search: Search, it: Iterate) -> Iterate:
+    """Ready to thin at a design to which drawn structures have led; where they lead to none, at the last one
+    that stood."""
+    stands, it = led(search, it, _descend)
+    if stands:
+        return _ready_to_thin(search, it)
+    it = restiffened(search, replace(it, mind=None, remembered=None), it.stiffness)
+    return _ready_as_it_is(search, last_sound(search, replace(it, accepted=it.accepted[: it.stood])))
+
+
+def _ready_as_it_is(search: Search, it: Iterate) -> Iterate:
+    """Ready to thin, with the stiffness that the design has."""
     return _ready_to_thin(search, _aiming_for(search, it, max(it.stiffness, stiffness_of(search, it.point))))
 
 
@@ -233,11 +195,16 @@ def _made_to_stand(search: Search, it: Iterate, trial: Linearisation) -> tuple[L
         before = stiffness_of(search, found)
         if not more or before <= 0.0 or search.left() <= 0:
             break
+        if it.mind is not None:
+            own = (*it.accepted, accepted_design(search, found))
+            it = replace(joined(search, replace(it, point=found, accepted=own)), accepted=it.accepted)
+            trial, it = _repaired(search, it, it.point)
+            continue
         it = restiffened(search, replace(it, point=found), solver.stiffer * before)
         trial, it = _repaired(search, it, it.point)
         if stiffness_of(search, trial) < (1.0 + _STIFFER) * before:
             break
-    search.evaluator.problem = stiff(search.inner, begun.stiffness)
+    search.evaluator.problem = aimed(search.inner, begun.stiffness, begun.mind)
     return None, replace(begun, fallen=it.fallen, fell=it.fell)
 
 
@@ -311,12 +278,15 @@ def _thin(search: Search, it: Iterate) -> Iterate:
             needed = it.needed.copy()
             needed[leaving] = alone
             it = replace(it, needed=needed, failures=it.failures + alone, batch=max(1, len(leaving) // 3))
-            if it.fell:  # a repair mayn't spend what made the present design stand
+            if it.fell and it.mind is None:  # a repair mayn't spend what made the present design stand
                 it = _aiming_for(search, it, stiffness_of(search, it.point))
             continue
         it = accepted(search, it, found)
         it = replace(it, failures=0, batch=int(1.3 * it.batch) + 1)
-        it = _aiming_for(search, it, solver.softer * stiffness_of(search, it.point))
+        if it.mind is None:
+            it = _aiming_for(search, it, solver.softer * stiffness_of(search, it.point))
+        else:
+            it = remembering(search, it)
     status = it.status + (
         ", and no further cable can be taken away"
         if it.failures >= solver.failures
@@ -373,5 +343,7 @@ def _leaving(search: Search, it: Iterate, model: StepModel) -> Indices:
     loss = 1.0 - np.diag(kept)
     pull = model.origin[: len(loss)]
     score = loss / loss.sum() + pull / pull.sum()
+    if it.mind is not None:
+        score += missed_without(search, it, model)
     free = np.flatnonzero((pull > 0.0) & ~it.needed)
     return removable(kept, free[np.argsort(score[free], kind="stable")], it.batch, search.solver.kept)

@@ -4,8 +4,9 @@ In windows u = (y - y0)/w the objective is slope'u + u'H u/2 with the Gauss-Newt
 are linear, held at a distance that covers what the last trial showed of their curvature (as Svanberg's
 approximations, 2002, are corrected by theirs, but by a constant, which shrinks with the window). The bounds
 are those of the window, of the variables (3), (4) and of cable forces (5) under the design load. NLopt's MMA
-solves it. Where cables are to stay taut under the further loads (guards.py), or cables alike keep one length
-(grouping.py), it has hundreds of constraints and goes to the interior-point method (quadratic.py).
+solves it. Where cables are to stay taut under the further loads (guards.py), cables alike keep one length
+(grouping.py), or many structures are kept in mind (minding.py), it has more constraints than MMA's dual comes to
+an end with and goes to the interior-point method (quadratic.py).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from shellform.problem.constraints import Constraint
 
 _WIDE = 1e3  # windows, no bound on a group's step beside those on its cables
 _TOLERANCE = 1e-9  # relative, of the convex model's optimum: well below what a step is judged by
+_FEW = 8  # constraints, beyond which MMA's dual may not come to an end
 _NONE = 1e-3  # of the mean tension: less is none, which MMA leaves of cables that die
 
 
@@ -80,7 +82,7 @@ def propose(task: Task) -> tuple[Reals, float]:
         u = _equal_steps(
             task, width, scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high
         )
-    elif task.guards:
+    elif task.guards or len(values) > _FEW:
         u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
         if u is None:
             u = _as_far_as_can_be(task, scaled_curvature, scaled_slope, scaled_rows, values, low, high)

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,16 +21,19 @@ from shellform.problem.constraints import AtLeast, Constraint, residuals
 from shellform.problem.engineering import ModalStiffness
 from shellform.problem.evaluation import Evaluator, Linearisation
 from shellform.problem.paths import follow, in_tension, without_slack
-from shellform.problem.problem import FEASIBLE, Problem
+from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.problem.terms import Term
-from shellform.reliability.trial_structures import Demand
-from shellform.structure.elements.state import State
+from shellform.reliability.scenarios import FactorsAsBuilt, scenarios
+from shellform.reliability.scenarios import remembered as remembered_in
+from shellform.reliability.trial_structures import SEED, Demand, enlarged, largest_on_path
 from shellform.structure.solve.loading import Loaded
 
 Watch = Callable[[Step], None]
 Keep = Callable[[Checkpoint], None]
 
-_COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
+_FOLLOWED = 1.25  # times what structures in mind are to bear: beyond, steps see no end of their branch
+_MAY_MISS = 0.02  # of an aim: along its edge a step that is judged to the last bit leads nowhere
+_NEARLY = 0.01  # of the stiffness left, to which the end of their branch is sought
 
 
 @dataclass(frozen=True)
@@ -104,7 +107,10 @@ class Iterate:
     `status`. Descending: whether the last trial was `refused`; the objective `before` this turn. Thinning:
     the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables
     `needed` (c,). As built: structures that have `fallen`, the last ones first; whether the last design
-    judged `fell`.
+    judged `fell`; drawn structures that the search keeps in `mind`, which are to bear their loads, and the
+    design in which they are `remembered`, None where nothing but stiffness leads it. Leading: how many
+    designs were accepted when the last one `stood`, which `turn` it is, and the design evaluations `until`
+    which it lasts.
     """
 
     point: Linearisation
@@ -128,12 +134,11 @@ class Iterate:
     needed: Flags = field(default_factory=lambda: np.zeros(0, dtype=bool))
     fallen: tuple[int, ...] = ()
     fell: bool = False
-
-
-_ARRAYS = ("tensioned", "excess", "needed")
-_NUMBERS = tuple(
-    each.name for each in fields(Iterate) if each.name not in (*_ARRAYS, "point", "accepted", "history")
-)
+    mind: FactorsAsBuilt | None = None
+    remembered: Design | None = None
+    stood: int = 0
+    turn: int = 0
+    until: int = 0
 
 
 class Models:
@@ -186,12 +191,40 @@ def stiff(problem: Problem, least: float) -> Problem:
     return replace(problem, constraints=[*problem.constraints, *added])
 
 
+def aimed(problem: Problem, least: float, mind: FactorsAsBuilt | None) -> Problem:
+    """The problem with what leads a search beside its own limits: the stiffness, N/m, and what structures that
+    it keeps in mind are to bear."""
+    problem = stiff(problem, least)
+    if mind is None:
+        return problem
+    return replace(problem, constraints=[*problem.constraints, AtLeast(1.0, mind)])
+
+
 def restiffened(search: Search, it: Iterate, least: float) -> Iterate:
     """With another stiffness, N/m, to keep; the window begins anew."""
-    search.evaluator.problem = stiff(search.inner, least)
+    search.evaluator.problem = aimed(search.inner, least, it.mind)
     point = search.evaluator.seed(it.point.design, it.point.states, it.stage)
     excess = np.zeros(len(point.constraints))
     return replace(it, stiffness=least, point=point, excess=excess, window=search.first_window)
+
+
+def kept_in_mind(search: Search, design: Design, least: Mapping[int, float]) -> FactorsAsBuilt:
+    """The structures of the numbers in `least`, drawn as trials draw them, as scenarios of the search with the
+    factors of the largest load that they are to bear, remembered in the design. Raises NotConverged."""
+    assert search.asked is not None
+    problem, asked, safety = search.problem, search.asked.trial, search.asked.trial.safety
+    largest, _ = largest_on_path(asked)
+    drawn = scenarios(
+        problem.shell,
+        design,
+        LoadCase(largest, asked.loads[largest]),
+        enlarged(safety.tolerances, safety.enlarged),
+        seed=safety.seed + SEED,
+        least=least,
+        most=_FOLLOWED * max(least.values()),
+        exact=_NEARLY,
+    )
+    return remembered_in(problem.shell, design, drawn)
 
 
 def stiffness_of(search: Search, point: Linearisation) -> float:
@@ -200,7 +233,11 @@ def stiffness_of(search: Search, point: Linearisation) -> float:
     problem, count = search.evaluator.problem, len(search.inner.constraints)
     added = zip(problem.constraints[count:], problem.places()[count:], strict=True)
     # residuals are limit / scale - value / scale, value and limit squares
-    squares = [part.lower - part.scale * float(point.constraints[own].max()) for part, own in added]
+    squares = [
+        part.lower - part.scale * float(point.constraints[own].max())
+        for part, own in added
+        if isinstance(part.term, ModalStiffness)
+    ]
     return float(np.sqrt(max(min(squares, default=0.0), 0.0)))
 
 
@@ -215,17 +252,31 @@ def taut_count(search: Search, point: Linearisation) -> int:
 
 
 def violation(search: Search, point: Linearisation) -> float:
-    """Of the constraint that is broken most, as a share of its scale; 0 where all hold."""
-    values = [float(point.constraints.max(initial=-1.0))]
+    """Of the constraint that is broken most, as a share of its scale; 0 where all hold. What structures kept
+    in mind are to bear is an aim and no limit: whoever judges draws them again."""
+    limits = len(point.constraints) - _in_mind(search)
+    values = [float(point.constraints[:limits].max(initial=-1.0))]
     pull = tensions(search, point).max(initial=0.0)
     values += [float(residuals(part, np.array([pull]))[0]) for part in search.bounded]
     largest = max(values)
     return largest if largest > FEASIBLE else 0.0
 
 
+def missed(search: Search, point: Linearisation) -> float:
+    """By what share of what it is to bear a structure in mind misses it, beyond what an aim may be missed by."""
+    aims = len(point.constraints) - _in_mind(search)
+    return max(float(point.constraints[aims:].max(initial=0.0)) - _MAY_MISS, 0.0)
+
+
+def _in_mind(search: Search) -> int:
+    """How many of the constraints, the last ones, are structures that the search keeps in mind."""
+    added = search.evaluator.problem.constraints[len(search.inner.constraints) :]
+    return sum(len(part.term.scenarios) for part in added if isinstance(part.term, FactorsAsBuilt))
+
+
 def merit(search: Search, point: Linearisation) -> float:
     """The objective and a penalty for the constraint that is broken most."""
-    return point.objective + search.solver.penalty * max(violation(search, point), 0.0)
+    return point.objective + search.solver.penalty * max(violation(search, point), missed(search, point), 0.0)
 
 
 def noted(search: Search, it: Iterate, point: Linearisation, accepted: bool) -> Iterate:
@@ -245,6 +296,7 @@ def record(search: Search, point: Linearisation, stage: float, accepted: bool) -
     constraints |= {
         _column(search, part.term): float(point.constraints[own].max(initial=-np.inf))
         for part, own in zip(problem.constraints, problem.places(), strict=True)
+        if part in search.inner.constraints or not isinstance(part.term, FactorsAsBuilt)
     }
     step = Step(
         search.evaluator.evaluations,
@@ -263,55 +315,6 @@ def record(search: Search, point: Linearisation, stage: float, accepted: bool) -
 
 def _column(search: Search, term: Term) -> str:
     return term.name if term.load in ("", search.base) else f"{term.name}.{term.load}"
-
-
-def tell(search: Search, it: Iterate) -> None:
-    """Hands out where the search stands."""
-    if search.keep is None:
-        return
-    numbers = {name: getattr(it, name) for name in _NUMBERS}
-    numbers |= {name: getattr(search.evaluator, name) for name in _COUNTS}
-    design = it.point.design
-    arrays = {"rest_length": design.rest_length, "present": design.present}
-    arrays |= {name: getattr(it, name) for name in _ARRAYS}
-    arrays |= {
-        "accepted rest_length": np.array([each.design.rest_length for each in it.accepted]),
-        "accepted present": np.array([each.design.present for each in it.accepted]),
-        "accepted radius": np.array([each.design.radius for each in it.accepted]),
-        "accepted taut": np.array([each.taut for each in it.accepted]),
-        "accepted violation": np.array([each.violation for each in it.accepted]),
-    }
-    for name, state in it.point.states.items():
-        arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
-    search.keep(Checkpoint(numbers | {"radius": design.radius}, arrays, it.history))
-
-
-def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
-    """Where a search of the same problem, start and settings stood."""
-    numbers, arrays = checkpoint.numbers, checkpoint.arrays
-    design = Design(arrays["rest_length"], np.array(arrays["present"]), numbers["radius"])
-    search.evaluator.problem = stiff(search.inner, numbers["stiffness"])
-    states = {
-        name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"])
-        for name in search.evaluator.problem.used()
-    }
-    point = search.evaluator.seed(design, states, numbers["stage"])
-    for name in _COUNTS:
-        setattr(search.evaluator, name, numbers[name])
-    kept = {name: numbers[name] for name in _NUMBERS} | {name: np.array(arrays[name]) for name in _ARRAYS}
-    kept["fallen"] = tuple(kept["fallen"])
-    before = tuple(
-        Accepted(Design(rest, np.array(present), float(radius)), np.array(taut), float(share))
-        for rest, present, radius, taut, share in zip(
-            *(
-                arrays[f"accepted {name}"]
-                for name in ("rest_length", "present", "radius", "taut", "violation")
-            ),
-            strict=True,
-        )
-    )
-    began = search.began - checkpoint.history[-1].seconds
-    return replace(search, began=began), Iterate(point, before, tuple(checkpoint.history), **kept)
 
 
 def finish(search: Search, it: Iterate) -> Optimum:

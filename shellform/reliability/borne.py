@@ -29,31 +29,36 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import NotConverged
-from shellform.reliability.branch import Here
-from shellform.reliability.path_of_one import STEP, Loading
+from shellform.reliability.branch import ON_THE_WAY, Here
+from shellform.reliability.path_of_one import Loading
 from shellform.structure.answers.sensitivity import by_rest_length, by_stiffness
 from shellform.structure.answers.stability import modes
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Part
+from shellform.structure.elements.state import State
 
 _RESOLUTION = 1 / 64  # of the load, to which the end of the branch is known before it is sought exactly
 _NARROW = 1e-3  # of the load, between whose ends one cable at most is taken to go slack
 _SHORT = 0.99  # of the way to where a cable goes slack: the tangent beyond is another one
 _AT_ONCE = 1e-9  # of the load, before a cable goes slack
-_EXACT = 1e-8  # relative, of the stiffness left
+EXACT = 1e-8  # relative, of the stiffness left
 _STEPS = 40
+CAREFUL = 1 / 8  # of the load, the steps from nothing: larger ones may leap over a short unstable stretch …
+_NEAR = 1 / 16  # … as may those from a state of a design nearby
+_SETTLING = 8  # factorisations of that state in this design
 
 
 @dataclass(frozen=True)
 class BorneFactor:
     """How much of a load a structure bears: the `factor`; by all rest lengths of the present cables
     `factor_by_rest_length` (p,), 1/m, and `factor_by_rate` (k,) by variables on which the beams' stiffness
-    depends. Both are 0 where the branch goes on beyond what was asked for."""
+    depends. Both are 0 where the branch goes on beyond what was asked for. The `state` under that load."""
 
     factor: float
     factor_by_rest_length: Reals
     factor_by_rate: Reals
+    state: State
 
 
 @dataclass(frozen=True)
@@ -78,11 +83,21 @@ class _End:
     by_rate: Reals
 
 
-def borne(loading: Loading, *, left: float, most: float, rates: Sequence[Part] = ()) -> BorneFactor:
-    """The factor up to which the structure keeps the stiffness `left`, N/m, `most` where it does so beyond;
-    `rates` are the beams as built with the derivatives of their stiffness by further variables. Raises
-    NotConverged where there is no unloaded equilibrium."""
-    here, factor = loading.followed(most, STEP, _RESOLUTION)
+def borne(
+    loading: Loading,
+    *,
+    left: float,
+    most: float,
+    rates: Sequence[Part] = (),
+    exact: float = EXACT,
+    near: tuple[float, State] | None = None,
+) -> BorneFactor:
+    """The factor up to which the structure keeps the stiffness `left`, N/m, to a relative error `exact` of it,
+    `most` where it does so beyond; `rates` are the beams as built with the derivatives of their stiffness by
+    further variables. From nothing, or from a factor and a state `near` it, of the same structure in a design
+    nearby, if Newton's steps from there keep every tangent definite. Raises NotConverged where there is no
+    unloaded equilibrium."""
+    here, factor = _followed(loading, most, near)
     if here is None:
         raise NotConverged(
             f"Structure {loading.number} as built has no unloaded equilibrium",
@@ -91,7 +106,7 @@ def borne(loading: Loading, *, left: float, most: float, rates: Sequence[Part] =
         )
     low = _point(loading, here, factor)
     if factor >= most and low.stiffness >= left:
-        return BorneFactor(most, np.zeros(len(low.taut)), np.zeros(len(rates)))
+        return BorneFactor(most, np.zeros(len(low.taut)), np.zeros(len(rates)), low.here.state)
     if low.stiffness >= left:
         above, high = factor + _RESOLUTION, None
     else:
@@ -99,7 +114,7 @@ def borne(loading: Loading, *, left: float, most: float, rates: Sequence[Part] =
         low = _stiff(loading, low, left)
     for _ in range(_STEPS):
         for each in (low, high):
-            if each is not None and abs(each.stiffness - left) <= _EXACT * left:
+            if each is not None and abs(each.stiffness - left) <= exact * left:
                 return _derived(loading, each, _softest(loading, each, rates), rates)
         if above - low.factor <= _NARROW and (high is None or (low.taut & ~high.taut).any()):
             end = _slackening(loading, low, above, left)
@@ -114,6 +129,15 @@ def borne(loading: Loading, *, left: float, most: float, rates: Sequence[Part] =
         else:
             above, high = goal, middle
     raise _not_found(loading, low)
+
+
+def _followed(loading: Loading, most: float, near: tuple[float, State] | None) -> tuple[Here | None, float]:
+    if near is not None and near[0] < most:
+        factor, state = near
+        begin = loading.newton(state, factor * loading.load, limit=_SETTLING, tolerance=ON_THE_WAY)
+        if begin is not None:
+            return loading.along(begin, factor, most, _NEAR, _RESOLUTION)
+    return loading.followed(most, CAREFUL, _RESOLUTION)
 
 
 def _between(low: _Point, above: float, high: _Point | None, left: float) -> float:
@@ -204,7 +228,7 @@ def _derived(loading: Loading, point: _Point, end: _End, rates: Sequence[Part]) 
     along = float(adjoint @ loading.load.ravel()[own.free])
     by_rest = end.by_rest_length - by_rest_length(own, state, _cables(loading)).T @ adjoint
     by_rate = end.by_rate - by_stiffness(own, state, *rates).T @ adjoint
-    return BorneFactor(point.factor, -by_rest / along, -by_rate / along)
+    return BorneFactor(point.factor, -by_rest / along, -by_rate / along, state)
 
 
 def _cables(loading: Loading) -> Cables:

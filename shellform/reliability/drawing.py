@@ -39,6 +39,7 @@ from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State, moved
 
+PERFECT = -1  # the number of the structure without errors
 SHAPES = 3  # softest modes in which the shape is off
 _LEAST = 0.2  # of an element's length is left to it by errors of marks
 _LEAST_CABLE = 0.05  # of a cable's rest length
@@ -137,6 +138,13 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
         _load_factors(members, t, z),
         t.shape * members.span * z["shape"],
     )
+
+
+def drawn(members: Members, tolerances: Tolerances, seed: int, number: int) -> Errors:
+    """The errors of a structure under the seed; of number PERFECT none."""
+    if number == PERFECT:
+        return errors_of(members, Tolerances(), variables(members, seed, 0))
+    return errors_of(members, tolerances, variables(members, seed, number))
 
 
 def built_beams(nominal: Beams, errors: Errors, imperfections: Imperfections | None = None) -> Beams:

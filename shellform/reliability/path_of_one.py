@@ -4,6 +4,7 @@ method).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
@@ -34,6 +35,7 @@ _ALIGNED = (
 
 FAR = 0.05  # of the span from the perfect structure
 STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps
+MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
 _RELAXING = 15  # of the unloaded state, before it is sought from the target instead
 _PASSES = 2  # of bringing beams to their length
@@ -97,9 +99,9 @@ class Loading(Branch):
         own = bench.assembly.with_parts((beams, cables))
         super().__init__(own, built_load(nominal.load, errors), nominal.members.span)
 
-    def outcome(self, step: float, smallest: float) -> DrawnOutcome:
+    def outcome(self, step: float, smallest: float, marks: Sequence[float] = ()) -> DrawnOutcome:
         nominal = self.nominal
-        here, factor = self.followed(1.0, step, smallest)
+        here, factor = self.followed(1.0, step, smallest, marks=marks)
         if here is None:
             return DrawnOutcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent)
         if factor < 1.0:
@@ -111,13 +113,26 @@ class Loading(Branch):
         return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent)
 
     def followed(
-        self, most: float, step: float, smallest: float, *, begin: tuple[float, State] | None = None
+        self,
+        most: float,
+        step: float,
+        smallest: float,
+        *,
+        begin: tuple[float, State] | None = None,
+        marks: Sequence[float] = (),
     ) -> tuple[Here | None, float]:
         """The last state on the stable branch and its load factor, `most` where the branch goes on; None
         where there is no unloaded state. With `begin` from a state at a load factor that is known to lie on
-        the branch."""
+        the branch. The end is known to the `smallest` step, but next to factors in `marks`, where it decides
+        whether a structure stands, to MARKED."""
         factor, here = (0.0, self._unloaded()) if begin is None else (begin[0], self.at(begin[1]))
-        return (None, factor) if here is None else self.along(here, factor, most, step, smallest)
+        if here is None:
+            return None, factor
+        here, factor = self.along(here, factor, most, step, smallest)
+        for mark in sorted(marks):
+            if factor < mark <= min(factor + 2.0 * smallest, most):
+                here, factor = self.along(here, factor, mark, mark - factor, min(MARKED, smallest))
+        return here, factor
 
     def kind(self, here: Here) -> str:
         """What ends the branch just beyond the state: at a limit point the path's tangent turns into the

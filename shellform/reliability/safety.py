@@ -137,7 +137,12 @@ def judge(
     failed = []
     for largest, shares in paths(loads).items():
         workshop = Workshop(perfect(shell, design, loads[largest]))
-        outcomes = workshop.drawn(safety.tolerances, seed=safety.seed, numbers=range(safety.drawn))
+        outcomes = workshop.drawn(
+            safety.tolerances,
+            seed=safety.seed,
+            numbers=range(safety.drawn),
+            marks=tuple(shares.values()),
+        )
         for name, share in shares.items():
             fallen = tuple(
                 each.number

@@ -3,48 +3,56 @@
 A scenario is a drawn structure that a search keeps in mind: its errors and the shapes of its imperfections
 stay while the design changes, it is loaded from nothing on its own path, and how much of a load it bears has a
 value and exact derivatives (borne.py), whether it falls or stands. So a design in which it falls can be led to
-one in which it stands.
+one in which it stands. Once it was followed in a design (`remembered`), it is loaded in designs nearby from a
+state not far from its end, where Newton's steps lead there with every tangent definite.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Indices
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.problem import LoadCase
 from shellform.problem.terms import LoadedDesign, Measurement, Term
-from shellform.reliability.borne import BorneFactor, borne
-from shellform.reliability.drawing import Errors, Imperfections, built_beams, errors_of, variables
+from shellform.reliability.borne import CAREFUL, EXACT, BorneFactor, borne
+from shellform.reliability.drawing import Errors, Imperfections, built_beams, drawn
 from shellform.reliability.path_of_one import Loading
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
 
 _STIFFNESS_LEFT = 0.1  # of the unloaded perfect structure's
+_BEFORE = 0.9  # of the factor that a scenario bears, where it is remembered …
+_BEFORE_RESOLUTION = 1 / 16  # … or this much of the load before
 
 
 @dataclass(frozen=True)
 class Scenario:
-    """A drawn structure: its `number` under a seed, and its `errors`."""
+    """A drawn structure: its `number` under a seed, its `errors`, the factor of the load that it is to bear at
+    `least`, and where it is remembered, a factor that it bears with its state, `near`."""
 
     number: int
     errors: Errors
+    least: float = 1.0
+    near: tuple[float, State] | None = None
 
 
 @dataclass(frozen=True)
 class FactorsAsBuilt(Term):
     """The factors of the load `case` up to which the `scenarios`, whose shapes have these `imperfections`, keep
-    the stiffness `left`, N/m, none followed beyond `most`: one value a scenario. Each has an equilibrium of
-    its own, so that the term needs none of the perfect structure's."""
+    the stiffness `left`, N/m, over those that they are to bear: one value a scenario, none followed beyond
+    the factor `most`, the end of none sought closer than to a relative error `exact` of the stiffness left.
+    Each has an equilibrium of its own, so that the term needs none of the perfect structure's."""
 
     name = "factor_as_built"
     stabilises = True
@@ -53,10 +61,11 @@ class FactorsAsBuilt(Term):
     imperfections: Imperfections
     left: float
     most: float = 1.5
+    exact: float = EXACT
     load: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("left", "most"):
+        for name in ("left", "most", "exact"):
             value = getattr(self, name)
             if not (value > 0.0 and np.isfinite(value)):
                 raise InputError("must be positive and finite", where=f"factors_as_built.{name}", value=value)
@@ -66,16 +75,18 @@ class FactorsAsBuilt(Term):
         return len(self.scenarios)
 
     def measure(self, at: LoadedDesign) -> Measurement:
-        """The factors. Raises NotConverged where a structure has no unloaded equilibrium."""
+        """The factors over the least ones. Raises NotConverged where a structure has no unloaded
+        equilibrium."""
         shell, design = at.shell, at.design
         rate = shell.beams_by_radius(design.radius)
         found = borne_factors(shell, design, self, rates=(rate,))
+        share = 1.0 / np.array([each.least for each in self.scenarios])
         rows = np.zeros((len(found), len(shell.cable_ends)))
         rows[:, design.present] = [each.factor_by_rest_length for each in found]
         return Measurement(
-            np.array([each.factor for each in found]),
-            by_rest_length=sp.csr_array(rows),
-            by_radius=np.array([each.factor_by_rate[0] for each in found]),
+            share * np.array([each.factor for each in found]),
+            by_rest_length=sp.csr_array(share[:, None] * rows),
+            by_radius=share * np.array([each.factor_by_rate[0] for each in found]),
         )
 
 
@@ -86,21 +97,39 @@ def scenarios(
     tolerances: Tolerances,
     *,
     seed: int,
-    numbers: Indices,
+    least: Mapping[int, float],
     most: float = 1.5,
+    exact: float = EXACT,
 ) -> FactorsAsBuilt:
-    """The drawn structures of these `numbers` under the `seed` as scenarios of the load `case`; imperfections
-    of shape follow the softest modes of this `design`. Raises NotConverged where it has no unloaded
-    equilibrium."""
+    """The drawn structures of the numbers in `least` under the `seed` as scenarios of the load `case`, with the
+    factors of it that they are to bear; imperfections of shape follow the softest modes of this `design`.
+    Raises NotConverged where it has no unloaded equilibrium."""
     nominal = perfect(shell, design, case.force)
     left = _STIFFNESS_LEFT * float(modes(assemble(nominal.network), nominal.unloaded, 1).stiffness[0])
-    drawn = tuple(
-        Scenario(
-            int(number), errors_of(nominal.members, tolerances, variables(nominal.members, seed, int(number)))
-        )
-        for number in numbers
+    own = tuple(
+        Scenario(number, drawn(nominal.members, tolerances, seed, number), factor)
+        for number, factor in least.items()
     )
-    return FactorsAsBuilt(case, drawn, nominal.imperfections, left, most)
+    return FactorsAsBuilt(case, own, nominal.imperfections, left, most, exact)
+
+
+def remembered(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> FactorsAsBuilt:
+    """The same with a factor and a state of each scenario in this design, not far from its end. Raises
+    NotConverged."""
+    ends = borne_factors(shell, design, asked)
+    workshop = _workshop(shell, design, asked)
+
+    def one(work: tuple[Scenario, BorneFactor]) -> Scenario:
+        scenario, end = work
+
+        def followed(loading: Loading) -> tuple[float, State] | None:
+            here, factor = loading.followed(_BEFORE * end.factor, CAREFUL, _BEFORE_RESOLUTION)
+            return None if here is None else (factor, here.state)
+
+        near = workshop.with_structure(scenario.errors, followed, number=scenario.number)
+        return replace(scenario, near=near)
+
+    return replace(asked, scenarios=tuple(side_by_side(one, list(zip(asked.scenarios, ends, strict=True)))))
 
 
 def borne_factors(
@@ -108,15 +137,25 @@ def borne_factors(
 ) -> list[BorneFactor]:
     """The factor of each scenario and its derivatives by the rest lengths and by variables on which the
     beams' stiffness depends at one of the `rates`. Raises NotConverged."""
-    shape = asked.imperfections
-    nominal = perfect(shell, design, asked.case.force, shapes=0, followed=False)
-    workshop = Workshop(replace(nominal, imperfections=shape))
+    workshop = _workshop(shell, design, asked)
 
     def one(scenario: Scenario) -> BorneFactor:
         def followed(loading: Loading) -> BorneFactor:
-            built = tuple(built_beams(rate, scenario.errors, shape) for rate in rates)
-            return borne(loading, left=asked.left, most=asked.most, rates=built)
+            built = tuple(built_beams(rate, scenario.errors, asked.imperfections) for rate in rates)
+            return borne(
+                loading,
+                left=asked.left,
+                most=asked.most,
+                rates=built,
+                exact=asked.exact,
+                near=scenario.near,
+            )
 
         return workshop.with_structure(scenario.errors, followed, number=scenario.number)
 
     return side_by_side(one, list(asked.scenarios))
+
+
+def _workshop(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> Workshop:
+    nominal = perfect(shell, design, asked.case.force, shapes=0, followed=False)
+    return Workshop(replace(nominal, imperfections=asked.imperfections))

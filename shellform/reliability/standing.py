@@ -91,10 +91,19 @@ class Workshop:
         self._idle.put(Bench(nominal, self._first))
 
     def load(
-        self, errors: Errors, *, number: int = 0, step: float = STEP, smallest: float = SMALLEST
+        self,
+        errors: Errors,
+        *,
+        number: int = 0,
+        step: float = STEP,
+        smallest: float = SMALLEST,
+        marks: Sequence[float] = (),
     ) -> DrawnOutcome:
-        """The structure with the errors, loaded from nothing."""
-        return self.with_structure(errors, lambda loading: loading.outcome(step, smallest), number=number)
+        """The structure with the errors, loaded from nothing, and surely on which side of load factors in
+        `marks` it falls."""
+        return self.with_structure(
+            errors, lambda loading: loading.outcome(step, smallest, marks), number=number
+        )
 
     def limit(
         self,
@@ -105,12 +114,13 @@ class Workshop:
         resolution: float = 1 / 64,
         tell: bool = True,
         begin: tuple[float, State] | None = None,
+        marks: Sequence[float] = (),
     ) -> Limit:
         """Where the structure with the errors loses stability under its growing load, which with `begin` is
-        known to bear a factor of it in a state; what ends its path is looked into only to `tell` it."""
+        known to bear a factor of it in a state, and surely on which side of factors in `marks`; what ends its path is looked into only to `tell` it."""
 
         def ended(loading: Loading) -> Limit:
-            here, factor = loading.followed(most, step, resolution, begin=begin)
+            here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks)
             if here is None:
                 return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
             kind = BORNE if factor >= most else (loading.kind(here) if tell else ENDED)
@@ -127,14 +137,20 @@ class Workshop:
             self._idle.put(own)
 
     def drawn(
-        self, tolerances: Tolerances, *, seed: int, numbers: Sequence[int], step: float = STEP
+        self,
+        tolerances: Tolerances,
+        *,
+        seed: int,
+        numbers: Sequence[int],
+        step: float = STEP,
+        marks: Sequence[float] = (),
     ) -> list[DrawnOutcome]:
-        """The structures of these numbers under the seed."""
+        """The structures of these numbers under the seed, each as `load` loads it."""
         members = self.nominal.members
 
         def one(number: int) -> DrawnOutcome:
             errors = errors_of(members, tolerances, variables(members, seed, number))
-            return self.load(errors, number=number, step=step)
+            return self.load(errors, number=number, step=step, marks=marks)
 
         return side_by_side(one, list(numbers))
 

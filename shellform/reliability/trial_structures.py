@@ -22,7 +22,7 @@ from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import Errors, errors_of, variables
+from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.members import Members
 from shellform.reliability.path_of_one import STEP
 from shellform.reliability.perfect import perfect
@@ -30,7 +30,7 @@ from shellform.reliability.safety import Safety, allowed, critical_on_halved, pa
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.threads import side_by_side
 
-_SEED, _CONFIRMED = (
+SEED, _CONFIRMED = (
     1,
     100,
 )  # added to the safety's: a search doesn't see the structures that a finished design is judged by
@@ -136,9 +136,11 @@ def tried(
     *,
     first: Sequence[int] = (),
     critical: bool = True,
+    whole: bool = False,
 ) -> JudgedTrial:
-    """The design judged by the search's structures, the numbers `first` before the others. Raises
-    NotConverged where it has no unloaded equilibrium."""
+    """The design judged by the search's structures, the numbers `first` before the others, and no more of
+    them than it takes to refuse it but where the `whole` sample is asked for. Raises NotConverged where it
+    has no unloaded equilibrium."""
     safety, spent = asked.safety, 0
     fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
     order = [*first, *(number for number in range(safety.tried) if number not in set(first))]
@@ -153,31 +155,65 @@ def tried(
             wanted = _MESH * safety.critical_factor * shares[asked.design_load]
 
         def one(
-            number: int, members: Members = members, workshop: Workshop = workshop, wanted: float = wanted
+            number: int,
+            members: Members = members,
+            workshop: Workshop = workshop,
+            wanted: float = wanted,
+            shares: Mapping[str, float] = shares,
         ) -> tuple[float, int]:
-            """The share of the largest load that a structure bears; number -1 is the perfect one."""
-            most = 1.0
-            if number < 0:
-                most, errors = wanted, _none(members, safety.seed)
-            else:
-                errors = errors_of(members, larger, variables(members, safety.seed + _SEED, number))
-            found = workshop.limit(errors, most=most, step=STEP, resolution=_RESOLUTION, tell=False)
+            """The share of the largest load that a structure bears."""
+            most = wanted if number == PERFECT else 1.0
+            errors = drawn(members, larger, safety.seed + SEED, number)
+            found = workshop.limit(
+                errors,
+                most=most,
+                step=STEP,
+                resolution=_RESOLUTION,
+                tell=False,
+                marks=tuple(shares.values()),
+            )
             return found.factor, found.factorisations
 
-        queue = [-1, *order] if wanted > 0.0 else order
+        queue = [PERFECT, *order] if wanted > 0.0 else order
         for begin in range(0, len(queue), _AT_ONCE):
             numbers = queue[begin : begin + _AT_ONCE]
             for number, (factor, work) in zip(numbers, side_by_side(one, numbers), strict=True):
                 spent += work
-                if number < 0:
+                if number == PERFECT:
                     kept = factor >= wanted * (1.0 - _SAME)
                     continue
                 for name, share in shares.items():
                     if factor < share * (1.0 - _SAME):
                         fallen[name].append(number)
-            if not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares):
+            refused = not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares)
+            if refused and not whole:
                 return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, False, spent)
-    return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, True, spent)
+    enough = all(len(own) <= asked.fallen[name] for name, own in fallen.items())
+    return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, kept and enough, spent)
+
+
+def largest_on_path(asked: Required) -> tuple[str, dict[str, float]]:
+    """The largest load on the design load's path, and the shares of it that lie on that path: the structures
+    are loaded with it, and their imperfections follow the softest modes under it."""
+    return next(
+        (largest, shares) for largest, shares in paths(asked.loads).items() if asked.design_load in shares
+    )
+
+
+def to_bear(shell: Gridshell, design: Design, asked: Required) -> dict[int, float]:
+    """The numbers of structures that fall under loads on the design load's path more often than is allowed,
+    and the factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its
+    critical factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
+    found = tried(shell, design, asked, whole=True)
+    _, shares = largest_on_path(asked)
+    least: dict[int, float] = {}
+    if not found.critical and asked.safety.critical_factor is not None:
+        least[PERFECT] = _MESH * asked.safety.critical_factor * shares[asked.design_load]
+    for name in sorted(shares, key=lambda each: -shares[each]):
+        if len(found.fallen[name]) > asked.fallen[name]:
+            for number in found.fallen[name]:
+                least.setdefault(number, shares[name])
+    return least
 
 
 def stands(shell: Gridshell, design: Design, asked: Required, *, first: Sequence[int] = ()) -> JudgedTrial:
@@ -204,10 +240,6 @@ def _known(safety: Safety, name: str, design_load: str) -> int:
     """How many of the structures tried may fall under a load by the probability that is asked for."""
     wanted = safety.required(name, design_load, None)
     return allowed(float(norm.cdf(norm.ppf(wanted) / safety.enlarged)), safety.tried)
-
-
-def _none(members: Members, seed: int) -> Errors:
-    return errors_of(members, Tolerances(), variables(members, seed, 0))
 
 
 def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:

@@ -16,6 +16,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.records.drawn import DrawnPath, read_drawn, write_drawn
 from shellform.reliability.perfect import perfect
+from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
 
 _AT_ONCE = 10  # structures, before they are kept
@@ -71,7 +72,12 @@ def drawn_of(
         if workshop is None:
             workshop = Workshop(perfect(shell, design, loads[load]))
         first = len(path.factors)
-        some = workshop.drawn(tolerances, seed=seed, numbers=range(first, min(first + _AT_ONCE, count)))
+        some = workshop.drawn(
+            tolerances,
+            seed=seed,
+            numbers=range(first, min(first + _AT_ONCE, count)),
+            marks=tuple(paths(loads).get(load, {}).values()),
+        )
         path = DrawnPath(
             (*path.factors, *(each.factor for each in some)), (*path.stand, *(each.stands for each in some))
         )

@@ -11,8 +11,10 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.net.grid import CONNECTOR
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.problem import LoadCase
+from shellform.problem.terms import LoadedDesign
+from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.perfect import perfect
-from shellform.reliability.scenarios import borne_factors, scenarios
+from shellform.reliability.scenarios import borne_factors, remembered, scenarios
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.sensitivity import stiffness_rate
 
@@ -39,7 +41,7 @@ def case(dome):
 
 @pytest.fixture(scope="module")
 def asked(dome, case):
-    return scenarios(dome, dome.design(), case, AS_BUILT, seed=7, numbers=NUMBERS, most=3.0)
+    return scenarios(dome, dome.design(), case, AS_BUILT, seed=7, least=dict.fromkeys(NUMBERS, 1.0), most=3.0)
 
 
 def factors(shell, design, asked):
@@ -90,6 +92,38 @@ def test_a_structure_that_bears_what_is_asked_for_has_no_slope(dome, asked):
     found = borne_factors(dome, dome.design(), replace(asked, most=0.5))
     assert [each.factor for each in found] == [0.5] * len(NUMBERS)
     assert not np.any([each.factor_by_rest_length for each in found])
+
+
+def test_a_remembered_structure_bears_the_same_as_one_that_is_loaded_from_nothing(dome, asked):
+    design = dome.design()
+    known = remembered(dome, design, asked)
+    for scenario, factor in zip(known.scenarios, factors(dome, design, asked), strict=True):
+        assert scenario.near is not None
+        assert 0.8 * factor < scenario.near[0] <= 0.9 * factor
+    nearby = replace(design, rest_length=0.999 * design.rest_length)
+    assert factors(dome, nearby, known) == pytest.approx(factors(dome, nearby, asked), rel=1e-6)
+
+
+def test_where_no_state_nearby_is_known_that_leads_to_the_branch_it_is_loaded_from_nothing(dome, asked):
+    design = dome.design()
+    known = remembered(dome, design, asked)
+    beyond = [
+        replace(each, near=(1.5 * factor, each.near[1]))
+        for each, factor in zip(known.scenarios, factors(dome, design, asked), strict=True)
+    ]
+    lost = replace(known, scenarios=tuple(beyond))
+    assert factors(dome, design, lost) == pytest.approx(factors(dome, design, asked), rel=1e-6)
+
+
+def test_the_structure_without_errors_is_a_scenario_too(dome, case):
+    design = dome.design()
+    alone = scenarios(dome, design, case, AS_BUILT, seed=7, least={PERFECT: 1.25}, most=3.0)
+    nominal = perfect(dome, design, case.force)
+    none = drawn(nominal.members, Tolerances(), 7, 0)
+    end = Workshop(nominal).limit(none, most=3.0, step=0.25, resolution=1e-4)
+    assert factors(dome, design, alone)[0] == pytest.approx(end.factor, rel=0.02)
+    value = alone.measure(LoadedDesign(dome, design, nominal.unloaded, case.force)).value
+    assert value == pytest.approx(factors(dome, design, alone) / 1.25)
 
 
 def test_scenarios_are_terms_of_a_problem(dome, case, asked):

@@ -149,3 +149,16 @@ def test_no_structure_at_all_is_refused(dome, nominal):
 def test_a_negative_seed_is_refused(nominal):
     with pytest.raises(InputError, match="seed"):
         variables(nominal.members, -1, 0)
+
+
+def test_next_to_a_load_it_is_known_surely_whether_a_structure_stands_under_it(nominal):
+    none = drawn(nominal, Tolerances(), 0)
+    workshop = Workshop(nominal)
+    end = workshop.limit(none, most=3.0, step=0.25, resolution=1e-4).factor
+    coarse = workshop.limit(none, most=3.0, step=1.0, resolution=0.25).factor
+    assert coarse < end - 0.02  # else this test says nothing
+    just = [end - 0.01, end + 0.01]
+    marked = [workshop.limit(none, most=3.0, step=1.0, resolution=0.25, marks=[mark]) for mark in just]
+    assert marked[0].factor >= just[0]
+    assert marked[1].factor < just[1]
+    assert workshop.load(none, marks=[end - 0.01]).factor >= min(end - 0.01, 1.0)

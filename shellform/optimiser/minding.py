@@ -1,0 +1,127 @@
+"""A search that is led by drawn structures: where more stiffness doesn't make a design stand as built, those
+that fall are kept in mind, and what each of them is to bear becomes an aim of the search, with exact
+derivatives (reliability/scenarios.py).
+
+It begins again at the last design that stands, with the structures in mind that fell in the design to which
+the objective alone has led. After a descent the design is judged by all structures again, those that fall now
+join, and the search goes on from there, until none falls that has to stand (scenario optimisation). The judge
+is the sample: what structures in mind bear is an aim and no limit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from shellform.arrays import Reals
+from shellform.errors import NotConverged
+from shellform.gridshell.gridshell import Design
+from shellform.optimiser.search_state import (
+    Iterate,
+    Search,
+    accepted_design,
+    kept_in_mind,
+    restiffened,
+)
+from shellform.optimiser.step_model import StepModel
+from shellform.optimiser.trials import sound, standing
+from shellform.reliability.trial_structures import to_bear
+
+_TURNS = 4  # of a descent and a judgement
+_SHARE = 0.2  # of all evaluations, for a turn at the most
+_WINDOW, _SMALLEST = (
+    0.05,
+    0.004,
+)  # mean tensions: where structures fall depends on steps less evenly than the shape
+_MOST = 10  # structures in mind
+_OVER = 1.03  # of what they are to bear is aimed for: an aim may be missed by a little
+
+
+def ready_to_lead(search: Search, it: Iterate, fell: Design) -> Iterate | None:
+    """The iterate, at a design that stands as built, ready to be led by the structures that fall in the design
+    that `fell`; None where there are none to be followed."""
+    led = minding(search, it, it.accepted[-1].built, falling(search, fell))
+    return None if led.mind is None else _turned(search, replace(led, phase="lead", stood=len(it.accepted)))
+
+
+def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]) -> tuple[bool, Iterate]:
+    """Whether the turns of a descent and a judgement have led to a design that stands as built; the iterate
+    there, or where the last turn ended."""
+    fine = replace(search.solver, window=_WINDOW, smallest=_SMALLEST)
+    while search.left() > 0:
+        it = descend(replace(search, solver=fine, evaluations=min(search.evaluations, it.until)), it)
+        found = sound(search, it.accepted[-1])
+        if found is None:
+            return False, it
+        it = replace(it, point=found, accepted=(*it.accepted[:-1], accepted_design(search, found)))
+        holds, it = standing(search, it, it.accepted[-1].built)
+        if holds or it.turn == _TURNS:
+            return holds, it
+        it = _turned(search, joined(search, it))
+    return False, it
+
+
+def joined(search: Search, it: Iterate) -> Iterate:
+    """With those structures in mind too that fall in the last accepted design."""
+    built = it.accepted[-1].built
+    return minding(search, it, built, falling(search, built))
+
+
+def _turned(search: Search, it: Iterate) -> Iterate:
+    until = search.evaluator.evaluations + max(1, int(_SHARE * search.evaluations))
+    return replace(
+        it, turn=it.turn + 1, until=until, before=float("inf"), guarded=True, window=_WINDOW * search.tension
+    )
+
+
+def falling(search: Search, design: Design) -> dict[int, float]:
+    """The numbers of structures that fall in the design and have to stand, and the factors of the largest
+    load that are aimed for; none where the design has no unloaded equilibrium."""
+    assert search.asked is not None
+    try:
+        least = to_bear(search.problem.shell, design, search.asked.trial)
+    except NotConverged:
+        return {}
+    return {number: _OVER * factor for number, factor in least.items()}
+
+
+def minding(search: Search, it: Iterate, design: Design, least: dict[int, float]) -> Iterate:
+    """With these structures in mind beside those that are, the latest first, all remembered in the `design`;
+    the stiffness to keep goes down to the solver's own. As it was where one of them can't be followed."""
+    known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
+    every = dict(list((least | {k: v for k, v in known.items() if k not in least}).items())[:_MOST])
+    if not every:
+        return it
+    try:
+        mind = kept_in_mind(search, design, every)
+    except NotConverged:
+        return it
+    aim = search.solver.stiffness * search.softest if it.stiffness > 0.0 else 0.0
+    return restiffened(search, replace(it, mind=mind, remembered=design), aim)
+
+
+def remembering(search: Search, it: Iterate) -> Iterate:
+    """With the structures in mind remembered in the present design, and its shapes of imperfection."""
+    if it.mind is None:
+        return it
+    window = it.window
+    least = {each.number: each.least for each in it.mind.scenarios}
+    it = minding(search, it, it.accepted[-1].built, least)
+    return replace(it, window=window, excess=np.zeros_like(it.excess))
+
+
+def missed_without(search: Search, it: Iterate, model: StepModel) -> Reals:
+    """By what share (c,) of all present cables' the structures in mind would miss more of what they are to
+    bear without each of them, to first order: the most that any structure loses when the cable goes slack."""
+    assert it.mind is not None
+    evaluator, present = search.evaluator, np.flatnonzero(it.point.design.present)
+    blocks = evaluator.blocks
+    own = next(
+        part for block, part in zip(blocks.variables, blocks.slices, strict=True) if block.of_each_cable
+    )
+    rows = it.point.constraints_by_variables[-len(it.mind.scenarios) :, own][:, present]
+    longer = (model.length - it.point.design.rest_length[present]) / blocks.unit[own][present]
+    misses = np.maximum(rows * longer, 0.0).max(axis=0)
+    return np.asarray(misses / max(float(misses.sum()), 1e-300))

@@ -1,0 +1,87 @@
+"""Where a search stands, handed out as a checkpoint and taken up again: the same search goes on from it to the
+same result, to the byte.
+"""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+
+from shellform.gridshell.gridshell import Design
+from shellform.optimiser.optimum import Checkpoint
+from shellform.optimiser.search_state import Accepted, Iterate, Search, aimed, kept_in_mind
+from shellform.structure.elements.state import State
+
+_COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
+_ARRAYS = ("tensioned", "excess", "needed")
+_NUMBERS = tuple(
+    each.name
+    for each in fields(Iterate)
+    if each.name not in (*_ARRAYS, "point", "accepted", "history", "mind", "remembered")
+)
+
+
+def tell(search: Search, it: Iterate) -> None:
+    """Hands out where the search stands."""
+    if search.keep is None:
+        return
+    numbers = {name: getattr(it, name) for name in _NUMBERS}
+    numbers |= {name: getattr(search.evaluator, name) for name in _COUNTS}
+    design = it.point.design
+    arrays = {"rest_length": design.rest_length, "present": design.present}
+    arrays |= {name: getattr(it, name) for name in _ARRAYS}
+    arrays |= {
+        "accepted rest_length": np.array([each.design.rest_length for each in it.accepted]),
+        "accepted present": np.array([each.design.present for each in it.accepted]),
+        "accepted radius": np.array([each.design.radius for each in it.accepted]),
+        "accepted taut": np.array([each.taut for each in it.accepted]),
+        "accepted violation": np.array([each.violation for each in it.accepted]),
+    }
+    for name, state in it.point.states.items():
+        arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
+    numbers["radius"], numbers["mind"] = design.radius, {}
+    if it.mind is not None and it.remembered is not None:
+        numbers["mind"] = {str(each.number): each.least for each in it.mind.scenarios}
+        numbers["remembered radius"] = it.remembered.radius
+        arrays["remembered rest_length"] = it.remembered.rest_length
+        arrays["remembered present"] = it.remembered.present
+    search.keep(Checkpoint(numbers, arrays, it.history))
+
+
+def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
+    """Where a search of the same problem, start and settings stood."""
+    numbers, arrays = checkpoint.numbers, checkpoint.arrays
+    design = Design(arrays["rest_length"], np.array(arrays["present"]), numbers["radius"])
+    remembered, mind = None, None
+    if numbers["mind"]:
+        remembered = Design(
+            arrays["remembered rest_length"],
+            np.array(arrays["remembered present"]),
+            numbers["remembered radius"],
+        )
+        least = {int(number): factor for number, factor in numbers["mind"].items()}
+        mind = kept_in_mind(search, remembered, least)
+    search.evaluator.problem = aimed(search.inner, numbers["stiffness"], mind)
+    states = {
+        name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"])
+        for name in search.evaluator.problem.used()
+    }
+    point = search.evaluator.seed(design, states, numbers["stage"])
+    for name in _COUNTS:
+        setattr(search.evaluator, name, numbers[name])
+    kept = {name: numbers[name] for name in _NUMBERS} | {name: np.array(arrays[name]) for name in _ARRAYS}
+    kept["fallen"] = tuple(kept["fallen"])
+    before = tuple(
+        Accepted(Design(rest, np.array(present), float(radius)), np.array(taut), float(share))
+        for rest, present, radius, taut, share in zip(
+            *(
+                arrays[f"accepted {name}"]
+                for name in ("rest_length", "present", "radius", "taut", "violation")
+            ),
+            strict=True,
+        )
+    )
+    began = search.began - checkpoint.history[-1].seconds
+    it = Iterate(point, before, tuple(checkpoint.history), mind=mind, remembered=remembered, **kept)
+    return replace(search, began=began), it

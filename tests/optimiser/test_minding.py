@@ -1,0 +1,143 @@
+"""A search led by the drawn structures that fall."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.optimiser import minding, phases, search_state, trials
+from shellform.optimiser.minding import joined, ready_to_lead
+from shellform.optimiser.optimise import begin
+from shellform.optimiser.optimum import Checkpoint
+from shellform.optimiser.resuming import resumed, tell
+from shellform.optimiser.search_state import merit, missed, violation
+from shellform.problem.terms import LoadedDesign
+from shellform.reliability.drawing import PERFECT
+from shellform.reliability.trial_structures import Demand, JudgedTrial, Required, to_bear
+
+ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
+ASKED = sf.Safety(ROUGH, critical_factor=None, tried=3, enlarged=1.0, seed=5)
+
+
+@pytest.fixture(scope="module")
+def dome(vault):
+    """The vault with wide cells and two elements a segment."""
+    net = sf.pull_net(vault, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    rod = sf.Rod.round(young=40e9, radius=0.0012, strength=255e6)
+    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
+    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=vault)
+
+
+@pytest.fixture
+def searching(dome):
+    """A search of a problem, its start, and all checkpoints that it handed out."""
+    wet = dome.point_load(4.5, every=2)
+    one = Required(ASKED, {"wet": wet}, "wet", {"wet": 0})
+    problem = sf.Problem(
+        dome,
+        sf.LoadCase("wet", wet),
+        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
+        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+        [sf.LoadCase("wetter", 1.2 * wet)],
+    )
+    kept: list[Checkpoint] = []
+    search, it = begin(
+        problem,
+        dome.design(),
+        sf.SequentialConvex(),
+        lambda softest: 0.5 * softest,
+        12,
+        keep=kept.append,
+        asked=Demand(one, one),
+    )
+    return search, it, kept
+
+
+def test_structures_that_fall_too_often_are_to_bear_their_loads_and_the_perfect_one_its_factor(dome):
+    load = dome.point_load(4.5, every=2)
+    heavy = {"wet": 10.0 * load, "wetter": 12.0 * load}  # nothing bears as much
+    asked = Required(replace(ASKED, critical_factor=1.25), heavy, "wet", {"wet": 0, "wetter": 0})
+    found = to_bear(dome, dome.design(), asked)
+    assert found.pop(PERFECT) == pytest.approx(1.25 * 1.01 / 1.2)
+    assert found == pytest.approx(dict.fromkeys(range(3), 1.0))
+    # what is allowed to fall under the larger load is to bear the design load
+    allowed = replace(asked, fallen={"wet": 0, "wetter": 3})
+    assert to_bear(dome, dome.design(), allowed)[0] == pytest.approx(1.0 / 1.2)
+    assert not to_bear(dome, dome.design(), replace(asked, loads={"wet": load}, fallen={"wet": 0}))
+
+
+def test_what_structures_in_mind_bear_is_an_aim_and_no_limit(searching, monkeypatch):
+    search, it, _ = searching
+    monkeypatch.setattr(
+        minding, "to_bear", lambda *_: {0: 1.0, 1: 9.0}
+    )  # no structure bears nine times the load
+    led = ready_to_lead(search, it, it.point.design)
+    assert led is not None
+    assert [each.number for each in led.mind.scenarios] == [0, 1]
+    assert led.phase == "lead"
+    assert violation(search, led.point) <= 0.0
+    assert missed(search, led.point) > 0.5
+    assert merit(search, led.point) > led.point.objective + 5.0
+    # those that fall later come first
+    monkeypatch.setattr(minding, "to_bear", lambda *_: {2: 1.0})
+    assert [each.number for each in joined(search, led).mind.scenarios] == [2, 0, 1]
+
+
+def test_without_a_structure_that_falls_there_is_nothing_to_be_led_by(searching, monkeypatch):
+    search, it, _ = searching
+    monkeypatch.setattr(minding, "to_bear", lambda *_: {})
+    assert ready_to_lead(search, it, it.point.design) is None
+
+
+def test_a_search_resumed_while_it_is_led_knows_the_same_structures_and_point(searching, monkeypatch):
+    search, it, kept = searching
+    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 2.0, 2: 2.5})
+    led = ready_to_lead(search, it, it.point.design)
+    tell(search, led)
+    numbers = json.loads(json.dumps(kept[-1].numbers))  # as a run folder keeps them
+    _, again = resumed(search, Checkpoint(numbers, kept[-1].arrays, kept[-1].history))
+    np.testing.assert_array_equal(again.point.constraints, led.point.constraints)
+    np.testing.assert_array_equal(again.point.constraints_by_variables, led.point.constraints_by_variables)
+    assert (again.phase, again.turn, again.until, again.stood) == ("lead", led.turn, led.until, led.stood)
+
+
+def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_what_stood(
+    searching, monkeypatch
+):
+    search, it, _ = searching
+    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 1.0})
+    led = ready_to_lead(search, it, it.point.design)
+    monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": (0,)}, True, False, 0))
+    after = phases._led(search, led)
+    assert after.phase == "thin"
+    assert after.mind is None
+    assert len(after.accepted) == led.stood
+    np.testing.assert_array_equal(after.point.design.rest_length, it.point.design.rest_length)
+
+
+def test_a_cable_counts_for_what_structures_in_mind_would_lose_without_it(searching, monkeypatch):
+    search, it, _ = searching
+    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 2.0, 2: 2.5})
+    monkeypatch.setattr(search_state, "_NEARLY", 1e-8)
+    led = ready_to_lead(search, it, it.point.design)
+    model = search.models.at(led.point)
+    found = minding.missed_without(search, led, model)
+    assert found.shape == (int(led.point.design.present.sum()),)
+    assert found.min() >= 0.0
+    assert found.sum() == pytest.approx(1.0)
+    # the cable that counts most: a ten-thousandth of the way to slack costs as much as is told
+    cable = int(np.argmax(found))
+    present = np.flatnonzero(led.point.design.present)
+    step = 1e-4 * (model.length[cable] - led.point.design.rest_length[present[cable]])
+    rest = led.point.design.rest_length.copy()
+    rest[present[cable]] += step
+    other = replace(led.point.design, rest_length=rest)
+    state = led.point.states["wet"]
+    at = [
+        led.mind.measure(LoadedDesign(search.problem.shell, design, state, None)).value
+        for design in (led.point.design, other)
+    ]
+    rows = led.point.constraints_by_variables[-2:, : len(rest)] / search.evaluator.blocks.unit[: len(rest)]
+    assert at[0] - at[1] == pytest.approx(step * rows[:, present[cable]], rel=1e-2)
