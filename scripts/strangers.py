@@ -6,6 +6,7 @@ and (two STEP files) Open CASCADE, in m, mm, cm, in and ft, z up and y up; every
 Files of others can be added by `--files`.
 
 Run: PYTHONPATH=. python scripts/strangers.py FOLDER [--files OTHER ...] [--only NAME ...] [--limit 120]
+     [--processor 150] [--rows FILE]
      [--do make check net new design] [--until safety] [--quick]
 """
 
@@ -477,26 +478,33 @@ class Ended:
     processor: float
 
 
-def ran(arguments: Sequence[str], limit: float) -> Ended:
-    """`shellform` with these arguments, given `limit` s; what it started is ended with it."""
+def ran(arguments: Sequence[str], limit: float, log: Path, processor: float | None = None) -> Ended:
+    """`shellform` with these arguments, given `limit` s, and `processor` s of a processor for each of its
+    processes; what it started is ended with it, and what it said stays in the `log`."""
     began, before = time.perf_counter(), _processor()
-    child = subprocess.Popen(
-        [sys.executable, "-m", "shellform", *arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    try:
-        printed, said = child.communicate(timeout=limit)
-        status: int | None = child.returncode
-    except subprocess.TimeoutExpired:
-        os.killpg(child.pid, signal.SIGKILL)
-        printed, said = child.communicate()
-        status = None
-    lines = said.strip().splitlines()
+    with log.open("w", encoding="utf-8") as said:
+        child = subprocess.Popen(
+            [sys.executable, "-m", "shellform", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+            start_new_session=True,
+            preexec_fn=None if processor is None else lambda: _allowed(processor),
+        )
+        try:
+            printed, _ = child.communicate(timeout=limit)
+            status = None if child.returncode in (-signal.SIGKILL, -signal.SIGXCPU) else child.returncode
+        except subprocess.TimeoutExpired:
+            os.killpg(child.pid, signal.SIGKILL)
+            printed, _ = child.communicate()
+            status = None
+    lines = log.read_text(encoding="utf-8").strip().splitlines()
     took = time.perf_counter() - began
     return Ended(status, printed, lines[-1] if lines else "", took, _processor() - before)
+
+
+def _allowed(processor: float) -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(processor), math.ceil(processor)))
 
 
 def _processor() -> float:
@@ -513,11 +521,18 @@ def measured(
     limit: float,
     quick: Sequence[str] = (),
     until: str = "safety",
+    processor: float | None = None,
 ) -> dict[str, Any]:
     """One row: what each of the steps in `do` came to; `design` with the further options `quick`."""
     row: dict[str, Any] = {"name": file.name}
+    logs = folder / "logs"
+    logs.mkdir(exist_ok=True)
+
+    def log(step: str) -> Path:
+        return logs / f"{file.name}.{step}.txt"
+
     if "check" in do or "net" in do:
-        check = ran(["check", str(file), *options, "--json"], limit)
+        check = ran(["check", str(file), *options, "--json"], limit, log("check"))
         row |= {"check": check.status, "reason": check.words if check.status else ""}
         if check.status != 0:
             return row
@@ -527,7 +542,7 @@ def measured(
         spacing = float(f"{math.sqrt(row['area'] / CROSSINGS):.2g}")
         out = folder / "runs" / file.name
         command = ["net", str(file), *options, "--spacing", str(spacing), "--angle", "auto"]
-        net = ran([*command, "--output", str(out), "--json"], limit)
+        net = ran([*command, "--output", str(out), "--json"], limit, log("net"))
         row |= {"net": net.status, "reason": net.words, "spacing": spacing, "seconds": net.seconds}
         if net.status == 0:
             told = json.loads(net.printed)["net"]
@@ -559,7 +574,7 @@ def measured(
                 *quick,
             ]
         )
-        ended = ran(arguments, limit)
+        ended = ran(arguments, limit, log(step), processor)
         row |= {step: ended.status, "reason": ended.words if ended.status else row.get("reason", "")}
         row[f"{step}_seconds"], row[f"{step}_processor"] = ended.seconds, ended.processor
         row |= proposed(ended.printed) if step == "new" else designed(ended.printed)
@@ -646,6 +661,8 @@ def main() -> None:
     parser.add_argument("--files", type=Path, nargs="*", default=[], help="files or folders of others")
     parser.add_argument("--only", nargs="*", default=[], help="names (their beginnings)")
     parser.add_argument("--limit", type=float, default=120.0, help="s for one command")
+    parser.add_argument("--processor", type=float, help="s of a processor for one new or design")
+    parser.add_argument("--rows", type=Path, help="a file that each row is appended to, as a line of JSON")
     parser.add_argument("--do", nargs="*", default=["check", "net"], help="of check, net, new, design")
     parser.add_argument("--until", default="safety", help="last stage of design")
     parser.add_argument(
@@ -669,8 +686,14 @@ def main() -> None:
     for file, options in corpus:
         if given.only and not any(file.stem.startswith(name) for name in given.only):
             continue
-        rows.append(measured(file, options, given.folder, given.do, given.limit, quick, given.until))
-        print(json.dumps(rows[-1], ensure_ascii=False), file=sys.stderr, flush=True)
+        rows.append(
+            measured(file, options, given.folder, given.do, given.limit, quick, given.until, given.processor)
+        )
+        line = json.dumps(rows[-1], ensure_ascii=False)
+        print(line, file=sys.stderr, flush=True)
+        if given.rows:
+            with given.rows.open("a", encoding="utf-8") as kept:
+                print(line, file=kept)
     print(table(rows))
 
 
