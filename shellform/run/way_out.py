@@ -47,6 +47,10 @@ def with_way_out(
         wanted = share * radius
         try:
             found = faired(surface, wanted)
+        except (InputError, NotConverged) as error:
+            say(f"rounded to {wanted:.3g} m: {error}")
+            break  # still rounder is still harder
+        try:
             if float(found.change.max()) > _SLENDER:
                 with TemporaryDirectory() as place:
                     trial = Path(place) / SURFACE

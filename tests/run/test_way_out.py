@@ -57,6 +57,17 @@ def test_a_refusal_stays_as_it_was_where_rounding_helps_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+def test_a_surface_that_can_not_be_rounded_is_not_rounded_further(tmp_path):
+    def never(surface):
+        raise AssertionError("nothing to try")
+
+    refusal = InputError("is no shell", where="surface", remedy="Draw another.")
+    heard = []
+    assert with_way_out(refusal, sheet(gable), 30.0, tmp_path / "out", never, heard.append) is refusal
+    assert len(heard) == 1
+    assert "more than the surface's size" in heard[0]
+
+
 @pytest.mark.slow
 def test_net_and_new_name_a_surface_with_which_they_go_on(tmp_path):
     file = as_obj(tmp_path / "gable.obj", sheet(gable))

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError, NotConverged
+from shellform.surface.shape import fairing
 from shellform.surface.shape.fairing import faired
 from shellform.surface.shape.target import curvature, make_surface
 from tests.net.edge_shells import oculus, sail
@@ -92,7 +93,7 @@ def test_a_coarse_mesh_is_refined_until_it_shows_the_radius():
 
 @pytest.mark.parametrize(
     ("radius", "said"),
-    [(0.0, "positive"), (np.inf, "positive"), (100.0, "size of 8 m"), (1e-4, "more than 40000 vertices")],
+    [(0.0, "positive"), (np.inf, "positive"), (100.0, "size of 8 m"), (1e-4, "more than 30000 vertices")],
 )
 def test_radii_that_make_no_sense_are_refused(radius, said):
     with pytest.raises(InputError, match=said):
@@ -103,3 +104,28 @@ def test_a_crumpled_sheet_is_refused_rather_than_flattened_in_silence():
     chance = np.random.default_rng(4)
     with pytest.raises((NotConverged, InputError)):
         faired(sheet(lambda x, y: chance.normal(size=x.shape)), 7.5)
+
+
+def test_where_cutting_all_makes_too_many_triangles_only_long_edges_are_halved(uneven, monkeypatch):
+    monkeypatch.setattr(fairing, "_MOST", 6000)
+    fine = fairing._refined(uneven, 0.3)
+    edges = np.vstack([fine.triangles[:, [k, (k + 1) % 3]] for k in range(3)])
+    assert np.linalg.norm(np.diff(fine.vertices[edges], axis=1)[:, 0], axis=1).max() <= 0.3
+    assert fine.area == pytest.approx(uneven.area, rel=1e-12)
+    in_the_middle = [np.hypot(*each.vertices[:, :2].T) < 0.1 for each in (uneven, fine)]
+    assert np.count_nonzero(in_the_middle[1]) == np.count_nonzero(in_the_middle[0])
+
+
+@pytest.fixture
+def uneven():
+    """A disc of rings: triangles that are long and thin round a middle of small ones."""
+    turn = np.linspace(0.0, 2 * np.pi, 40, endpoint=False)
+    rings = [r * np.column_stack([np.cos(turn), np.sin(turn), 0 * turn]) for r in (0.05, 1.0, 4.0)]
+    number = np.arange(120).reshape(3, 40)
+    inner, outer = number[:-1].ravel(), number[1:].ravel()
+    inner_on, outer_on = (np.roll(each, -1, axis=1).ravel() for each in (number[:-1], number[1:]))
+    faces = np.vstack(
+        [np.column_stack([inner, outer, outer_on]), np.column_stack([inner, outer_on, inner_on])]
+    )
+    faces = np.vstack([faces, np.column_stack([np.full(40, 120), number[0], np.roll(number[0], -1)])])
+    return make_surface(np.vstack([*rings, [[0.0, 0.0, 0.0]]]), faces)

@@ -26,18 +26,17 @@ ground stay on their level, and move in plan only where a crease runs into it.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.sparse.linalg import splu
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged
+from shellform.structure.solve.factorisation import Factor, Symmetric
 from shellform.surface.shape.target import Surface, make_surface, rough_normals
 
 _MESH = 0.3  # of R: edges that aren't longer show its curvature
-_MOST = 40_000  # vertices of the refined mesh
+_MOST = 30_000  # vertices of the refined mesh
 _ROUNDS, _STEPS = 12, 60  # of frames, and of multipliers in each
 _BETTER, _VAIN = 0.98, 2  # of the least so far; rounds in a row that don't come below it end the search
 _MARGIN = 0.96  # of the cap, at which forms are capped
@@ -240,14 +239,11 @@ def _directions(surface: Surface, radius: float) -> Reals:
     return np.where(size > 0.1, smooth / np.maximum(size, 1e-300), 0.0)
 
 
-def _factored(matrix: sp.sparray) -> Any:
+def _factored(matrix: sp.sparray) -> Factor:
     """A symmetric positive definite matrix, factored."""
-    return splu(
-        sp.csc_matrix(matrix),
-        permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=0.0,
-        options={"SymmetricMode": True},
-    )
+    lower = sp.csc_array(sp.tril(matrix))
+    lower.sort_indices()
+    return Symmetric(lower.indptr, lower.indices).factor(lower.data)
 
 
 def _weights(surface: Surface) -> Reals:
@@ -274,27 +270,50 @@ def _on_ground(surface: Surface) -> Flags:
 
 
 def _refined(surface: Surface, longest: float) -> Surface:
-    """The surface with triangles cut in four until no edge is longer, m."""
-    points, faces = surface.vertices, surface.triangles
-    while True:
-        pairs = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-        edges, number = np.unique(pairs, axis=0, return_inverse=True)
-        if np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1).max() <= longest:
-            return (
-                surface if faces is surface.triangles else make_surface(points, faces, source=surface.source)
-            )
-        if len(points) + len(edges) > _MOST:
-            raise InputError(
-                f"needs triangles of {longest:.3g} m, more than {_MOST} vertices",
-                where="fair",
-                remedy="Give a larger radius, or a surface with a mesh as even as can be.",
-            )
-        a, b, c = faces.T
-        ab, bc, ca = (len(points) + each for each in number.reshape(3, -1))
-        points = np.vstack([points, 0.5 * (points[edges[:, 0]] + points[edges[:, 1]])])
-        faces = np.vstack(
-            [np.column_stack(each) for each in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))]
+    """The surface with triangles cut in four until no edge is longer, m; where that makes too many, only the
+    longer edges halved."""
+    for every in (True, False):
+        points, faces = surface.vertices, surface.triangles
+        while True:
+            pairs = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+            edges, number = np.unique(pairs, axis=0, return_inverse=True)
+            long = np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1) > longest
+            if not long.any():
+                unchanged = faces is surface.triangles
+                return surface if unchanged else make_surface(points, faces, source=surface.source)
+            cut = long | every
+            if len(points) + np.count_nonzero(cut) > _MOST:
+                break
+            middle = np.where(cut, len(points) + np.cumsum(cut) - 1, -1)
+            points = np.vstack([points, 0.5 * (points[edges[cut, 0]] + points[edges[cut, 1]])])
+            faces = _halved(points, faces, middle[number.reshape(3, -1).T])
+    raise InputError(
+        f"needs triangles of {longest:.3g} m, more than {_MOST} vertices",
+        where="fair",
+        remedy="Give a larger radius, or a surface with a mesh as even as can be.",
+    )
+
+
+def _halved(points: Reals, faces: Indices, middle: Indices) -> Indices:
+    """The triangles (t, 3) that come of `faces` whose edges ab, bc, ca have a vertex in the middle, `middle`
+    (f, 3), or none, -1."""
+    cut = middle >= 0
+    found = [faces[~cut.any(axis=1)]]
+    for turn in range(3):  # so that one cut edge is ab, and of two the whole one is ca
+        (a, b, c), (ab, bc, ca) = np.roll(faces, -turn, axis=1).T, np.roll(middle, -turn, axis=1).T
+        one = (ab >= 0) & (bc < 0) & (ca < 0)
+        found += [np.column_stack(each)[one] for each in ((a, ab, c), (ab, b, c))]
+        two = (ab >= 0) & (bc >= 0) & (ca < 0)
+        across = np.linalg.norm(points[a] - points[bc], axis=1) < np.linalg.norm(
+            points[c] - points[ab], axis=1
         )
+        first, second = two & across, two & ~across
+        found += [np.column_stack((ab, b, bc))[two]]
+        found += [np.column_stack(each)[first] for each in ((a, ab, bc), (a, bc, c))]
+        found += [np.column_stack(each)[second] for each in ((a, ab, c), (ab, bc, c))]
+    (a, b, c), (ab, bc, ca), every = faces.T, middle.T, cut.all(axis=1)
+    found += [np.column_stack(each)[every] for each in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))]
+    return np.vstack(found)
 
 
 def _refuse_folds(start: Surface, at: Reals, radius: float) -> None:
