@@ -75,13 +75,16 @@ def climbed_net(
     angle: float,
     offset: tuple[float, float] = (0.0, 0.0),
     tolerance: float = TOLERANCE,
+    most: int = _MOST,
+    failed: NoNet | Stalled | None = None,
     progress: Callable[[str], None] = lambda text: None,
     watch: Progress | None = None,
 ) -> tuple[Net, Attempt]:
     """The net with the `settings` of pull_net at the `angle`, rad, and `offset`, or the first on the ladder,
     turned by at most `tolerance`, rad; and the attempt that gave it.
 
-    Raises InputError for settings that can't work, NoNet or Stalled where no rung helps.
+    `most`: factorisations of pulls that fail, all rungs together; `failed`: what the first rung is known to
+    end with. Raises InputError for settings that can't work, NoNet or Stalled where no rung helps.
     """
     attempts: list[Attempt] = []
     first: NoNet | Stalled | None = None
@@ -95,6 +98,8 @@ def climbed_net(
         turned = angle + rung.turn
         shifted = (offset[0] + rung.shift[0], offset[1] + rung.shift[1])
         try:
+            if failed is not None and not attempts:
+                raise failed
             net = pull_net(
                 surface,
                 **_changed(settings, rung),
@@ -109,7 +114,7 @@ def climbed_net(
             reasons.add(error.reason)
             first = first or error
             spent += error.iterations if isinstance(error, Stalled) else 0
-            if spent > _MOST:
+            if spent > most:
                 break
             continue
         given = Attempt(rung.change, turned, shifted, None)

@@ -25,7 +25,7 @@ from shellform.gridshell.gridshell import Rod, erection_stress
 from shellform.gridshell.joints import following, usual_gap
 from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
-from shellform.net.chebyshev import pull_net
+from shellform.net.chebyshev import NetTuning, pull_net
 from shellform.net.edges import stand
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
@@ -66,6 +66,8 @@ THICKNESS, LEAST_THICKNESS = 0.05, 0.015  # m: usual; a first layer of sprayed c
 _ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
+_PULL = 110  # factorisations of one pull: nets that are found take up to a hundred
+_PULLS, _USUAL_CROSSINGS = 600, 300  # factorisations of failed pulls, for so many crossings
 _STRESSED = 0.95  # of the strength, at the most, under the additional load
 _AIMED = 0.92  # of it, for which concrete is thinned
 _STEPS = 4  # sections tried on one net
@@ -222,16 +224,23 @@ class _Search:
         """The net that bends its rods least, among several angles and offsets. Raises NoNet or Stalled."""
         settings: dict[str, Any] = {"spacing": spacing, "gap": gap, "elements": ELEMENTS}
         angles: Sequence[float] = self.angles if self.wish.angle is None else (self.wish.angle,)
-        nets = [each for angle in angles if (each := self._pulled(settings, angle, (0.0, 0.0))) is not None]
+        pulled = [self._pulled(settings, angle, (0.0, 0.0)) for angle in angles]
+        nets = [each for each in pulled if isinstance(each, Placed)]
         if nets:
             best = _least_bent(nets)
             near = (1.0 + 2.0 * _ALIKE) * best.net.quality.curvature_max
             self.angles = [each.angle for each in nets if each.net.quality.curvature_max <= near][:2]
             moved = self._pulled(settings, best.angle, (0.5, 0.5)) if angles is _ANGLES else None
-            best = best if moved is None else _least_bent([best, moved])
+            best = _least_bent([best, moved]) if isinstance(moved, Placed) else best
         else:
+            failed = next(each for each in pulled if not isinstance(each, Placed))
             net, given = climbed_net(
-                self.surface, settings, angle=math.radians(angles[0]), progress=self._say
+                self.surface,
+                settings,
+                angle=math.radians(angles[0]),
+                most=self._pulls(spacing),
+                failed=failed,
+                progress=self._say,
             )
             best = Placed(net, math.degrees(given.angle), given.offset)
         self.say(
@@ -242,16 +251,23 @@ class _Search:
         refuse_tipping(placed.net)
         return placed
 
-    def _pulled(self, settings: dict[str, Any], angle: float, offset: tuple[float, float]) -> Placed | None:
-        """The net at that angle, degrees, and offset; None where there is none."""
+    def _pulled(
+        self, settings: dict[str, Any], angle: float, offset: tuple[float, float]
+    ) -> Placed | NoNet | Stalled:
+        """The net at that angle, degrees, and offset, or why there is none."""
         where = f"net at {angle:g}°, {settings['spacing']:g} m"
+        tuning = NetTuning(limit=_PULL)
         try:
-            net = pull_net(self.surface, **settings, angle=math.radians(angle), offset=offset)
+            net = pull_net(self.surface, **settings, angle=math.radians(angle), offset=offset, tuning=tuning)
         except (NoNet, Stalled) as error:
             self.say(f"{where}: {error.reason.value}")
-            return None
+            return error
         self._say(f"{where}: rods bend to a radius of {_radius(net):.3g} m")
         return Placed(net, angle, offset)
+
+    def _pulls(self, spacing: float) -> int:
+        """How many factorisations of pulls that fail a net is worth: fewer of large ones."""
+        return round(_PULLS * min(1.0, _USUAL_CROSSINGS * spacing**2 / self.surface.area))
 
     def _stands(
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
@@ -285,7 +301,8 @@ class _Search:
         if failure is not None:
             return self._keep(failure)
         standing = drawn_standing(placed.net, self.surface, parts, thickness)
-        self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the additional load")
+        fall = "" if standing == DRAWN else ", the next falls"
+        self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the additional load{fall}")
         if standing < DRAWN:
             return self._keep(
                 Obstacle(
@@ -326,6 +343,7 @@ class _Search:
             {"spacing": spacing, "gap": gap, "elements": ELEMENTS},
             angle=math.radians(placed.angle),
             offset=placed.offset,
+            most=self._pulls(spacing),
             progress=self._say,
         )
         return Placed(stand(net, self.surface), math.degrees(given.angle), given.offset)

@@ -7,25 +7,22 @@ Every number comes with its reason. Forces and lengths that only limit the searc
 from __future__ import annotations
 
 import json
-import math
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from shellform.case.build_net import size_text, surface_of
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import label
-from shellform.gridshell.joints import usual_gap
 from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import stretches_of
-from shellform.net.ladder import climbed_net
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import THICKNESS, FirstDesign, first_design
 from shellform.run.first_look import surface_entry
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
-from shellform.run.sizes import DesignWish, RodChoice, choices
+from shellform.run.sizes import DesignWish, RodChoice
 from shellform.run.unbuildable import Unbuildable
 from shellform.run.way_out import BUILDABLE, with_way_out
 from shellform.surface.shape.target import Surface
@@ -62,7 +59,11 @@ def propose_case(
         design = first_design(surface, wanted, say)
     except Unbuildable as error:
         folder = output.with_name(f"{output.stem}-{BUILDABLE}")
-        raise with_way_out(error, surface, error.radius, folder, _again(error, wanted), say) from error
+
+        def again(rounded: Surface) -> None:
+            first_design(rounded, wanted, say)
+
+        raise with_way_out(error, surface, error.radius, folder, again, say) from error
     edges = _edges_told(stretches_of(surface))
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
     write_text(output, _text(file, entries, surface, design, wanted, edges))
@@ -77,23 +78,6 @@ def propose_case(
         "edges": edges,
         "case": str(output),
     }
-
-
-def _again(refusal: Unbuildable, wish: DesignWish) -> Callable[[Surface], None]:
-    """What finds a net on a surface, and rods that it allows, with the spacing that was refused."""
-
-    def covered(surface: Surface) -> None:
-        angle = 45.0 if wish.angle is None else wish.angle
-        settings: dict[str, Any] = {
-            "spacing": refusal.spacing, "gap": usual_gap(refusal.spacing), "elements": ELEMENTS
-        }  # fmt: skip
-        net, _ = climbed_net(surface, settings, angle=math.radians(angle))
-        if not choices(net, refusal.spacing, wish.rod, wish.layers or 1):
-            raise InputError(
-                f"no rod bears it: the net is bent to a radius of {1.0 / net.quality.curvature_max:.3g} m"
-            )
-
-    return covered
 
 
 def _text(

@@ -33,6 +33,8 @@ SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are siz
 _BY_RADIUS = 3.0  # cells across a radius of curvature
 _CROSSINGS = 260.0  # to begin with
 MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
+_CURVED = 600  # crossings for the sake of curvature, at the most: each pull of more takes long, and where so many are
+# asked for it is of creases, which no spacing follows
 _USUAL = 1.0  # m, of rods on site
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
@@ -142,18 +144,22 @@ def vertex_areas(surface: Surface) -> Reals:
 def first_spacing(surface: Surface) -> tuple[float, str]:
     """The spacing, m, to begin with, and its reason."""
     area, bent = surface.area, curvature_shown(surface)
-    finest = math.sqrt(area / MOST_CROSSINGS)
+    radius = 1.0 / max(bent, 1e-12)
+    curved, finest = radius / _BY_RADIUS, math.sqrt(area / _CURVED)
+    shown = f"a third of the surface's radius of {radius:.3g} m"
     wanted = {
         f"about {_CROSSINGS:.0f} crossings": math.sqrt(area / _CROSSINGS),
-        "usual on site": max(_USUAL, finest),
-        f"a third of the surface's radius of {1.0 / max(bent, 1e-12):.3g} m": 1.0 / (_BY_RADIUS * max(bent, 1e-12)),
-    }  # fmt: skip
+        "usual on site": max(_USUAL, math.sqrt(area / MOST_CROSSINGS)),
+        shown: max(curved, finest),
+    }
     reason = min(wanted, key=lambda each: wanted[each])
-    if wanted[reason] < finest:
-        return practical(
-            finest
-        ), f"{MOST_CROSSINGS} crossings at the most, where {reason} asks for {wanted[reason]:.2g} m"
-    return practical(wanted[reason]), reason
+    if reason == shown and curved < finest:
+        told = f"{_CURVED} crossings at the most, where {shown} asks for {curved:.2g} m"
+    elif wanted[reason] > _USUAL and reason == "usual on site":
+        told = f"{MOST_CROSSINGS} crossings at the most"
+    else:
+        told = reason
+    return practical(wanted[reason]), told
 
 
 def practical(spacing: float) -> float:

@@ -15,16 +15,21 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
-from shellform.run.sizes import DesignWish, Placed, RodChoice, least_spacing
+from shellform.run.first_trial import NEEDED
+from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_shown, least_spacing, wished
 from shellform.run.way_out import COVERED
 from shellform.surface.shape.target import Surface, curvature
 
 SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _RATHER = 1.5  # times the least radius, where that alone isn't the reason
 _SPARE = 1.05  # times the radius that rods just bear
+_BENT = 0.65  # of their strength, that bending takes at the most of rods for which a surface is rounded
+_OPEN = 0.9  # of the radius that nearly all of a surface keeps: rounded further it would be another one
+_WORTH = 1.3  # times the radius to which rods bend now, at the least, for rounding to be worth while
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
 _UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
@@ -144,6 +149,11 @@ def refused(
         )
     choice, stress = failure.choice, failure.stress
     assert choice is not None
+    crease = (
+        None if bears is not None and bears >= 0.5 * failure.thickness else _crease(surface, failure, wish)
+    )
+    if crease is not None:
+        return crease
     place = "" if failure.where is None else f" at {_at(failure.where)}"
     if failure.why is Why.SPACING:
         return InputError(
@@ -177,6 +187,43 @@ def refused(
     else:
         remedy = "Give the surface more rise: buckling grows with the square of its curvature."
     return NotConverged(what, residual=math.nan, iterations=0, remedy=remedy)
+
+
+def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildable | None:
+    """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the load,
+    while nearly all of it takes thicker ones; None where that isn't so."""
+    placed, choice = failure.placed, failure.choice
+    if placed is None or choice is None or failure.why in (Why.EDGES, Why.CURVATURE, Why.SPACING):
+        return None
+    net = placed.net
+    bent = {
+        each: erection_stress(net, each.section) / each.section.material.strength
+        for layers in ((1, 2) if wish.layers is None and not wish.rod else (wish.layers or 1,))
+        for each in wished(wish.rod, layers)
+        if least_spacing(each) <= failure.spacing and each.bending > choice.bending
+    }
+    barred = sorted((each for each in bent if bent[each] > 1.0), key=lambda each: each.bending)
+    if not barred:
+        return None
+    share = NEEDED / max(failure.nearness(NEEDED), 0.1)
+    enough = choice.bending * share**2  # buckling grows with the root of the rods' stiffness
+    other = next((each for each in barred if each.bending >= enough), barred[-1])
+    radius = 1.0 / max(net.quality.curvature_max, 1e-12)
+    wanted = min(radius * bent[other] / _BENT, _OPEN / max(curvature_shown(surface), 1e-12))
+    if wanted < _WORTH * radius:
+        return None
+    most = int(np.argmax(net.curvature.max(axis=1)))
+    where = net.target.positions[net.grid.rod_ends[most]].mean(axis=0)
+    return Unbuildable(
+        f"reason: curvature. At {_at(where)} rods bend to a radius of {radius:.3g} m: those that can, {choice.label} of "
+        f"{choice.catalogue} for one, stand up to {failure.factor:.2f} × the load of {1e3 * failure.thickness:.3g} mm of concrete "
+        f"at {failure.spacing:g} m, where {NEEDED:g} is needed",
+        where="rod",
+        remedy=f"Round the surface there to {wanted:.2g} m or more, so that thicker rods follow it, or cut it into pieces "
+        "along its creases.",
+        spacing=failure.spacing,
+        radius=wanted,
+    )
 
 
 def _thinner_rods(wish: DesignWish) -> str:
