@@ -16,24 +16,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
-
-import numpy as np
 
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Rod, erection_stress
 from shellform.gridshell.joints import following, usual_gap
 from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
-from shellform.net.chebyshev import NetTuning, pull_net
 from shellform.net.edges import stand
-from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
-from shellform.net.orientation import cost
 from shellform.net.refusal import NoNet, Stalled
+from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
 from shellform.run.first_trial import (
     DRAWN,
-    ELEMENTS,
     NEEDED,
     PULLED,
     FirstParts,
@@ -42,6 +36,7 @@ from shellform.run.first_trial import (
     followed,
 )
 from shellform.run.sizes import (
+    CURVED,
     MOST_CROSSINGS,
     DesignWish,
     Placed,
@@ -50,6 +45,7 @@ from shellform.run.sizes import (
     choices,
     first_choice,
     first_spacing,
+    hopeless,
     least_spacing,
     load_borne,
     next_choice,
@@ -58,22 +54,26 @@ from shellform.run.sizes import (
     rope_for,
     wished,
 )
-from shellform.run.unbuildable import Obstacle, Why, refuse_flat, refuse_size, refuse_tipping, refused
+from shellform.run.unbuildable import (
+    Obstacle,
+    Why,
+    refuse_flat,
+    refuse_size,
+    refuse_tipping,
+    refused,
+    sharpest,
+)
 from shellform.surface.shape.target import Surface
 
 BUNDLES = (19, 37)  # rods of an edge beam
 THICKNESS, LEAST_THICKNESS = 0.05, 0.015  # m: usual; a first layer of sprayed concrete
-_ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
-_PULL = 110  # factorisations of one pull: nets that are found take up to a hundred
-_PULLS, _USUAL_CROSSINGS = 600, 300  # factorisations of failed pulls, for so many crossings
 _STRESSED = 0.95  # of the strength, at the most, under the additional load
 _AIMED = 0.92  # of it, for which concrete is thinned
 _STEPS = 4  # sections tried on one net
 _THINNER = 8  # thicknesses tried
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
-_ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
 Say = Callable[[str], None]
 
 
@@ -99,25 +99,30 @@ class FirstDesign:
     told: tuple[str, ...]
 
 
-def first_design(surface: Surface, wish: DesignWish, say: Say = lambda text: None) -> FirstDesign:
-    """The design to propose. Raises InputError for a surface of absurd size, a flat one, or one that no net
+def first_design(
+    surface: Surface,
+    wish: DesignWish,
+    say: Say = lambda text: None,
+    allowance: Allowance | None = None,
+) -> FirstDesign:
+    """The design to propose, found within an `allowance` of work. Raises InputError for a surface of absurd size, a flat one, or one that no net
     covers or no rod follows, NotConverged where nothing stands; both with the reason and a way out."""
     refuse_size(surface)
     refuse_flat(surface)
-    return _Search(surface, wish, say).found()
+    return _Search(surface, wish, say, allowance or Allowance()).found()
 
 
 class _Search:
     """The search under way: what was tried is `told`."""
 
-    def __init__(self, surface: Surface, wish: DesignWish, say: Say) -> None:
-        self.surface, self.wish, self._say = surface, wish, say
+    def __init__(self, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance) -> None:
+        self.surface, self.wish, self._say, self.allowance = surface, wish, say, allowance
         self.told: list[str] = []
         self.best: Obstacle | None = None
         self.reason = "as asked"
         one = (1,) if wish.rod else (1, 2)
         self.layers: Sequence[int] = one if wish.layers is None else (wish.layers,)
-        self.angles: Sequence[float] = _ANGLES  # worth trying; with a finer spacing only those that were best
+        self.angles: Sequence[float] = ANGLES  # worth trying; with a finer spacing only those that were best
 
     def say(self, text: str) -> None:
         self.told.append(text)
@@ -148,9 +153,14 @@ class _Search:
         """Whether a finer spacing is too fine to solve, or far too little help."""
         if self.best is None:
             raise refused(self.surface, None, self.wish)
-        if self.surface.area / finer**2 > MOST_CROSSINGS:
+        crossings = self.surface.area / finer**2
+        if self.allowance.left <= 0:
             return True
-        return self.best.why is Why.STABILITY and self.best.factor * (spacing / finer) ** 2 < 0.5 * NEEDED
+        if crossings > (CURVED if self.best.why is Why.NET else MOST_CROSSINGS):
+            return True
+        breaks_at_once = self.best.why is Why.STRENGTH and self.best.factor == 0.0
+        falls = self.best.why is Why.STABILITY or breaks_at_once
+        return falls and self.best.factor * (spacing / finer) ** 2 < 0.5 * NEEDED
 
     def _on_net(self, spacing: float, thickness: float) -> FirstDesign | None:
         """The first section that stands on a net of that spacing; None where none does."""
@@ -174,9 +184,18 @@ class _Search:
     ) -> FirstDesign | None:
         """The design with the first of the `possible` sections, by rising stiffness, that stands; None where
         none does that is likely to."""
+        if hopeless(self.surface, spacing, possible[-1], NEEDED * pressure(thickness, 2500.0)):
+            place = sharpest(placed.net)
+            self._keep(Obstacle(Why.STABILITY, spacing, thickness, 0.0, possible[-1], placed, place))
+            self.say(
+                f"{possible[-1].label} ({possible[-1].catalogue}) and thinner: far too thin for the load"
+            )
+            return None
         at = first_choice(placed.net, self.surface, spacing, possible, NEEDED * pressure(thickness, 2500.0))
         tried_before: set[int] = set()
         while at not in tried_before and len(tried_before) < _STEPS:
+            if tried_before and self.allowance.left <= 0:
+                break
             tried_before.add(at)
             result = self._stands(placed, possible[at], spacing, thickness)
             if isinstance(result, FirstDesign):
@@ -196,7 +215,7 @@ class _Search:
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
         for _ in range(_THINNER):
-            if failure.factor == 0.0:  # it doesn't stand without any concrete
+            if failure.factor == 0.0 or self.allowance.left <= 0:  # without any concrete it doesn't stand
                 break
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
@@ -222,52 +241,25 @@ class _Search:
 
     def _net(self, spacing: float, gap: float) -> Placed:
         """The net that bends its rods least, among several angles and offsets. Raises NoNet or Stalled."""
-        settings: dict[str, Any] = {"spacing": spacing, "gap": gap, "elements": ELEMENTS}
         angles: Sequence[float] = self.angles if self.wish.angle is None else (self.wish.angle,)
-        pulled = [self._pulled(settings, angle, (0.0, 0.0)) for angle in angles]
-        nets = [each for each in pulled if isinstance(each, Placed)]
-        if nets:
-            best = _least_bent(nets)
-            near = (1.0 + 2.0 * _ALIKE) * best.net.quality.curvature_max
-            self.angles = [each.angle for each in nets if each.net.quality.curvature_max <= near][:2]
-            moved = self._pulled(settings, best.angle, (0.5, 0.5)) if angles is _ANGLES else None
-            best = _least_bent([best, moved]) if isinstance(moved, Placed) else best
-        else:
-            failed = next(each for each in pulled if not isinstance(each, Placed))
-            net, given = climbed_net(
-                self.surface,
-                settings,
-                angle=math.radians(angles[0]),
-                most=self._pulls(spacing),
-                failed=failed,
-                progress=self._say,
-            )
-            best = Placed(net, math.degrees(given.angle), given.offset)
+        best, near = least_bent_net(
+            self.surface,
+            spacing,
+            gap,
+            angles,
+            self.say,
+            self.allowance,
+            shifted=angles is ANGLES,
+            tell=self._say,
+        )
+        self.angles = near or self.angles
         self.say(
             f"net at {best.angle:g}° and {spacing:g} m: {len(best.net.grid.lattice)} crossings, "
-            f"rods bend to a radius of {_radius(best.net):.3g} m"
+            f"rods bend to a radius of {bends_to(best.net):.3g} m"
         )
         placed = replace(best, net=stand(best.net, self.surface))
         refuse_tipping(placed.net)
         return placed
-
-    def _pulled(
-        self, settings: dict[str, Any], angle: float, offset: tuple[float, float]
-    ) -> Placed | NoNet | Stalled:
-        """The net at that angle, degrees, and offset, or why there is none."""
-        where = f"net at {angle:g}°, {settings['spacing']:g} m"
-        tuning = NetTuning(limit=_PULL)
-        try:
-            net = pull_net(self.surface, **settings, angle=math.radians(angle), offset=offset, tuning=tuning)
-        except (NoNet, Stalled) as error:
-            self.say(f"{where}: {error.reason.value}")
-            return error
-        self._say(f"{where}: rods bend to a radius of {_radius(net):.3g} m")
-        return Placed(net, angle, offset)
-
-    def _pulls(self, spacing: float) -> int:
-        """How many factorisations of pulls that fail a net is worth: fewer of large ones."""
-        return round(_PULLS * min(1.0, _USUAL_CROSSINGS * spacing**2 / self.surface.area))
 
     def _stands(
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
@@ -291,7 +283,7 @@ class _Search:
         gap = following(Rod(choice.section)).gap
         if failure is None and not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
             try:
-                placed = self._with_gap(placed, spacing, gap)
+                placed = with_gap(self.surface, placed, spacing, gap, self._say)
             except (NoNet, Stalled) as error:
                 return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             parts, tried, failure = self._solved(placed, parts, spacing, thickness)
@@ -300,6 +292,7 @@ class _Search:
         )
         if failure is not None:
             return self._keep(failure)
+        self.allowance.spend(len(placed.net.grid.lattice), times=2)
         standing = drawn_standing(placed.net, self.surface, parts, thickness)
         fall = "" if standing == DRAWN else ", the next falls"
         self.say(f"{what}: {standing} of {DRAWN} drawn structures stand under the additional load{fall}")
@@ -320,6 +313,7 @@ class _Search:
         self, placed: Placed, parts: FirstParts, spacing: float, thickness: float
     ) -> tuple[FirstParts, Followed, Obstacle | None]:
         """The parts with cables below their limit, what the design came to, and what it fails by, if it does."""
+        self.allowance.spend(len(placed.net.grid.lattice))
         tried = followed(placed.net, self.surface, parts, thickness)
         if tried.factor >= NEEDED and tried.pull > PULLED:
             parts = parts.eased(tried.pull)
@@ -336,23 +330,9 @@ class _Search:
             why, spacing, thickness, tried.factor, parts.choice, placed, tried.where, stress
         )  # fmt: skip
 
-    def _with_gap(self, placed: Placed, spacing: float, gap: float) -> Placed:
-        """The net pulled anew with another gap. Raises NoNet or Stalled."""
-        net, given = climbed_net(
-            self.surface,
-            {"spacing": spacing, "gap": gap, "elements": ELEMENTS},
-            angle=math.radians(placed.angle),
-            offset=placed.offset,
-            most=self._pulls(spacing),
-            progress=self._say,
-        )
-        return Placed(stand(net, self.surface), math.degrees(given.angle), given.offset)
-
     def _too_curved(self, placed: Placed, spacing: float, thickness: float) -> Obstacle:
         """The failure of a net on which every section breaks, or is too deep for the spacing."""
-        net = placed.net
-        bent = net.curvature.max(axis=1)
-        place = net.target.positions[net.grid.rod_ends[int(np.argmax(bent))]].mean(axis=0)
+        net, place = placed.net, sharpest(placed.net)
         least = min(
             wished(self.wish.rod, self.layers[0]), key=lambda each: erection_stress(net, each.section)
         )
@@ -379,17 +359,6 @@ def _next(net: Net, possible: Sequence[RodChoice], at: int, failure: Obstacle) -
     if failure.why is not Why.STRENGTH:
         times = max(1.3, (1.1 * NEEDED / max(failure.nearness(NEEDED), 0.1)) ** 1.3)
     return next_choice(net, possible, at, failure.stress, times, _STRESSED)
-
-
-def _least_bent(nets: Sequence[Placed]) -> Placed:
-    """The net whose rods bend least; among those alike that of the least cost."""
-    least = min(each.net.quality.curvature_max for each in nets)
-    alike = [each for each in nets if each.net.quality.curvature_max <= (1.0 + _ALIKE) * least]
-    return min(alike, key=lambda each: cost(each.net))
-
-
-def _radius(net: Net) -> float:
-    return 1.0 / max(net.quality.curvature_max, 1e-12)
 
 
 def _whole_mm(thickness: float) -> float:

@@ -41,6 +41,7 @@ PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond 
 COMPOSITE = 0.5  # how far the rods of an edge beam act together
 _SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
 _TOGETHER = 2  # structures drawn, until one falls: what falls takes ten times as long as what stands
+_SETTLED = 1e-4  # residual: rods too thin for the load are not solved with twice the digits to be told so
 _UNLOADED = 120  # factorisations of the unloaded shell; one that stands without load takes five to thirty
 
 
@@ -83,10 +84,12 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     factor, borne = 0.0, none
     state, stressed = shell.target, shell.target
     try:
-        state = find_equilibrium(assembly, shell.target, none, limit=_UNLOADED).state
+        state = find_equilibrium(assembly, shell.target, none, tolerance=_SETTLED, limit=_UNLOADED).state
         for goal in (ADDITIONAL, NEEDED):  # the stress counts under the first
             more = goal * load
-            found = apply_load(assembly, state, borne, more, stay=True, smallest=_SMALLEST)
+            found = apply_load(
+                assembly, state, borne, more, stay=True, smallest=_SMALLEST, tolerance=_SETTLED
+            )
             factor += (goal - factor) * found.share
             state, borne = found.equilibrium.state, more
             stressed = state if goal == ADDITIONAL else stressed

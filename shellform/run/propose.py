@@ -21,10 +21,11 @@ from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import THICKNESS, FirstDesign, first_design
 from shellform.run.first_look import surface_entry
+from shellform.run.first_net import Allowance
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
 from shellform.run.sizes import DesignWish, RodChoice
 from shellform.run.unbuildable import Unbuildable
-from shellform.run.way_out import BUILDABLE, with_way_out
+from shellform.run.way_out import BUILDABLE, MORE, with_way_out
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
@@ -58,12 +59,15 @@ def propose_case(
     try:
         design = first_design(surface, wanted, say)
     except Unbuildable as error:
-        folder = output.with_name(f"{output.stem}-{BUILDABLE}")
+        folder, allowance = output.with_name(f"{output.stem}-{BUILDABLE}"), Allowance()
 
         def again(rounded: Surface) -> None:
-            first_design(rounded, wanted, say)
+            if allowance.left <= 0:
+                raise InputError("left untried, since the one before took all the work that is allowed")
+            first_design(rounded, wanted, lambda text: say(f"rounded, {text}"), allowance)
 
-        raise with_way_out(error, surface, error.radius, folder, again, say) from error
+        told = with_way_out(error, surface, error.radius, folder, again, say, MORE[:2])
+        raise (error.rounded_in_vain() if told is error and not wanted.rod else told) from error
     edges = _edges_told(stretches_of(surface))
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
     write_text(output, _text(file, entries, surface, design, wanted, edges))

@@ -30,10 +30,12 @@ from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.target import Surface, curvature
 
 SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
+_USUALLY = 0.75  # of its area: what is curved more may be creases, which bear nothing
+_HOPELESS = 0.03  # of the load needed, by the estimate: rods of a tenth of the depth that is needed
 _BY_RADIUS = 3.0  # cells across a radius of curvature
 _CROSSINGS = 260.0  # to begin with
 MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
-_CURVED = 600  # crossings for the sake of curvature, at the most: each pull of more takes long, and where so many are
+CURVED = 600  # crossings for the sake of curvature, at the most: each pull of more takes long, and where so many are
 # asked for it is of creases, which no spacing follows
 _USUAL = 1.0  # m, of rods on site
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
@@ -132,6 +134,14 @@ def curvature_shown(surface: Surface) -> float:
     return float(bent[order][min(int(np.searchsorted(share, SHOWN)), len(bent) - 1)])
 
 
+def curvature_usual(surface: Surface) -> float:
+    """The larger principal curvature, 1/m, that three quarters of the surface keep: how it would be curved
+    without its creases."""
+    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface)
+    order = np.argsort(bent)
+    return float(bent[order][np.searchsorted(np.cumsum(weight[order]), _USUALLY * weight.sum())])
+
+
 def vertex_areas(surface: Surface) -> Reals:
     """A third (v,), m², of the triangles at each vertex."""
     corner = surface.vertices[surface.triangles]
@@ -145,7 +155,7 @@ def first_spacing(surface: Surface) -> tuple[float, str]:
     """The spacing, m, to begin with, and its reason."""
     area, bent = surface.area, curvature_shown(surface)
     radius = 1.0 / max(bent, 1e-12)
-    curved, finest = radius / _BY_RADIUS, math.sqrt(area / _CURVED)
+    curved, finest = radius / _BY_RADIUS, math.sqrt(area / CURVED)
     shown = f"a third of the surface's radius of {radius:.3g} m"
     wanted = {
         f"about {_CROSSINGS:.0f} crossings": math.sqrt(area / _CROSSINGS),
@@ -154,7 +164,7 @@ def first_spacing(surface: Surface) -> tuple[float, str]:
     }
     reason = min(wanted, key=lambda each: wanted[each])
     if reason == shown and curved < finest:
-        told = f"{_CURVED} crossings at the most, where {shown} asks for {curved:.2g} m"
+        told = f"{CURVED} crossings at the most, where {shown} asks for {curved:.2g} m"
     elif wanted[reason] > _USUAL and reason == "usual on site":
         told = f"{MOST_CROSSINGS} crossings at the most"
     else:
@@ -261,6 +271,38 @@ def wished(wish: str | None, layers: int = 1) -> list[RodChoice]:
         return [RodChoice(name, named(catalogue, size))]
     except InputError as error:
         raise InputError(error.what, where="--rod", value=wish, remedy=error.remedy) from error
+
+
+def radius_for(surface: Surface, spacing: float, needed: float, wish: DesignWish) -> float:
+    """The radius, m, to which rods can be bent that are likely to bear `needed`, N/m², where the surface is
+    curved as usual: of all sections, in one layer or two, the least; 0 where none is."""
+    layers = (1, 2) if wish.layers is None and wish.rod is None else (wish.layers or 1,)
+    fit = [each for n in layers for each in wished(wish.rod, n) if least_spacing(each) <= spacing]
+    borne = {each: _without_creases(surface, spacing, each) for each in fit}
+    for ample in (_AMPLE, 0.5 * _AMPLE, 0.25 * _AMPLE):  # the estimate is rough
+        enough = [_radius(each) / _BENT for each in fit if borne[each] >= ample * needed]
+        if enough:
+            return min(enough)
+    return 0.0
+
+
+def hopeless(surface: Surface, spacing: float, choice: RodChoice, needed: float) -> bool:
+    """Whether rods are so thin that the surface, curved as usual, would by the estimate buckle far below
+    `needed`, N/m²."""
+    return _without_creases(surface, spacing, choice) < _HOPELESS * needed
+
+
+def _without_creases(surface: Surface, spacing: float, choice: RodChoice) -> float:
+    """About what load, N/m², the braced grid buckles under, curved as usual everywhere."""
+    rope = rope_for(spacing)
+    across, shear = choice.bending / spacing, rope.stiffness / (math.sqrt(2.0) * spacing)
+    return _BUCKLING * math.sqrt(across * shear) * 0.5 * curvature_usual(surface) ** 2
+
+
+def _radius(choice: RodChoice) -> float:
+    """To which a rod can be bent until it breaks, m: equation (1)."""
+    material = choice.section.material
+    return material.young * max(choice.section.fibres) / material.strength
 
 
 def buckling_load(surface: Surface, spacing: float, bending: float, rope: Rope) -> float:

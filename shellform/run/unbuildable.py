@@ -15,20 +15,19 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
-from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import layers_of
+from shellform.gridshell.loads import pressure
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_trial import NEEDED
-from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_shown, least_spacing, wished
+from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
 from shellform.surface.shape.target import Surface, curvature
 
 SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _RATHER = 1.5  # times the least radius, where that alone isn't the reason
 _SPARE = 1.05  # times the radius that rods just bear
-_BENT = 0.65  # of their strength, that bending takes at the most of rods for which a surface is rounded
-_OPEN = 0.9  # of the radius that nearly all of a surface keeps: rounded further it would be another one
+_OPEN = 0.9  # of the radius that three quarters of a surface keep: rounded further it would be another one
 _WORTH = 1.3  # times the radius to which rods bend now, at the least, for rounding to be worth while
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
@@ -42,6 +41,17 @@ class Unbuildable(InputError):
     def __init__(self, what: str, *, where: str, remedy: str, spacing: float, radius: float) -> None:
         self.spacing, self.radius = spacing, radius
         super().__init__(what, where=where, remedy=remedy)
+
+    def rounded_in_vain(self) -> Unbuildable:
+        """The same, where no rounding was found that helps."""
+        return Unbuildable(
+            f"{self.what}; no surface near it that is rounded there to {self.radius:.2g} m or more was found on which a "
+            "design stands",
+            where=self.where,
+            remedy="Cut it into pieces there, each with an edge of its own, or give it more rise and rounder edges.",
+            spacing=self.spacing,
+            radius=self.radius,
+        )
 
 
 class Why(Enum):
@@ -139,6 +149,8 @@ def refused(
         most, radius = _most_curved(surface)
         spacing = 0.0 if failure is None else failure.spacing
         needed = max(COVERED * spacing, _RATHER * radius)
+        if failure is not None:
+            needed = max(needed, _rounding(surface, failure, wish))
         return Unbuildable(
             f"reason: {Why.NET.value}. No net of {spacing:g} m covers it{'' if error is None else f' ({_said(error)})'}; it is "
             f"curved most at {_at(most)}, to a radius of {radius:.3g} m",
@@ -172,7 +184,9 @@ def refused(
             if wish.rod
             else f"Round the surface there: {max(stress, 1.0):.2g} times its radius is needed.",
             spacing=failure.spacing,
-            radius=_SPARE * max(stress, 1.0) * bends,
+            radius=max(
+                _SPARE * max(stress, 1.0) * bends, 0.0 if wish.rod else _rounding(surface, failure, wish)
+            ),
         )
     what = (
         f"reason: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
@@ -189,6 +203,14 @@ def refused(
     return NotConverged(what, residual=math.nan, iterations=0, remedy=remedy)
 
 
+def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
+    """The radius, m, to which creases are to be rounded so that rods follow them that bear the load, but no more
+    than nearly what three quarters of the surface keep."""
+    needed = NEEDED * pressure(failure.thickness, 2500.0)
+    wanted = radius_for(surface, failure.spacing, needed, wish)
+    return min(wanted, _OPEN / max(curvature_usual(surface), 1e-12))
+
+
 def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildable | None:
     """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the load,
     while nearly all of it takes thicker ones; None where that isn't so."""
@@ -196,26 +218,12 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildabl
     if placed is None or choice is None or failure.why in (Why.EDGES, Why.CURVATURE, Why.SPACING):
         return None
     net = placed.net
-    bent = {
-        each: erection_stress(net, each.section) / each.section.material.strength
-        for layers in ((1, 2) if wish.layers is None and not wish.rod else (wish.layers or 1,))
-        for each in wished(wish.rod, layers)
-        if least_spacing(each) <= failure.spacing and each.bending > choice.bending
-    }
-    barred = sorted((each for each in bent if bent[each] > 1.0), key=lambda each: each.bending)
-    if not barred:
-        return None
-    share = NEEDED / max(failure.nearness(NEEDED), 0.1)
-    enough = choice.bending * share**2  # buckling grows with the root of the rods' stiffness
-    other = next((each for each in barred if each.bending >= enough), barred[-1])
     radius = 1.0 / max(net.quality.curvature_max, 1e-12)
-    wanted = min(radius * bent[other] / _BENT, _OPEN / max(curvature_shown(surface), 1e-12))
+    wanted = _rounding(surface, failure, wish)
     if wanted < _WORTH * radius:
         return None
-    most = int(np.argmax(net.curvature.max(axis=1)))
-    where = net.target.positions[net.grid.rod_ends[most]].mean(axis=0)
     return Unbuildable(
-        f"reason: curvature. At {_at(where)} rods bend to a radius of {radius:.3g} m: those that can, {choice.label} of "
+        f"reason: curvature. At {_at(sharpest(net))} rods bend to a radius of {radius:.3g} m: those that can, {choice.label} of "
         f"{choice.catalogue} for one, stand up to {failure.factor:.2f} × the load of {1e3 * failure.thickness:.3g} mm of concrete "
         f"at {failure.spacing:g} m, where {NEEDED:g} is needed",
         where="rod",
@@ -232,6 +240,12 @@ def _thinner_rods(wish: DesignWish) -> str:
 
 def _said(error: NoNet | Stalled) -> str:
     return error.what if isinstance(error, InputError) else str(error)
+
+
+def sharpest(net: Net) -> Reals:
+    """Where its rods are bent most (3,), m."""
+    most = int(np.argmax(net.curvature.max(axis=1)))
+    return np.asarray(net.target.positions[net.grid.rod_ends[most]].mean(axis=0))
 
 
 def _most_curved(surface: Surface) -> tuple[Reals, float]:

@@ -7,7 +7,7 @@ surface as given. Beside it stands a map of the change.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -23,7 +23,7 @@ from shellform.written import folder as made
 SURFACE = "surface.obj"
 BUILDABLE = "buildable"  # folder in a run's
 COVERED = 3.0  # spacings: a radius of curvature that nets cover
-_MORE = (1.0, 1.5, 2.2)  # times the radius asked for
+MORE = (1.0, 1.5, 2.2)  # times the radius asked for
 _SLENDER = 1e-9  # m: less is no change
 
 
@@ -34,16 +34,18 @@ def with_way_out(
     folder: Path,
     again: Callable[[Surface], object],
     say: Callable[[str], None] = lambda text: None,
+    shares: Sequence[float] = MORE,
 ) -> InputError | NotConverged:
     """The refusal of a surface with the nearest buildable one as its remedy, written into `folder` as
     surface.obj, surface.step, change.vtu and change.png; as it was, where none is found.
 
     `radius`, m, to which the surface must be rounded at least; `again` does with a surface what was refused
-    and raises InputError or NotConverged where it is refused again; `say` hears what is tried.
+    and raises InputError or NotConverged where it is refused again; `say` hears what is tried;
+    `shares` of the radius are, one after the other.
     """
     from shellform.surface.readers.meshes import write_mesh
 
-    for share in _MORE:
+    for share in shares:
         wanted = share * radius
         try:
             found = faired(surface, wanted)

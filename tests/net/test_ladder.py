@@ -46,6 +46,22 @@ def test_where_the_first_attempt_succeeds_nothing_is_changed():
     assert (net.quality.curvature == plain.quality.curvature).all()
 
 
+def test_an_attempt_that_is_known_to_fail_is_not_made_again(umbrella):
+    heard = []
+    known = NoNet(Reason.OFF, "the net stays off the surface")
+    _, given = climbed_net(
+        umbrella, SETTINGS, angle=math.pi / 4, failed=known, watch=lambda what, residual: heard.append(what)
+    )
+    assert given.change is Change.TIGHTER
+    assert len(set(heard)) == 3, "springs of three densities, and none of an attempt before them"
+
+
+def test_no_further_rung_is_climbed_once_failed_pulls_took_what_they_may(umbrella):
+    known = Stalled("stalled", residual=1.0, iterations=200)
+    with pytest.raises(Stalled, match="1 attempts"):
+        climbed_net(umbrella, SETTINGS, angle=math.pi / 4, failed=known, most=100)
+
+
 def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tmp_path):
     with pytest.raises(NoNet) as caught:
         sf.pull_net(umbrella, **SETTINGS, angle=math.pi / 4)

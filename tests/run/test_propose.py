@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,27 +14,42 @@ from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import read_catalogue
 from shellform.gridshell.gridshell import erection_stress
+from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
+from shellform.run import first_trial
 from shellform.run.first_design import first_design
+from shellform.run.first_net import Allowance
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts
 from shellform.run.propose import propose_case
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
     STRAINED,
     DesignWish,
+    Placed,
     choices,
     curvature_shown,
+    curvature_usual,
     first_spacing,
+    hopeless,
     load_borne,
     next_choice,
     practical,
+    radius_for,
     rest_ratio_for,
     rope_for,
     wished,
 )
-from shellform.run.unbuildable import refuse_flat, refuse_size, refuse_tipping
+from shellform.run.unbuildable import (
+    Obstacle,
+    Unbuildable,
+    Why,
+    refuse_flat,
+    refuse_size,
+    refuse_tipping,
+    refused,
+)
 from shellform.surface.readers.reading import read_surface
-from shellform.surface.shape.target import make_surface
+from shellform.surface.shape.target import curvature, make_surface
 from tests.net.edge_shells import barrel, sail
 
 DOME = Path(__file__).parent.parent / "data" / "dome_mm.step"
@@ -124,6 +140,52 @@ def test_one_crease_does_not_decide_the_spacing_but_the_radius_of_most_of_the_su
     assert "radius" in reason or spacing * curvature_shown(tight) <= 1.0 / 3.0 + 1e-9
 
 
+def test_curvature_alone_asks_for_no_more_crossings_than_can_be_tried_in_a_minute():
+    x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(-6.0, 6.0, 41)], indexing="ij"))
+    flat = dish(size=12.0, rise=0.001, count=41)
+    folded = make_surface(
+        np.column_stack([x, y, 0.5 * np.abs(x % 2 - 1) + 0.5 * np.abs(y % 2 - 1)]), flat.triangles
+    )
+    spacing, reason = first_spacing(folded)
+    assert folded.area / spacing**2 < 700
+    assert "crossings at the most, where a third" in reason
+
+
+def test_a_crease_leaves_the_usual_curvature_and_the_rods_that_bear_the_load_as_they_are():
+    smooth = dish()
+    points = smooth.vertices.copy()
+    points[:, 2] -= 0.3 * np.abs(points[:, 0])
+    creased = make_surface(points, smooth.triangles)
+    assert curvature_usual(creased) == pytest.approx(curvature_usual(smooth), rel=0.15)
+    assert np.abs(curvature(creased)).max() > 5.0 * curvature_usual(creased)
+    least = radius_for(creased, 0.5, 800.0, DesignWish())
+    assert least == pytest.approx(radius_for(smooth, 0.5, 800.0, DesignWish()), rel=0.25)
+    assert least > radius_for(creased, 0.5, 100.0, DesignWish()) > 0.0
+    assert radius_for(creased, 0.5, 1e6, DesignWish()) == 0.0
+
+
+def test_rods_far_too_thin_are_told_from_those_worth_a_trial():
+    thin, stout = wished("gfrp_rods/2 mm")[0], wished("gfrp_rods/25 mm")[0]
+    assert hopeless(dish(), 0.5, thin, 2000.0)
+    assert not hopeless(dish(), 0.5, stout, 2000.0)
+
+
+def test_a_crease_is_told_as_the_reason_where_the_rods_that_follow_it_bear_too_little():
+    surface = dish()
+    points = surface.vertices.copy()
+    points[:, 2] -= 0.2 * np.maximum(np.abs(points[:, 0]) - 0.4, 0.0)
+    surface = make_surface(points, surface.triangles)
+    placed = Placed(pull_net(surface, spacing=0.5, gap=0.02, angle=0.0, elements=2), 0.0, (0.0, 0.0))
+    thin = wished("gfrp_rods/4 mm")[0]
+    failure = Obstacle(Why.STABILITY, 0.5, 0.05, 0.1, thin, placed, np.zeros(3), 0.5)
+    told = refused(surface, failure, DesignWish())
+    assert isinstance(told, Unbuildable)
+    assert told.what.startswith("reason: curvature. At (")
+    assert told.radius > 1.3 / placed.net.quality.curvature_max
+    thick = refused(surface, replace(failure, factor=1.2), DesignWish(), bears=0.04)
+    assert "--thickness 0.04" in thick.remedy
+
+
 @pytest.mark.parametrize(("exact", "set_out"), [(0.0557, 0.055), (0.234, 0.23), (0.58, 0.55), (1.04, 1.0)])
 def test_spacings_are_rounded_down_to_what_is_set_out(exact, set_out):
     assert practical(exact) == pytest.approx(set_out)
@@ -164,6 +226,32 @@ def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none()
     assert 1.0 - parts.eased(PULLED + 0.2).rest_ratio == pytest.approx(0.004 - 0.2 * STRAINED, abs=1e-4)
     assert parts.eased(3.0).rest_ratio == 1.0 - LEAST_PRESTRAIN
     assert 1.0 - rest_ratio_for(dish(), 0.4) > 1.0 - rest_ratio_for(dish(), 4.0)
+
+
+def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_after_it(monkeypatch, net):
+    drawn = []
+
+    class Bench:
+        def __init__(self, nominal):
+            pass
+
+        def drawn(self, tolerances, *, seed, numbers):
+            drawn.extend(numbers)
+            return [SimpleNamespace(stands=number != 4) for number in numbers]
+
+    monkeypatch.setattr(first_trial, "Workshop", Bench)
+    monkeypatch.setattr(first_trial, "perfect", lambda *_: None)
+    parts = FirstParts(wished("gfrp_rods/2 mm")[0], 19, 0.998)
+    assert first_trial.drawn_standing(net, barrel(), parts, 0.002) == 5
+    assert drawn == [0, 1, 2, 3, 4, 5]
+
+
+def test_a_search_ends_at_the_same_place_once_its_work_is_done():
+    said = []
+    wish = DesignWish(rod="gfrp_rods/40 mm", spacing=0.8, angle=45.0)
+    with pytest.raises((InputError, NotConverged), match="reason: "):
+        first_design(dish(), replace(wish, thickness=0.4), said.append, Allowance(1))
+    assert sum("of concrete: stands up to" in each for each in said) == 1
 
 
 def test_sections_are_real_ones_that_the_net_and_the_spacing_allow(net):

@@ -1,0 +1,125 @@
+"""The net that a first design begins with: of several angles and offsets the one that bends its rods least.
+
+Pulls that fail end earlier here than in a design: nets that are found take up to a hundred factorisations. Where
+no angle gives a net, the ladder (net/ladder.py) is climbed from the one whose failure costs least to mend, with
+fewer factorisations for larger nets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from shellform.net.chebyshev import NetTuning, pull_net
+from shellform.net.edges import stand
+from shellform.net.ladder import climbed_net
+from shellform.net.net import Net
+from shellform.net.orientation import cost
+from shellform.net.refusal import NoNet, Stalled
+from shellform.run.first_trial import ELEMENTS
+from shellform.run.sizes import Placed
+from shellform.surface.shape.target import Surface
+
+ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
+_ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
+_PULL = 110  # factorisations of one pull
+_PULLS, _USUAL_CROSSINGS = 600, 300  # factorisations of failed pulls, for so many crossings
+_STALLED = 4  # times the work of a pull that ends, one that stalls
+Say = Callable[[str], None]
+
+
+@dataclass
+class Allowance:
+    """How much work a search may still do: crossings of the nets that were pulled and of the designs that were
+    solved, so that the same surface is given up at the same place on any machine."""
+
+    left: int = 25_000  # about a minute and a half of one processor
+
+    def spend(self, crossings: float, times: int = 1) -> None:
+        """Takes what a pull or a trial on a net of so many `crossings` costs."""
+        self.left -= times * round(crossings)
+
+
+def least_bent_net(
+    surface: Surface,
+    spacing: float,
+    gap: float,
+    angles: Sequence[float],
+    say: Say,
+    allowance: Allowance,
+    *,
+    shifted: bool,
+    tell: Say,
+) -> tuple[Placed, list[float]]:
+    """The net that bends its rods least among those at the `angles`, degrees, and, if it is to be `shifted`, the
+    best of these half a spacing off; and up to two angles that bend them nearly as little, none where only the
+    ladder gave a net. `say` hears what fails, `tell` what doesn't; the `allowance` is spent. Raises NoNet or Stalled."""
+    settings: dict[str, Any] = {"spacing": spacing, "gap": gap, "elements": ELEMENTS}
+
+    def at(angle: float, offset: tuple[float, float]) -> Placed | NoNet | Stalled:
+        crossings = surface.area / spacing**2
+        where, tuning = f"net at {angle:g}°, {spacing:g} m", NetTuning(limit=_PULL)
+        try:
+            net = pull_net(surface, **settings, angle=math.radians(angle), offset=offset, tuning=tuning)
+        except (NoNet, Stalled) as error:
+            say(f"{where}: {error.reason.value}")
+            allowance.spend(crossings, _STALLED if isinstance(error, Stalled) else 1)
+            return error
+        allowance.spend(crossings)
+        tell(f"{where}: rods bend to a radius of {bends_to(net):.3g} m")
+        return Placed(net, angle, offset)
+
+    pulled = [at(angle, (0.0, 0.0)) for angle in angles]
+    nets = [each for each in pulled if isinstance(each, Placed)]
+    if nets:
+        best = _least_bent(nets)
+        most = (1.0 + 2.0 * _ALIKE) * best.net.quality.curvature_max
+        near = [each.angle for each in nets if each.net.quality.curvature_max <= most][:2]
+        moved = at(best.angle, (0.5, 0.5)) if shifted else None
+        return (_least_bent([best, moved]) if isinstance(moved, Placed) else best), near
+    first, failed = min(
+        ((k, each) for k, each in enumerate(pulled) if not isinstance(each, Placed)),
+        key=lambda each: (isinstance(each[1], Stalled), each[0]),  # whose next attempts take longest
+    )
+    allowance.spend(_STALLED * surface.area / spacing**2)
+    net, given = climbed_net(
+        surface,
+        settings,
+        angle=math.radians(angles[first]),
+        most=_worth(surface, spacing),
+        failed=failed,
+        progress=tell,
+    )
+    return Placed(net, math.degrees(given.angle), given.offset), []
+
+
+def with_gap(surface: Surface, placed: Placed, spacing: float, gap: float, tell: Say) -> Placed:
+    """The net pulled anew with another gap, on its supports. Raises NoNet or Stalled."""
+    net, given = climbed_net(
+        surface,
+        {"spacing": spacing, "gap": gap, "elements": ELEMENTS},
+        angle=math.radians(placed.angle),
+        offset=placed.offset,
+        most=_worth(surface, spacing),
+        progress=tell,
+    )
+    return Placed(stand(net, surface), math.degrees(given.angle), given.offset)
+
+
+def bends_to(net: Net) -> float:
+    """The least radius, m, to which its rods are bent."""
+    return 1.0 / max(net.quality.curvature_max, 1e-12)
+
+
+def _worth(surface: Surface, spacing: float) -> int:
+    """How many factorisations of pulls that fail a net is worth."""
+    return round(_PULLS * min(1.0, _USUAL_CROSSINGS * spacing**2 / surface.area))
+
+
+def _least_bent(nets: Sequence[Placed]) -> Placed:
+    """The net whose rods bend least; among those alike that of the least cost."""
+    least = min(each.net.quality.curvature_max for each in nets)
+    alike = [each for each in nets if each.net.quality.curvature_max <= (1.0 + _ALIKE) * least]
+    return min(alike, key=lambda each: cost(each.net))
