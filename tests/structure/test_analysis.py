@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from shellform.errors import InputError, NotConverged
 from shellform.structure.answers.analysis import analyse
@@ -76,3 +77,61 @@ def test_a_torque_alone_has_a_critical_factor_that_comes_to_greenhill_s():
         assert critical is not None
         found.append(critical.factor)
     assert order(np.array(found) - reference) == pytest.approx(2.0, abs=0.2)
+
+
+def twisted(count, moment):
+    """A clamped rod of L = EI = 1, GJ = 0.8 under a dead end moment."""
+    network = chain(line(count), (1e6, 0.8, 1.0, 1.0), {0: CLAMP})
+    return Model(network, {"moment": load_at(network, count, [0.0, 0.0, 0.0, *moment])}, None, (0,))
+
+
+def test_a_dead_end_moment_in_space_bends_a_rod_into_its_helix_by_the_default_method():
+    """Kirchhoff: the tangent turns about the constant moment m at the rate |m|/EI."""
+    moment = np.array([2.0, 0.0, 5.0])
+    rate = np.linalg.norm(moment)
+    axis, tangent = moment / rate, np.array([1.0, 0.0, 0.0])
+    along = (tangent @ axis) * axis
+    across, third = tangent - along, np.cross(axis, tangent)
+    tip = along + across * np.sin(rate) / rate + third * (1.0 - np.cos(rate)) / rate
+    misses = []
+    for count in (20, 40):
+        found = analyse(twisted(count, moment))
+        assert found.converged
+        assert found.on_branch is False
+        misses.append(np.linalg.norm(found.equilibrium.state.positions[-1] - tip))
+    assert order(np.array(misses)) == pytest.approx(2.0, abs=0.2)
+    assert any("semi-tangential" in warning for warning in found.warnings)
+    assert any("the path was followed from load factor 0 " in warning for warning in found.warnings)
+
+
+def test_relaxation_falls_back_to_the_path_of_an_increment_and_says_from_where():
+    found = analyse(twisted(20, [2.0, 0.0, 5.0]), increments=2)
+    assert found.converged
+    assert [step["factor"] for step in found.increments] == [0.5, 1.0]
+    np.testing.assert_allclose(
+        found.equilibrium.state.positions,
+        analyse(twisted(20, [2.0, 0.0, 5.0]), method="path").equilibrium.state.positions,
+        atol=1e-6,
+    )
+
+
+def test_a_rod_free_in_space_is_rolled_up_to_a_spiral_of_ten_turns():
+    found = analyse(twisted(100, [0.0, 0.0, 20.0 * np.pi]))
+    assert found.converged
+    positions = found.equilibrium.state.positions
+    np.testing.assert_allclose(positions[::10], np.zeros((11, 3)), atol=1e-6)
+    assert np.linalg.norm(positions[5]) == pytest.approx(0.1 / np.pi, rel=0.02)
+
+
+def test_a_hinged_rod_under_a_torque_has_the_critical_factor_of_a_semi_tangential_one():
+    """w'''' = ik w''' with half the torque's turning at each end: tan(k/2) = -k/6 (Ziegler 1968)."""
+    found = []
+    for count in (20, 40):
+        held = {0: [True, True, True, True, False, False], count: [False, True, True, False, False, False]}
+        network = chain(line(count), (1e6, 1.0, 1.0, 1.0), held)
+        model = Model(network, {"torque": load_at(network, count, [0, 0, 0, 1.0, 0, 0])}, None, (0, count))
+        result = analyse(model, critical_to=12.0)
+        assert any("semi-tangential" in warning for warning in result.warnings)
+        found.append(result.critical.factor)
+    half = brentq(lambda x: np.tan(x) + x / 3.0, 2.0, 3.0)
+    assert order(np.array(found) - 2.0 * half) == pytest.approx(2.0, abs=0.2)

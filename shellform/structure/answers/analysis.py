@@ -5,7 +5,8 @@ Four ways lead to the equilibrium under a load. Relaxation, the default, goes in
 stable branch and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole
 increments without help, dynamic relaxation lets the network move until it comes to rest (dynamic.py). A path goes
 through limit points, loads falling and rising, to where the factor first comes to its goal or a led displacement
-to its own (path.py).
+to its own (path.py). Where relaxation doesn't come to rest under moments that have no potential, the path of that
+increment is followed instead, and a warning says so.
 """
 
 from __future__ import annotations
@@ -35,9 +36,12 @@ from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_e
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.loading import Drive, advance
 from shellform.structure.solve.path import follow
-from shellform.structure.solve.residual import Turning
+from shellform.structure.solve.residual import Drowned, Turning
 
 LIMIT = 1000  # factorisations of one relaxation
+_TURNING = (
+    200  # the same under moments that have no potential to lower, before their path is followed instead
+)
 
 Progress = Callable[[float, int], None]
 """Called with the load factor and the factorisations so far."""
@@ -150,6 +154,7 @@ class _Analysis:
     found: Equilibrium | None = None
     on_branch: bool | None = True
     left_at: float | None = None  # the factor at which the stable branch ended
+    followed_from: float | None = None  # the factor from which a path stands in for the relaxation
 
     def __post_init__(self) -> None:
         network = self.model.network
@@ -198,21 +203,59 @@ class _Analysis:
                 spent = found.factorisations
                 self.on_branch = None
             else:
-                arrived = advance(
-                    self.assembly,
-                    self.state,
-                    self.drive,
-                    begin=before,
-                    end=after,
-                    tolerance=self.tolerance,
-                    limit=self.limit,
-                    report=self._reporter(steps, before, after),
-                )
-                if not arrived.on_branch:
-                    self._left(before + arrived.share * (after - before))
-                found, spent = arrived.equilibrium, arrived.factorisations
+                found, spent = self._relaxed(before, after, steps)
             self.accept(found, after, spent)
             self.documented.append(self._increment(after, spent) | {"steps": steps})
+
+    def _relaxed(self, before: float, after: float, steps: list[dict[str, Any]]) -> tuple[Equilibrium, int]:
+        """The equilibrium at the factor `after` from the one at `before`, and factorisations spent; along the path
+        where moments without potential don't let the relaxation come to rest.
+        """
+        try:
+            arrived = advance(
+                self.assembly,
+                self.state,
+                self.drive,
+                begin=before,
+                end=after,
+                tolerance=self.tolerance,
+                limit=min(self.limit, _TURNING) if self.turns else self.limit,
+                report=self._reporter(steps, before, after),
+            )
+        except NotConverged as error:
+            if not self.turns or isinstance(error, Drowned):
+                raise
+            steps.clear()
+            found = self._followed(before, after, steps, error.iterations)
+            return found, error.iterations + found.factorisations
+        if not arrived.on_branch:
+            self._left(before + arrived.share * (after - before))
+        return arrived.equilibrium, arrived.factorisations
+
+    def _followed(self, before: float, after: float, steps: list[dict[str, Any]], wasted: int) -> Equilibrium:
+        """The equilibrium at the factor `after` along the path from the one at `before`, `wasted` factorisations
+        having led nowhere.
+        """
+        change = after - before
+        rest = Drive(change * self.drive.load, change * self.drive.imposed, self.drive.at(before))
+        if self.followed_from is None:
+            self.followed_from = before
+        points = follow(self.assembly, self.state, rest, tolerance=self.tolerance)
+        last = next(points)
+        for last in points:
+            factor = before + last.factor * change
+            if last.event or not last.equilibrium.stable:
+                self._left(factor)
+            steps.append(
+                {
+                    "factor": factor,
+                    "iterations": last.equilibrium.factorisations,
+                    "stable": last.equilibrium.stable,
+                }
+            )
+            if self.progress is not None:
+                self.progress(factor, self.spent + wasted + last.equilibrium.factorisations)
+        return last.equilibrium
 
     def path(self, lead: tuple[int, int, float] | None, parts: int) -> None:
         """Along the path to the factor or to the led displacement, the first step a `parts`-th of it, or a
@@ -256,8 +299,14 @@ class _Analysis:
             )
         if self.turns:
             said.append(
-                "Moments about fixed axes turn nodes in space and have no potential: stability is that of the "
-                "tangent's symmetric part, as under semi-tangential moments."
+                "Moments about fixed axes turn nodes in space and have no potential: equilibrium is that under "
+                "these dead moments, stability and critical factors are those of the tangent's symmetric part, as "
+                "under semi-tangential moments."
+            )
+        if self.followed_from is not None:
+            said.append(
+                "The relaxation does not come to rest under these moments: the path was followed from load factor "
+                f"{self.followed_from:.6g} on."
             )
         return said
 
