@@ -26,7 +26,7 @@ from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import SOUGHT, Limit
 from shellform.reliability.perfect import perfect_of
 from shellform.reliability.standing import Workshop
-from shellform.structure.elements import rotation
+from shellform.structure.answers.halved import with_middles
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.sections import Section
 from shellform.structure.elements.state import State
@@ -109,7 +109,7 @@ def halved(model: Model) -> Model:
     rest[len(beams.ends) :] *= 0.5
     finer = replace(cut, ends=np.vstack([ends, again]), rest_length=rest)
     wider = np.zeros((len(rods), 6))
-    start = None if model.start is None else _between(model.start, beams, rods)
+    start = None if model.start is None else with_middles(model.start, beams, rods)
     if start is not None and beams.of_kind(LOCK).any():
         finer = _with_locks_cut(finer, start, beams, rods, new)
     return Model(
@@ -149,23 +149,6 @@ def _repeated(beams: Beams, rods: np.ndarray) -> Beams:
 def _chosen(beams: Beams, chosen: Indices) -> Beams:
     names = ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length", "frames", "kind")
     return replace(beams, **{name: getattr(beams, name)[chosen] for name in names})
-
-
-def _between(start: State, beams: Beams, rods: np.ndarray) -> State:
-    """The state with the rods' middles on the cubic through their ends."""
-    a, b = beams.ends[rods].T
-    one, other = start.positions[a], start.positions[b]
-    length = np.linalg.norm(other - one, axis=1)[:, None]
-    axis = beams.frames[rods][:, 0, :, 0]
-    along = [
-        np.einsum("eij,ej->ei", rotation.matrices(start.quaternions[node]), axis) * length for node in (a, b)
-    ]
-    middle = 0.5 * (one + other) + 0.125 * (along[0] - along[1])
-    first, second = start.quaternions[a], start.quaternions[b]
-    same = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
-    half = first + same * second
-    half /= np.linalg.norm(half, axis=1, keepdims=True)
-    return State(np.vstack([start.positions, middle]), np.vstack([start.quaternions, half]))
 
 
 def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:

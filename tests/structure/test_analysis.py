@@ -6,13 +6,16 @@ from scipy.optimize import brentq
 
 from shellform.errors import InputError, NotConverged
 from shellform.structure.answers.analysis import analyse
+from shellform.structure.answers.halved import critical_error
 from shellform.structure.answers.result_document import result
+from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
 from shellform.structure.solve.dynamic import dynamic
-from shellform.verification import exact
-from shellform.verification.models import CLAMP, PIN, chain, in_plane, line, load_at, order, polyline
+from shellform.structure.solve.loading import forces
+from shellform.verification import exact, limit_points
+from shellform.verification.models import CLAMP, PIN, chain, in_plane, line, load_at, order, polyline, ropes
 
 
 def toggle():
@@ -135,3 +138,50 @@ def test_a_hinged_rod_under_a_torque_has_the_critical_factor_of_a_semi_tangentia
         found.append(result.critical.factor)
     half = brentq(lambda x: np.tan(x) + x / 3.0, 2.0, 3.0)
     assert order(np.array(found) - 2.0 * half) == pytest.approx(2.0, abs=0.2)
+
+
+def lee_frame():
+    points = polyline([[0.0, 0.0, 0.0], [0.0, 0.0, 120.0], [120.0, 0.0, 120.0]], 10)
+    return points, (4320.0, 1440.0, 1440.0, 1440.0), {0: PIN, 20: PIN}, 12, limit_points.LEE_LIMITS[0][0]
+
+
+def williams_toggle():
+    points = polyline([[-12.943, 0.0, 0.0], [0.0, 0.0, 0.386], [12.943, 0.0, 0.0]], 10)
+    stiffness = (1.885e6, 9.274e3, 9.274e3, 9.274e3)
+    return points, stiffness, {0: CLAMP, 20: CLAMP}, 10, limit_points.TOGGLE[0][0]
+
+
+def deep_arch():
+    angle = np.linspace(-1.0, 1.0, 21) * np.radians(107.5)
+    points = 100.0 * np.column_stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)])
+    return points, (1e8, 1e6, 1e6, 1e6), {0: CLAMP, 20: PIN}, 10, limit_points.ARCH[0]
+
+
+@pytest.mark.parametrize("frame", [lee_frame, williams_toggle, deep_arch])
+def test_a_critical_factor_tells_what_ten_straight_elements_a_member_leave_of_it(frame):
+    points, stiffness, held, node, limit = frame()
+    network = in_plane(chain(points, stiffness, held))
+    load = load_at(network, node, [0.0, 0.0, -1.0])
+    found = analyse(Model(network, {"down": load}, None, tuple(held)), factor=0.01, critical_to=1.25 * limit)
+    critical = result(found)["critical"]
+    assert critical["factor"] - critical["factor_error"] == pytest.approx(limit, rel=5e-4)
+    assert 0.005 < critical["factor_error"] / critical["factor"] < 0.02
+    assert f"too high, by the same with beams halved (extrapolated {limit:.3g}"[:-2] in found.warnings[-1]
+
+
+def test_a_fine_mesh_s_critical_factor_needs_no_warning():
+    points = polyline([[-12.943, 0.0, 0.0], [0.0, 0.0, 0.386], [12.943, 0.0, 0.0]], 20)
+    network = in_plane(chain(points, (1.885e6, 9.274e3, 9.274e3, 9.274e3), {0: CLAMP, 40: CLAMP}))
+    model = Model(network, {"down": load_at(network, 20, [0.0, 0.0, -1.0])}, None, (0, 40))
+    found = analyse(model, factor=0.01, critical_to=60.0)
+    assert found.warnings == ()
+    assert found.critical_mesh.error > 0.0
+
+
+def test_cables_alone_have_no_beams_to_halve_and_no_error():
+    assert critical_error(ropes_only(), forces(np.zeros((3, 6))), 1.0, goal=2.0, tolerance=1e-8) is None
+
+
+def ropes_only():
+    cables = make_cables([[0, 1], [1, 2]], rest_length=0.9, stiffness=100.0)
+    return Model(ropes(line(2, 2.0), cables, [0, 2]), {}, None, (0, 2))

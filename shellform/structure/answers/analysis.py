@@ -20,6 +20,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
+from shellform.structure.answers.halved import MeshNote, critical_error
 from shellform.structure.answers.request import (
     check_imposed_turns,
     check_request,
@@ -39,9 +40,8 @@ from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import Drowned, Turning
 
 LIMIT = 1000  # factorisations of one relaxation
-_TURNING = (
-    200  # the same under moments that have no potential to lower, before their path is followed instead
-)
+_COARSE = 0.005  # of a critical factor, the error above which it is told
+_TURNING = 200  # the same under moments without potential, before their path is followed instead
 
 Progress = Callable[[float, int], None]
 """Called with the load factor and the factorisations so far."""
@@ -54,7 +54,8 @@ class Analysis:
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
     `converged`; `increments` as the contract has them, each with the `steps` it took; `modes` and `critical`
     where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable branch
-    from the start; None where the method (Newton's) doesn't tell.
+    from the start; None where the method (Newton's) doesn't tell. `critical_mesh`: what straight beams leave of the
+    critical factor.
     """
 
     model: Model
@@ -70,6 +71,7 @@ class Analysis:
     critical: Critical | None = None
     critical_sought: float = 0.0
     on_branch: bool | None = None
+    critical_mesh: MeshNote | None = None
 
 
 def analyse(
@@ -101,7 +103,7 @@ def analyse(
     assembly = assemble(model.network)
     walk = _Analysis(model, assembly, chosen, factor, tolerance, limit, progress)
     message, converged = "", True
-    critical, softest = None, None
+    critical, softest, mesh = None, None, None
     try:
         walk.begin()
         origin = walk.state
@@ -111,6 +113,10 @@ def analyse(
             walk.increments(increments, method)
         if critical_to is not None:
             critical = critical_load(assembly, origin, walk.drive, goal=critical_to, tolerance=tolerance)
+            if critical is not None:
+                mesh = critical_error(
+                    model, walk.drive, critical.factor, goal=critical_to, tolerance=tolerance
+                )
         if mode_count:
             softest = modes(fit_for(assembly, walk.state), walk.state, mode_count)
     except NotConverged as error:
@@ -129,11 +135,12 @@ def analyse(
         tuple(walk.documented),
         _seconds(assembly, time.perf_counter() - began),
         message,
-        (*doubts(model.network), *walk.warnings()),
+        (*doubts(model.network), *walk.warnings(), *_coarse(mesh)),
         softest,
         critical,
         critical_to or 0.0,
         walk.on_branch,
+        mesh,
     )
 
 
@@ -358,6 +365,17 @@ class _Analysis:
             return None
         tell = self.progress
         return lambda factorisations, residual: tell(factor, self.spent + factorisations)
+
+
+def _coarse(mesh: MeshNote | None) -> list[str]:
+    """What has to be said of a critical factor that the size of the elements decides, in a sentence."""
+    if mesh is None or abs(mesh.share) <= _COARSE:
+        return []
+    side = "high" if mesh.error > 0.0 else "low"
+    return [
+        f"The critical factor {mesh.factor:.6g} is about {100.0 * abs(mesh.share):.1f} % too {side}, by the same with "
+        f"beams halved (extrapolated {mesh.factor - mesh.error:.6g}): divide the rods into more elements."
+    ]
 
 
 def _seconds(assembly: Assembly, total: float) -> dict[str, float]:

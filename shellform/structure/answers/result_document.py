@@ -11,7 +11,6 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.structure.answers.analysis import Analysis
 from shellform.structure.answers.results import elongation, end_stress, energy_by_kind, twist, utilisation
-from shellform.structure.answers.stability import Critical
 from shellform.structure.elements.sections import Section
 
 
@@ -70,18 +69,20 @@ def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None)
             for stiffness, shape in zip(analysis.modes.stiffness.tolist(), analysis.modes.shapes, strict=True)
         ]
     if analysis.critical_sought:
-        document["critical"] = _critical(analysis.critical, analysis.critical_sought)
+        document["critical"] = _critical(analysis)
     if analysis.message:
         document["message"] = analysis.message
     return document
 
 
-def _critical(critical: Critical | None, sought: float) -> dict[str, Any]:
+def _critical(analysis: Analysis) -> dict[str, Any]:
+    critical, sought, mesh = analysis.critical, analysis.critical_sought, analysis.critical_mesh
     if critical is None:
         return {"factor": None, "sought_to": sought}
     estimate = critical.linearised if np.isfinite(critical.linearised) else None
     return {
         "factor": critical.factor,
+        "factor_error": None if mesh is None else mesh.error,
         "kind": critical.kind,
         "linearised": estimate,
         "sought_to": sought,

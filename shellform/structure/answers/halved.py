@@ -1,0 +1,177 @@
+"""A model with each beam cut in two, and what a critical factor is off because beams are straight.
+
+With f4 and f8 found on the two meshes and an error of order h² (elements/beam.py), Richardson's estimate of the error
+of f4 is 4 (f4 - f8) / 3.
+
+Where beams stand for a curve, halves of the chords would keep the polygon. The curvature at a node where two beams
+of one kind meet, k = (t' - t) / l with their directions and mean length, belongs to a beam as far as both its ends have
+it (the smaller of the two where they point to one side, else none; at a chain's end its neighbour's), so that a
+corner among straight beams stays one. The new node lies off the chord by -k l²/8, where the circle has its middle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.errors import NotConverged
+from shellform.structure.answers.stability import critical_load
+from shellform.structure.elements import rotation
+from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.state import State, at_rest
+from shellform.structure.model import Model
+from shellform.structure.network import Network, assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.loading import Drive
+
+_CORNER = np.radians(30.0)  # between two beams that don't stand for a curve
+
+
+@dataclass(frozen=True)
+class MeshNote:
+    """What a critical `factor` is too high by, `error`, negative where it is too low."""
+
+    factor: float
+    error: float
+
+    @property
+    def share(self) -> float:
+        """The error over the factor."""
+        return self.error / self.factor
+
+
+def critical_error(
+    model: Model, drive: Drive, factor: float, *, goal: float, tolerance: float
+) -> MeshNote | None:
+    """The error of the critical `factor` of the model under the drive, found up to `goal`; None where no beam can be
+    halved or the finer model has no critical factor up to 1.5 times the goal.
+    """
+    finer = halved(model)
+    more = len(finer.network.nodes) - len(model.network.nodes)
+    if not more:
+        return None
+    none = np.zeros((more, 6))
+    wider = Drive(*(np.vstack([part, none]) for part in (drive.load, drive.imposed, drive.base)))
+    assembly = assemble(finer.network)
+    try:
+        state = at_rest(finer.network.nodes) if finer.start is None else finer.start
+        if finer.start is not None:
+            state = find_equilibrium(assembly, state, wider.at(0.0), tolerance=tolerance).state
+        found = critical_load(assembly, state, wider, goal=1.5 * goal, first=0.1 / 1.5, tolerance=tolerance)
+    except NotConverged:
+        return None
+    return None if found is None else MeshNote(factor, 4.0 * (factor - found.factor) / 3.0)
+
+
+def halved(model: Model) -> Model:
+    """The model with each beam that is straight and unstressed between its nodes cut in two; its nodes come
+    first, in their order. New nodes are held as all others are.
+    """
+    network, beams = model.network, model.network.beams
+    cut = np.flatnonzero(~beams.built_in)
+    count, (a, b) = len(network.nodes), beams.ends[cut].T
+    new = count + np.arange(len(cut))
+    offset = np.zeros((len(cut), 3)) if model.start is not None else _bulge(network.nodes, beams)[cut]
+    middle = 0.5 * (network.nodes[a] + network.nodes[b]) + offset
+    nodes = np.vstack([network.nodes, middle])
+    # The beams with their second ends at the middles, then their second halves.
+    whole = np.concatenate([np.arange(len(beams.ends)), cut])
+    ends, rest, frames = (each[whole] for each in (beams.ends, beams.rest_length, beams.frames))
+    ends[cut, 1], ends[len(beams.ends) :, 0] = new, new
+    halves = np.concatenate([cut, np.arange(len(beams.ends), len(whole))])
+    chord = nodes[ends[halves, 1]] - nodes[ends[halves, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    before = np.linalg.norm(network.nodes[b] - network.nodes[a], axis=1)
+    rest[halves] *= length / np.tile(before, 2)
+    frames[halves] = _turned_to(frames[halves], chord / length[:, None])
+    others = {
+        name: getattr(beams, name)[whole] for name in ("axial", "torsion", "bending_y", "bending_z", "kind")
+    }
+    none = np.zeros((len(cut), 6))
+    held = np.broadcast_to(network.fixed.all(axis=0) & ~network.imposed.any(axis=0), none.shape)
+    finer = replace(beams, ends=ends, rest_length=rest, frames=frames, **others)
+    return Model(
+        Network(
+            nodes,
+            finer,
+            network.cables,
+            np.vstack([network.fixed, held]),
+            np.vstack([network.imposed, none]),
+        ),
+        {name: np.vstack([load, none]) for name, load in model.loads.items()},
+        None if model.start is None else with_middles(model.start, beams, cut),
+        model.supported,
+    )
+
+
+def with_middles(state: State, beams: Beams, cut: Indices) -> State:
+    """The state with the middles of the beams `cut` on the cubic through their ends, turned halfway."""
+    a, b = beams.ends[cut].T
+    one, other = state.positions[a], state.positions[b]
+    length = np.linalg.norm(other - one, axis=1)[:, None]
+    axis = beams.frames[cut][:, 0, :, 0]
+    along = [
+        np.einsum("eij,ej->ei", rotation.matrices(state.quaternions[node]), axis) * length for node in (a, b)
+    ]
+    middle = 0.5 * (one + other) + 0.125 * (along[0] - along[1])
+    first, second = state.quaternions[a], state.quaternions[b]
+    same = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+    half = first + same * second
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    return State(np.vstack([state.positions, middle]), np.vstack([state.quaternions, half]))
+
+
+def _bulge(nodes: Reals, beams: Beams) -> Reals:
+    """How far off its chord the middle of each beam lies (m, 3) where beams stand for a curve."""
+    a, b = beams.ends.T
+    chord = nodes[b] - nodes[a]
+    length = np.linalg.norm(chord, axis=1)
+    at_node, joins = _curvature(nodes, beams, chord / length[:, None], length)
+    one, other = at_node[a], at_node[b]
+    same_side = (one * other).sum(axis=1) > 0.0
+    smaller = np.where((np.linalg.norm(one, axis=1) < np.linalg.norm(other, axis=1))[:, None], one, other)
+    inner = joins[a] & joins[b]
+    own = np.where((inner & same_side)[:, None], smaller, 0.0)
+    # A chain's last beam bends as its neighbour does.
+    by_node = np.zeros_like(nodes)
+    for side in (a, b):
+        np.add.at(by_node, side[inner], own[inner])
+    for here, there in ((a, b), (b, a)):
+        last = joins[here] & ~joins[there]
+        own[last] = by_node[here[last]]
+    across = own - (own * chord).sum(axis=1)[:, None] * chord / length[:, None] ** 2
+    return np.asarray(-0.125 * length[:, None] ** 2 * across)
+
+
+def _curvature(nodes: Reals, beams: Beams, direction: Reals, length: Reals) -> tuple[Reals, Flags]:
+    """The curvature (n, 3), 1/m, at each node, towards the curve's centre, and whether two beams of a kind go on
+    through it (n,).
+    """
+    count, m = len(nodes), len(beams.ends)
+    meeting = np.bincount(beams.ends.ravel(), minlength=count)
+    outward = np.zeros((count, 3))
+    np.add.at(outward, beams.ends[:, 0], direction)
+    np.add.at(outward, beams.ends[:, 1], -direction)
+    mean = np.bincount(beams.ends.ravel(), weights=np.repeat(0.5 * length, 2), minlength=count)
+    least, most = np.full(count, m), np.full(count, -1)
+    np.minimum.at(least, beams.ends.ravel(), np.repeat(beams.kind, 2))
+    np.maximum.at(most, beams.ends.ravel(), np.repeat(beams.kind, 2))
+    # Two unit vectors away from a node add up to twice the sine of half the turn there.
+    smooth = np.linalg.norm(outward, axis=1) < 2.0 * np.sin(0.5 * _CORNER)
+    joins = (meeting == 2) & (least == most) & smooth
+    curvature = np.zeros((count, 3))
+    curvature[joins] = outward[joins] / mean[joins, None]
+    return curvature, joins
+
+
+def _turned_to(frames: Reals, axis: Reals) -> Reals:
+    """Frames (k, 2, 3, 3) turned by the least rotation that brings their x axes onto `axis` (k, 3)."""
+    sine = np.cross(frames[:, 0, :, 0], axis)
+    cosine = (frames[:, 0, :, 0] * axis).sum(axis=1)
+    cross = np.zeros((len(axis), 3, 3))
+    cross[:, [2, 0, 1], [1, 2, 0]] = sine
+    cross[:, [1, 2, 0], [2, 0, 1]] = -sine
+    turn = np.eye(3) + cross + cross @ cross / (1.0 + cosine)[:, None, None]
+    return np.asarray(turn[:, None] @ frames)

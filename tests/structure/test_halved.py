@@ -1,0 +1,69 @@
+"""Models with their beams cut in two: what stands for a curve is cut on it, what is straight stays straight."""
+
+import numpy as np
+import pytest
+
+from shellform.structure.answers.analysis import analyse
+from shellform.structure.answers.halved import halved
+from shellform.structure.elements.state import at_rest
+from shellform.structure.model import Model
+from shellform.structure.network import assemble
+from shellform.verification.models import CLAMP, PIN, chain, in_plane, line, load_at, polyline
+
+
+def model(points, held):
+    network = chain(points, (1e6, 0.8, 1.0, 2.0), held)
+    return Model(network, {"down": load_at(network, 1, [0.0, 0.0, -1.0])}, None, tuple(held))
+
+
+def circle(count):
+    angle = np.linspace(0.0, np.pi, count + 1)
+    return np.column_stack([np.cos(angle), np.zeros_like(angle), np.sin(angle)])
+
+
+def test_new_nodes_of_a_circle_s_chords_lie_on_the_circle_ends_included():
+    finer = halved(model(circle(12), {0: PIN, 12: PIN})).network.nodes[13:]
+    assert len(finer) == 12
+    sagitta = 1.0 - np.cos(np.pi / 24.0)
+    np.testing.assert_allclose(np.linalg.norm(finer, axis=1), 1.0, atol=0.02 * sagitta)
+
+
+def test_a_corner_among_straight_beams_stays_one():
+    points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.05], [1.0, 0.0, 0.0]], 2)
+    finer = halved(model(points, {0: PIN, 4: PIN})).network.nodes[5:]
+    np.testing.assert_allclose(finer, 0.5 * (points[1:] + points[:-1]), atol=1e-15)
+
+
+@pytest.mark.parametrize("points", [circle(12), polyline([[0, 0, 0], [0, 0, 1], [1, 1, 1]], 2)])
+def test_a_halved_model_is_without_stress_as_the_whole_one_is(points):
+    finer = halved(model(points, {0: CLAMP})).network
+    balance = assemble(finer).evaluate(at_rest(finer.nodes))
+    assert np.abs(balance.force).max() < 1e-8 * 1e6
+    assert balance.energy < 1e-12
+
+
+def test_each_half_keeps_its_beam_s_axes_and_stiffness_and_half_of_a_stretched_rest_length():
+    points = line(2)
+    whole = model(points, {0: CLAMP})
+    finer = halved(whole).network.beams
+    np.testing.assert_allclose(finer.rest_length, 0.25)
+    np.testing.assert_array_equal(finer.bending_z, 2.0)
+    np.testing.assert_allclose(finer.frames[2:], whole.network.beams.frames, atol=1e-15)
+    assert finer.ends.tolist() == [[0, 3], [1, 4], [3, 1], [4, 2]]
+
+
+def test_new_nodes_are_held_only_as_all_others_are():
+    network = in_plane(chain(line(2), (1e6, 0.8, 1.0, 1.0), {0: CLAMP, 2: CLAMP}))
+    finer = halved(Model(network, {}, None, (0, 2))).network
+    assert finer.fixed[3:].tolist() == [[False, True, False, True, False, True]] * 2
+
+
+def test_a_bent_start_is_cut_on_the_cubic_through_its_ends():
+    network = chain(line(8), (1e6, 0.8, 1.0, 1.0), {0: CLAMP})
+    load = load_at(network, 8, [0.0, 0.0, 0.0, 0.0, 2.0, 0.0])
+    bent = analyse(Model(network, {"moment": load}, None, (0,))).equilibrium.state
+    finer = halved(Model(network, {"moment": load}, bent, (0,)))
+    assert finer.start is not None
+    radius = 0.125 / (2.0 * np.sin(0.125))
+    away = np.linalg.norm(finer.start.positions - [0.0, 0.0, -radius], axis=1)
+    np.testing.assert_allclose(away, radius, atol=0.02 * radius * (1.0 - np.cos(0.125)))
