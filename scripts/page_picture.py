@@ -36,7 +36,7 @@ def pick_a_cable(page: Page) -> None:
     page.select_option("select[name=scale]", "state")
     page.check("input[name=surface]")
     for _ in range(60):
-        page.locator("canvas").press("n")
+        page.locator("canvas").first.press("n")
     page.evaluate("document.activeElement.blur(); scrollTo(0, 0)")
 
 

@@ -146,18 +146,22 @@ def _checked(where: str, make: Callable[[], Any]) -> Any:
         ) from error
 
 
-def label(section: Section) -> str:
-    """What a section is called: "⌀ 10 mm", "⌀ 42 × 3.5 mm", "50 × 35 mm", "2 layers of 50 × 35 mm", "19
-    rods ⌀ 10 mm"."""
+def label(section: Section, places: int = 6) -> str:
+    """What a section is called, in mm to so many decimal places (two are as exact as rods are made): "⌀ 10 mm",
+    "⌀ 42 × 3.5 mm", "50 × 35 mm", "2 layers of 50 × 35 mm", "19 rods ⌀ 10 mm"."""
+
+    def mm(size: float) -> str:
+        return f"{round(1e3 * size, places):g}"
+
     if isinstance(section, TwoLayers):
-        return f"2 layers of {label(section.single)}"
+        return f"2 layers of {label(section.single, places)}"
     if isinstance(section, Bundle):
-        return f"{section.count} rods ⌀ {2e3 * section.radius:g} mm"
+        return f"{section.count} rods ⌀ {mm(2.0 * section.radius)} mm"
     if isinstance(section, Round):
-        return f"⌀ {2e3 * section.radius:g} mm"
+        return f"⌀ {mm(2.0 * section.radius)} mm"
     if isinstance(section, Tube):
-        return f"⌀ {2e3 * section.radius:g} × {1e3 * section.thickness:g} mm"
-    return " × ".join(f"{1e3 * size:g}" for size in section.sizes) + " mm"
+        return f"⌀ {mm(2.0 * section.radius)} × {mm(section.thickness)} mm"
+    return " × ".join(mm(size) for size in section.sizes) + " mm"
 
 
 def named(catalogue: Catalogue, name: str) -> Section:

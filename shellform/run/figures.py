@@ -329,7 +329,11 @@ def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:
     usual = {"deviation": run.case.figures.limit, "utilisation": 1.0, "mode": 1.0}
     if math.isfinite(borne):
         usual["curvature"] = borne
-    force = max(float(panel.cable_forces.max(initial=0.0)) for panel in panels)
+    force = max(  # of the whole run, as on its page: a picture of one state is read beside the others
+        float(run.shell_of(name).cables(design).tension(state).max(initial=0.0))
+        for name, design in run.designs.items()
+        for state in run.states[name].values()
+    )
     look = Look(
         limit=wish.limit or usual.get(wish.quantity, largest),
         size=wish.size or _USUAL,

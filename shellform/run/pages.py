@@ -4,15 +4,19 @@ at all.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from platform import python_version
 
 import shellform
+from shellform.case.build_gridshell import rounding_catalogue
 from shellform.errors import InputError
+from shellform.gridshell.catalogue import label, rounded_up
 from shellform.output.page.embed import KINDS, embed
-from shellform.output.page.report import GENERATOR, ShownRun, html
+from shellform.output.page.report import GENERATOR, html
+from shellform.output.page.shown_run import ShownRun
 from shellform.records.history import read_history
 from shellform.records.progress import Event, Report, unheard
 from shellform.records.stages import read_stages
@@ -23,7 +27,7 @@ from shellform.run.keys import stage_keys
 from shellform.written import is_partial, write_text
 
 FILE = "report.html"
-_BUDGET = 9_000_000  # bytes of pictures in a page, before they become text, which adds a third
+_BUDGET = 5_000_000  # bytes of pictures in a page, before they become text, which adds a third: it stays below 8 MB
 _PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "mkl", "gmsh", "nlopt", "pyvista")
 _DRAWN = ("objective", "constraints")
 _HEAD = 2000  # characters in which a page of ours names its maker
@@ -52,13 +56,13 @@ def write_report(
 def write_page(runs: Sequence[Run], file: Path) -> Path:
     """As `write_report`, of runs that are read already."""
     _refuse_foreign(file)
-    text = html([shown_run(run, _BUDGET // len(runs)) for run in runs], versions())
+    text = html([shown_run(run, _BUDGET // len(runs), page=file) for run in runs], versions())
     write_text(file, text)
     return file
 
 
-def shown_run(run: Run, budget: int = _BUDGET) -> ShownRun:
-    """A run as the page takes it, with at most `budget` bytes of pictures."""
+def shown_run(run: Run, budget: int = _BUDGET, *, page: Path | None = None) -> ShownRun:
+    """A run as the `page` (in its folder) takes it, with at most `budget` bytes of pictures."""
     pictures, left = embed(_pictures(run), budget=budget)
     found = run_checks(run)
     return ShownRun(
@@ -84,7 +88,30 @@ def shown_run(run: Run, budget: int = _BUDGET) -> ShownRun:
             for file in run.folder.rglob("*")
             if file.is_file() and file.name != LOCK and not is_partial(file)
         ),
+        home="" if page is None else _home(run.folder, page),
+        next_size=_next_size(run),
     )
+
+
+def _home(folder: Path, page: Path) -> str:
+    """The folder's address, relative to the page; "" where the page stands in it."""
+    try:
+        home = Path(os.path.relpath(folder.resolve(), page.resolve().parent)).as_posix()
+    except ValueError:  # another drive
+        home = folder.resolve().as_posix()
+    return "" if home == "." else f"{home}/"
+
+
+def _next_size(run: Run) -> str:
+    """The size of the case's catalogue that the rods of the design to build would be rounded to."""
+    catalogue = rounding_catalogue(run.case)
+    if catalogue is None:
+        return ""
+    try:
+        shell, _ = rounded_up(run.shell_of(run.best), run.designs[run.best], catalogue)
+    except InputError:  # none is stiff enough
+        return ""
+    return label(shell.rod.section)
 
 
 def _notes(run: Run, has_pictures: bool) -> list[str]:

@@ -11,10 +11,11 @@ from PIL import Image
 import shellform as sf
 from shellform.errors import InputError
 from shellform.net.net import Stretch
-from shellform.output.page import report
+from shellform.output.page import report, view_data
 from shellform.output.page.charts import line_chart
 from shellform.output.page.embed import embed
 from shellform.output.page.first_answers import answers
+from shellform.output.page.shown_run import ShownRun
 from shellform.records.check import Cell
 from shellform.records.summary import StandingRecord, VerdictRecord
 from shellform.records.words import number
@@ -147,9 +148,9 @@ def test_a_picture_of_absurdly_many_pixels_is_left_out_and_named(tmp_path, monke
 
 
 def test_a_fine_surface_is_made_light_and_stays_where_it_is(vault, monkeypatch):
-    assert report._light(vault)[1] is not None
-    monkeypatch.setattr(report, "_MOST_TRIANGLES", 2000)
-    vertices, triangles = report._light(vault)
+    assert view_data._light(vault)[1] is not None
+    monkeypatch.setattr(view_data, "_MOST_TRIANGLES", 2000)
+    vertices, triangles = view_data._light(vault)
     assert 500 < len(triangles) < 4000
     assert triangles.max() < len(vertices)
     a, b, c = (vertices[triangles[:, k]] for k in range(3))
@@ -174,7 +175,7 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
     design = shell.design()
     states = {"none": shell.target, "design": moved}
     loads = {"none": np.zeros((len(moved.positions), 6)), "design": shell.point_load(6.9)}
-    run = report.ShownRun(
+    run = ShownRun(
         "t",
         "p",
         {"initial": shell},
@@ -194,7 +195,7 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
         [],
         [],
     )
-    drawn = report._drawn(run)
+    drawn = view_data.view_data(report.viewed(run))
     found = drawn["designs"][0]["states"]["design"]
     assert found["length"] == pytest.approx(1e3 * shell.cables(design).lengths(moved), abs=1e-4)
     assert found["force"] == pytest.approx(shell.cables(design).tension(moved), rel=1e-5)
@@ -203,3 +204,34 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
     )
     assert drawn["loads"][0]["points"] == []
     assert len(drawn["loads"][1]["points"]) == len(shell.net.grid.lattice)
+
+
+def test_the_flat_grid_lies_under_the_shell_as_near_as_it_can(shell):
+    flat, place = shell.net.grid.flat, shell.target.positions
+    laid = view_data.laid_out(flat, place)
+    apart = np.linalg.norm(laid[:, None, :2] - laid[None, :, :2], axis=2)[:40, :40]
+    assert apart == pytest.approx(np.linalg.norm(flat[:, None, :2] - flat[None, :, :2], axis=2)[:40, :40])
+    near = np.linalg.norm((laid - place)[:, :2], axis=1).mean()
+    for turn in (-0.05, 0.05):
+        spun = (laid[:, :2] - laid[:, :2].mean(axis=0)) @ [
+            [math.cos(turn), math.sin(turn)],
+            [-math.sin(turn), math.cos(turn)],
+        ] + laid[:, :2].mean(axis=0)
+        assert np.square(spun - place[:, :2]).sum() > np.square((laid - place)[:, :2]).sum()
+    assert near < 0.2
+    assert laid[:, 2].min() == pytest.approx(place[:, 2].min())
+
+
+def test_a_radius_between_two_sizes_is_told_as_it_can_be_made_with_the_next_size_sold(shell, designs):
+    design = replace(designs["polished"], radius=0.00132268)
+    found = answers(shell, "polished", design, {}, summary(designs), next_size="⌀ 3 mm")
+    rods = next(answer for answer in found if answer.question == "Which rods?")
+    assert rods.words == "⌀ 2.65 mm"
+    assert rods.detail.endswith("the next size sold is ⌀ 3 mm")
+
+
+def test_cables_that_are_slack_before_the_load_are_named(shell, designs):
+    given = summary(designs, "none", slack=("C3", "C7"))
+    found = answers(shell, "polished", designs["polished"], {}, given)
+    cables = next(answer for answer in found if answer.question == "How many cables?")
+    assert "slack before any load: C3, C7" in cables.detail

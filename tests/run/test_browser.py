@@ -21,6 +21,7 @@ from shellform.run.pages import write_report
 from tests.run.small_run import begin, finish
 
 ROOT = Path(__file__).parent.parent.parent
+LAST = "document.querySelector('.pane.second canvas').toDataURL()"
 SYSTEM = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -113,13 +114,13 @@ def hovered(page, kind):
     """A place on the canvas, in the window's pixels, where the pointer finds a cable or rod, and what the
     page says of it.
     """
-    page.locator("canvas").scroll_into_view_if_needed()
-    box = page.locator("canvas").bounding_box()
+    page.locator("canvas").first.scroll_into_view_if_needed()
+    box = page.locator("canvas").first.bounding_box()
     for share in np.linspace(0.3, 0.7, 25):
         x, y = box["x"] + share * box["width"], box["y"] + (0.35 + 0.3 * share) * box["height"]
         page.mouse.move(x, y)
         page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
-        told = page.locator(".tip").text_content() if page.locator(".tip").is_visible() else ""
+        told = page.locator(".tip").first.text_content() if page.locator(".tip").first.is_visible() else ""
         if told.startswith(kind):
             return x, y, told
     raise AssertionError(f"no {kind} was found")
@@ -173,12 +174,12 @@ def test_switching_design_and_load_changes_picture_words_and_tables(visit, file,
     assert cells(page, "cables", 6) != forces
     choose(page, "design", "initial")
     away = 1e3 * deviations(run.shell, run.states["initial"]["none"])
-    told = page.locator(".told").text_content()
+    told = page.locator(".told").first.text_content()
     assert told.startswith("Initial design under no load")
     assert float(re.search(r"([\d.]+) mm off at most", told)[1]) == pytest.approx(away.max(), rel=0.06)
     assert len(cells(page, "cables", 1)) == run.designs["initial"].present.sum()
     choose(page, "design", "unbraced")
-    assert "no cables" in page.locator(".told").text_content()
+    assert "no cables" in page.locator(".told").first.text_content()
     assert not page.locator(".cables-legend").is_visible()
 
 
@@ -199,7 +200,7 @@ def test_what_is_shown_can_be_switched_turned_and_scaled(visit, file):
         after = picture(page)
         assert changed(now, after) > 0.001
         now = after
-    box = page.locator("canvas").bounding_box()
+    box = page.locator("canvas").first.bounding_box()
     page.mouse.move(box["x"] + 200, box["y"] + 200)
     page.mouse.down()
     page.mouse.move(box["x"] + 320, box["y"] + 160, steps=4)
@@ -209,7 +210,7 @@ def test_what_is_shown_can_be_switched_turned_and_scaled(visit, file):
 
 def test_the_colours_fit_the_design_and_its_cables_are_saved_as_shown(visit, file, tmp_path):
     page = visit(file)
-    off = float(re.search(r"([\d.]+) mm off at most", page.locator(".told").text_content())[1])
+    off = float(re.search(r"([\d.]+) mm off at most", page.locator(".told").first.text_content())[1])
     end = float(page.locator(".rods-legend .ticks span").last.text_content().removeprefix("≥ "))
     assert off <= 1.01 * end <= 2.6 * off
     with page.expect_download() as begun:
@@ -218,6 +219,108 @@ def test_the_colours_fit_the_design_and_its_cables_are_saved_as_shown(visit, fil
     head, *rows = (tmp_path / "cables.csv").read_text(encoding="utf-8").splitlines()
     assert head.startswith("Cable,From crossing,To crossing,Rest length [mm]")
     assert [row.split(",")[0] for row in rows] == cells(page, "cables", 1)
+
+
+def test_a_second_design_stands_beside_the_first_under_one_camera_and_one_scale(visit, file):
+    page = visit(file)
+    second = page.locator(".pane.second canvas")
+    assert not second.is_visible()
+    page.select_option("[name=beside]", label="Initial")
+    assert second.is_visible()
+    told = page.locator(".told").all_text_contents()
+    assert told[0].startswith("Optimised design under the design load")
+    assert told[1].startswith("Initial design under the design load")
+    before = page.evaluate(LAST)
+    page.get_by_role("button", name="Top", exact=True).click()
+    picture(page)
+    assert page.evaluate(LAST) != before, "the second turns with the first"
+    choose(page, "load", "none")
+    assert page.locator(".told").nth(1).text_content().startswith("Initial design under no load")
+    page.select_option("[name=beside]", label="the same under the design load")
+    assert page.locator(".told").nth(1).text_content().startswith("Optimised design under the design load")
+    page.select_option("[name=beside]", "")
+    assert not second.is_visible()
+
+
+def test_the_distance_of_two_crossings_is_that_of_the_state(visit, file, run):
+    page = visit(file)
+    page.fill("[name=from]", "3")
+    page.fill("[name=to]", "20")
+    pairs = run.net.grid.crossing_nodes[[3, 20]]
+    for name, load in [("optimised", "design"), ("optimised", "none")]:
+        choose(page, "load", load)
+        a, b = run.states[name][load].positions[pairs].mean(axis=1)
+        told = page.locator(".measure output").text_content()
+        assert float(told.split(" mm")[0]) == pytest.approx(1e3 * np.linalg.norm(b - a), abs=0.006)
+    page.fill("[name=to]", "100000")
+    assert "numbered from 0 to" in page.locator(".measure output").text_content()
+    page.click("[data-measure]")
+    canvas = page.locator("canvas").first
+    canvas.scroll_into_view_if_needed()
+    box = canvas.bounding_box()
+    for share in np.linspace(0.2, 0.8, 20):
+        page.mouse.click(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
+        if "straight from crossing" in page.locator(".measure output").text_content():
+            break
+    assert "straight from crossing" in page.locator(".measure output").text_content()
+    assert not page.locator(".picked h3").count(), "a click measures, it doesn't pick"
+
+
+def test_a_cut_takes_away_what_lies_beyond_and_draws_the_section(visit, file):
+    page = visit(file)
+    whole = picture(page)
+    page.select_option("[name=cut]", "x")
+    half = picture(page)
+    assert changed(whole, half) > 0.005
+    assert page.locator(".profile path.target").count() == 1
+    assert page.locator(".profile circle").count() > 4
+    page.locator("[name=level]").fill("10")
+    assert changed(half, picture(page)) > 0.002
+    assert re.search(r"at x = -?\d+\.\d\d mm", page.locator(".profile figcaption").text_content())
+    page.select_option("[name=cut]", "")
+    assert changed(whole, picture(page)) < 0.001
+
+
+def test_the_way_leads_from_the_flat_grid_to_the_poured_shell(visit, file):
+    page = visit(file)
+    poured = picture(page)
+    assert page.locator(".way").text_content() == "flat → erected → braced → poured"
+    seen = []
+    for share in ("0", "20", "33", "67", "100"):
+        page.locator("[name=moment]").fill(share)
+        seen.append(picture(page))
+    assert changed(seen[0], seen[1]) > 0.01
+    assert changed(seen[1], seen[2]) > 0.005
+    assert changed(poured, seen[-1]) < 0.001
+    page.locator("[name=moment]").fill("0")
+    assert page.locator(".told").first.text_content() == "Optimised design: flat."
+    page.locator("[name=moment]").fill("15")
+    assert "drawn straight between" in page.locator(".told").first.text_content()
+    choose(page, "load", "none")
+    assert page.locator("[name=moment]").input_value() == "100", "a load is shown as computed"
+
+
+def test_pictures_tables_and_the_view_are_saved(visit, file, tmp_path):
+    page = visit(file)
+    for what, ending in [("[data-save=picture]", ".png"), ("[data-save-picture]", ".webp")]:
+        with page.expect_download() as begun:
+            page.locator(what).first.click()
+        assert begun.value.suggested_filename.endswith(ending)
+        begun.value.save_as(tmp_path / "picture")
+        with Image.open(tmp_path / "picture") as saved:
+            assert saved.width > 60
+    with page.expect_download() as begun:
+        page.locator("[data-save-table=checks]").click()
+    begun.value.save_as(tmp_path / "checks.csv")
+    assert (tmp_path / "checks.csv").read_text(encoding="utf-8").startswith("Check,Optimised")
+
+
+def test_the_links_lead_to_the_files_of_the_run(visit, folder, tmp_path):
+    for page_file in (folder / "report.html", tmp_path / "elsewhere.html"):
+        page = visit(write_report([folder], page_file))
+        addresses = page.eval_on_selector_all(".files a", "links => links.map((link) => link.href)")
+        assert len(addresses) > 5
+        assert all(Path(address.removeprefix("file://")).is_file() for address in addresses)
 
 
 def test_tables_are_sorted_and_searched(visit, file):
@@ -246,7 +349,9 @@ def test_everything_is_reached_by_keys(visit, file):
     page = visit(file)
     page.locator("input[name=load]:checked").focus()
     page.keyboard.press("ArrowRight")
-    assert "1.2 × the load" in page.locator(".told").text_content()
+    assert "1.2 × the load" in page.locator(".told").first.text_content()
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.name") == "beside"
     page.keyboard.press("Tab")
     assert page.evaluate("document.activeElement.tagName") == "CANVAS"
     page.keyboard.press("0")
@@ -298,13 +403,22 @@ def test_a_phone_shows_it_without_scrolling_sideways(visit, file):
     assert page.evaluate("document.documentElement.scrollWidth") <= 360
     drawn = picture(page)
     assert (np.abs(drawn - drawn[2, 2]).max(axis=2) > 40).mean() > 0.01
-    page.locator("canvas").scroll_into_view_if_needed()
-    box = page.locator("canvas").bounding_box()
+    page.locator("canvas").first.scroll_into_view_if_needed()
+    box = page.locator("canvas").first.bounding_box()
     for share in np.linspace(0.35, 0.65, 13):
         page.touchscreen.tap(box["x"] + share * box["width"], box["y"] + 0.5 * box["height"])
         if page.locator(".picked h3").count():
             break
     assert re.match("(Cable|Rod) ", page.locator(".picked h3").text_content())
+    canvas = page.locator("canvas").first
+    assert canvas.evaluate("each => getComputedStyle(each).touchAction") == "none", "now one finger turns it"
+    page.evaluate("document.activeElement.blur()")
+    assert canvas.evaluate("each => getComputedStyle(each).touchAction") == "pan-y", "and scrolls again"
+
+
+def test_on_a_laptop_the_view_begins_on_the_first_screen(visit, file):
+    page = visit(file, viewport={"width": 1366, "height": 680})
+    assert page.locator("canvas").first.bounding_box()["y"] < 560
 
 
 def test_dark_and_light_follow_the_reader_s_wish(visit, file):
@@ -345,7 +459,7 @@ def test_several_runs_are_compared_and_stand_in_tabs(visit, folder, tmp_path):
     page.get_by_role("tab").first.focus()
     page.keyboard.press("ArrowRight")
     assert page.locator(".run:not([hidden]) h1").text_content() == "other"
-    assert "Initial design" in page.locator(".run:not([hidden]) .told").text_content()
+    assert "Initial design" in page.locator(".run:not([hidden]) .told").first.text_content()
     assert changed(first, picture(page)) > 0.001
     page.get_by_role("tab").first.click()
     assert changed(first, picture(page)) < 0.001, "and back"
@@ -358,7 +472,9 @@ def test_without_webgl_the_page_says_so_and_the_rest_works(visit, file, browser)
     context.add_init_script("HTMLCanvasElement.prototype.getContext = () => null")
     page = context.new_page()
     page.goto(file.as_uri())
-    assert "The view can't be drawn: this browser has no WebGL 2" in page.locator(".told").text_content()
+    assert (
+        "The view can't be drawn: this browser has no WebGL 2" in page.locator(".told").first.text_content()
+    )
     page.locator("[data-table=cables] tbody tr").first.click()
     assert page.locator(".picked h3").text_content().startswith("Cable")
     context.close()

@@ -5,7 +5,7 @@ rods, is it safe, what does it stand on, what to buy.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,7 +15,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.records.check import SLACK, Cell
-from shellform.records.summary import LoadRecord, Summary
+from shellform.records.summary import DesignRecord, LoadRecord, Summary
 from shellform.records.words import critical_words, number
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
@@ -45,9 +45,11 @@ def answers(
     summary: Summary,
     *,
     as_built: Cell | None = None,
+    next_size: str = "",
 ) -> list[Answer]:
     """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the
-    design to build, whose check `as_built` says how many drawn structures stand under the additional load."""
+    design to build, whose check `as_built` says how many drawn structures stand under the additional load; `next_size` is the size
+    of the catalogue that its rods would be rounded to."""
     row = summary.designs.get(name)
     main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
     found = [] if main is None else [_how_far(main)]
@@ -58,10 +60,11 @@ def answers(
             "How many cables?",
             f"{len(cables.ends)} of {len(shell.cable_ends)}",
             f"{number(float(pull.max(initial=0.0)))} N at most in one, {number(float(pull.sum()))} N in all, "
-            "under the design load",
+            f"under the design load{_slack(main, row)}",
         )
     )
     section = shell.rod.resized(design.radius).section
+    bought = f"; the next size sold is {next_size}" if next_size and next_size != label(section, 2) else ""
     rods = np.array([rod.length for rod in shell.net.grid.rods])
     stressed = (
         ""
@@ -72,8 +75,8 @@ def answers(
     found.append(
         Answer(
             "Which rods?",
-            label(section),
-            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}{locked}",
+            label(section, 2),
+            f"{len(rods)} rods of up to {number(1e3 * float(rods.max()))} mm{stressed}{locked}{bought}",
         )
     )
     if more is not None:
@@ -93,6 +96,25 @@ def answers(
         )
     )
     return found
+
+
+def _slack(main: LoadRecord | None, row: DesignRecord | None) -> str:
+    """Which cables hang slack, before the load and under it."""
+    before = None if row is None or "none" not in row.loads else row.loads["none"].slack
+    found = [
+        f"{'slack ' + when}: {_listed(names)}"
+        for when, names in [("before any load", before), ("under it", None if main is None else main.slack)]
+        if names
+    ]
+    return "".join(f"; {each}" for each in found) or (
+        "; none slack before the load" if before is not None else ""
+    )
+
+
+def _listed(names: Sequence[str], most: int = 8) -> str:
+    return (
+        ", ".join(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"
+    )
 
 
 def _stands_on(net: Net, more: LoadRecord | None) -> Answer:

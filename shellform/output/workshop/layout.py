@@ -62,7 +62,7 @@ def flat_grid(built: Built) -> Sheet:
         "schedules/marks.csv.",
         f"U rods lie below, V rods above; {MM * grid.gap:g} mm between their axes at the connectors.",
         f"{len(grid.rods)} rods, {sum(rod.length for rod in grid.rods):.2f} m in all, "
-        f"{label(built.shell.rod.resized(built.design.radius).section)}; "
+        f"{label(built.shell.rod.resized(built.design.radius).section, 2)}; "
         f"{len(grid.lattice)} connectors.",
         *(
             f"{note.text[:1].upper()}{note.text[1:]}: rods cross there without a connector."

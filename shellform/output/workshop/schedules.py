@@ -93,7 +93,7 @@ def rods(built: Built, cutting: Cutting) -> Table:
             places.setdefault(piece.rod, []).append((piece.part, said))
     rows = tuple(
         (
-            name, rod.direction, rod.length, label(section), weight * rod.length if weight else None,
+            name, rod.direction, rod.length, label(section, 2), weight * rod.length if weight else None,
             len(rod.marks), " ".join(f"{mark:.4f}" for mark in rod.marks),
             " ".join(map(str, rod.crossings.tolist())), ", ".join(said for _, said in sorted(places[k])),
             "spliced" if k in cutting.spliced else "",

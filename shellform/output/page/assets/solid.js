@@ -43,9 +43,13 @@ const TUBE_FRAGMENT = `#version 300 es
   in vec3 colour, normal, place;
   in float plain;
   uniform vec3 eye;
+  uniform vec4 cut;
   out vec4 result;
   ${LIGHT}
-  void main() { result = vec4(mix(lit(colour, normalize(normal), normalize(eye - place)), colour, plain), 1.0); }`;
+  void main() {
+    if (dot(place, cut.xyz) > cut.w) discard;
+    result = vec4(mix(lit(colour, normalize(normal), normalize(eye - place)), colour, plain), 1.0);
+  }`;
 
 const SKIN_VERTEX = `#version 300 es
   layout(location = 0) in vec3 place_;
@@ -58,8 +62,10 @@ const SKIN_FRAGMENT = `#version 300 es
   precision highp float;
   in vec3 normal, place;
   uniform vec3 eye, colour;
+  uniform vec4 cut;
   out vec4 result;
   void main() { // denser where it is seen from the side, as glass is
+    if (dot(place, cut.xyz) > cut.w) discard;
     float facing = abs(dot(normalize(normal), normalize(eye - place)));
     result = vec4(colour, 0.18 + 0.42 * pow(1.0 - facing, 2.0));
   }`;
@@ -69,8 +75,8 @@ class Solid {
     const gl = canvas.getContext("webgl2", { alpha: false, antialias: true, preserveDrawingBuffer: true });
     if (!gl) throw new Error("this browser has no WebGL 2");
     this.gl = gl;
-    this.tube = program(gl, TUBE_VERTEX, TUBE_FRAGMENT, ["project", "pixel", "eye", "rim"]);
-    this.skin = program(gl, SKIN_VERTEX, SKIN_FRAGMENT, ["project", "eye", "colour"]);
+    this.tube = program(gl, TUBE_VERTEX, TUBE_FRAGMENT, ["project", "pixel", "eye", "rim", "cut"]);
+    this.skin = program(gl, SKIN_VERTEX, SKIN_FRAGMENT, ["project", "eye", "colour", "cut"]);
     const { corners, triangles } = cylinder();
     this.corners = triangles.length;
     this.tubes = gl.createVertexArray();
@@ -109,7 +115,7 @@ class Solid {
     this.skinCount = triangles.length;
   }
 
-  draw(camera, { background, skin, rim }) { // colours as [r, g, b] up to 1; skin null: no surface
+  draw(camera, { background, skin, rim, cut }) { // colours as [r, g, b] up to 1; skin null: no surface; what lies beyond dot(p, cut.xyz) = cut.w isn't drawn
     const gl = this.gl;
     gl.viewport(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight);
     gl.clearColor(...background, 1);
@@ -120,12 +126,14 @@ class Solid {
     gl.uniform1f(this.tube.pixel, camera.pixel);
     gl.uniform1f(this.tube.rim, rim);
     gl.uniform3fv(this.tube.eye, camera.eye);
+    gl.uniform4fv(this.tube.cut, cut);
     gl.bindVertexArray(this.tubes);
     gl.drawElementsInstanced(gl.TRIANGLES, this.corners, gl.UNSIGNED_SHORT, 0, this.count);
     if (!skin || !this.skinCount) return;
     gl.useProgram(this.skin.program);
     gl.uniformMatrix4fv(this.skin.project, false, camera.matrix);
     gl.uniform3fv(this.skin.eye, camera.eye);
+    gl.uniform4fv(this.skin.cut, cut);
     gl.uniform3fv(this.skin.colour, skin);
     gl.bindVertexArray(this.skins);
     gl.enable(gl.BLEND);

@@ -31,6 +31,15 @@ function sortStatic(table) { // one that the page came with
   }));
 }
 
+function saveCsv(rows, name) {
+  const quoted = (value) => (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value);
+  const text = rows.map((cells) => cells.map((cell) => quoted(String(cell ?? ""))).join(",")), link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([`${text.join("\n")}\n`], { type: "text/csv" }));
+  link.download = `${name}.csv`;
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+
 class LiveTable {
   constructor(table, search, count, columns, onpick) { // columns: { title, value(row), text(row), number }
     Object.assign(this, { table, search, count, columns, onpick, rows: [], order: null, picked: null });
@@ -77,14 +86,7 @@ class LiveTable {
   }
 
   save(name) { // all rows as a CSV file
-    const quoted = (value) => (/[",\n]/.test(value) ? `"${value.replaceAll('"', '""')}"` : value);
-    const line = (cells) => cells.map((cell) => quoted(String(cell ?? ""))).join(",");
-    const text = [line(this.columns.map((column) => column.title)), ...this.rows.map((row) => line(this.columns.map((column) => (column.number ? column.value(row) : column.text(row)))))];
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([`${text.join("\n")}\n`], { type: "text/csv" }));
-    link.download = `${name}.csv`;
-    link.click();
-    URL.revokeObjectURL(link.href);
+    saveCsv([this.columns.map((column) => column.title), ...this.rows.map((row) => this.columns.map((column) => (column.number ? column.value(row) : column.text(row))))], name);
   }
 
   mark(key, show = false) { // which row is picked

@@ -3,17 +3,19 @@
 const NEAR = 10; // pixels: how far from a cable or rod a click still picks it
 
 class View {
-  constructor(stage, run, viridis, show) {
+  constructor(stage, run, viridis, show, camera = new Camera()) {
     this.run = run;
     this.viridis = viridis.map((colour) => colour.map((value) => value / 255));
-    this.show = show; // { design, load, surface, cables, loads, supports, colour, scale, exaggerate }
+    this.show = show; // { design, load, surface, cables, loads, supports, colour, scale, exaggerate, moment, cut, measured }
     this.stage = stage;
     this.canvas = stage.querySelector("canvas");
     this.tip = stage.querySelector(".tip");
     this.picked = null; // { kind: "cable" | "rod", index }: a candidate cable's or a rod's number
     this.onpick = () => {};
+    this.onmeasure = () => {};
     this.solid = new Solid(this.canvas);
-    this.camera = new Camera();
+    this.camera = camera;
+    this.twins = []; // views beside this one, of the same camera and the same scales
     this.target = floats(run.target);
     this.cache = new Map();
     this.solid.setSkin(floats(run.surface.vertices), new Uint32Array(bytes(run.surface.triangles)));
@@ -22,7 +24,6 @@ class View {
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(this.canvas);
     this.resize();
-    this.look("iso");
   }
 
   close() {
@@ -34,42 +35,76 @@ class View {
   get design() { return this.run.designs.find((each) => each.name === this.show.design); }
   get state() { return this.design.states[this.show.load]; }
 
-  decoded(key) { // an array of this state, once
-    const name = [this.show.design, this.show.load, key].join("\n");
-    if (!this.cache.has(name)) this.cache.set(name, floats(this.state[key]));
-    return this.cache.get(name);
+  decoded(key, state = this.state) { // an array of a state, once
+    if (!this.cache.has(state)) this.cache.set(state, {});
+    const known = this.cache.get(state);
+    return (known[key] ||= floats(state[key]));
   }
 
-  get deviation() { // (n,) mm
-    const name = [this.show.design, this.show.load, "deviation"].join("\n");
-    if (!this.cache.has(name)) {
-      const place = this.decoded("positions");
-      this.cache.set(name, Float32Array.from({ length: place.length / 3 }, (_, k) => 1e3 * norm(minus(at(place, k), at(this.target, k)))));
-    }
-    return this.cache.get(name);
+  // The states on the way to the one that is chosen: { title, state }, where null is the flat grid.
+  get way() {
+    const { design, run } = this, found = [], unbraced = run.designs.find((each) => each.name === "unbraced"), { none } = design.states;
+    if (run.flat) found.push({ title: "flat", state: null });
+    if (unbraced && unbraced !== design && unbraced.states.none) found.push({ title: "erected", state: unbraced.states.none, bare: true });
+    if (none && this.show.load !== "none") found.push({ title: design.cables.length ? "braced" : "erected", state: none });
+    if (this.show.load === "additional" && design.states.design) found.push({ title: "poured", state: design.states.design });
+    return [...found, { title: { none: design.cables.length ? "braced" : "erected", design: "poured", additional: "overloaded" }[this.show.load] || "loaded", state: this.state }];
+  }
+
+  get between() { // the two states that the moment shown lies between, and how far: { from, to, share, whole }
+    const way = this.way, last = way.length - 1, at = Math.min(this.show.moment, 1) * last, k = Math.min(Math.floor(at), Math.max(last - 1, 0));
+    return { from: way[k], to: way[Math.min(k + 1, last)], share: last ? at - k : 0, whole: this.show.moment >= 1 };
+  }
+
+  blend() { // what is drawn of the moment: places, stress over strength, cable forces; straight between the computed states
+    const { from, to, share, whole } = this.between, [a, b] = [from, to].map((each) => (each.state ? this.decoded("positions", each.state) : floats(this.run.flat)));
+    const mixed = (first, second) => (share === 0 ? first : share === 1 || first === second ? second : second.map((value, k) => first[k] + share * (value - first[k])));
+    const used = [from, to].map((each) => (each.state ? this.decoded("utilisation", each.state) : new Float32Array(a.length / 3)));
+    const force = [from, to].map((each) => (each.state && !each.bare ? each.state.force : this.state.force.map(() => 0)));
+    this.places = mixed(a, b);
+    this.used = mixed(...used);
+    this.force = whole ? this.state.force : mixed(...force);
+    this.hung = whole || !(to.state === null || to.bare || ((from.state === null || from.bare) && share === 0)); // cables are there
+    this.deviation = Float32Array.from({ length: this.places.length / 3 }, (_, k) => 1e3 * norm(minus(at(this.places, k), at(this.target, k)))); // (n,) mm
+  }
+
+  get ownScale() {
+    return { design: this.run.fitting, case: this.run.limit }[this.show.scale] || Math.max(largest(this.deviation || [0]), 1e-6);
   }
 
   get scale() { // end of the colours: mm, or % of the strength
-    if (this.show.colour === "stress") return 100;
-    return { design: this.run.fitting, case: this.run.limit }[this.show.scale] || Math.max(largest(this.deviation), 1e-6);
+    return this.show.colour === "stress" ? 100 : Math.max(...[this, ...this.twins].map((view) => view.ownScale));
   }
 
   get forceScale() { // N: one for all designs and loads, as in the pictures
-    return Math.max(...this.run.designs.flatMap((each) => Object.values(each.states).map((state) => largest(state.force))), 1e-9);
+    return Math.max(...[this, ...this.twins].map((view) => view.run.force), 1e-9);
   }
 
   node(k) { // where a node is drawn
-    const there = at(this.decoded("positions"), k), meant = at(this.target, k);
-    return this.show.exaggerate === 1 ? there : plus(meant, times(this.show.exaggerate, minus(there, meant)));
+    const there = at(this.places, k), { exaggerate } = this.show;
+    if (exaggerate === 1 || !this.between.whole) return there;
+    const meant = at(this.target, k);
+    return plus(meant, times(exaggerate, minus(there, meant)));
+  }
+
+  crossing(k) { // the middle of a connector
+    const [u, v] = this.run.crossings[k];
+    return times(0.5, plus(this.node(u), this.node(v)));
+  }
+
+  get plane() { // [normal, level]: what lies beyond isn't drawn
+    const { cut } = this.show, axis = cut ? "xyz".indexOf(cut.axis) : 0;
+    return cut ? [[0, 1, 2].map((k) => (k === axis ? 1 : 0)), cut.at] : [[0, 0, 0], 1];
   }
 
   update() { // after any change of what is shown
+    this.blend();
     const { run, show } = this, rows = [], css = getComputedStyle(this.stage), colour = (name) => rgb(css.getPropertyValue(`--${name}`));
     this.colours = { background: colour("stage"), skin: colour("skin"), rim: Number(css.getPropertyValue("--rim")) };
     const [low, mid, high, picked] = ["cable-low", "cable-mid", "cable-high", "picked"].map(colour);
     const thick = Math.max(this.design.radius, 0.0016 * this.reach);
     const add = (a, ra, b, rb, ca, cb, least = 0, plain = 0) => rows.push(...a, ra, ...b, rb, ...ca, ...cb, least, plain);
-    const values = show.colour === "stress" ? this.decoded("utilisation").map((share) => 100 * share) : this.deviation;
+    const values = show.colour === "stress" ? this.used.map((share) => 100 * share) : this.deviation;
     const shade = (k) => this.viridisAt(values[k] / this.scale);
     run.rods.forEach((rod, index) => {
       const own = this.picked?.kind === "rod" && this.picked.index === index;
@@ -78,11 +113,11 @@ class View {
         add(this.node(a), thick, this.node(b), thick, own ? picked : shade(a), own ? picked : shade(b), own ? 2.6 : 1.4, own ? 1 : 0);
       }
     });
-    if (show.cables) {
+    if (show.cables && this.hung) {
       const top = this.forceScale;
       this.design.cables.forEach((cable, k) => {
         const own = this.picked?.kind === "cable" && this.picked.index === cable, [a, b] = run.cables.ends[cable].map((n) => this.node(n));
-        const share = this.state.force[k] / top, slack = share <= 0;
+        const share = this.force[k] / top, slack = share <= 0;
         const tint = slack ? mix(this.colours.background, low, 0.55) : share < 0.5 ? mix(low, mid, 2 * share) : mix(mid, high, 2 * share - 1);
         const radius = thick * (slack ? 0.2 : 0.3 + 0.45 * Math.sqrt(share)), drawn = own ? picked : tint;
         add(a, own ? thick : radius, b, own ? thick : radius, drawn, drawn, own ? 2.4 : slack ? 0.6 : 0.9, own ? 1 : 0);
@@ -92,13 +127,16 @@ class View {
       const top = this.node(n);
       add(minus(top, [0, 0, 6 * thick]), 3 * thick, top, 0, colour("support"), colour("support"));
     }
-    if (show.loads) for (const n of run.loads.find((each) => each.name === show.load).points) {
+    const marks = show.measured.filter((k) => k < run.crossings.length).map((k) => this.crossing(k));
+    for (const [x, y, z] of marks) add([x, y, z - 2.2 * thick], 2.6 * thick, [x, y, z + 2.2 * thick], 2.6 * thick, picked, picked, 4, 1);
+    if (marks.length === 2) add(marks[0], 0.6 * thick, marks[1], 0.6 * thick, picked, picked, 1, 1);
+    if (show.loads && this.between.whole) for (const n of run.loads.find((each) => each.name === show.load).points) {
       const tip = plus(this.node(n), [0, 0, 1.3 * thick]), tall = 0.05 * this.reach;
       add(plus(tip, [0, 0, 0.35 * tall]), 0.10 * tall, tip, 0, colour("load"), colour("load"));
       add(plus(tip, [0, 0, tall]), 0.028 * tall, plus(tip, [0, 0, 0.35 * tall]), 0.028 * tall, colour("load"), colour("load"), 0.5);
     }
     this.solid.setTubes(rows);
-    this.redraw();
+    this.draw();
   }
 
   viridisAt(share) {
@@ -113,7 +151,11 @@ class View {
     this.redraw();
   }
 
-  redraw() {
+  redraw() { // and those of the same camera
+    for (const view of [this, ...this.twins]) view.draw();
+  }
+
+  draw() {
     if (this.waiting || !this.colours) return;
     this.waiting = requestAnimationFrame(() => this.drawNow());
   }
@@ -121,12 +163,16 @@ class View {
   drawNow() {
     this.waiting = 0;
     this.camera.place(this.canvas.width, this.canvas.height);
-    this.solid.draw(this.camera, { ...this.colours, skin: this.show.surface ? this.colours.skin : null });
+    this.solid.draw(this.camera, { ...this.colours, skin: this.show.surface ? this.colours.skin : null, cut: this.plane.flat() });
   }
 
   look(view) {
     this.camera.turn(view);
-    this.camera.fit(this.frame(), this.canvas.width / this.canvas.height);
+    this.fit();
+  }
+
+  fit() {
+    this.camera.fit([this, ...this.twins].flatMap((view) => view.frame()), this.canvas.width / this.canvas.height);
     this.redraw();
   }
 
@@ -145,12 +191,25 @@ class View {
     const seen = new Map(), screen = (n) => { if (!seen.has(n)) seen.set(n, this.camera.onScreen(this.node(n))); return seen.get(n); };
     const test = (kind, index, a, b) => {
       const { away, share } = besides([x * ratio, y * ratio], screen(a), screen(b));
+      const [normal, level] = this.plane;
+      if (dot(normal, this.node(share < 0.5 ? a : b)) > level) return;
       const deep = screen(a)[2] + share * (screen(b)[2] - screen(a)[2]);
       if (away < NEAR * ratio) found.push({ kind, index, node: share < 0.5 ? a : b, score: away / (NEAR * ratio) + (3 * deep) / this.camera.distance });
     };
-    if (this.show.cables) for (const cable of this.design.cables) test("cable", cable, ...this.run.cables.ends[cable]);
+    if (this.show.cables && this.hung) for (const cable of this.design.cables) test("cable", cable, ...this.run.cables.ends[cable]);
     this.run.rods.forEach((rod, index) => rod.nodes.slice(1).forEach((n, k) => test("rod", index, rod.nodes[k], n)));
     return found.sort((a, b) => a.score - b.score)[0] || null;
+  }
+
+  findCrossing(x, y) { // the number of the nearest crossing within three times the reach of a pick, or null
+    const ratio = this.canvas.width / this.canvas.clientWidth, [normal, level] = this.plane;
+    this.camera.place(this.canvas.width, this.canvas.height);
+    let best = null, least = 3 * NEAR * ratio;
+    this.run.crossings.forEach((_, k) => {
+      const place = this.crossing(k), [sx, sy] = this.camera.onScreen(place), away = Math.hypot(sx - x * ratio, sy - y * ratio);
+      if (away < least && dot(normal, place) <= level) [best, least] = [k, away];
+    });
+    return best;
   }
 
   pick(picked) { // { kind, index } or null
@@ -169,6 +228,8 @@ class View {
     const down = new Map(), { canvas } = this;
     const on = (name, act, options = {}) => canvas.addEventListener(name, act, { signal: this.stop.signal, ...options });
     let moved = 0;
+    on("focus", () => canvas.classList.add("held")); // from then on one finger turns the shell both ways; until then it scrolls the page up and down
+    on("blur", () => canvas.classList.remove("held"));
     on("pointerdown", (event) => {
       canvas.setPointerCapture(event.pointerId);
       down.set(event.pointerId, event);
@@ -192,7 +253,7 @@ class View {
       this.redraw();
     });
     on("pointerup", (event) => {
-      if (down.has(event.pointerId) && down.size === 1 && moved <= 4 && event.button === 0) this.pick(this.find(event.offsetX, event.offsetY));
+      if (down.has(event.pointerId) && down.size === 1 && moved <= 4 && event.button === 0) this.click(event.offsetX, event.offsetY);
       down.delete(event.pointerId);
       canvas.classList.remove("dragging");
     });
@@ -221,6 +282,12 @@ class View {
     });
   }
 
+  click(x, y) {
+    if (!this.show.measuring) return this.pick(this.find(x, y));
+    const crossing = this.findCrossing(x, y);
+    if (crossing !== null) this.onmeasure(crossing);
+  }
+
   hover(event) {
     cancelAnimationFrame(this.hovering);
     const [x, y] = [event.offsetX, event.offsetY];
@@ -232,7 +299,7 @@ class View {
     this.canvas.classList.toggle("over", Boolean(found));
     if (!found) return;
     const away = `${this.deviation[found.node].toFixed(2)} mm off`, k = this.design.cables.indexOf(found.index);
-    this.tip.textContent = found.kind === "cable" ? `Cable C${k}: ${newtons(this.state.force[k])} N` : `Rod ${this.run.rods[found.index].name}: ${away}`;
+    this.tip.textContent = found.kind === "cable" ? `Cable C${k}: ${newtons(this.force[k])} N` : `Rod ${this.run.rods[found.index].name}: ${away}`;
     const top = this.canvas.offsetTop + y - 36, left = Math.min(x + 12, this.canvas.clientWidth - this.tip.offsetWidth - 8);
     Object.assign(this.tip.style, { left: `${left}px`, top: `${Math.max(top, 4)}px` });
   }

@@ -1,0 +1,54 @@
+"""What the page of a run is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from shellform.arrays import Reals
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.optimiser.optimum import Step
+from shellform.output.page.embed import Picture
+from shellform.records.check import Check
+from shellform.records.summary import Summary, VerdictRecord
+from shellform.structure.elements.state import State
+from shellform.surface.shape.target import Surface
+
+
+@dataclass(frozen=True)
+class ShownRun:
+    """One run on the page.
+
+    `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which `best` is to
+    be built; `loads` (n, 6), N; the run's `summary`, and `checks` and `verdict` made from it; the optimiser's
+    `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `force_max`, N, limits the
+    cables; `notes` say what is missing or to be known; `files` are those of the run folder, which is reached
+    from the page by the relative address `home` ("": the page stands in it); `next_size` is the size of the
+    catalogue that the rods to build would be rounded to ("": no catalogue, or none is stiff enough).
+    """
+
+    title: str
+    place: str
+    shells: Mapping[str, Gridshell]
+    surface: Surface
+    loads: Mapping[str, Reals]
+    designs: Mapping[str, Design]
+    states: Mapping[str, Mapping[str, State]]
+    best: str
+    summary: Summary
+    checks: Sequence[Check]
+    verdict: VerdictRecord
+    history: Sequence[Step]
+    settings: str
+    pictures: Sequence[Picture]
+    limit: float
+    force_max: float
+    notes: Sequence[str]
+    files: Sequence[str]
+    home: str = ""
+    next_size: str = ""
+
+    @property
+    def shell(self) -> Gridshell:
+        """The shell of the design to build."""
+        return self.shells[self.best]
