@@ -27,7 +27,7 @@ from shellform.run.keys import stage_keys
 from shellform.written import is_partial, write_text
 
 FILE = "report.html"
-_BUDGET = 5_000_000  # bytes of pictures in a page, before they become text, which adds a third: it stays below 8 MB
+_BUDGET = 5_000_000  # bytes of pictures, before they become text, which adds a third: a page stays below 8 MB
 _PACKAGES = ("numpy", "scipy", "numba", "cvxopt", "mkl", "gmsh", "nlopt", "pyvista")
 _DRAWN = ("objective", "constraints")
 _HEAD = 2000  # characters in which a page of ours names its maker

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import InputError
+from shellform.output.page.measures import found, given
 from shellform.output.page.study_page import (
     StudyContent,
     StudyRow,
@@ -69,6 +70,10 @@ def write_study_page(folder: Path, plan: Plan) -> Path:
         rows=[_row(columns, k, [*own, *entry.column]) for k in rows],
         varied=own,
         found=list(entry.column),
+        measures={
+            **{name: given(name.removeprefix("case.")) for name in own},
+            **{name: found(path) for name, path in entry.column.items()},
+        },
         goals=signs,
         front=ordered,
         best=best,

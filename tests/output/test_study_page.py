@@ -2,9 +2,14 @@
 
 import json
 import re
+from dataclasses import is_dataclass
+from pathlib import Path
 
 import pytest
 
+from shellform.output.page import measures
+from shellform.output.page.measures import found as found_
+from shellform.output.page.measures import given as given_
 from shellform.output.page.study_page import (
     StudyContent,
     StudyRow,
@@ -14,6 +19,9 @@ from shellform.output.page.study_page import (
     study_page,
     thumbnail,
 )
+from shellform.records import summary
+
+CASE = Path(measures.__file__).parents[2] / "case"
 
 
 def content(**changes):
@@ -31,6 +39,10 @@ def content(**changes):
         "rows": rows,
         "varied": ["case.net.spacing"],
         "found": ["misfit", "cables"],
+        "measures": {
+            "case.net.spacing": given_("net.spacing"),
+            "misfit": found_("designs.best.loads.design.deviation_rms"),
+        },
         "goals": {"misfit": 1.0, "cables": 1.0},
         "front": ["k0", "k1"],
         "best": ["k0", "k1"],
@@ -51,7 +63,7 @@ def test_the_page_asks_for_nothing_and_escapes_what_comes_from_elsewhere():
     assert page.count("<script") == 2
     assert "&lt;/script&gt;" in page
     data = json.loads(page.split('id="data">')[1].split("</script>")[0])
-    assert [row[:3] for row in data["rows"]] == [[0, 1, 0.1], [1, 1, 0.11], [2, 0, 0.12], [4, 0, 0.14]]
+    assert [row[:3] for row in data["rows"]] == [[0, 1, 100.0], [1, 1, 110.0], [2, 0, 120.0], [4, 0, 140.0]]
     assert data["rows"][3][3:] == [None, 5]
     assert data["links"] == {"0": "runs/k0/report.html"}
     assert "−1.00" in page
@@ -88,3 +100,38 @@ def test_a_thumbnail_shows_each_rod_in_the_colour_of_its_distance(shell):
     assert {"#440154", "#fde725"} <= set(re.findall(r'stroke="(#\w+)"', drawn))
     assert "20.0 mm off at most" in drawn
     assert len(drawn) < 60_000
+
+
+def test_columns_are_told_in_units_that_a_designer_uses():
+    page = study_page(content())
+    data = json.loads(page.split('id="data">')[1].split("</script>")[0])
+    assert data["names"] == ["spacing of the rods [mm]", "misfit [mm]", "cables"]
+    assert data["rows"][1][3] == 1.0, "1 mm, not 0.001"
+    assert data["goals"] == [1, 2]
+    assert (
+        "root mean square of the distances from the target under the design load of the design to build"
+        in page
+    )
+    for name in ("colour", "size"):
+        assert f'select name="{name}"' in page
+    unknown = found_("net.something_new")
+    assert (unknown.words, unknown.unit, unknown.factor) == ("net.something_new", "", 1.0)
+
+
+def test_every_measure_of_a_summary_is_one_of_its_fields():
+    fields = {
+        each.name
+        for record in vars(summary).values()
+        if is_dataclass(record)
+        for each in record.__dataclass_fields__.values()
+    }
+    known = set(measures._FOUND) - {"total"}
+    assert known <= fields
+
+
+def test_every_measure_of_a_case_is_an_entry_that_it_has():
+    for name in measures._ENTRIES:
+        table, _, entry = name.partition(".")
+        text = "".join(path.read_text(encoding="utf-8") for path in CASE.glob("*.py"))
+        assert re.search(rf"^    {table}: ", text, re.MULTILINE), name
+        assert re.search(rf"^    {entry}: ", text, re.MULTILINE), name

@@ -15,9 +15,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from shellform.output.page.study_page import study_page
 from shellform.problem.paths import deviations
 from shellform.run.folder import read_run
 from shellform.run.pages import write_report
+from tests.output.test_study_page import content
 from tests.run.small_run import begin, finish
 
 ROOT = Path(__file__).parent.parent.parent
@@ -465,6 +467,30 @@ def test_several_runs_are_compared_and_stand_in_tabs(visit, folder, tmp_path):
     assert changed(first, picture(page)) < 0.001, "and back"
     page.locator(".compare tbody a").nth(1).click()
     assert page.locator(".run:not([hidden]) h1").text_content() == "other"
+
+
+def test_a_study_s_designs_tell_their_values_under_the_pointer_in_colours_and_sizes(browser, tmp_path):
+    (tmp_path / "study.html").write_text(study_page(content()), encoding="utf-8")
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    page, wrong = context.new_page(), []
+    page.on("pageerror", lambda error: wrong.append(str(error)))
+    page.on("console", lambda said: wrong.append(said.text) if said.type == "error" else None)
+    page.goto((tmp_path / "study.html").as_uri())
+    page.select_option("[name=colour]", label="spacing of the rods [mm]")
+    page.select_option("[name=size]", label="cables")
+    assert "Colour: spacing of the rods [mm], 100" in page.locator("#key").text_content()
+    fills = page.eval_on_selector_all("circle", "dots => dots.map((dot) => dot.style.fill)")
+    assert len(set(fills)) == len(fills) == 3
+    assert (
+        len(set(page.eval_on_selector_all("circle", "dots => dots.map((dot) => dot.getAttribute('r'))"))) == 3
+    )
+    page.locator("circle.front").first.hover(force=True)
+    assert page.locator(".hint").is_visible()
+    hint = page.locator(".hint").text_content()
+    assert hint.startswith("Design ")
+    assert "misfit [mm]: " in hint
+    assert not wrong
+    context.close()
 
 
 def test_without_webgl_the_page_says_so_and_the_rest_works(visit, file, browser):

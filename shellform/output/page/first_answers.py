@@ -143,6 +143,7 @@ def _is_safe(
     """Of the additional load: from the drawn structures, where the perfect one stands at all."""
     used = more.rod_utilisation_max
     known = math.isfinite(used) and strength_known
+    sure = ""
     safe: bool | None
     if not more.stable:
         safe, words = False, "No, it is unstable"
@@ -153,11 +154,15 @@ def _is_safe(
     elif as_built is None or more.stands is None:
         safe, words = None, "Not examined as built"
     else:
-        safe, words = as_built.holds, as_built.found
+        safe, (words, _, more_words) = as_built.holds, as_built.found.partition(" (")
+        sure = f"{more_words[:1].upper()}{more_words[1:].rstrip(')')}. " if more_words else ""
     rods = f", rods at {100.0 * used:.0f} % of their strength" if known else ""
     off = f"{_mm(more.deviation_max)} off at most, {_mm(more.deviation_mean)} in the mean{rods}"
     return Answer(
-        f"Is it safe at {more.factor:.3g} × the load?", words, f"As planned {off}. {_collapse(main)}", safe
+        f"Is it safe at {more.factor:.3g} × the load?",
+        words,
+        f"{sure}As planned {off}. {_collapse(main)}",
+        safe,
     )
 
 

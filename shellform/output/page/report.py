@@ -54,7 +54,7 @@ def html(runs: Sequence[ShownRun], versions: Mapping[str, str]) -> str:
             "versions": versions,
         },
         generator=GENERATOR,
-        style=part("style.css"),
+        style=part("look.css") + part("style.css"),
         script="(() => {\n" + "\n".join(part(name) for name in (*VIEW, "tables.js", "page.js")) + "\n})();",
         data={"viridis": VIRIDIS, "runs": [view_data(viewed(run)) for run in runs]},
         number=words.number,

@@ -18,6 +18,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.gridshell.gridshell import Gridshell
+from shellform.output.page.measures import Measure
 from shellform.output.page.template import filled, part
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.problem.paths import deviations
@@ -43,14 +44,15 @@ class StudyRow:
 
 @dataclass(frozen=True)
 class StudyContent:
-    """What the page says: `rows` with their columns, of which `varied` were given and `goals` are to be small
-    (1) or large (-1); the keys on the `front`, of which `best` have a card; by key, `links` to pages and
+    """What the page says: `rows` with their columns, of which `varied` were given, `found` came out and `goals` are to be
+    small (1) or large (-1), each with its measure; the keys on the `front`, of which `best` have a card; by key, `links` to pages and
     `pictures` (SVG); counts of `designs` done and failed; rank `correlation`; and `notes`."""
 
     title: str
     rows: Sequence[StudyRow]
     varied: Sequence[str]
     found: Sequence[str]
+    measures: Mapping[str, Measure]
     goals: Mapping[str, float]
     front: Sequence[str]
     best: Sequence[str]
@@ -64,16 +66,22 @@ class StudyContent:
 def study_page(study: StudyContent) -> str:
     """The page's text."""
     names = [*study.varied, *study.found]
+    measures = [study.measures.get(name, Measure(name)) for name in names]
     front = set(study.front)
     drawn = [
-        [row.number, int(row.key in front), *(_number(row.columns.get(name)) for name in names)]
+        [
+            row.number,
+            int(row.key in front),
+            *(_scaled(row.columns.get(name), each) for name, each in zip(names, measures, strict=True)),
+        ]
         for row in study.rows
         if row.done
     ]
     data = {
-        "names": names,
+        "names": [_label(name, each) for name, each in zip(names, measures, strict=True)],
         "varied": len(study.varied),
-        "goals": [name for name in study.goals if name in names],
+        "goals": [names.index(name) for name in study.goals if name in names],
+        "colours": list(_COLOURS),
         "rows": drawn,
         "links": {str(row.number): study.links[row.key] for row in study.rows if row.key in study.links},
     }
@@ -84,12 +92,14 @@ def study_page(study: StudyContent) -> str:
         {
             "study": study,
             "cards": [shown[key] for key in study.best if key in shown],
-            "names": names,
+            "columns": [(name, _label(name, each), each) for name, each in zip(names, measures, strict=True)],
+            "labels": {name: _label(name, each) for name, each in zip(names, measures, strict=True)},
+            "scaled": _scaled,
             "failed": failed.most_common(20),
             "shade": _shade,
         },
         generator="shellform study",
-        style=part("study.css"),
+        style=part("look.css") + part("study.css"),
         script=part("study.js"),
         data=data,
         number=number_text,
@@ -183,6 +193,18 @@ def number_text(value: Any) -> str:
     if value is None or (isinstance(value, float) and not math.isfinite(value)):
         return "–"
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _label(name: str, measure: Measure) -> str:
+    """A column's name with its unit: "misfit [mm]"."""
+    words = measure.words if name.startswith("case.") else name.replace("_", " ")
+    return f"{words.removeprefix('case.')} [{measure.unit}]" if measure.unit else words.removeprefix("case.")
+
+
+def _scaled(value: Any, measure: Measure) -> Any:
+    """A number in the measure's unit; what is no number as it is."""
+    number = _number(value)
+    return None if number is None else _number(number * measure.factor) if measure.factor != 1.0 else number
 
 
 def _number(value: Any) -> float | int | None:

@@ -5,7 +5,7 @@ const data = JSON.parse(document.getElementById("data").textContent);
 const SVG = "http://www.w3.org/2000/svg";
 const rows = data.rows.map((row) => ({ number: row[0], front: row[1] === 1, values: row.slice(2) }));
 const usable = data.names.map((name, k) => k).filter((k) => rows.some((row) => typeof row.values[k] === "number"));
-const label = (k) => data.names[k].replace(/^case\./, "");
+const label = (k) => data.names[k];
 const told = document.getElementById("told");
 const ranges = new Map(); // of axes that are narrowed: [low, high] as shares
 let picked = null;
@@ -32,6 +32,8 @@ function ticks(low, high) {
   return found;
 }
 
+const shade = (share) => data.colours[Math.min(Math.floor(share * data.colours.length), data.colours.length - 1)];
+
 const number = (v) => (typeof v !== "number" ? "–" : String(Number(v.toPrecision(4))).replace("-", "−"));
 
 function scatter() {
@@ -45,17 +47,50 @@ function scatter() {
   node("text", { class: "title", transform: `translate(14 ${(T + H - B) / 2}) rotate(-90)`, "text-anchor": "middle" }, svg, label(ky));
   const drawn = rows.filter((row) => typeof row.values[kx] === "number" && typeof row.values[ky] === "number");
   const front = drawn.filter((row) => row.front).sort((a, b) => a.values[kx] - b.values[kx]);
-  if (front.length > 1 && data.goals.length === 2 && data.goals.includes(data.names[kx]) && data.goals.includes(data.names[ky])) {
+  if (front.length > 1 && data.goals.length === 2 && data.goals.includes(kx) && data.goals.includes(ky)) {
     node("polyline", { class: "step", points: front.map((row) => `${x(row.values[kx])},${y(row.values[ky])}`).join(" ") }, svg);
   }
+  const by = (select) => { // a row's place, from 0 to 1, in a further column
+    if (select.value === "") return null;
+    const k = Number(select.value), [low, high] = extent(k);
+    return { k, low, high, share: (row) => (typeof row.values[k] === "number" ? (row.values[k] - low) / (high - low) : null) };
+  };
+  const colour = by(form.colour), size = by(form.size), named = [...new Set([kx, ky, colour?.k, size?.k])].filter((k) => k !== undefined);
+  const hint = document.createElement("p");
+  hint.className = "hint";
+  hint.hidden = true;
   for (const row of [...drawn.filter((each) => !each.front), ...front]) {
-    const dot = node("circle", { class: "dot", cx: x(row.values[kx]), cy: y(row.values[ky]), r: row.front ? 5 : 3.5 }, svg);
+    const wide = size ? 3 + 7 * (size.share(row) ?? 0) : row.front ? 5 : 3.5, dot = node("circle", { class: "dot", cx: x(row.values[kx]), cy: y(row.values[ky]), r: wide.toFixed(1) }, svg);
+    const tint = colour ? colour.share(row) : null;
+    if (tint !== null) dot.style.fill = shade(tint);
+    if (colour && row.front) dot.style.stroke = "var(--front)";
     row.dot = dot;
-    dot.addEventListener("pointerenter", () => pick(row));
+    dot.addEventListener("pointerenter", () => {
+      pick(row);
+      const place = dot.getBoundingClientRect(), frame = box.getBoundingClientRect();
+      hint.textContent = [`Design ${row.number}${row.front ? ", on the front" : ""}`, ...named.map((k) => `${label(k)}: ${number(row.values[k])}`)].join("\n");
+      hint.hidden = false;
+      const left = Math.min(place.right - frame.left + box.scrollLeft + 8, box.scrollLeft + frame.width - hint.offsetWidth - 8);
+      Object.assign(hint.style, { left: `${Math.max(left, 4)}px`, top: `${Math.max(place.top - frame.top - hint.offsetHeight - 6, 4)}px` });
+    });
+    dot.addEventListener("pointerleave", () => (hint.hidden = true));
     dot.addEventListener("click", () => open(row));
   }
-  box.replaceChildren(svg);
+  box.replaceChildren(svg, hint);
+  key(colour, size);
   mark();
+}
+
+function key(colour, size) { // what colours and sizes mean
+  const parts = [];
+  if (colour) {
+    const words = document.createElement("span"), bar = document.createElement("i");
+    bar.style.background = `linear-gradient(90deg, ${data.colours.join(", ")})`;
+    words.append(`Colour: ${label(colour.k)}, ${number(colour.low)} `, bar, ` ${number(colour.high)}; the front is ringed`);
+    parts.push(words);
+  }
+  if (size) parts.push(Object.assign(document.createElement("span"), { textContent: `Size: ${label(size.k)}, small ${number(size.low)}, large ${number(size.high)}` }));
+  document.getElementById("key").replaceChildren(...parts);
 }
 
 const pad = ([low, high]) => [low - 0.04 * (high - low), high + 0.04 * (high - low)];
@@ -73,7 +108,7 @@ function parallel() {
   }
   axes.forEach((k, j) => {
     node("line", { class: "axis", x1: x(j), x2: x(j), y1: T, y2: H - B }, svg);
-    node("text", { class: "title", x: x(j), y: j % 2 ? 14 : 28, "text-anchor": "middle" }, svg, label(k));
+    node("text", { class: "title", x: j === 0 ? 4 : j === axes.length - 1 ? W - 4 : x(j), y: j % 2 ? 14 : 28, "text-anchor": j === 0 ? "start" : j === axes.length - 1 ? "end" : "middle" }, svg, label(k));
     node("text", { x: x(j), y: T - 5, "text-anchor": "middle" }, svg, number(spans[j][1]));
     node("text", { x: x(j), y: H - B + 15, "text-anchor": "middle" }, svg, number(spans[j][0]));
     const brush = node("rect", { class: "brush", x: x(j) - 7, width: 14, y: 0, height: 0, visibility: "hidden" }, svg);
@@ -118,9 +153,15 @@ function mark() {
 
 function pick(row) {
   picked = row;
-  told.textContent = `Design ${row.number}${row.front ? ", on the front" : ""}: ` + data.names.map((name, k) => `${label(k)} ${number(row.values[k])}`).join(", ") + " ";
-  const link = data.links[row.number];
-  if (link) { const a = document.createElement("a"); a.href = link; a.textContent = "open it"; told.append(a); }
+  const head = document.createElement("strong"), list = document.createElement("dl"), link = data.links[row.number];
+  head.textContent = `Design ${row.number}${row.front ? ", on the front" : ""} `;
+  list.append(...data.names.map((name, k) => {
+    const line = document.createElement("div");
+    line.append(...[["dt", name], ["dd", number(row.values[k])]].map(([kind, text]) => Object.assign(document.createElement(kind), { textContent: text })));
+    return line;
+  }));
+  if (link) head.append(Object.assign(document.createElement("a"), { href: link, textContent: "open it" }));
+  told.replaceChildren(head, list);
   const picture = document.querySelector(`#design-${row.number} svg`);
   if (picture) told.prepend(picture.cloneNode(true));
   mark();
@@ -132,12 +173,13 @@ function open(row) {
 }
 
 const form = document.forms[0];
-for (const select of [form.x, form.y]) for (const k of usable) select.append(new Option(label(k), k));
-const goals = data.goals.map((name) => data.names.indexOf(name)).filter((k) => usable.includes(k));
+for (const select of [form.x, form.y, form.colour, form.size]) for (const k of usable) select.append(new Option(label(k), k));
+const goals = data.goals.filter((k) => usable.includes(k));
 const start = [...goals, ...usable.filter((k) => k >= data.varied && !goals.includes(k)), ...usable.filter((k) => !goals.includes(k))];
 if (usable.length) {
   form.x.value = start[0];
   form.y.value = start[1] ?? start[0];
+  if (goals.length > 2) form.colour.value = goals[2];
   form.addEventListener("change", scatter);
   scatter();
   parallel();
