@@ -1,6 +1,7 @@
 """Tables that leave the house: CSV files, and one workbook of them; the door to openpyxl.
 
-Values are in SI units, said in the column's head: "length [m]". An empty cell means that the value isn't
+Values are in SI units, said in the column's head: "length [m]"; `for_the_workshop` makes mm and degrees of
+them. An empty cell means that the value isn't
 known. Words that a spreadsheet would take for a formula, which may run programs, begin with an apostrophe: then
 it takes them for words.
 """
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 import re
 import zipfile
 from collections.abc import Sequence
@@ -53,16 +55,42 @@ class Table:
         return [row[place] for row in self.rows]
 
 
+_WORKSHOP = {"[m]": ("[mm]", 1e3), "[rad]": ("[°]", 180.0 / math.pi)}
+
+
+def for_the_workshop(table: Table) -> Table:
+    """The table with lengths in mm and angles in degrees, each said in its column's head."""
+    heads, factors = [], []
+    for head in table.columns:
+        unit, (other, factor) = next(
+            ((unit, how) for unit, how in _WORKSHOP.items() if unit in head), ("", ("", 1.0))
+        )
+        heads.append(head.replace(unit, other) if unit else head)
+        factors.append(factor)
+    rows = tuple(
+        tuple(
+            value * factor if isinstance(value, float) and factor != 1.0 else value
+            for value, factor in zip(row, factors, strict=True)
+        )
+        for row in table.rows
+    )
+    return Table(table.name, tuple(heads), rows, table.notes)
+
+
 def table_text(table: Table, *, exact: bool = False, line_end: str = "\n") -> str:
-    """The table as CSV: heads, then rows, numbers to six decimals or, if they are to be `exact`, with all
+    """The table as CSV: heads, then rows, numbers to six decimals (mm to three) or, if they are to be `exact`, with all
     their digits.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator=line_end)
+    places = [3 if "[mm]" in head else 6 for head in table.columns]
     writer.writerow([_harmless(head) for head in table.columns])
     for row in table.rows:
         writer.writerow(
-            [f"{value:.6f}" if isinstance(value, float) and not exact else _harmless(value) for value in row]
+            [
+                f"{value:.{digits}f}" if isinstance(value, float) and not exact else _harmless(value)
+                for value, digits in zip(row, places, strict=True)
+            ]
         )
     return text.getvalue()
 
@@ -124,7 +152,7 @@ def _workbook(tables: Sequence[Table]) -> Any:
             sheet.append([_harmless(value) for value in row])
         for number, name in enumerate(table.columns, 1):
             letter = get_column_letter(number)
-            decimals = "0.0000" if "[m]" in name else "0.00"
+            decimals = "0.0000" if "[m]" in name else "0.0" if "[mm]" in name else "0.00"
             longest = len(name) // 2
             for (cell,) in sheet.iter_rows(
                 min_row=head + 1, max_row=head + len(table.rows), min_col=number, max_col=number

@@ -43,6 +43,7 @@ from shellform.case.entries import (
     SheetEntry,
     StockRodEntry,
     SurfaceEntry,
+    TitleBlockEntry,
 )
 from shellform.case.safety_entries import SafetyEntry, TolerancesEntry
 from shellform.errors import InputError
@@ -84,6 +85,7 @@ class Case(Entry):
     robust: RobustEntry | None = None
     tolerances: TolerancesEntry = Field(default_factory=lambda: TolerancesEntry.model_validate({}))
     safety: SafetyEntry = Field(default_factory=lambda: SafetyEntry.model_validate({}))
+    title_block: TitleBlockEntry = Field(default_factory=lambda: TitleBlockEntry.model_validate({}))
     figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=0.010))
 
     @model_validator(mode="after")

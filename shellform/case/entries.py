@@ -4,7 +4,8 @@ together and reads the file).
 
 from __future__ import annotations
 
-from typing import Literal
+import datetime
+from typing import Any, Literal
 
 from pydantic import (
     BaseModel,
@@ -14,6 +15,7 @@ from pydantic import (
     NonNegativeInt,
     PositiveFloat,
     PositiveInt,
+    field_validator,
     model_validator,
 )
 
@@ -344,6 +346,23 @@ class LimitsEntry(Entry):
     critical_loads: list[str] = Field(
         ["design"], min_length=1, description="load cases that critical_factor holds for"
     )
+
+
+class TitleBlockEntry(Entry):
+    """What drawings and models for others say of who drew them and when."""
+
+    date: str = Field("", pattern=r"^(\d{4}-\d\d-\d\d)?$", description="of the drawings, like 2026-05-31")
+    revision: str = Field("", max_length=20, description="of the drawings")
+    author: str = Field("", max_length=60, description="who drew them")
+
+    @field_validator("date", mode="before")
+    @classmethod
+    def _day(cls, value: Any) -> Any:
+        if isinstance(value, datetime.date):
+            return value.isoformat()
+        if isinstance(value, str) and value:
+            datetime.date.fromisoformat(value)
+        return value
 
 
 class RobustEntry(Entry):

@@ -8,7 +8,7 @@ from shellform.case.case import Case, StockRodEntry
 from shellform.gridshell.catalogue import read_catalogue
 from shellform.output.exchange import exports
 from shellform.output.workshop import drawings, nesting, schedules
-from shellform.output.workshop.schedules import Built
+from shellform.output.workshop.schedules import Built, TitleBlock
 from shellform.output.workshop.splice_schedule import cutting_notes
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.summary import DocumentsRecord
@@ -19,6 +19,7 @@ def built_design(run: Run) -> Built:
     """The run's best design, a rounded one with the catalogue's rods; its cables are hung into the erected
     grid before bracing.
     """
+    block = run.case.title_block
     hung = run.states["unbraced"]["none"] if "unbraced" in run.states else None
     return Built(
         run.shell_of(run.best),
@@ -28,6 +29,7 @@ def built_design(run: Run) -> Built:
         run.best,
         run.case.title,
         run.case.cable.adjustment,
+        TitleBlock(block.date, block.revision, block.author),
     )
 
 

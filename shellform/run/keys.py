@@ -20,7 +20,7 @@ _NEEDS = {
     "optimise": ["optimise", "limits", "robust", "tolerances", "safety"],
     "safety": ["told"],
     "figures": ["figures", "title"],
-    "documents": ["stock"],
+    "documents": ["stock", "title_block"],
     "report": [],
 }
 

@@ -38,6 +38,8 @@ _AGREES = (
 )
 _STEP_TIME = re.compile(r"(?<=')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?=')")
 _STEP_FILE = re.compile(r"(Open CASCADE STEP translator [\d.]+) \d+")
+_STEP_PRODUCT = re.compile(r"PRODUCT\('Open CASCADE STEP translator [^']*',\s*'[^']*'")
+_STEP_PLACE = re.compile(r"(NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+',)''")
 _STEP_PART = re.compile(r"NEXT_ASSEMBLY_USAGE_OCCURRENCE\('\d+'")
 _SAMPLES = 33  # points on a curve that tell its extent
 _SAME = 1e-9  # of the extent of a curve: ends so near close it
@@ -89,9 +91,9 @@ def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
         raise InputError(f"{what}: {said.rstrip('.')}", where=str(path), remedy=remedy) from error
 
 
-def write_curves(path: Path, curves: Sequence[Reals]) -> None:
+def write_curves(path: Path, curves: Sequence[Reals], names: Sequence[str]) -> None:
     """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), closed where
-    the last is the first, a straight line where there are two. The same curves give the same bytes: of the
+    the last is the first, a straight line where there are two, each under its name. The same curves give the same bytes: of the
     time, and of how many files OpenCASCADE has written before, nothing is told.
     """
     with session(), errors(path, "gmsh can't write the curves", "Choose another folder."):
@@ -112,7 +114,17 @@ def write_curves(path: Path, curves: Sequence[Reals]) -> None:
     text = path.read_text(encoding="utf-8", errors="surrogateescape") if path.is_file() else ""
     if not text.rstrip().endswith("END-ISO-10303-21;"):  # which gmsh doesn't say
         raise InputError("can't be written", where=str(path), remedy="Choose another folder.")
-    path.write_text(_timeless(text), encoding="utf-8", errors="surrogateescape", newline="")
+    path.write_text(_timeless(_named(text, names)), encoding="utf-8", errors="surrogateescape", newline="")
+
+
+def _named(text: str, names: Sequence[str]) -> str:
+    """A STEP file's text with the curves' names in place of OpenCASCADE's numbers: of the parts, and of their
+    places in the whole, which come in the order of the curves. A last part has the splines' inner points."""
+    alone = len(_STEP_PRODUCT.findall(text)) == 1
+    own = itertools.chain(names if alone else ["gridshell", *names], itertools.repeat("points"))
+    placed = itertools.chain(names, itertools.repeat("points"))
+    text = _STEP_PRODUCT.sub(lambda _: "PRODUCT('{0}','{0}'".format(next(own)), text)
+    return _STEP_PLACE.sub(lambda found: f"{found[1]}'{next(placed)}'", text)
 
 
 def _timeless(text: str) -> str:

@@ -12,8 +12,9 @@ from pypdf import PdfReader
 
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
-from shellform.output.workshop import drawings, layout, nesting
-from shellform.output.workshop.marks import PENS, Words, overlap
+from shellform.output.workshop import drawings, layout, nesting, schedules, setting_out
+from shellform.output.workshop.marks import PENS, Span, Words, overlap
+from shellform.output.workshop.schedules import TitleBlock
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +28,7 @@ def on(space, layer, kind):
     return [entity for entity in space if entity.dxf.layer == layer and entity.dxftype() == kind]
 
 
-@pytest.mark.parametrize("name", ["grid", "cables", "supports", "rods"])
+@pytest.mark.parametrize("name", ["grid", "cables", "supports", "elevations", "rods"])
 def test_each_dxf_file_is_sound_and_in_millimetres(folder, name):
     document = ezdxf.readfile(folder / f"{name}.dxf")
     audit = document.audit()
@@ -113,7 +114,8 @@ def sheets(built):
     return [
         layout.flat_grid(built),
         layout.cable_plan(built),
-        layout.support_plan(built),
+        setting_out.support_plan(built),
+        setting_out.elevations(built),
         layout.rod_strips(built, cutting),
     ]
 
@@ -171,3 +173,45 @@ def test_drawings_that_can_not_be_written_leave_nothing_behind(built, tmp_path):
     with pytest.raises(InputError, match="another ending"):
         drawings.write_dxf(tmp_path / "grid.dwg", layout.flat_grid(built))
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def test_the_title_block_says_who_drew_it_and_when_as_the_case_does(built, tmp_path):
+    block = TitleBlock("2026-05-31", "B", "A. Author")
+    told = replace(built, block=block)
+    for name in ("first", "second"):
+        drawings.write_drawings(tmp_path / name, told, nesting.cut(built.grid, stock=0.6))
+    for file in sorted((tmp_path / "first").iterdir()):
+        assert file.read_bytes() == (tmp_path / "second" / file.name).read_bytes()
+    text = PdfReader(tmp_path / "first/elevations.pdf").pages[0].extract_text()
+    for word in ("2026-05-31 / B", "A. Author"):
+        assert word in text
+    properties = dict(ezdxf.readfile(tmp_path / "first/grid.dxf").header.custom_vars.properties)
+    assert (properties["Date"], properties["Revision"]) == ("2026-05-31", "B")
+
+
+def test_elevations_tell_the_levels_of_crown_and_supports(built):
+    sheet = setting_out.elevations(built)
+    place = 1e3 * built.shell.target.positions
+    words = [mark.text for mark in sheet.marks if isinstance(mark, Words)]
+    assert words.count(f"crown {place[:, 2].max():+.1f}") == 2
+    feet = place[built.shell.net.supports, 2]
+    assert f"lowest support {feet.min():+.1f}" in words
+    spans = [mark.text for mark in sheet.marks if isinstance(mark, Span)]
+    assert spans[::2] == [f"{np.ptp(place[:, axis]):.1f}" for axis in (0, 1)]
+
+
+def test_supports_that_stand_too_near_for_their_shoes_are_named(built):
+    found = schedules.clashing_supports(built)
+    feet = built.shell.target.positions[built.shell.net.supports]
+    apart = np.linalg.norm(feet[:, None] - feet[None], axis=2)
+    wanted = [(a, b) for a in range(len(feet)) for b in range(a) if apart[a, b] < 0.006]
+    assert sorted((b, a) for a, b, _ in found) == sorted(wanted), "three diameters of 2 mm"
+    assert found
+    note = setting_out.support_plan(built).notes[-1]
+    table = schedules.supports(built)
+    for a, b, _ in found:
+        assert f"S{a} and S{b}" in note
+        assert f"S{b}" in table.column("clashes with")[a].split(", ")
+    thin = replace(built, design=replace(built.design, radius=1e-6))
+    assert not schedules.clashing_supports(thin)
+    assert "Nearer" not in " ".join(setting_out.support_plan(thin).notes)

@@ -1,6 +1,7 @@
 """Files for other programs, each read back by another library and compared with the design."""
 
 import ast
+import re
 import sys
 
 import gmsh
@@ -13,6 +14,7 @@ import trimesh
 import shellform.surface
 from shellform.errors import InputError
 from shellform.output.exchange import exports
+from shellform.output.workshop.schedules import rod_names
 from shellform.surface.occ import session
 
 
@@ -54,13 +56,25 @@ def test_the_3dm_file_has_rods_cables_and_supports_on_layers_in_metres(folder, b
     state, grid = built.states["design"], built.grid
     for k, rod in enumerate(grid.rods):
         curve = found[f"rods {rod.direction}"][f"{rod.direction.upper()}{k}"].Geometry
-        points = np.array([(p.X, p.Y, p.Z) for p in (curve.Point(i) for i in range(curve.PointCount))])
-        assert points == pytest.approx(state.positions[rod.nodes], abs=1e-12)
+        assert curve.IsValid
+        assert curve.Degree == min(3, len(rod.nodes) - 1)
+        place = state.positions[rod.nodes]
+        along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(place, axis=0), axis=1)))
+        points = np.array([(p.X, p.Y, p.Z) for p in map(curve.PointAt, along.tolist())])
+        assert points == pytest.approx(place, abs=1e-12), "the curve goes through the nodes"
     ties = built.shell.cables(built.design)
     assert len(found["cables"]) == len(ties.ends)
     strings = dict(found["cables"]["C3"].Attributes.GetUserStrings())
     assert float(strings["rest length [m]"]) == pytest.approx(ties.rest_length[3], abs=1e-6)
     assert float(strings["force under design [N]"]) == pytest.approx(ties.tension(state)[3], abs=1e-6)
+    for load in built.states:
+        assert f"force under {load} [N]" in strings
+        told = dict(found["supports"]["S2"].Attributes.GetUserStrings())
+        assert len(told[f"on the support under {load} [N]"].split()) == 3
+    rod = dict(found[f"rods {grid.rods[0].direction}"]["U0"].Attributes.GetUserStrings())
+    assert rod["section"] == "⌀ 2 mm"
+    assert [int(k) for k in rod["crossings"].split()] == grid.rods[0].crossings.tolist()
+    assert dict(found["target"]["target"].Attributes.GetUserStrings())["job"] == "The vault"
     assert len(found["supports"]) == len(built.shell.net.supports)
     assert len(found["crossings"]) == len(grid.lattice)
     assert len(found["target"]["target"].Geometry.Vertices) == len(vault.vertices)
@@ -96,6 +110,11 @@ def test_the_step_file_has_a_curve_of_each_rod_and_cable_at_the_right_scale(fold
     rods = [np.linalg.norm(np.diff(place[rod.nodes], axis=0), axis=1).sum() for rod in built.grid.rods]
     cables = built.shell.cables(built.design).lengths(built.states["design"])
     assert lengths == pytest.approx([*rods, *cables], rel=1e-3)
+    text = (folder / "gridshell.step").read_text(encoding="utf-8")
+    parts = re.findall(r"PRODUCT\('([^']*)','", text)
+    names = [*rod_names(built.grid), *(f"C{k}" for k in range(len(cables)))]
+    assert parts == ["gridshell", *names, "points"], "each curve is a part under its name"
+    assert re.findall(r"OCCURRENCE\('\d+','([^']*)'", text) == [*names, "points"]
 
 
 def test_the_script_is_that_of_the_design(folder, built):
@@ -129,6 +148,8 @@ def test_without_gmsh_s_libraries_everything_but_the_step_file_is_written(
     assert "gmsh can't be loaded" in exports.no_step()
     exports.write_exports(tmp_path, built, vault, loads)
     assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "blender.py",
+        "grasshopper.py",
         "gridshell-opensees.py",
         "gridshell.3dm",
         "gridshell.glb",
@@ -145,4 +166,4 @@ def test_what_a_library_can_not_write_is_said_plainly(tmp_path):
         write_rhino(tmp_path / "model.3dm", [Item("rods u", "U0", np.eye(3))], {"rods u": "#000000"})
     (tmp_path / "model.step").mkdir()
     with pytest.raises(InputError, match=r"can't (write the curves|be written)"):
-        write_curves(tmp_path / "model.step", [np.eye(3)])
+        write_curves(tmp_path / "model.step", [np.eye(3)], ["U0"])

@@ -17,7 +17,7 @@ ITEMS = [Item("rods u", "U0", np.eye(3)), Item("rods u", "U1", 2.0 * np.eye(3))]
 
 
 def steps(folder):
-    write_curves(folder / "a.step", CURVES)
+    write_curves(folder / "a.step", CURVES, ["U0", "C0"])
 
 
 def workbook(folder):

@@ -40,8 +40,8 @@ def test_the_cut_list_has_every_rod_with_its_length_and_marks(read, net):
         sum(rod.length for rod in net.grid.rods), abs=1e-4
     )
     for row, rod in zip(rows, net.grid.rods, strict=True):
-        marks = [float(mark) for mark in row["marks from the first end [m]"].split()]
-        assert marks == pytest.approx(rod.marks.tolist(), abs=5.1e-5)
+        marks = [float(mark) for mark in row["marks from the first end [mm]"].split()]
+        assert marks == pytest.approx((1e3 * rod.marks).tolist(), abs=5.1e-2)
         assert row["crossing numbers"].split() == [str(k) for k in rod.crossings]
         assert row["section"] == "⌀ 2 mm"
         assert row["mass [kg]"] == ""  # the density isn't known
@@ -358,3 +358,19 @@ def test_turnbuckles_reach_from_the_length_hung_in_to_the_rest_length_and_two_pe
     np.testing.assert_allclose(told["hung in at [m]"], hung)
     np.testing.assert_allclose(told["turnbuckle shortest [m]"], 0.98 * np.minimum(rest, hung))
     np.testing.assert_allclose(told["turnbuckle longest [m]"], 1.02 * np.maximum(rest, hung))
+
+
+def test_the_files_speak_of_millimetres_and_degrees(built, tmp_path):
+    cutting = nesting.cut(built.grid, stock=0.8)
+    schedules.write_schedules(tmp_path, built, cutting)
+    for table in schedules.all_tables(built, cutting):
+        text = (tmp_path / f"{table.name}.csv").read_text(encoding="utf-8")
+        heads, *rows = csv.reader(text.splitlines())
+        assert not [head for head in heads if "[m]" in head or "[rad]" in head]
+        for head, other in zip(table.columns, heads, strict=True):
+            factor = 1e3 if "[m]" in head else 180.0 / np.pi if "[rad]" in head else 1.0
+            for value, row in zip(table.column(head), rows, strict=True):
+                cell = row[heads.index(other)]
+                assert not isinstance(value, float) or float(cell) == pytest.approx(
+                    factor * value, abs=5.1e-4
+                )

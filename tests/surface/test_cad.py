@@ -332,7 +332,7 @@ def test_a_curve_that_ends_where_it_begins_is_written_closed(tmp_path):
 
     angle = np.linspace(0.0, 2.0 * np.pi, 25)
     ring = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(25)])
-    write_curves(tmp_path / "ring.step", [ring])
+    write_curves(tmp_path / "ring.step", [ring], ["E0"])
     with session():
         gmsh.model.occ.importShapes(str(tmp_path / "ring.step"), highestDimOnly=False)
         gmsh.model.occ.synchronize()

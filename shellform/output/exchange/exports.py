@@ -10,19 +10,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
+from shellform.gridshell.catalogue import label
 from shellform.gridshell.layers import TwoLayers
 from shellform.net.grid import crossing_points
 from shellform.net.net import EdgeLine
 from shellform.output.exchange.opensees import opensees_script
+from shellform.output.exchange.run_readers import write_readers
 from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import PENS
-from shellform.output.workshop.schedules import Built, cable_crossings, rod_names
+from shellform.output.workshop.schedules import Built, cable_crossings, rod_names, rounds, support_forces
+from shellform.problem.paths import deviations
 from shellform.structure.elements import rotation
+from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 from shellform.written import whole, write_text
 
@@ -43,7 +48,8 @@ def write_exports(
     folder: str | Path, built: Built, target: Surface, loads: Mapping[str, Reals], *, load: str = "design"
 ) -> list[Path]:
     """Writes gridshell.vtu, .3dm, .glb, .step and, but for designs with edge beams or rods in two layers,
-    gridshell-opensees.py for the geometry under `load`; returns the files.
+    gridshell-opensees.py for the geometry under `load`, and the scripts that open a run in Blender and
+    Grasshopper; returns the files.
 
     `loads` (n, 6) by name. The .step is left out where gmsh can't be loaded (`no_step` says why). Raises
     InputError for an unknown load and where files can't be written.
@@ -60,6 +66,7 @@ def write_exports(
     if not built.shell.beams(built.design.radius).built_in.any():  # which OpenSees' frames can't say
         files.append(place / "gridshell-opensees.py")
         write_script(files[-1], built, loads[load], load=load)
+    files += write_readers(place)
     if not no_step():
         files.append(place / "gridshell.step")
         write_step(files[-1], built, load=load)
@@ -96,41 +103,84 @@ def write_vtu(path: str | Path, built: Built) -> None:
 
 
 def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "design") -> None:
-    """Rhino: rods u, rods v, cables, supports, crossings and the target's mesh on layers of their own;
-    lengths and forces as user strings.
+    """Rhino: rods u, rods v, cables, supports, crossings and the target's mesh on layers of their own; rods as
+    NURBS curves. Section, lengths, marks, and forces and places at each load are user strings.
     """
     from shellform.surface.readers.rhino import Item, write_rhino
 
-    shell, grid, state = built.shell, built.grid, built.states[load]
-    ties = shell.cables(built.design)
-    items = [
-        Item(
-            f"rods {rod.direction}",
-            name,
-            state.positions[rod.nodes],
-            strings={"length [m]": f"{rod.length:.6f}"},
-        )
-        for name, rod in zip(rod_names(grid), grid.rods, strict=True)
-    ]
+    shell, state = built.shell, built.states[load]
+    items = _rod_items(built, state)
     items += [
         Item("edge beams", name, state.positions[_path(line)])
         for name, line in zip(edge_names(shell.net), shell.net.edges, strict=True)
     ]
-    rows = zip(
-        ties.ends, ties.rest_length, ties.tension(state), cable_crossings(shell, built.design), strict=True
-    )
-    for number, (ends, rest, force, pair) in enumerate(rows):
-        strings = {
-            "crossings": f"{pair[0]} {pair[1]}",
-            "rest length [m]": f"{rest:.6f}",
-            f"force under {load} [N]": f"{force:.6f}",
-        }
-        items.append(Item("cables", f"C{number}", state.positions[ends], strings=strings))
-    items += [Item("supports", f"S{k}", state.positions[[node]]) for k, node in enumerate(shell.net.supports)]
-    items += [Item("crossings", str(k), point[None]) for k, point in enumerate(crossing_points(grid, state))]
-    items.append(Item("target", "target", target.vertices, target.triangles))
+    items += _cable_items(built, state)
+    pushes = support_forces(built)
+    for k, node in enumerate(shell.net.supports.tolist()):
+        strings = {f"on the support under {name} [N]": _row(push[node]) for name, push in pushes.items()}
+        items.append(Item("supports", f"S{k}", state.positions[[node]], strings=strings))
+    places = {name: crossing_points(built.grid, each) for name, each in built.states.items()}
+    for k, point in enumerate(places[load]):
+        strings = {"target [m]": _row(shell.net.crossings[k])}
+        strings |= {f"under {name} [m]": _row(each[k]) for name, each in places.items()}
+        items.append(Item("crossings", str(k), point[None], strings=strings))
+    about = {"job": built.title, "design": built.name, "load": load, "date": built.block.date}
+    about |= {"revision": built.block.revision, "author": built.block.author}
+    told = {name: value for name, value in about.items() if value}
+    items.append(Item("target", "target", target.vertices, target.triangles, told))
     with whole(path, ".3dm") as partial:
         write_rhino(partial, items, _LAYERS)
+
+
+def _rod_items(built: Built, state: State) -> list[Any]:
+    from shellform.surface.readers.rhino import Item
+
+    section = label(built.shell.rod.resized(built.design.radius).section, 2)
+    off = {name: deviations(built.shell, each) for name, each in built.states.items()}
+    return [
+        Item(
+            f"rods {rod.direction}",
+            name,
+            state.positions[rod.nodes],
+            strings={
+                "section": section,
+                "length [m]": f"{rod.length:.6f}",
+                "crossings": " ".join(map(str, rod.crossings.tolist())),
+                "marks from the first end [m]": _row(rod.marks),
+                **{
+                    f"off the target at most under {load} [m]": f"{each[rod.nodes].max():.6f}"
+                    for load, each in off.items()
+                },
+            },
+        )
+        for name, rod in zip(rod_names(built.grid), built.grid.rods, strict=True)
+    ]
+
+
+def _cable_items(built: Built, state: State) -> list[Any]:
+    from shellform.surface.readers.rhino import Item
+
+    ties = built.shell.cables(built.design)
+    pairs = cable_crossings(built.shell, built.design)
+    turns = rounds(built.shell, built.design)
+    lengths = {name: ties.lengths(each) for name, each in built.states.items()}
+    pulls = {name: ties.tension(each) for name, each in built.states.items()}
+    items = []
+    for k, ends in enumerate(ties.ends):
+        strings = {
+            "crossings": f"{pairs[k][0]} {pairs[k][1]}",
+            "tensioning round": str(int(turns[k])),
+            "stiffness EA [N]": f"{built.shell.cable.stiffness:g}",
+            "rest length [m]": f"{ties.rest_length[k]:.6f}",
+            **{f"length under {name} [m]": f"{each[k]:.6f}" for name, each in lengths.items()},
+            **{f"force under {name} [N]": f"{each[k]:.6f}" for name, each in pulls.items()},
+        }
+        items.append(Item("cables", f"C{k}", state.positions[ends], strings=strings))
+    return items
+
+
+def _row(values: Reals) -> str:
+    return " ".join(f"{value:.6f}" for value in values.tolist())
 
 
 def write_glb(path: str | Path, built: Built, target: Surface, *, load: str = "design") -> None:
@@ -178,16 +228,18 @@ def _levels(built: Built) -> tuple[float, ...]:
 
 def write_step(path: str | Path, built: Built, *, load: str = "design") -> None:
     """Curves: a B-spline through the nodes of each rod, in the order of the rods' numbers, then of each
-    edge beam, then a line for each cable.
+    edge beam, then a line for each cable, each a part under its name.
     """
     from shellform.surface.occ import write_curves
 
     state = built.states[load]
     curves = [state.positions[rod.nodes] for rod in built.grid.rods]
     curves += [state.positions[_path(line)] for line in built.shell.net.edges]
-    curves += [state.positions[ends] for ends in built.shell.cables(built.design).ends]
+    ties = built.shell.cables(built.design).ends
+    curves += [state.positions[ends] for ends in ties]
+    names = [*rod_names(built.grid), *edge_names(built.shell.net), *(f"C{k}" for k in range(len(ties)))]
     with whole(path, ".step") as partial:
-        write_curves(partial, curves)
+        write_curves(partial, curves, names)
 
 
 def write_script(path: str | Path, built: Built, load_forces: Reals, *, load: str = "design") -> None:

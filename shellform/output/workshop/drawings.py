@@ -2,9 +2,9 @@
 
 The DXF file has the drawing in mm at real scale, on one layer a kind of thing (RODS_U, RODS_V,
 CROSSING_NUMBERS, …), with real dimensions. The PDF sheet has it at the largest usual scale that fits the
-smallest paper on which its smallest letters are `SMALLEST` mm high, with notes, a list and a title block; no
-date, so that the same design gives the same file (DXF has to bear the time at which it was written). What is
-on the sheets: layout.py.
+smallest paper on which its smallest letters are `SMALLEST` mm high, with notes, a list and a title block.
+Date, revision and author are those of the case ([title_block]), never the day of writing, so that the same
+case gives the same bytes. What is on the sheets: layout.py and setting_out.py.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ezdxf.layouts import Modelspace
 
 import shellform
 from shellform.output.pictures.plots import Label, PaperLine, PaperPage, write_pages
-from shellform.output.workshop import layout
+from shellform.output.workshop import layout, setting_out
 from shellform.output.workshop.marks import PENS, WIDE, Mark, Ring, Sheet, Span, Stroke, Words
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.schedules import Built
@@ -34,26 +34,27 @@ SMALLEST = 1.6  # mm, of letters on paper
 STRIPS = 26  # rods on a sheet
 _EDGE, _BOUND = 10.0, 20.0  # mm, of the frame from the paper's edge, and on the side where it is bound
 _COLUMN = 110.0  # mm, of the column with title block, notes and list
-_BLOCK = 62.0  # mm, height of the title block
+_BLOCK = 72.0  # mm, height of the title block
 _PROSE, _BOLD = 0.8, 0.93  # width of a letter of prose over its height, plain and bold
 _SIDES = {"left": "LEFT", "middle": "CENTER", "right": "RIGHT"}
 
 
 def write_drawings(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
-    """Writes grid, cables, supports and rods, each as .dxf and .pdf; returns the files. Raises InputError
+    """Writes grid, cables, supports, elevations and rods, each as .dxf and .pdf; returns the files. Raises InputError
     where they can't be written.
     """
     place = Path(folder)
     sheets = {
         "grid": layout.flat_grid(built),
         "cables": layout.cable_plan(built),
-        "supports": layout.support_plan(built),
+        "supports": setting_out.support_plan(built),
+        "elevations": setting_out.elevations(built),
         "rods": layout.rod_strips(built, cutting),
     }
     files = []
     for name, sheet in sheets.items():
         files += [place / f"{name}.dxf", place / f"{name}.pdf"]
-        write_dxf(files[-2], sheet)
+        write_dxf(files[-2], sheet, built)
         pages = [sheet]
         if name == "rods":
             pages = [
@@ -64,12 +65,13 @@ def write_drawings(folder: str | Path, built: Built, cutting: Cutting) -> list[P
     return files
 
 
-def write_dxf(path: str | Path, sheet: Sheet) -> Path:
-    """Writes the sheet's drawing in mm at real scale, with no time of day and no number of chance: the same
+def write_dxf(path: str | Path, sheet: Sheet, built: Built | None = None) -> Path:
+    """Writes the sheet's drawing in mm at real scale, with date, revision and author of what is `built` among
+    the drawing's properties, with no time of day and no number of chance: the same
     sheet gives the same bytes. Raises InputError where the file can't be written.
     """
     with _timeless():
-        return _saved(Path(path), sheet)
+        return _saved(Path(path), sheet, built)
 
 
 @contextmanager
@@ -83,9 +85,15 @@ def _timeless() -> Iterator[None]:
         ezdxf.options.write_fixed_meta_data_for_testing = usual
 
 
-def _saved(target: Path, sheet: Sheet) -> Path:
+def _saved(target: Path, sheet: Sheet, built: Built | None) -> Path:
     document = ezdxf.new("R2010", setup=["linetypes"], units=units.MM)
     document.header["$LTSCALE"] = sheet.lettering
+    if built is not None:
+        told = {"Job": built.title, "Drawing": sheet.title, "Design": built.name}
+        told |= {"Date": built.block.date, "Revision": built.block.revision, "Author": built.block.author}
+        for name, said in told.items():
+            if said:
+                document.header.custom_vars.append(name, said)
     document.styles.new("LETTERS", dxfattribs={"font": "arial.ttf"})
     used = {mark.layer for mark in sheet.marks}
     for name, pen in PENS.items():
@@ -315,9 +323,9 @@ class _Column:
 def _title_block(
     left: float, right: float, built: Built, sheet: Sheet, paper: str, scale: float, number: str
 ) -> tuple[list[PaperLine], list[Label]]:
-    bottom, top = _EDGE, _EDGE + _BLOCK
+    bottom, top, block = _EDGE, _EDGE + _BLOCK, built.block
     middle = 0.5 * (left + right)
-    rows = [top - 16.0, top - 26.0, top - 36.0, bottom + 14.0]
+    rows = [top - 16.0, top - 26.0, top - 36.0, top - 46.0, bottom + 14.0]
     lines = [PaperLine([(left, top), (right, top)], width=0.35)]
     lines += [PaperLine([(left, y), (right, y)], width=0.18) for y in rows]
     lines.append(PaperLine([(middle, rows[-1]), (middle, rows[0])], width=0.18))
@@ -329,6 +337,8 @@ def _title_block(
         ("paper", f"{paper}, print at 100 %", middle, rows[1], 3.0),
         ("unit", "mm", left, rows[2], 3.0),
         ("sheet", f"{number}   shellform {shellform.__version__}", middle, rows[2], 3.0),
+        ("date, revision", " / ".join(filter(None, (block.date, block.revision))) or "–", left, rows[3], 3.0),
+        ("drawn by", block.author or "–", middle, rows[3], 3.0),
     ]
     labels = []
     for head, text, x, y, height in fields:

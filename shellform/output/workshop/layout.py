@@ -19,24 +19,21 @@ from shellform.gridshell.catalogue import label
 from shellform.net.grid import GridRod
 from shellform.net.notes import NoteKind
 from shellform.output.workshop.block_schedule import block_marks
-from shellform.output.workshop.edge_schedule import edge_names
 from shellform.output.workshop.marks import (
     MM,
-    Box,
     Mark,
-    Point,
     Ring,
     Sheet,
     Span,
     Stroke,
     Words,
     box_of,
-    overlap,
+    free,
+    point_of,
+    square,
 )
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.schedules import Built, cable_crossings, rod_names, rounds
-
-_APART = 0.2  # of their height: between words
 
 
 def flat_grid(built: Built) -> Sheet:
@@ -95,11 +92,11 @@ def _rod(built: Built, name: str, rod: GridRod, s: float) -> list[Mark]:
     middles = 0.5 * (places[:-1] + places[1:]) if len(places) > 1 else np.array([0.5 * MM * rod.length])
     at = float(middles[np.argmin(np.abs(middles - 0.5 * MM * rod.length))])
     return [
-        Stroke(f"RODS_{rod.direction.upper()}", (_point(ends[0]), _point(ends[1]))),
-        *(_square(end, 0.03 * s) for end in ends),
+        Stroke(f"RODS_{rod.direction.upper()}", (point_of(ends[0]), point_of(ends[1]))),
+        *(square(end, 0.03 * s) for end in ends),
         Words(
             "ROD_NAMES",
-            _point(ends[0] + at * along + 0.03 * s * left),
+            point_of(ends[0] + at * along + 0.03 * s * left),
             0.1 * s,
             name,
             angle,
@@ -133,7 +130,7 @@ def _ends(built: Built, s: float, marks: Sequence[Mark]) -> list[Mark]:
                 choices = [
                     Words(
                         layer,
-                        _point(begin + 0.08 * s * step * sign * along + turn * gap * left),
+                        point_of(begin + 0.08 * s * step * sign * along + turn * gap * left),
                         height,
                         text,
                         angle,
@@ -143,7 +140,7 @@ def _ends(built: Built, s: float, marks: Sequence[Mark]) -> list[Mark]:
                     for step in range(12)
                     for turn, foot in (sides if layer == "SUPPORT_NUMBERS" else sides[::-1])
                 ]
-                chosen = next((words for words in choices if _free(words, taken)), choices[0])
+                chosen = next((words for words in choices if free(words, taken)), choices[0])
                 taken.append(chosen.box)
                 found.append(chosen)
     return found
@@ -175,7 +172,7 @@ def _lanes(built: Built, direction: str, names: list[str], low: Reals, high: Rea
             lane[axis] = (low if end == 0 else high)[axis] + sign * 0.75 * s
             begin = tip.copy()
             begin[axis] += sign * 0.42 * s
-            marks.append(Stroke("LEADERS", (_point(begin), _point(lane))))
+            marks.append(Stroke("LEADERS", (point_of(begin), point_of(lane))))
             spot = lane.copy()
             spot[axis] += sign * 0.06 * s
             text = (
@@ -184,7 +181,7 @@ def _lanes(built: Built, direction: str, names: list[str], low: Reals, high: Rea
                 else f"{MM * rod.length:.1f}   {names[number]}"
             )
             text = text if end == 0 or len(several) > 1 else names[number]
-            marks.append(Words("CUT_LENGTHS", _point(spot), 0.12 * s, text, angle, side, "middle"))
+            marks.append(Words("CUT_LENGTHS", point_of(spot), 0.12 * s, text, angle, side, "middle"))
     return marks
 
 
@@ -229,20 +226,20 @@ def cable_plan(built: Built) -> Sheet:
                 (b if k == len(stops) - 2 else b - bubble * along),
             )
             if float((end - begin) @ along) > 0.0:
-                marks.append(Stroke("BACKGROUND", (_point(begin), _point(end))))
+                marks.append(Stroke("BACKGROUND", (point_of(begin), point_of(end))))
     for number, joint in enumerate(joints):
-        marks.append(Ring("CROSSINGS", _point(joint), bubble))
-        marks.append(Words("CROSSING_NUMBERS", _point(joint), height, str(number), 0.0, "middle", "middle"))
+        marks.append(Ring("CROSSINGS", point_of(joint), bubble))
+        marks.append(Words("CROSSING_NUMBERS", point_of(joint), height, str(number), 0.0, "middle", "middle"))
     pairs = cable_crossings(built.shell, built.design)
     turns = rounds(built.shell, built.design)
     for number, ((a, b), turn) in enumerate(zip(joints[pairs], turns.tolist(), strict=True)):
         along = (b - a) / np.linalg.norm(b - a)
-        marks.append(Stroke("CABLES", (_point(a + bubble * along), _point(b - bubble * along))))
+        marks.append(Stroke("CABLES", (point_of(a + bubble * along), point_of(b - bubble * along))))
         # Both diagonals of a cell cross in its middle: the names stand in the upper and in the lower of the
         # triangles between them.
         sign, foot = (1.0, "bottom") if along[0] * along[1] > 0.0 else (-1.0, "top")
         spot = 0.5 * (a + b) + np.array([0.0, sign * 0.27 * MM * grid.spacing_v])
-        marks.append(Words("CABLE_NAMES", _point(spot), height, f"C{number}·{turn}", 0.0, "middle", foot))
+        marks.append(Words("CABLE_NAMES", point_of(spot), height, f"C{number}·{turn}", 0.0, "middle", foot))
     notes = (
         "Drawn on the flat grid; the erected grid's cells are skewed. C12·3: cable 12, tightened in round 3.",
         "Where a cell has two cables, the upper name is that of the rising one.",
@@ -252,77 +249,6 @@ def cable_plan(built: Built) -> Sheet:
         "schedules/cables.csv.",
     )
     return Sheet("Cables", tuple(marks), height, notes)
-
-
-def support_plan(built: Built) -> Sheet:
-    """The supports in plan with the rods as they stand on the target, and the supports' coordinates."""
-    grid, place = built.grid, MM * built.shell.target.positions
-    s = MM * min(grid.spacing, grid.spacing_v)
-    names = rod_names(grid)
-    marks: list[Mark] = []
-    for rod in grid.rods:
-        points = tuple(_point(p) for p in place[rod.nodes, :2])
-        marks.append(Stroke(f"RODS_{rod.direction.upper()}", points))
-    ends = {int(rod.nodes[k]): name for name, rod in zip(names, grid.rods, strict=True) for k in (0, -1)}
-    for name, line in zip(edge_names(built.shell.net), built.shell.net.edges, strict=True):
-        path = place[np.append(line.ends[:, 0], line.ends[-1, 1]), :2]
-        marks.append(Stroke("EDGE_BEAMS", tuple(_point(p) for p in path)))
-        ends |= {int(foot): ends.get(int(foot), name) for foot in line.nodes[[0, -1]]}
-    supports = built.shell.net.supports
-    middle, rows = place[supports, :2].mean(axis=0), []
-    height = 0.13 * s
-    taken = [box_of(_square(place[node, :2], 0.05 * s)) for node in supports]
-    for number, node in enumerate(supports.tolist()):
-        here = place[node]
-        marks.append(_square(here[:2], 0.05 * s))
-        words = _clear(f"S{number}", here[:2], here[:2] - middle, height, taken)
-        taken.append(words.box)
-        marks.append(words)
-        rows.append((f"S{number}", ends[node], *(f"{value:.1f}" for value in here.tolist())))
-    low, high = place[:, :2].min(axis=0), place[:, :2].max(axis=0)
-    for axis in range(2):
-        a, b, base = float(low[axis]), float(high[axis]), float(low[1 - axis]) - 1.2 * s
-        text = f"{b - a:.1f}"
-        marks.append(
-            Span("DIMENSIONS", (a, base), (b, base), (a, base), 0.14 * s, text)
-            if axis == 0
-            else Span("DIMENSIONS", (base, a), (base, b), (base, a), 0.14 * s, text)
-        )
-    zero = (("0", (0.0, 0.0)),) if (low < 0.0).all() and (high > 0.0).all() else ()
-    for text, (x, y) in zero:
-        marks += [
-            Stroke("DIMENSIONS", ((x - 0.3 * s, y), (x + 0.3 * s, y))),
-            Stroke("DIMENSIONS", ((x, y - 0.3 * s), (x, y + 0.3 * s))),
-            Words("DIMENSIONS", (x + 0.1 * s, y + 0.1 * s), 0.14 * s, f"x, y = {text}"),
-        ]
-    notes = (
-        "Supports are where the rods' axes meet the ground; rods stand as on the target.",
-        "Directions of the rods at the supports: schedules/supports.csv. Survey targets: "
-        "schedules/survey.csv.",
-    )
-    return Sheet(
-        "Setting-out of the supports",
-        tuple(marks),
-        height,
-        notes,
-        ("support", "rod", "x", "y", "z"),
-        tuple(rows),
-    )
-
-
-def _clear(text: str, here: Reals, away: Reals, height: float, taken: Sequence[Box]) -> Words:
-    """A support's number beside it, outwards, as far off as it takes to lie on no other."""
-    out = away / (np.linalg.norm(away) or 1.0)
-    side = "left" if out[0] > 0.3 else "right" if out[0] < -0.3 else "middle"
-    foot = "bottom" if out[1] > 0.3 else "top" if out[1] < -0.3 else "middle"
-    words = Words("SUPPORT_NUMBERS", _point(here + height * out), height, text, 0.0, side, foot)
-    for step in range(1, 40):
-        if _free(words, taken):
-            break
-        words = Words(
-            "SUPPORT_NUMBERS", _point(here + (1.0 + 0.5 * step) * height * out), height, text, 0.0, side, foot
-        )
-    return words
 
 
 def rod_strips(built: Built, cutting: Cutting, first: int = 0, last: int | None = None) -> Sheet:
@@ -376,25 +302,3 @@ def rod_strips(built: Built, cutting: Cutting, first: int = 0, last: int | None 
         *(["Red: splices of rods that are longer than the stock."] if cuts else []),
     )
     return Sheet("Rods", tuple(marks), height, notes)
-
-
-def _free(words: Words, taken: Sequence[Box]) -> bool:
-    """Whether the words lie on none of what is there already, nor too near."""
-    gap = _APART * words.height
-    return not any(overlap(words.box, other, gap) for other in taken)
-
-
-def _square(place: Reals, half: float) -> Stroke:
-    x, y = _point(place)
-    corners = (
-        (x - half, y - half),
-        (x + half, y - half),
-        (x + half, y + half),
-        (x - half, y + half),
-        (x - half, y - half),
-    )
-    return Stroke("SUPPORTS", corners)
-
-
-def _point(place: Reals) -> Point:
-    return float(place[0]), float(place[1])

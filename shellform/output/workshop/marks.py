@@ -4,13 +4,17 @@ layers, mm at real scale, y upwards.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from shellform.arrays import Reals
+
 WIDE = 0.88  # width of a figure over its height, in the widest of the usual fonts
 
 MM = 1e3  # in a metre
+APART = 0.2  # of their height: between words
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]  # x from, y from, x to, y to
 
@@ -41,6 +45,8 @@ PENS = {
     "LEADERS": Pen("#9a9a9a", 0.09, dashed=True),
     "BACKGROUND": Pen("#b8b8b8", 0.13),
     "DIMENSIONS": Pen("#404040", 0.13),
+    "LEVELS": Pen("#404040", 0.13),
+    "GROUND": Pen("#7a5c3a", 0.5),
 }
 
 
@@ -129,6 +135,7 @@ class Sheet:
 
 
 def box_of(mark: Mark) -> Box:
+    """Where a mark lies."""
     if isinstance(mark, Words):
         return mark.box
     if isinstance(mark, Ring):
@@ -143,3 +150,27 @@ def box_of(mark: Mark) -> Box:
 def overlap(a: Box, b: Box, gap: float = 0.0) -> bool:
     """Whether two boxes lie on each other, or nearer than `gap`."""
     return a[0] < b[2] + gap and b[0] < a[2] + gap and a[1] < b[3] + gap and b[1] < a[3] + gap
+
+
+def free(words: Words, taken: Sequence[Box]) -> bool:
+    """Whether the words lie on none of what is there already, nor too near."""
+    gap = APART * words.height
+    return not any(overlap(words.box, other, gap) for other in taken)
+
+
+def square(place: Reals, half: float) -> Stroke:
+    """A support's square about a place, with half its side."""
+    x, y = point_of(place)
+    corners = (
+        (x - half, y - half),
+        (x + half, y - half),
+        (x + half, y + half),
+        (x - half, y + half),
+        (x - half, y - half),
+    )
+    return Stroke("SUPPORTS", corners)
+
+
+def point_of(place: Reals) -> Point:
+    """The first two coordinates."""
+    return float(place[0]), float(place[1])

@@ -1,4 +1,5 @@
-"""What is cut, tensioned and set out: the tables that go to the workshop and to the site, in SI units.
+"""What is cut, tensioned and set out: the tables that go to the workshop and to the site; here in SI units, in
+their files in mm and degrees.
 
 Names are those of the drawings: rod U5 or V16 has the number 5 or 16 in net.json, crossing 37 and support S3
 too; cable C12 is number 12 in the model file of the design. All places are those of the rods' axes; a
@@ -31,6 +32,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
@@ -46,9 +48,18 @@ from shellform.output.workshop.splice_schedule import cutting_notes, splice_tabl
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
-from shellform.tables import Table, write_tables
+from shellform.tables import Table, for_the_workshop, write_tables
 
 RESERVE = 0.02  # of the rest length, at both ends of a turnbuckle's range
+
+
+@dataclass(frozen=True)
+class TitleBlock:
+    """Who stands for a drawing: its `date` (2026-05-31), `revision` and `author`; "" leaves one out."""
+
+    date: str = ""
+    revision: str = ""
+    author: str = ""
 
 
 @dataclass(frozen=True)
@@ -57,7 +68,7 @@ class Built:
     state `hung` in which the cables are hung in, the erected grid before bracing (left out: the target).
     `name` of the design and `title` of the job are for the heads; `adjustment`, m, is the range of the
     turnbuckles by which cables are let out from the lengths that they are cut to (None: each is cut for
-    itself)."""
+    itself); `block` is what the drawings' title block says of who drew them and when."""
 
     shell: Gridshell
     design: Design
@@ -66,6 +77,7 @@ class Built:
     name: str = ""
     title: str = ""
     adjustment: float | None = None
+    block: TitleBlock = TitleBlock()
 
     def __post_init__(self) -> None:
         if "none" not in self.states:
@@ -94,7 +106,7 @@ def rods(built: Built, cutting: Cutting) -> Table:
     rows = tuple(
         (
             name, rod.direction, rod.length, label(section, 2), weight * rod.length if weight else None,
-            len(rod.marks), " ".join(f"{mark:.4f}" for mark in rod.marks),
+            len(rod.marks), " ".join(f"{1e3 * mark:.1f}" for mark in rod.marks),
             " ".join(map(str, rod.crossings.tolist())), ", ".join(said for _, said in sorted(places[k])),
             "spliced" if k in cutting.spliced else "",
         )
@@ -102,7 +114,7 @@ def rods(built: Built, cutting: Cutting) -> Table:
     )  # fmt: skip
     heads = (
         "rod", "direction", "length [m]", "section", "mass [kg]", "crossings",
-        "marks from the first end [m]", "crossing numbers", "bars", "note",
+        "marks from the first end [mm]", "crossing numbers", "bars", "note",
     )  # fmt: skip
     notes = cutting_notes(cutting, rod_names(built.grid))
     if layers_of(section) == 2:
@@ -249,6 +261,28 @@ def cutting_of_cables(built: Built) -> tuple[str, ...]:
     )
 
 
+def shoe_width(built: Built) -> float:
+    """What a support needs across, m: three rod diameters, the rod between two walls of its own thickness."""
+    return 6.0 * max(built.shell.rod.resized(built.design.radius).section.fibres)
+
+
+def clashing_supports(built: Built) -> list[tuple[int, int, float]]:
+    """Pairs of supports that stand nearer to each other than a shoe is wide, by number, with the distance of
+    their axes, m."""
+    feet = built.shell.target.positions[built.shell.net.supports]
+    pairs = sorted(cKDTree(feet).query_pairs(shoe_width(built))) if len(feet) else []
+    return [(a, b, float(np.linalg.norm(feet[a] - feet[b]))) for a, b in pairs]
+
+
+def support_forces(built: Built) -> dict[str, Reals]:
+    """With which force (n, 3), N, rods act on each node at each load, in order; away from supports that is the
+    load."""
+    assembly = assemble(built.shell.network(built.design))
+    return {
+        name: -assembly.evaluate(built.states[name], tangent=False).force[:, :3] for name in _in_order(built)
+    }
+
+
 def supports(built: Built) -> Table:
     """The supports: which end of which rod, where its axis stands, how it leaves the ground: bearing from x
     and rise, rad; and with which force the rod acts on it at each load."""
@@ -262,18 +296,16 @@ def supports(built: Built) -> Table:
         for tip, inner, word in ((0, 1, "first"), (-1, -2, "second")):
             foot, following = (int(node) for node in line.nodes[[tip, inner]])
             ends.setdefault(foot, (name, word, place[following] - place[foot]))
-    assembly = assemble(built.shell.network(built.design))
-    pushes = {
-        name: -assembly.evaluate(built.states[name], tangent=False).force[:, :3] for name in _in_order(built)
-    }
-    rows = []
+    pushes = support_forces(built)
+    rows, clashes = [], clashing_supports(built)
     for support, node in enumerate(built.shell.net.supports.tolist()):
         rod, side, along = ends[node]
         x, y, z = place[node].tolist()
         bearing = float(np.arctan2(along[1], along[0]))
         rise = float(np.arctan2(along[2], np.hypot(along[0], along[1])))
         forces = [value for push in pushes.values() for value in push[node].tolist()]
-        rows.append((f"S{support}", rod, side, x, y, z, bearing, rise, *forces))
+        near = ", ".join(f"S{b if a == support else a}" for a, b, _ in clashes if support in (a, b))
+        rows.append((f"S{support}", rod, side, x, y, z, bearing, rise, near, *forces))
     heads = [
         "support",
         "rod",
@@ -283,11 +315,16 @@ def supports(built: Built) -> Table:
         "z [m]",
         "bearing of the rod [rad]",
         "rise of the rod [rad]",
+        "clashes with",
     ]
     heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
     notes = (
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' "
         "ends on them, and at the feet of edge beams (E0, E1, …) those of the beams.",
+        f"Supports whose axes are nearer than {1e3 * shoe_width(built):.3g} mm, the width of a shoe (three rod "
+        "diameters), clash: "
+        + (", ".join(f"S{a} and S{b}, {1e3 * apart:.1f} mm" for a, b, apart in clashes) or "none")
+        + ".",
     )
     return Table("supports", tuple(heads), tuple(rows), notes)
 
@@ -329,10 +366,10 @@ def all_tables(built: Built, cutting: Cutting) -> list[Table]:
 
 
 def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
-    """Writes every schedule as NAME.csv and all of them as schedules.xlsx; returns the files. Raises
-    InputError where they can't be written.
+    """Writes every schedule as NAME.csv and all of them as schedules.xlsx, lengths in mm and angles in degrees
+    as workshops read them; returns the files. Raises InputError where they can't be written.
     """
-    return write_tables(folder, all_tables(built, cutting))
+    return write_tables(folder, [for_the_workshop(table) for table in all_tables(built, cutting)])
 
 
 def _told_states(built: Built) -> dict[str, State]:

@@ -20,6 +20,7 @@ from uuid import UUID, uuid5
 
 import numpy as np
 import rhino3dm
+from scipy.interpolate import make_interp_spline
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
@@ -40,8 +41,8 @@ _SAMPLES = 161  # along each side, whose chords are then nearer to it than that
 
 @dataclass(frozen=True)
 class Item:
-    """What is written: on `layer`, under a `name`, a polyline through `points` (n, 3), m, a point where there
-    is one, or where `triangles` are given their mesh; `strings` are its user strings."""
+    """What is written: on `layer`, under a `name`, a NURBS curve through `points` (n, 3), m, a straight line
+    where there are two, a point where there is one, or where `triangles` are given their mesh; `strings` are its user strings."""
 
     layer: str
     name: str
@@ -80,10 +81,25 @@ def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -
         elif len(item.points) == 1:
             model.Objects.AddPoint(rhino3dm.Point3d(*item.points[0].tolist()), own)
         else:
-            line = rhino3dm.Polyline([rhino3dm.Point3d(*point) for point in item.points.tolist()])
-            model.Objects.AddPolyline(line, own)
+            model.Objects.AddCurve(_through(item.points), own)
     if not model.Write(str(path), 7):
         raise OSError(f"rhino3dm can't write {path}")
+
+
+def _through(points: Reals) -> Any:
+    """The cubic spline through the points over the chords' length, without a kink at its second and its last but
+    one point (de Boor 1978), as a NURBS curve; of less degree where there are fewer than four."""
+    if len(points) == 2:
+        return rhino3dm.LineCurve(*(rhino3dm.Point3d(*point) for point in points.tolist()))
+    degree = min(3, len(points) - 1)
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    spline = make_interp_spline(along, points, k=degree)
+    curve = rhino3dm.NurbsCurve(3, False, degree + 1, len(points))
+    for k, point in enumerate(spline.c.tolist()):
+        curve.Points[k] = rhino3dm.Point4d(*point, 1.0)
+    for k, knot in enumerate(spline.t[1:-1].tolist()):  # Rhino leaves the first and the last one out
+        curve.Knots[k] = knot
+    return curve
 
 
 def read_rhino(
