@@ -316,7 +316,7 @@ def brace(
     if rod.radius > bearable * (1.0 + 1e-9):
         raise TooCurved(
             f"the net bends rods to {net.quality.curvature_max:.3g} 1/m; with the outermost fibre more than "
-            f"{bearable:.4g} m from the "
+            f"{1e3 * bearable:.4g} mm from the "
             "axis they break (equation 1)",
             where="rod.radius",
             value=rod.radius,

@@ -21,7 +21,7 @@ from shellform.arrays import Reals
 from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
 from shellform.case.case import Case, check_script, dump_case
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, ShellformError
 from shellform.gridshell.gridshell import Gridshell, TooCurved
 from shellform.gridshell.joints import doubts as joint_doubts
 from shellform.gridshell.tolerances import default_tolerances
@@ -32,6 +32,7 @@ from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.stages import SHOWING, STAGES, StagesDone, read_stages, write_stages
 from shellform.records.summary import ModelRecord, Summary, read_summary, write_summary
 from shellform.run import designs
+from shellform.run.broken_off import break_off
 from shellform.run.checkpoint import drop_checkpoint
 from shellform.run.figures import draw_everything
 from shellform.run.folder import alone, load_surface, read_run, refuse_links, refuse_overwriting, save_surface
@@ -155,8 +156,8 @@ def _stages(
         except Exception as error:
             workspace.say(stage, f"ended: {error}", Kind.FAILED)
             if stage not in SHOWING:
-                if isinstance(error, NotConverged):
-                    _broken_off(workspace, stage, str(error))
+                if isinstance(error, ShellformError):
+                    _tell(workspace, stage, error)
                 raise
             failures.append(error)
             kind = Kind.FAILED
@@ -177,17 +178,12 @@ def _stages(
     return summary
 
 
-def _broken_off(workspace: Workspace, stage: str, why: str) -> None:
-    """A stage that ended without a result: what was found before it is judged, and shown on the page."""
-    summary = read_summary(workspace.folder)
-    summary = replace(summary, failed={**summary.failed, stage: why})
-    write_summary(workspace.folder, summary)
-    if not summary.designs:
-        return
-    run = read_run(workspace.folder)
-    run = replace(run, summary=replace(summary, verdict=judged(run)))
-    write_summary(workspace.folder, run.summary)
-    write_page([run], workspace.path(FILE))
+def _tell(workspace: Workspace, stage: str, error: ShellformError) -> None:
+    """The page of a run that ends early; where it can't be written, the error says so too."""
+    try:
+        break_off(workspace, stage, error)
+    except (ShellformError, OSError) as other:
+        error.add_note(f"Nor could its page be written: {other}")
 
 
 def _steps() -> dict[str, Callable[[Workspace, Parts, Summary, bool], _Ended]]:

@@ -1,0 +1,63 @@
+"""A run that ends early has a page that tells the cause first; where it has designs, they are shown and judged."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from shellform.errors import InputError, NotConverged
+from shellform.records.summary import read_summary
+from shellform.run import broken_off
+from shellform.run.run import run_case
+from tests.run.small_run import small_case
+
+ROOT = Path(__file__).parent.parent.parent
+
+
+def text_of(folder):
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_run_without_a_design_tells_cause_remedy_and_what_was_found(tmp_path, monkeypatch):
+    from shellform.run import run
+
+    monkeypatch.setattr(run, "with_way_out", lambda error, *_: error)  # which takes its time
+    case = small_case(ROOT, "rod.radius=0.004", "title=<b>thick")
+    with pytest.raises(InputError, match="they break") as refused:
+        run_case(case, tmp_path / "run")
+    page = text_of(tmp_path / "run")
+    first = page.index("The run ended in the stage “initial”")
+    cause = page.index("the net bends rods to")
+    assert first < cause < page.index("Choose a thinner rod") < page.index("How far it came")
+    assert "mm from the axis" in page
+    assert "&lt;b&gt;thick" in page
+    assert "14 rods" in page
+    assert "default-src 'none'" in page
+    for address in re.findall('<a href="([^"#]*)"', page):
+        assert (tmp_path / "run" / address).is_file()
+    assert read_summary(tmp_path / "run").failed == {"initial": str(refused.value)}
+    run_case(small_case(ROOT), tmp_path / "run", until="initial")
+    assert not read_summary(tmp_path / "run").failed, "and it goes on once the cause is gone"
+
+
+def test_a_run_with_a_design_that_deforms_too_much_shows_it_and_says_so_first(tmp_path):
+    case = small_case(ROOT, "rod.radius=0.0003", "load.force=20.0")
+    with pytest.raises(NotConverged, match="deforms excessively"):
+        run_case(case, tmp_path / "run")
+    page = text_of(tmp_path / "run")
+    assert "The initial design does not hold" in page
+    verdict = page.index("ended without a result: The initial design deforms excessively")
+    assert verdict < page.index("How far off is the shell?")
+
+
+def test_a_page_that_can_not_be_written_is_told_with_the_cause(tmp_path, monkeypatch):
+    from shellform.run import run
+
+    def refused(*_):
+        raise OSError("the disc is full")
+
+    monkeypatch.setattr(run, "with_way_out", lambda error, *_: error)
+    monkeypatch.setattr(broken_off, "ended_page", refused)
+    with pytest.raises(InputError, match="they break") as found:
+        run_case(small_case(ROOT, "rod.radius=0.004"), tmp_path / "run")
+    assert found.value.__notes__ == ["Nor could its page be written: the disc is full"]
