@@ -67,6 +67,7 @@ from shellform.surface.shape.target import Surface
 
 BUNDLES = (19, 37)  # rods of an edge beam
 THICKNESS, LEAST_THICKNESS = 0.05, 0.015  # m: usual; a first layer of sprayed concrete
+_SLENDER = 80.0  # thicknesses across the larger side of a model, on which 50 mm would be a block
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
 _STRESSED = 0.95  # of the strength, at the most, under the additional load
@@ -130,7 +131,7 @@ class _Search:
 
     def found(self) -> FirstDesign:
         spacing, self.reason = self._first_spacing()
-        thickness = self.wish.thickness or THICKNESS
+        thickness = self.wish.thickness or usual_thickness(self.surface)
         for number in range(_SPACINGS):
             if number:
                 finer = practical(_FINER * spacing)
@@ -230,7 +231,7 @@ class _Search:
                 break
             result = self._stands(placed, choice, failure.spacing, thinner)
             if isinstance(result, FirstDesign):
-                if self.wish.thickness is not None or thinner < LEAST_THICKNESS:
+                if self.wish.thickness is not None or thinner < min(LEAST_THICKNESS, 0.5 * asked):
                     nearest = replace(nearest, thickness=asked)
                     raise refused(self.surface, nearest, self.wish, bears=thinner)
                 return result
@@ -345,6 +346,11 @@ class _Search:
         if self.best is None or failure.factor >= self.best.factor:
             self.best = failure
         return failure
+
+
+def usual_thickness(surface: Surface) -> float:
+    """Of the concrete with which `new` begins, m: 50 mm, less on models of under 4 m."""
+    return max(min(THICKNESS, _whole_mm(float(surface.size[:2].max()) / _SLENDER)), 0.002)
 
 
 def _edges_may_help(failure: Obstacle) -> bool:

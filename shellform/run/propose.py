@@ -19,7 +19,7 @@ from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.run.first_design import THICKNESS, FirstDesign, first_design
+from shellform.run.first_design import THICKNESS, FirstDesign, first_design, usual_thickness
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
@@ -135,7 +135,7 @@ composite = {COMPOSITE!r}      # how far they act together: 1 as if glued, 0 loo
 
 [part.concrete]      # on its true area, so that the load stays where the spacing changes
 kind = "concrete"
-thickness = {design.thickness!r}     # m: {_thickness_told(design, wish)}
+thickness = {design.thickness!r}     # m: {_thickness_told(surface, design, wish)}
 
 [part.rods]
 kind = "rods"
@@ -165,11 +165,15 @@ limit = {_short(design.tried.deviation)!r}      # m, end of the colour scale: ho
 """
 
 
-def _thickness_told(design: FirstDesign, wish: DesignWish) -> str:
+def _thickness_told(surface: Surface, design: FirstDesign, wish: DesignWish) -> str:
     if wish.thickness is not None:
         return "as asked"
-    if design.thickness == THICKNESS:
-        return "usual"
+    if design.thickness == usual_thickness(surface):
+        return (
+            "usual"
+            if design.thickness == THICKNESS
+            else "that of a model: a shell of 4 m or more would have 50 mm"
+        )
     return "what these rods bear; pour it first, and the rest when it has hardened"
 
 

@@ -17,7 +17,7 @@ from shellform.gridshell.gridshell import erection_stress
 from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
 from shellform.run import first_trial
-from shellform.run.first_design import first_design
+from shellform.run.first_design import first_design, usual_thickness
 from shellform.run.first_net import Allowance
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts
 from shellform.run.propose import propose_case
@@ -244,6 +244,12 @@ def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_afte
     parts = FirstParts(wished("gfrp_rods/2 mm")[0], 19, 0.998)
     assert first_trial.drawn_standing(net, barrel(), parts, 0.002) == 5
     assert drawn == [0, 1, 2, 3, 4, 5]
+
+
+def test_models_begin_with_thinner_concrete_and_shells_with_what_is_usual():
+    assert usual_thickness(dish()) == 0.05
+    assert usual_thickness(dish(size=1.0, rise=0.2)) == 0.012
+    assert usual_thickness(dish(size=0.05, rise=0.01)) == 0.002
 
 
 def test_a_search_ends_at_the_same_place_once_its_work_is_done():
