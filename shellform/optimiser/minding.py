@@ -18,6 +18,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
+from shellform.optimiser.going_back import last_sound
 from shellform.optimiser.search_state import (
     Iterate,
     Search,
@@ -27,40 +28,58 @@ from shellform.optimiser.search_state import (
 )
 from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.trials import sound, standing
-from shellform.reliability.trial_structures import to_bear
+from shellform.reliability.trial_structures import closer, to_bear
 
-_TURNS = 4  # of a descent and a judgement
-_SHARE = 0.2  # of all evaluations, for a turn at the most
+_SHARE, _LED = (
+    0.1,
+    0.5,
+)  # of all evaluations, for one turn of a descent and a judgement at the most, and for all
+_WORTH = 0.03  # of the objective, gained by a turn, for which another is made
 _WINDOW, _SMALLEST = (
     0.05,
     0.004,
 )  # mean tensions: where structures fall depends on steps less evenly than the shape
-_MOST = 10  # structures in mind
+_MOST = 12  # structures in mind
 _OVER = 1.03  # of what they are to bear is aimed for: an aim may be missed by a little
 
 
 def ready_to_lead(search: Search, it: Iterate, fell: Design) -> Iterate | None:
     """The iterate, at a design that stands as built, ready to be led by the structures that fall in the design
     that `fell`; None where there are none to be followed."""
+    search = looking_closer(search)
     led = minding(search, it, it.accepted[-1].built, falling(search, fell))
     return None if led.mind is None else _turned(search, replace(led, phase="lead", stood=len(it.accepted)))
 
 
-def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]) -> tuple[bool, Iterate]:
-    """Whether the turns of a descent and a judgement have led to a design that stands as built; the iterate
-    there, or where the last turn ended."""
+def looking_closer(search: Search) -> Search:
+    """The search with more structures in each trial."""
+    return search if search.asked is None else replace(search, asked=closer(search.asked))
+
+
+def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]) -> Iterate:
+    """After turns of a descent and a judgement, as long as they lead to a better design that stands as built:
+    at the last one that does, or where none does at the one that stood before."""
     fine = replace(search.solver, window=_WINDOW, smallest=_SMALLEST)
+    last = int(_LED * search.evaluations)
     while search.left() > 0:
         it = descend(replace(search, solver=fine, evaluations=min(search.evaluations, it.until)), it)
         found = sound(search, it.accepted[-1])
         if found is None:
-            return False, it
+            break
         it = replace(it, point=found, accepted=(*it.accepted[:-1], accepted_design(search, found)))
         holds, it = standing(search, it, it.accepted[-1].built)
-        if holds or it.turn == _TURNS:
-            return holds, it
-        it = _turned(search, joined(search, it))
-    return False, it
+        if holds:
+            gained = found.objective < (1.0 - _WORTH) * it.led_to
+            it = replace(it, stood=len(it.accepted), led_to=min(found.objective, it.led_to))
+            if not gained:
+                break
+        if search.evaluator.evaluations >= last:
+            break
+        it = _turned(search, remembering(search, it) if holds else joined(search, it))
+    back = last_sound(search, replace(it, accepted=it.accepted[: it.stood]))
+    if it.led_to < np.inf:
+        return remembering(search, back)
+    return restiffened(search, replace(back, mind=None, remembered=None), back.stiffness)
 
 
 def joined(search: Search, it: Iterate) -> Iterate:
@@ -71,9 +90,7 @@ def joined(search: Search, it: Iterate) -> Iterate:
 
 def _turned(search: Search, it: Iterate) -> Iterate:
     until = search.evaluator.evaluations + max(1, int(_SHARE * search.evaluations))
-    return replace(
-        it, turn=it.turn + 1, until=until, before=float("inf"), guarded=True, window=_WINDOW * search.tension
-    )
+    return replace(it, until=until, before=float("inf"), guarded=True, window=_WINDOW * search.tension)
 
 
 def falling(search: Search, design: Design) -> dict[int, float]:

@@ -13,7 +13,14 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices
 from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
-from shellform.optimiser.minding import joined, led, missed_without, ready_to_lead, remembering
+from shellform.optimiser.minding import (
+    joined,
+    led,
+    looking_closer,
+    missed_without,
+    ready_to_lead,
+    remembering,
+)
 from shellform.optimiser.proposal import propose
 from shellform.optimiser.resuming import tell
 from shellform.optimiser.search_state import (
@@ -61,9 +68,9 @@ def run(search: Search, it: Iterate) -> Iterate:
         else:
             it = last_standing(search, it)
     if it.phase == "lead":
-        it = _led(search, it)
+        it = _led(looking_closer(search), it)
     if it.phase == "thin":
-        it = _thin(search, it)
+        it = _thin(search if it.mind is None else looking_closer(search), it)
     return last_confirmed(search, it)
 
 
@@ -161,11 +168,8 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
 def _led(search: Search, it: Iterate) -> Iterate:
     """Ready to thin at a design to which drawn structures have led; where they lead to none, at the last one
     that stood."""
-    stands, it = led(search, it, _descend)
-    if stands:
-        return _ready_to_thin(search, it)
-    it = restiffened(search, replace(it, mind=None, remembered=None), it.stiffness)
-    return _ready_as_it_is(search, last_sound(search, replace(it, accepted=it.accepted[: it.stood])))
+    it = led(search, it, _descend)
+    return _ready_as_it_is(search, it) if it.mind is None else _ready_to_thin(search, it)
 
 
 def _ready_as_it_is(search: Search, it: Iterate) -> Iterate:

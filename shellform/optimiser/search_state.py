@@ -109,8 +109,8 @@ class Iterate:
     `needed` (c,). As built: structures that have `fallen`, the last ones first; whether the last design
     judged `fell`; drawn structures that the search keeps in `mind`, which are to bear their loads, and the
     design in which they are `remembered`, None where nothing but stiffness leads it. Leading: how many
-    designs were accepted when the last one `stood`, which `turn` it is, and the design evaluations `until`
-    which it lasts.
+    designs were accepted when the last one `stood`, the objective that it was `led_to`, and the design
+    evaluations `until` which a turn lasts.
     """
 
     point: Linearisation
@@ -137,7 +137,7 @@ class Iterate:
     mind: FactorsAsBuilt | None = None
     remembered: Design | None = None
     stood: int = 0
-    turn: int = 0
+    led_to: float = float("inf")
     until: int = 0
 
 

@@ -102,6 +102,18 @@ def demand(
     return Demand(trial, Required(fresh, trial.loads, design_load, known))
 
 
+def closer(asked: Demand) -> Demand:
+    """The same with as many structures in a trial as confirm a result: what is led by those that fall comes to
+    know the ones by which it is judged."""
+    trial, own = asked.trial, replace(asked.trial.safety, tried=max(MOST, asked.trial.safety.tried))
+    share = own.tried / trial.safety.tried
+    fallen = {name: _known(own, name, trial.design_load) for name in trial.fallen}
+    for name, count in trial.fallen.items():
+        if name != trial.design_load and own.probability_additional is None:
+            fallen[name] = max(fallen[name], int(share * count))  # as many as of the start
+    return replace(asked, trial=replace(trial, safety=own, fallen=fallen))
+
+
 def required(
     shell: Gridshell,
     start: Design,

@@ -15,7 +15,8 @@ from shellform.optimiser.resuming import resumed, tell
 from shellform.optimiser.search_state import merit, missed, violation
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability.drawing import PERFECT
-from shellform.reliability.trial_structures import Demand, JudgedTrial, Required, to_bear
+from shellform.reliability.scenarios import FactorsAsBuilt
+from shellform.reliability.trial_structures import Demand, JudgedTrial, Required, closer, to_bear
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
 ASKED = sf.Safety(ROUGH, critical_factor=None, tried=3, enlarged=1.0, seed=5)
@@ -100,7 +101,7 @@ def test_a_search_resumed_while_it_is_led_knows_the_same_structures_and_point(se
     _, again = resumed(search, Checkpoint(numbers, kept[-1].arrays, kept[-1].history))
     np.testing.assert_array_equal(again.point.constraints, led.point.constraints)
     np.testing.assert_array_equal(again.point.constraints_by_variables, led.point.constraints_by_variables)
-    assert (again.phase, again.turn, again.until, again.stood) == ("lead", led.turn, led.until, led.stood)
+    assert (again.phase, again.led_to, again.until, again.stood) == ("lead", np.inf, led.until, led.stood)
 
 
 def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_what_stood(
@@ -114,7 +115,22 @@ def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_
     assert after.phase == "thin"
     assert after.mind is None
     assert len(after.accepted) == led.stood
+    assert not any(isinstance(part.term, FactorsAsBuilt) for part in search.evaluator.problem.constraints)
     np.testing.assert_array_equal(after.point.design.rest_length, it.point.design.rest_length)
+
+
+def test_where_structures_lead_to_a_better_design_that_stands_thinning_begins_there(searching, monkeypatch):
+    search, it, _ = searching
+    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 1.0})
+    led = ready_to_lead(search, it, it.point.design)
+    monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": ()}, True, True, 0))
+    after = phases._led(search, led)
+    assert after.phase == "thin"
+    assert [each.number for each in after.mind.scenarios] == [0]
+    assert after.point.objective == pytest.approx(after.led_to)
+    assert after.led_to < it.point.objective
+    assert len(after.accepted) == after.stood > led.stood
+    assert search.evaluator.evaluations <= 12
 
 
 def test_a_cable_counts_for_what_structures_in_mind_would_lose_without_it(searching, monkeypatch):
@@ -141,3 +157,15 @@ def test_a_cable_counts_for_what_structures_in_mind_would_lose_without_it(search
     ]
     rows = led.point.constraints_by_variables[-2:, : len(rest)] / search.evaluator.blocks.unit[: len(rest)]
     assert at[0] - at[1] == pytest.approx(step * rows[:, present[cable]], rel=1e-2)
+
+
+def test_a_search_that_is_led_is_judged_by_more_structures(dome):
+    load = dome.point_load(4.5, every=2)
+    loads = {"wet": load, "wetter": 1.2 * load}
+    one = Required(ASKED, loads, "wet", {"wet": 0, "wetter": 2})
+    found = closer(Demand(one, one)).trial
+    assert found.safety.tried == 40
+    assert found.fallen == {"wet": 0, "wetter": 26}  # two of three of the start's fell under more load
+    assert found.safety.seed == ASKED.seed
+    bounded = replace(one, safety=replace(ASKED, probability_additional=0.9))
+    assert closer(Demand(bounded, one)).trial.fallen == {"wet": 0, "wetter": 4}
