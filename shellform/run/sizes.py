@@ -35,8 +35,7 @@ _HOPELESS = 0.03  # of the load needed, by the estimate: rods of a tenth of the 
 _BY_RADIUS = 3.0  # cells across a radius of curvature
 _CROSSINGS = 260.0  # to begin with
 MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
-CURVED = 600  # crossings for the sake of curvature, at the most: each pull of more takes long, and where so many are
-# asked for it is of creases, which no spacing follows
+CURVED = 600  # crossings for the sake of curvature, at the most: what asks for more are creases
 _USUAL = 1.0  # m, of rods on site
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")

@@ -161,9 +161,8 @@ def refused(
         )
     choice, stress = failure.choice, failure.stress
     assert choice is not None
-    crease = (
-        None if bears is not None and bears >= 0.5 * failure.thickness else _crease(surface, failure, wish)
-    )
+    much = bears is not None and bears >= 0.5 * failure.thickness
+    crease = None if much else _crease(surface, failure, wish)
     if crease is not None:
         return crease
     place = "" if failure.where is None else f" at {_at(failure.where)}"
@@ -215,7 +214,7 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildabl
     """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the load,
     while nearly all of it takes thicker ones; None where that isn't so."""
     placed, choice = failure.placed, failure.choice
-    if placed is None or choice is None or failure.why in (Why.EDGES, Why.CURVATURE, Why.SPACING):
+    if placed is None or choice is None or failure.why not in (Why.STABILITY, Why.STRENGTH):
         return None
     net = placed.net
     radius = 1.0 / max(net.quality.curvature_max, 1e-12)
