@@ -37,7 +37,6 @@ from shellform.structure.solve.loading import Drive, advance
 from shellform.tables import Table, table_text
 
 STEP = 0.1  # of a stage
-_CANCELLED = 1e-12  # of the weight: what is left where a lift takes all of it
 _SMALLEST = 1.0 / 256.0
 _SLACK = 1.5  # times its length in the target: a cable that isn't tightened yet
 _TRIAL = 25  # factorisations of one step of tightening
@@ -264,8 +263,7 @@ def _taken_down(
 
     if lift.any():
         state = passed("lowering", Drive(lift, none, weight), (1.0, 0.0))
-    carried = weight + lift
-    carried[np.abs(carried) <= _CANCELLED * np.abs(weight).max(initial=0.0)] = 0.0
+    carried = Drive(lift, none, weight).at(1.0)
     for k in range(total, 0, -1):
         imposed = none.copy()
         imposed[supports, :3] = places[k - 1] - places[k]

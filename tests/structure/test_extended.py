@@ -1,17 +1,26 @@
 """Numbers of twice the digits, against exact fractions, and what is built from them."""
 
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
+from shellform.reliability.branch import Branch
+from shellform.structure.answers.analysis import analyse
 from shellform.structure.elements import double_double
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import at_rest, from_vectors, moved
 from shellform.structure.elements.state import extended as with_tail
-from shellform.structure.elements.state import from_vectors, moved
-from shellform.structure.solve.extended import ExtendedSymmetric
+from shellform.structure.model import Model
+from shellform.structure.network import assemble
+from shellform.structure.solve.extended import ExtendedSymmetric, fit_for
 from shellform.structure.solve.factorisation import NotPositiveDefinite
+from shellform.structure.solve.loading import Drive
+from shellform.structure.solve.residual import Drowned, ResidualNorm
+from shellform.verification.cables import hypar
+from shellform.verification.models import CLAMP, chain, line, load_at
 from tests.structure.test_solver import family, random_matrix
 
 NODES = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.1]])
@@ -101,3 +110,51 @@ def test_a_nearly_singular_matrix_keeps_its_small_eigenvalue():
     matrix = ExtendedSymmetric(plain)
     both = matrix.raised(np.column_stack([values, 0.0 * values]), np.array([2]), np.array([1.0]))
     np.testing.assert_allclose(matrix.factor(both).solve(np.array([0.0, 1.0])), [1.0, 1.0], rtol=1e-9)
+
+
+def stressed_net():
+    """A saddle net under 50 N/m of its own, 7,000 times what loads it."""
+    network, shape = hypar()
+    load = np.zeros((len(shape), 6))
+    load[~network.fixed[:, 2], 2] = -0.01
+    return network, shape, load
+
+
+def left_over(assembly, state, load):
+    force = assembly.evaluate(state, tangent=False).force
+    return np.abs((load - force).ravel()[assembly.free]).max() / np.abs(load).max()
+
+
+@pytest.mark.parametrize("way", ["relaxation", "newton", "path", "dynamic"])
+def test_what_a_stressed_net_leaves_over_is_at_most_1e_6_of_a_small_load(way):
+    network, shape, load = stressed_net()
+    found = analyse(Model(network, {"down": load}, at_rest(shape), ()), method=way)
+    assert found.converged
+    assembly = fit_for(assemble(network), found.equilibrium.state)
+    assert left_over(assembly, found.equilibrium.state, load) <= 1e-6
+
+
+def test_a_net_without_load_is_measured_by_its_own_forces():
+    network, shape, load = stressed_net()
+    measure = ResidualNorm(assemble(network))
+    balance = assemble(network).evaluate(at_rest(shape))
+    assert measure.most(balance, 0.0 * load, 1e-8) == 1e-6
+    assert measure.most(balance, load, 1e-8) == pytest.approx(1e-6 * 0.01 / balance.largest)
+
+
+def test_a_branch_refuses_by_name_what_rounding_hides():
+    rod = chain(line(20), (1e6, 0.8, 1.0, 1.0), {0: CLAMP})
+    half = np.where(np.arange(20) < 10, 1.0, 1e10)  # as stiff again
+    names = ("axial", "torsion", "bending_y", "bending_z")
+    beams = replace(rod.beams, **{name: half * getattr(rod.beams, name) for name in names})
+    load = load_at(rod, 20, [0.0, 0.0, -2.0])
+    branch = Branch(assemble(replace(rod, beams=beams)), load, 1.0)
+    with pytest.raises(Drowned, match=r"beams\[1\d\]"):
+        branch.newton(at_rest(rod.nodes), load, limit=50, tolerance=1e-8)
+
+
+def test_loads_that_cancel_to_their_last_digit_are_none():
+    weight = np.zeros((2, 6))
+    weight[:, 2] = [-0.1, -0.3]
+    assert (Drive(-weight * (1.0 + 2e-16), 0.0 * weight, weight).at(1.0) == 0.0).all()
+    assert (Drive(-weight * (1.0 + 1e-12), 0.0 * weight, weight).at(1.0)[:, 2] != 0.0).all()

@@ -27,7 +27,14 @@ from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium, stability
 from shellform.structure.solve.factorisation import NotPositiveDefinite
-from shellform.structure.solve.residual import ResidualNorm, Turning, check_turned, held, overturned
+from shellform.structure.solve.residual import (
+    STAGNANT,
+    ResidualNorm,
+    Turning,
+    check_turned,
+    held,
+    overturned,
+)
 
 FIRST = 1.0  # time step to begin with, in natural times of the stiffest motions
 DAMPING = 0.0  # c, 1 over time; kinetic damping alone needs none
@@ -58,7 +65,7 @@ def dynamic(
     diagonal = np.abs(assembly.matrix.leading(now.tangent)[assembly.matrix.diagonal])
     mass = float(diagonal[assembly.free % 6 < 3].mean()) * measure.mass_shape
     velocity, kinetic, step, spent = np.zeros(len(assembly.free)), 0.0, time_step, 0
-    while not measure.balanced(residual, now, state, load, tolerance, residual > 0.1 * before):
+    while not measure.balanced(residual, now, state, load, tolerance, residual > STAGNANT * before):
         if spent >= limit or step < _SHORTEST * time_step:
             raise NotConverged(
                 f"The fictitious motion didn't come to rest in {spent} factorisations (residual {residual:.1e})",

@@ -34,6 +34,7 @@ from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
 from shellform.structure.solve.residual import (
+    STAGNANT,
     Drowned,
     ResidualNorm,
     Turning,
@@ -55,8 +56,6 @@ _CLOSE, _CONTRACTION = (
 # sliding springs on a surface known to a finite order have no exact potential
 _SHORTEST = 0.1  # share of a step to which it is cut before the mass is raised instead
 _PATIENCE = 3  # steps with mass between two looks for a symmetric path
-# ratio of two residuals one after the other: a step that brings less than this may be down to rounding
-_STAGNANT = 0.1
 _HEAVY = 1e6  # times the largest stiffness
 _FAR = 1e6  # m or rad, a step of Newton's iteration that leads nowhere
 _SYMMETRIC_UP_TO = 20_000  # degrees of freedom
@@ -175,7 +174,7 @@ def newton(
             progress(spent, residual)
         if residual < least:
             best, least = state, residual
-        stagnant, before = residual > _STAGNANT * before, residual
+        stagnant, before = residual > STAGNANT * before, residual
         if measure.balanced(residual, now, state, load, tolerance, stagnant):
             check_turned(assembly, state, now, spent)
             stable, negative = stability(assembly, now)
@@ -365,7 +364,7 @@ class _Relaxation:
 
     def balanced(self) -> bool:
         """Whether the state is in equilibrium. Raises Drowned where rounding doesn't let it come nearer."""
-        stagnant = self.residual > _STAGNANT * self.before
+        stagnant = self.residual > STAGNANT * self.before
         known = self.measure.balanced(
             self.residual, self.now, self.state, self.load, self.tolerance, stagnant
         )

@@ -30,6 +30,7 @@ STEP = 0.25
 SMALLEST = 1.0 / 64.0
 _PATIENCE = 25  # factorisations of one increment; on the branch five or six are enough
 _LEAST = 1e-6  # of the whole, by which supports move on at least where the branch has ended
+_LAST_DIGITS = 1e-15  # of a load, which nothing can be told from
 _REGROWTH = 2  # good increments before one is doubled again
 
 Report = Callable[[float, Equilibrium], None]
@@ -45,8 +46,11 @@ class Drive:
     base: Reals
 
     def at(self, factor: float) -> Reals:
-        """The dead load (n, 6) at the factor."""
-        return self.base + factor * self.load
+        """The dead load (n, 6) at the factor; nothing where base and load cancel to their last digits."""
+        grown = factor * self.load
+        total = self.base + grown
+        total[np.abs(total) <= _LAST_DIGITS * np.abs(grown)] = 0.0
+        return total
 
     @property
     def moves_supports(self) -> bool:

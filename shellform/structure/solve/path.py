@@ -38,7 +38,7 @@ from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
 from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.factorisation import Indefinite
 from shellform.structure.solve.loading import Drive
-from shellform.structure.solve.residual import OF_LOAD, ResidualNorm, Turning, held, overturned
+from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
 
 FIRST = 0.1  # of the goal, the first step's change of the factor
 MOST = 500  # points
@@ -85,7 +85,7 @@ def follow(
     load, measure = drive.at(goal), ResidualNorm(assembly)
     if precise is not None and measure.drowns(assembly.evaluate(start), start, load, tolerance):
         assembly, start = precise, extended(start)
-    walk = _Path(assembly, start, drive, tolerance)
+    walk = _Path(assembly, start, drive, tolerance, abs(goal) if lead is None else 0.0)
     led = None if lead is None else walk.number(lead)
     here = walk.point(start, 0.0, 0)
     if lead is not None:
@@ -159,13 +159,16 @@ class _Here:
 
 
 class _Path:
-    def __init__(self, assembly: Assembly, start: State, drive: Drive, tolerance: float) -> None:
+    def __init__(
+        self, assembly: Assembly, start: State, drive: Drive, tolerance: float, largest: float
+    ) -> None:
         self.assembly, self.drive, self.tolerance, self.start = assembly, drive, tolerance, start
         self.measure = ResidualNorm(assembly)
         self.turning = Turning(assembly, drive.load + drive.base)
         self.moving = assembly.free % 6 < 3
         self.by_turns = False
         self.spent = 0
+        self.largest = largest  # of the factors come to
 
     def number(self, lead: tuple[int, int, float]) -> int:
         """Place among the free degrees of freedom of the one that leads."""
@@ -219,6 +222,7 @@ class _Path:
                 raise _Missed
             change = size / float(tangent[led])
         state, factor = self._moved(here.state, change * tangent, change), here.factor + change
+        before = np.inf
         for iteration in range(1, _ITERATIONS + 1):
             balance = self.assembly.evaluate(state)
             unbalanced = (self.drive.at(factor) - balance.force).ravel()[self.assembly.free]
@@ -227,8 +231,9 @@ class _Path:
             gap = size - done[led] if led is not None else size * size - float(done @ done)
             size_kept = abs(gap) <= 1e-6 * (abs(size) if led is not None else size * size)
             residual = self.measure.residual(balance, self.drive.at(factor))
-            if size_kept and self._balanced(residual, balance, state, factor):
+            if size_kept and self._balanced(residual, before, balance, state, factor):
                 return self._settled(here, state, factor, iteration)
+            before = residual
             if not residual < 1e12:
                 raise _Missed
             matrix = self._factor(balance)
@@ -250,11 +255,13 @@ class _Path:
         """
         near = here if abs(here.factor - goal) < abs(there.factor - goal) else there
         state = self._moved(near.state, (goal - near.factor) * near.tangent, goal - near.factor)
+        before = np.inf
         for iteration in range(1, _ITERATIONS + 1):
             balance = self.assembly.evaluate(state)
             residual = self.measure.residual(balance, self.drive.at(goal))
-            if self._balanced(residual, balance, state, goal):
+            if self._balanced(residual, before, balance, state, goal):
                 return self._settled(here, state, goal, iteration)
+            before = residual
             if not residual < 1e12:
                 break
             unbalanced = (self.drive.at(goal) - balance.force).ravel()[self.assembly.free]
@@ -301,17 +308,20 @@ class _Path:
         found = self.point(state, factor, iterations)
         if overturned(self.assembly, here.state, here.turned, state, found.turned):
             raise _Missed
+        self.largest = max(self.largest, abs(factor))
         onward = float(np.sign(found.tangent[self.moving] @ self.between(here.state, state))) or 1.0
         return replace(found, rate=onward * abs(found.rate))
 
-    def _balanced(self, residual: float, balance: Balance, state: State, factor: float) -> bool:
-        """Whether a state of the path is in equilibrium, to the tolerance of the load at the goal: it may fall to
-        nothing on the way.
+    def _balanced(
+        self, residual: float, before: float, balance: Balance, state: State, factor: float
+    ) -> bool:
+        """Whether a state of the path is in equilibrium after a step from the residual `before`. The load that counts
+        is the largest on the way, for it falls to nothing on it.
         """
+        whole = self.drive.at(max(self.largest, abs(factor)))
+        stagnant = residual > STAGNANT * before
         load = self.drive.at(factor)
-        if residual <= self.tolerance:
-            return True
-        return residual <= min(self.measure.rounding(balance, state, load), OF_LOAD)
+        return self.measure.balanced(residual, balance, state, load, self.tolerance, stagnant, whole=whole)
 
     def _factor(self, balance: Balance) -> Indefinite:
         self.spent += 1

@@ -18,9 +18,8 @@ HOLDS = np.radians(
     170.0
 )  # the largest local rotation that is accepted: at 180 degrees its measure turns back
 _UNTOLD = np.radians(90.0)  # of twist, up to which it is not told
-OF_LOAD = 1e-6  # of the load, the largest residual that is ever told to be none
-_OF_STRESS = 1e-5  # of the largest internal force, the same where there is no load
-_OWN_STRESS = 1e-2  # of the largest internal force, below which a load isn't what has to be balanced
+OF_LOAD = 1e-6  # of the load (without load: of the stress), the largest residual that is ever told to be none
+STAGNANT = 0.1  # ratio of two residuals one after the other: a step that brings less may be down to rounding
 _NO_STRESS = 1e-3  # of the largest internal force: above, what rounding leaves is all there is of it
 _HELD = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
 _HELD_EXTENDED = 1e-22  # with twice the digits, where soft rods must not feel how stiff ones are held
@@ -38,7 +37,6 @@ class ResidualNorm:
         self.arms = assembly.arms
         self._reach = assembly.reach
         self._last_digit = assembly.last_digit
-        self._extended = assembly.last_digit < np.finfo(float).eps
         turns = self.free % 6 >= 3
         self.mass_shape = np.ones(len(self.free))
         self.mass_shape[turns] = self.arms[self.free[turns] // 6] ** 2
@@ -68,25 +66,29 @@ class ResidualNorm:
         return stiffest * last_bit / scale if scale > 0.0 else 0.0
 
     def most(self, balance: Balance, load: Reals, tolerance: float) -> float:
-        """The largest residual of what is told to be an equilibrium: 1e-6, or the `tolerance` where it is looser, of
-        the load, or of a hundredth of the largest internal force where that is more: a structure under stress of
-        its own has more to balance than a small load (with twice the digits it can do both). Without any load, 1e-5
-        of the largest internal force.
+        """The largest residual of what is told to be an equilibrium: 1e-6 of the `load` (n, 6), or the `tolerance` where
+        it is looser. A structure without load is measured by its own stress: 1e-6 of the largest internal force.
         """
         applied, scale = float(_largest(load.ravel(), self._reach)), self.scale(balance, load)
         share = max(OF_LOAD, tolerance)
-        if applied == 0.0:
-            return max(_OF_STRESS, share)
-        return share * max(applied / scale, 0.0 if self._extended else _OWN_STRESS)
+        return share * applied / scale if applied > 0.0 else share
 
     def balanced(
-        self, residual: float, balance: Balance, state: State, load: Reals, tolerance: float, stagnant: bool
+        self,
+        residual: float,
+        balance: Balance,
+        state: State,
+        load: Reals,
+        tolerance: float,
+        stagnant: bool,
+        *,
+        whole: Reals | None = None,
     ) -> bool:
         """Whether the residual of a state counts as none: within the tolerance or, where steps have stopped to
-        bring anything (`stagnant`), within what rounding leaves, and never above `most`. A structure without load
-        whose forces are all rounding is without stress.
+        bring anything (`stagnant`), within what rounding leaves, and never above `most`, of the load or, on the way
+        to it, of the `whole` (n, 6). A structure without load whose forces are all rounding is without stress.
         """
-        most = self.most(balance, load, tolerance)
+        most = self.most(balance, load if whole is None else whole, tolerance)
         if residual <= min(tolerance, most):
             return True
         if not stagnant:
