@@ -5,10 +5,7 @@ Large libraries are loaded by the command that needs them.
 
 from __future__ import annotations
 
-import signal
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Annotated
 
 import typer
@@ -21,6 +18,7 @@ from shellform.cli.design import design
 from shellform.cli.docs import docs
 from shellform.cli.erect import erect
 from shellform.cli.example import example
+from shellform.cli.interruption import ctrl_c, heed, pressed
 from shellform.cli.net import net
 from shellform.cli.new import new
 from shellform.cli.render import render
@@ -86,9 +84,10 @@ def main() -> None:
     """Runs the command line: status 0 done, 2 input refused, 3 no result or a design that doesn't hold, 130
     stopped.
     """
-    with _ctrl_c() as stopped:
+    with ctrl_c():
         try:
             status = app(standalone_mode=False)  # typer turns Ctrl-C into a returned status
+            heed()
             if status == _STOPPED:
                 raise KeyboardInterrupt
             sys.exit(status if isinstance(status, int) else 0)
@@ -97,30 +96,9 @@ def main() -> None:
         except typer.Exit as stop:
             sys.exit(stop.exit_code)
         except Exception as error:
-            if stopped:
+            if pressed():  # compiled loops, and processes that read for this one, make errors of it
                 _leave(_KEPT, _STOPPED)
             _fail(error)
-
-
-@contextmanager
-def _ctrl_c() -> Iterator[list[int]]:
-    """A list that is empty until Ctrl-C is pressed: compiled loops, and processes that read for this one,
-    turn the interruption into errors of their own."""
-    stopped: list[int] = []
-
-    def note(number: int, frame: object) -> None:
-        stopped.append(number)
-        raise KeyboardInterrupt
-
-    usual = signal.getsignal(signal.SIGINT)
-    if usual is not signal.default_int_handler:  # ignored, as in a job of a shell that runs in the background
-        yield stopped
-        return
-    signal.signal(signal.SIGINT, note)
-    try:
-        yield stopped
-    finally:
-        signal.signal(signal.SIGINT, usual)
 
 
 def _fail(error: Exception) -> None:

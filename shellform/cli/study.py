@@ -6,12 +6,16 @@ import json
 import sys
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from shellform.cli.interruption import heed
 from shellform.cli.options import Json, Quiet, Scripts
 from shellform.errors import InputError
+
+if TYPE_CHECKING:
+    from shellform.study.studies import StudyProgress
 
 
 def study(
@@ -41,6 +45,11 @@ def study(
             "the cluster has its own workers", where="--workers", remedy="Leave out --workers or --scheduler."
         )
     with Live(quiet=quiet) as live:
+
+        def show(progress: StudyProgress) -> None:
+            heed()
+            live(progress)
+
         found = run_study(
             file,
             output,
@@ -48,7 +57,7 @@ def study(
             scheduler=scheduler,
             dashboard=dashboard,
             allow_scripts=allow_scripts,
-            show=live,
+            show=show,
         )
     for name in () if quiet else found.empty:
         print(

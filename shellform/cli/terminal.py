@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from shellform.cli.interruption import heed
 from shellform.errors import NotConverged
 from shellform.records.progress import Event, Kind
 
@@ -28,6 +29,7 @@ class Spinner:
         self.status.start()
 
     def __call__(self, event: Event) -> None:
+        heed()
         if event.kind in _LASTING:
             self.console.print(f"{event.stage}: {event.text}")
         self.status.update(f"{event.stage}: {event.text}")
@@ -118,6 +120,7 @@ def tell_cases(rows: Iterable[Any]) -> None:
     head = f"{'case':40} {'quantity':38} {'value':>12} {'reference':>12} {'difference':>10} {'allowed':>8}"
     print(f"{head}       source")
     for row in rows:
+        heed()
         failed += not row.passed
         cases.add(row.case)
         number += 1

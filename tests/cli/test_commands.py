@@ -3,6 +3,8 @@
 import html
 import json
 import signal
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -168,6 +170,47 @@ def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):
     assert "Traceback" not in said
     again = shellform("design", case, "--output", tmp_path / "run", "--until", "net")
     assert again.stderr.count("kept") == 2
+
+
+SWALLOWED = """
+import os, signal, sys
+from shellform.structure.elements import threads
+from shellform.__main__ import main
+
+class Dropped:
+    def __del__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        for _ in range(1000):
+            pass
+
+import shellform.run.run as run
+usual = run.run_case
+def run_case(case, folder, **given):
+    report = given["report"]
+    def told(event):
+        if event.stage == "net" and event.kind.name == "DONE":
+            Dropped()
+        report(event)
+    return usual(case, folder, **{**given, "report": told})
+run.run_case = run_case
+main()
+"""
+
+
+def test_ctrl_c_that_python_drops_in_a_destructor_is_heeded_at_the_next_step(tmp_path):
+    case = tmp_path / "dome.toml"
+    case.write_text(CASE, encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-c", SWALLOWED, "design", case, "--output", tmp_path / "run"],
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        check=False,
+    )
+    assert "Exception ignored in" in done.stderr
+    assert done.returncode == 130
+    assert done.stderr.rstrip().endswith("goes on from there")
+    assert not (tmp_path / "run/designs").exists() or not list((tmp_path / "run/designs").iterdir())
 
 
 def test_ctrl_c_while_python_still_loads_the_program_ends_with_130(tmp_path):
