@@ -9,7 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from shellform.verification import beams, bent, buckling, cables, invariances, limit_points
+from shellform.verification import (
+    beams,
+    bent,
+    buckling,
+    cables,
+    invariances,
+    limit_points,
+    suites,
+    twisted,
+)
 from shellform.verification.cables import slack_pair
 from shellform.verification.compared import Comparison
 from shellform.verification.invariances import turned_forces
@@ -55,6 +64,17 @@ CASES: tuple[Callable[[], Iterator[Comparison]], ...] = (
     cables.opensees,
     cables.force_densities,
     cables.nets,
+    suites.truss_domes,
+    suites.jayaraman,
+    suites.inclined_catenaries,
+    suites.crossing_cables,
+    suites.spokes,
+    suites.self_stressed_simplex,
+    twisted.dead_moment,
+    twisted.spirals,
+    twisted.semi_tangential,
+    twisted.hockling,
+    twisted.elastica_at_nine_thrusts,
     invariances.turns,
     invariances.invariances,
     invariances.statics,
@@ -66,7 +86,11 @@ CASES: tuple[Callable[[], Iterator[Comparison]], ...] = (
 )
 
 
-def verify() -> Iterator[Comparison]:
-    """All cases, one row a compared number."""
-    for case in CASES:
+LARGE = (suites.large_net,)
+"""Cases of 100,000 elements, which take a minute."""
+
+
+def verify(*, large: bool = False) -> Iterator[Comparison]:
+    """All cases, one row a compared number; with `large` those of 100,000 elements too."""
+    for case in (*CASES, *(LARGE if large else ())):
         yield from case()

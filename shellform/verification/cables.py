@@ -144,16 +144,16 @@ def force_densities() -> Iterator[Comparison]:
 SIDE = 6
 
 
-def hypar() -> tuple[Network, Reals]:
-    """A saddle net over a square of 6 × 6 meshes of 1 m, z = (x² - y²)/12, cables of force density 50 N/m, EA
+def hypar(side: int = SIDE) -> tuple[Network, Reals]:
+    """A saddle net over a square of `side` × `side` meshes of 1 m, z = (x² - y²)/(2 side), cables of force density 50 N/m, EA
     = 5e4 N.
 
     z is discretely harmonic, so that equal force densities balance at every node: an exact form. Returns it
     and its shape.
     """
-    number = np.arange((SIDE + 1) ** 2).reshape(SIDE + 1, SIDE + 1)
-    x, y = np.meshgrid(np.arange(SIDE + 1) - 0.5 * SIDE, np.arange(SIDE + 1) - 0.5 * SIDE, indexing="ij")
-    shape = np.column_stack([x.ravel(), y.ravel(), (x**2 - y**2).ravel() / 12.0])
+    number = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
+    x, y = np.meshgrid(np.arange(side + 1) - 0.5 * side, np.arange(side + 1) - 0.5 * side, indexing="ij")
+    shape = np.column_stack([x.ravel(), y.ravel(), (x**2 - y**2).ravel() / (2.0 * side)])
     inside = slice(1, -1)
     along = np.stack([number[:-1, inside], number[1:, inside]], axis=-1).reshape(-1, 2)
     across = np.stack([number[inside, :-1], number[inside, 1:]], axis=-1).reshape(-1, 2)

@@ -176,3 +176,42 @@ def shallow_truss(half: float, rise: float, axial: float) -> tuple[float, float]
     length = np.cbrt(rest * half**2)
     height = np.sqrt(length**2 - half**2)
     return float(2.0 * axial * height * (1.0 / length - 1.0 / rest)), float(height)
+
+
+def column(alpha: float) -> tuple[float, float, float]:
+    """A cantilever column of length 1 and EI 1 whose tip has the slope `alpha`, rad: thrust, tip along and across."""
+    k = np.sin(0.5 * alpha)
+    quarter = ellipk(k * k)
+    return float(quarter**2), float(2.0 * ellipe(k * k) / quarter - 1.0), float(2.0 * k / quarter)
+
+
+def helix(moment: Reals) -> Reals:
+    """Tip (3,) of a rod of length 1 and EI 1 clamped along x under a dead end `moment` (3,)."""
+    rate = np.linalg.norm(moment)
+    axis, tangent = moment / rate, np.array([1.0, 0.0, 0.0])
+    along = (tangent @ axis) * axis
+    turned = np.sin(rate) * (tangent - along) + (1.0 - np.cos(rate)) * np.cross(axis, tangent)
+    return np.asarray(along + turned / rate)
+
+
+def twist_under_thrust(thrust: float) -> float:
+    """ML/EI at which a rod between clamps, one free to slide, buckles under torsion and the `thrust` PL²/EI (tension
+    negative): the least M > 0 at which w = A + Bx + C exp(iax) + D exp(ibx) can vanish with its slope at both ends.
+
+    With a, b = (M ± √(M² + 4P))/2 the determinant of these four conditions is i (a - b) exp(iM/2) times a real number.
+    """
+    if thrust == 0.0:  # b = 0: the functions are no longer four
+        return clamped_twist()
+
+    def gap(torque: float) -> float:
+        apart = np.sqrt(complex(torque**2 + 4.0 * thrust))
+        a, b = 0.5 * (torque + apart), 0.5 * (torque - apart)
+        ea, eb = np.exp(1j * a), np.exp(1j * b)
+        rows = [[1, 0, 1, 1], [0, 1, 1j * a, 1j * b], [1, 1, ea, eb], [0, 1, 1j * a * ea, 1j * b * eb]]
+        value = np.linalg.det(np.array(rows)) * np.exp(-0.5j * torque) / (1j * apart)
+        return float(value.real)
+
+    torques = np.linspace(max(1.0, 1.001 * np.sqrt(max(0.0, -4.0 * thrust))), 16.0, 400)
+    signs = np.sign([gap(torque) for torque in torques])
+    first = int(np.argmax(signs[1:] != signs[:-1]))
+    return float(brentq(gap, torques[first], torques[first + 1], xtol=1e-13))

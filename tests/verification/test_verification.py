@@ -3,11 +3,14 @@
 import numpy as np
 import pytest
 
+from shellform import verification
 from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
 from shellform.structure.solve.loading import forces
-from shellform.verification import buckling
+from shellform.verification import buckling, suites
+from shellform.verification.cables import hypar
+from shellform.verification.compared import Comparison
 from shellform.verification.models import (
     CLAMP,
     PIN,
@@ -44,3 +47,27 @@ def test_lateral_buckling_of_a_frame_is_a_bifurcation():
     found = critical_load(assemble(frame), at_rest(points), forces(load), goal=1.4)
     assert np.abs((found.mode * load).sum()) < 1e-12  # the load does no work on the mode
     assert found.kind == "bifurcation"
+
+
+def test_the_large_cases_come_only_where_they_are_asked_for(monkeypatch):
+    def small():
+        yield Comparison("small", "number", 1.0, 1.0, 0.0, "here")
+
+    def large():
+        yield Comparison("large", "number", 1.0, 1.0, 0.0, "here")
+
+    monkeypatch.setattr(verification, "CASES", (small,))
+    monkeypatch.setattr(verification, "LARGE", (large,))
+    assert [row.case for row in verification.verify()] == ["small"]
+    assert [row.case for row in verification.verify(large=True)] == ["small", "large"]
+
+
+def test_a_net_like_the_large_one_is_found_back_exactly():
+    network, shape = hypar(20)
+    found = solved(network, start=at_rest(np.where(network.fixed[:, :3], shape, shape * [1.0, 1.0, 1.1])))
+    np.testing.assert_allclose(found.positions, shape, atol=1e-8)
+
+
+@pytest.mark.slow
+def test_a_net_of_100_000_cables_is_found_back():
+    assert all(row.passed for row in suites.large_net())
