@@ -5,22 +5,28 @@ The first compilation takes seconds in which nothing else would be seen to happe
 process, unless the environment has SHELLFORM_QUIET, which processes hand on to those that they start.
 
 The cache lies beside the package, or in the user's home where the package can't be written; where neither can,
-in a temporary folder of this process and those that it starts.
+in a temporary folder of this process and those that it starts. Processes that compile side by side take turns at a
+function's entry, each machine code has a file of its own name, and it is there before the entry names it: Numba's own
+entry could name the code that another process, or an older version of the function, left under the same number.
 """
 
 from __future__ import annotations
 
 import atexit
+import contextlib
 import os
+import secrets
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numba
 from numba import prange, set_num_threads
 from numba.core import event
+from numba.core.caching import IndexDataCacheFile
 
 __all__ = ["njit", "prange", "set_num_threads"]
 
@@ -49,12 +55,45 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
     def compiled(function: Callable[..., Any]) -> Any:
         try:
-            return numba.njit(**options)(function)
+            found = numba.njit(**options)(function)
         except RuntimeError:  # no place for the cache
             _cache_for_now()
-            return numba.njit(**options)(function)
+            found = numba.njit(**options)(function)
+        if options.get("cache"):
+            own = found._cache
+            own._cache_file = _Entry(own.cache_path, own._impl.filename_base, own._cache_file._source_stamp)
+        return found
 
     return compiled
+
+
+class _Entry(IndexDataCacheFile):  # type: ignore[misc]
+    """What the cache holds of one function: an index of signatures, and a file of machine code for each."""
+
+    def save(self, key: Any, data: Any) -> None:
+        """Takes machine code up."""
+        with self._alone():
+            known = self._load_index()
+            if not known:  # what there is belongs to an older version of the function
+                for file in Path(self._cache_path).glob(
+                    self._data_name_pattern.format(number=0)[:-5] + "*.nbc"
+                ):
+                    with contextlib.suppress(OSError):
+                        file.unlink()
+            known[key] = self._data_name(secrets.randbits(60))
+            self._save_data(known[key], data)
+            self._save_index(known)
+
+    @contextlib.contextmanager
+    def _alone(self) -> Iterator[None]:
+        try:
+            import fcntl
+        except ImportError:  # no such locks on Windows: an entry may get lost there, and is compiled again
+            yield
+            return
+        with open(f"{self._index_path}.lock", "wb") as held:
+            fcntl.flock(held, fcntl.LOCK_EX)
+            yield
 
 
 def _cache_for_now() -> None:

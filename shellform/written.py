@@ -2,7 +2,8 @@
 
 So an interrupted run leaves nothing half-written, and a full disc or a closed folder is told in one sentence.
 Beside its place a file has a name of its own that can't be foreseen and nothing had before: two processes
-never write to the same one, and no symbolic link in a folder that somebody else made leads a writer elsewhere.
+never write to the same one, and no symbolic link in a folder that somebody else made leads a writer elsewhere. A
+writer holds a lock on it, which ends with its process: what is left without one may be deleted.
 """
 
 from __future__ import annotations
@@ -18,6 +19,11 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 _REMEDIES = {
     errno.ENOSPC: "Free some space, then run the same command again: what was finished is kept.",
@@ -48,9 +54,9 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
     partial = target.with_name(f"{target.stem[:_STEM]}{_PART}{secrets.token_hex(8)}{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        os.close(os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))  # follows no link
-        yield partial
-        os.replace(partial, target)
+        with _made(partial):
+            yield partial
+            os.replace(partial, target)
     except OSError as error:
         raise refusal(target, error) from error
     finally:
@@ -64,10 +70,42 @@ def is_partial(file: Path) -> bool:
 
 
 def clear(place: Path) -> None:
-    """Deletes what writers that were killed left in a folder where nobody writes now."""
+    """Deletes what writers that were killed left in a folder; what somebody is still writing stays."""
     for file in place.glob(f"*{_PART}*"):
         with contextlib.suppress(OSError):
-            file.unlink()
+            _clear_one(file)
+
+
+@contextlib.contextmanager
+def _made(partial: Path) -> Iterator[None]:
+    """Makes a file that nobody had, and holds a lock on it."""
+    while True:
+        opened = os.open(partial, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)  # follows no link
+        if fcntl is None:  # Windows can't move a file that is open
+            os.close(opened)
+            yield
+            return
+        with contextlib.suppress(OSError):  # a file system without locks
+            fcntl.flock(opened, fcntl.LOCK_EX)
+        if partial.exists():  # not cleared away before it was held
+            break
+        os.close(opened)
+    try:
+        yield
+    finally:
+        os.close(opened)
+
+
+def _clear_one(file: Path) -> None:
+    if fcntl is None:
+        file.unlink()
+        return
+    opened = os.open(file, os.O_RDONLY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        file.unlink()
+    finally:
+        os.close(opened)
 
 
 def write_text(path: str | Path, text: str, ending: str = "") -> None:

@@ -43,3 +43,74 @@ def test_where_no_place_for_a_cache_can_be_written_loops_are_compiled_all_the_sa
     )
     assert done.stdout.startswith(str(tmp_path))
     assert list(tmp_path.iterdir()) == [], "it goes with the process"
+
+
+SIDE_BY_SIDE = """
+import sys
+import numpy as np
+from shellform import compiled
+
+kept = compiled.njit(cache=True)(__import__("loop").twice)
+kind = np.dtype(sys.argv[1])
+print("ready", flush=True)
+sys.stdin.readline()
+print(kept(np.ones(1, kind)).dtype, flush=True)
+"""
+
+
+def test_processes_that_compile_side_by_side_lose_no_entry_and_take_no_other_s_code(tmp_path):
+    (tmp_path / "loop.py").write_text("def twice(x):\n    return x + x\n", encoding="utf-8")
+    variables = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}",
+        "SHELLFORM_QUIET": "1",
+    }
+    kinds = ["float32", "float64", "int64", "complex64"]
+    jobs = [
+        subprocess.Popen(
+            [sys.executable, "-c", SIDE_BY_SIDE, kind], env=variables, text=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        )
+        for kind in kinds
+    ]  # fmt: skip
+    for job in jobs:
+        assert job.stdout.readline() == "ready\n"
+    for job in jobs:
+        job.stdin.write("go\n")
+        job.stdin.flush()
+    assert [job.communicate()[0].strip() for job in jobs] == kinds
+    assert len(list((tmp_path / "cache").rglob("*.nbc"))) == len(kinds)
+    told = [
+        subprocess.run(
+            [sys.executable, "-c", SIDE_BY_SIDE, kind], env={**variables, "NUMBA_DEBUG_CACHE": "1"}, input="go\n",
+            capture_output=True, text=True, check=True,
+        ).stdout
+        for kind in kinds
+    ]  # fmt: skip
+    for text in told:
+        assert "data loaded" in text
+        assert "data saved" not in text
+
+
+def test_code_that_an_older_version_of_a_function_left_is_never_taken(tmp_path):
+    variables = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "PYTHONPATH": f"{tmp_path}:{os.environ.get('PYTHONPATH', '')}",
+        "SHELLFORM_QUIET": "1",
+    }
+    code = (
+        "import loop\nimport numpy as np\nfrom shellform import compiled\n"
+        "print(compiled.njit(cache=True)(loop.times)(1.0))\n"
+    )
+    told = []
+    for factor in ("2.0", "30.0"):  # two lengths, for the stamp is time and size
+        (tmp_path / "loop.py").write_text(f"def times(x):\n    return {factor} * x\n", encoding="utf-8")
+        told.append(
+            subprocess.run(
+                [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
+            ).stdout
+        )
+    assert told == ["2.0\n", "30.0\n"]
+    assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 1

@@ -2,13 +2,15 @@
 
 import errno
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 from shellform.arrays import read_arrays
 from shellform.errors import InputError
-from shellform.written import whole, write_arrays, write_text
+from shellform.written import clear, is_partial, whole, write_arrays, write_text
 
 
 def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
@@ -49,3 +51,47 @@ def test_arrays_and_text_come_back_as_they_were_written(tmp_path):
         write_arrays(tmp_path / "a.txt", places=np.eye(3))
     write_text(tmp_path / "a.csv", "ø 2 mm\n")
     assert (tmp_path / "a.csv").read_bytes() == "ø 2 mm\n".encode()
+
+
+WRITER = """
+import sys
+from shellform.written import whole
+with whole(sys.argv[1]) as partial:
+    partial.write_text("half")
+    print("begun", flush=True)
+    sys.stdin.readline()
+    partial.write_text("all of it")
+"""
+
+
+def writer(target):
+    job = subprocess.Popen(
+        [sys.executable, "-c", WRITER, target], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert job.stdout.readline() == "begun\n"
+    return job
+
+
+def test_what_another_process_is_writing_is_not_cleared_away(tmp_path):
+    job = writer(tmp_path / "a.txt")
+    clear(tmp_path)
+    job.communicate("go on\n")
+    assert job.returncode == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+    assert (tmp_path / "a.txt").read_text() == "all of it"
+
+
+def test_what_a_killed_process_was_writing_is_cleared_away(tmp_path):
+    job = writer(tmp_path / "a.txt")
+    job.kill()
+    job.communicate()
+    assert [is_partial(path) for path in tmp_path.iterdir()] == [True]
+    clear(tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_link_under_a_partial_name_is_not_followed_when_it_is_cleared(tmp_path):
+    (tmp_path / "mine.txt").write_text("mine")
+    (tmp_path / "a.part-0123.txt").symlink_to(tmp_path / "mine.txt")
+    clear(tmp_path)
+    assert (tmp_path / "mine.txt").read_text() == "mine"

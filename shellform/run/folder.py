@@ -2,7 +2,8 @@
 
 Every file is written whole or not at all. `read_run` gives the nouns that pictures, drawings and the page are
 made from. Whoever makes a run is `alone` in its folder, and no symbolic link in a folder is followed: it may
-come from somebody else.
+come from somebody else. Who only adds to it needs no lock (render, report, what is told on site): what they read and
+what they write are whole files, and pictures may be drawn while the run goes on.
 """
 
 from __future__ import annotations
