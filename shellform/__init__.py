@@ -16,20 +16,22 @@ from shellform import lazy
 __version__ = "0.4.0"
 __getattr__, __dir__ = lazy.public(__name__)
 
-_PICTURES = {
-    ("shellform.net.net", "Net"): "net_png",
-    ("shellform.gridshell.gridshell", "Gridshell"): "gridshell_png",
-    ("shellform.optimiser.optimum", "Optimum"): "optimum_png",
+_SHOWN = {
+    ("shellform.net.net", "Net"): "net",
+    ("shellform.gridshell.gridshell", "Gridshell"): "gridshell",
+    ("shellform.optimiser.optimum", "Optimum"): "optimum",
 }
+_KINDS = {"image/png": "png", "text/html": "html"}
 
 
 def load_ipython_extension(ipython):  # typed in the stub
-    """Nets, gridshells and optima show their picture where they are displayed (`%load_ext shellform`; done by
-    itself where IPython runs).
+    """Nets, gridshells and optima show their picture, and where HTML is shown a view to be turned and picked in
+    (`%load_ext shellform`; done by itself where IPython runs).
     """
-    formatter = ipython.display_formatter.formatters["image/png"]
-    for (home, name), function in _PICTURES.items():
-        formatter.for_type_by_name(home, name, _drawer(function))
+    for kind, ending in _KINDS.items():
+        formatter = ipython.display_formatter.formatters[kind]
+        for (home, name), thing in _SHOWN.items():
+            formatter.for_type_by_name(home, name, _drawer(f"{thing}_{ending}"))
 
 
 def _drawer(function):

@@ -1,5 +1,6 @@
 """The public names of shellform, the one list of them: read by type checkers, editors and by lazy.py."""
 
+from shellform import networks as networks
 from shellform import study as study
 from shellform import verification as verification
 from shellform.errors import InputError as InputError
@@ -41,6 +42,7 @@ from shellform.optimiser.optimum import Optimum as Optimum
 from shellform.optimiser.optimum import Step as Step
 from shellform.optimiser.solver import POLISHING as POLISHING
 from shellform.optimiser.solver import SequentialConvex as SequentialConvex
+from shellform.output import frames as frames
 from shellform.output.exchange import exports as exports
 from shellform.output.pictures import plots as plots
 from shellform.output.pictures import render as render

@@ -45,6 +45,10 @@ class Table:
                     f"row {number} has another length than the heads", where=self.name, value=len(row)
                 )
 
+    def records(self) -> list[dict[str, Value]]:
+        """A dictionary by head for each row: what `pandas.DataFrame` takes."""
+        return [dict(zip(self.columns, row, strict=True)) for row in self.rows]
+
     def column(self, head: str) -> list[Value]:
         """The values under a head. Raises InputError where there is no such head."""
         if head not in self.columns:

@@ -24,7 +24,7 @@ FLOORS = {
         ["tables"],
         ["structure"],
         ["surface"],
-        ["verification", "net"],
+        ["verification", "net", "networks"],
         ["gridshell"],
         ["problem"],
         ["reliability"],
@@ -47,7 +47,7 @@ FLOORS = {
         ["funicular"],
     ],
     "shellform.structure": [["elements", "refusals"], ["solve"], ["network"], ["model"], ["answers"]],
-    "shellform.output": [["pictures"], ["workshop"], ["exchange"], ["page", "notebook"]],
+    "shellform.output": [["pictures"], ["workshop"], ["exchange"], ["frames"], ["page"], ["notebook"]],
 }
 # Behind which module each library lies. Of VTK two parts are used for two things that have no line in
 # common: to draw, to read VTK's own files. Of CVXOPT two: CHOLMOD, and interior points.

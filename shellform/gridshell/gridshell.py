@@ -142,6 +142,10 @@ class Design:
             self, "rest_length", reals("rest_length", self.rest_length, (count,), positive=True)
         )
 
+    def __repr__(self) -> str:
+        cables = f"{int(self.present.sum())} of {len(self.present)} cables"
+        return f"Design({cables}, rods of {1e3 * self.radius:.4g} mm radius)"
+
 
 @dataclass(frozen=True)
 class Gridshell:
@@ -167,6 +171,12 @@ class Gridshell:
         )
         object.__setattr__(self, "_edges", edge_beams(self.net, self.edge))
         object.__setattr__(self, "_locks", locks(self.net, self.rod.section, self.target))
+
+    def __repr__(self) -> str:
+        return (
+            f"Gridshell({len(self.net.grid.rods)} rods of {1e3 * self.rod.radius:.4g} mm radius, "
+            f"{len(self.net.grid.lattice)} connectors, {len(self.cable_ends)} candidate cables)"
+        )
 
     @property
     def target(self) -> State:

@@ -69,6 +69,9 @@ class Grid:
             indices("crossing_nodes", self.crossing_nodes, (count, 2), below=len(self.flat)),
         )
 
+    def __repr__(self) -> str:
+        return f"Grid({len(self.rods)} rods, {len(self.lattice)} crossings, spacing {self.spacing:g} m)"
+
     @property
     def node_count(self) -> int:
         """How many nodes there are, those of both layers."""

@@ -78,6 +78,12 @@ class Net:
         count = self.node_count
         object.__setattr__(self, "supports", indices("supports", self.supports, (None,), below=count))
 
+    def __repr__(self) -> str:
+        return (
+            f"Net({len(self.grid.rods)} rods, {len(self.grid.lattice)} crossings, {len(self.supports)} supports, "
+            f"spacing {self.spacing:g} m)"
+        )
+
     @property
     def node_count(self) -> int:
         """How many nodes there are, those of both layers of rods."""

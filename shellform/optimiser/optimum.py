@@ -65,6 +65,12 @@ class Optimum:
     stiffness: float
     asked: Demand | None = None
 
+    def __repr__(self) -> str:
+        return (
+            f"Optimum(objective {self.objective:.3g} from {self.objective_start:.3g}, "
+            f"{int(self.design.present.sum())} cables, {self.evaluations} evaluations: {self.status})"
+        )
+
     @property
     def states(self) -> dict[str, State]:
         """The equilibrium state by load case."""

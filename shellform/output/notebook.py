@@ -1,4 +1,5 @@
-"""Pictures of net_maps, gridshells and optima where they are displayed in Jupyter or IPython.
+"""Pictures of nets, gridshells and optima where they are displayed in Jupyter or IPython, and the page's own view
+of them, to be turned, picked in, measured and cut; it stands in a frame of its own and asks for nothing.
 
 `import shellform` in a running IPython, or `%load_ext shellform`, tells its formatter the names of the types;
 nothing is loaded until one of them is displayed. Without OpenGL the picture is made of lines.
@@ -6,7 +7,9 @@ nothing is loaded until one of them is displayed. Without OpenGL the picture is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +17,18 @@ from shellform.errors import InputError
 from shellform.gridshell.gridshell import Gridshell
 from shellform.net.net import Net
 from shellform.optimiser.optimum import Optimum
+from shellform.output.page.report import VIEW
+from shellform.output.page.template import filled, part
+from shellform.output.page.view_data import ViewedShell, controls, net_data, view_data
 from shellform.output.pictures import maps, net_maps, painter, sheets
+from shellform.output.pictures.colours import VIRIDIS
 from shellform.output.pictures.images import png_bytes
 from shellform.output.pictures.panel import Look, Panel
+from shellform.problem.paths import deviations
+from shellform.records.words import load_title, number
 
 _SIZE = (900, 560)
+_TALL = 760  # pixels, of the view's frame
 _SMALL = (560, 400)  # one of several side by side
 
 
@@ -65,3 +75,63 @@ def _png(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> byte
 
         picture = vectors.rasterised(laid)
     return png_bytes(picture)
+
+
+def net_html(net: Net) -> str:
+    """The net's view, its rods coloured by their curvature."""
+    return _framed(net_data(net, "net", repr(net), np.zeros((0, 2), dtype=np.int64)))
+
+
+def gridshell_html(shell: Gridshell) -> str:
+    """The gridshell's view in its target shape with all candidate cables."""
+    return _framed(net_data(shell.net, "gridshell", repr(shell), shell.cable_ends))
+
+
+def optimum_html(optimum: Optimum) -> str:
+    """The optimum's view under each of its loads."""
+    shell, states = optimum.problem.shell, optimum.states
+    none = np.zeros((shell.node_count, 6))
+    first = optimum.problem.design_load.name
+    largest = float(deviations(shell, states[first]).max())
+    viewed = ViewedShell(
+        "optimum",
+        {"optimum": shell},
+        {"optimum": optimum.design},
+        {"optimum": states},
+        "optimum",
+        {name: optimum.problem.loads.get(name, none) for name in states},
+        {name: load_title(name) for name in states},
+        None,
+        max(largest, 1e-6),
+        first,
+    )
+    return _framed(view_data(viewed), viewed)
+
+
+def _framed(data: Mapping[str, Any], viewed: ViewedShell | None = None) -> str:
+    gradient = ", ".join(f"rgb{colour}" for colour in VIRIDIS)
+    told: dict[str, Any] = {
+        "design_titles": [(each["name"], each["title"]) for each in data["designs"]],
+        "loads": [(each["name"], each["title"]) for each in data["loads"]],
+        "first_load": "none",
+        "best": data["designs"][data["best"]]["name"],
+        "fitting": data["fitting"],
+        "limit": data["limit"],
+        "gradient": gradient,
+        "has_surface": False,
+    }
+    if viewed is not None:
+        told = controls(viewed, gradient)
+    page = filled(
+        "view.html",
+        {"r": {"id": "run0", "title": data["title"], **told}},
+        generator="shellform view",
+        style=part("look.css") + part("style.css"),
+        script="(() => {\n" + "\n".join(part(name) for name in (*VIEW, "view_alone.js")) + "\n})();",
+        data={"viridis": VIRIDIS, "runs": [data]},
+        number=number,
+    )
+    return (
+        f'<iframe srcdoc="{escape(page, quote=True)}" title="{data["title"]}" '
+        f'style="width: 100%; height: {_TALL}px; border: 0" sandbox="allow-scripts allow-downloads"></iframe>'
+    )

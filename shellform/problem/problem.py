@@ -67,6 +67,10 @@ class Problem:
                 "the shares of the objective must add up to 1", where="problem.minimise", value=total
             )
 
+    def __repr__(self) -> str:
+        loads = ", ".join(case.name for case in self.load_cases)
+        return f"Problem({self.shell!r}, loads {loads}, {len(self.minimise)} terms, {len(self.constraints)} constraints)"
+
     @property
     def load_cases(self) -> list[LoadCase]:
         """The design load, then the further ones."""

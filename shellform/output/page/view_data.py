@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.net import Net
 from shellform.problem.paths import deviations
 from shellform.records import words
 from shellform.structure.elements.state import State
@@ -31,7 +32,7 @@ _MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 class ViewedShell:
     """What is seen: `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which
     `best` is to be built; `loads` (n, 6), N, with their `load_titles`; the `surface`, if it is known; `limit`,
-    m, which ends the case's colour scale."""
+    m, which ends the case's colour scale; the load that is `shown_first`."""
 
     title: str
     shells: Mapping[str, Gridshell]
@@ -42,6 +43,7 @@ class ViewedShell:
     load_titles: Mapping[str, str]
     surface: Surface | None
     limit: float
+    shown_first: str = "design"
 
     @property
     def shell(self) -> Gridshell:
@@ -51,7 +53,7 @@ class ViewedShell:
     @property
     def first_load(self) -> str:
         """The load that is shown first."""
-        return "design" if "design" in self.loads else next(iter(self.loads))
+        return self.shown_first if self.shown_first in self.loads else next(iter(self.loads))
 
 
 def fitting(viewed: ViewedShell) -> float:
@@ -97,27 +99,9 @@ def view_data(viewed: ViewedShell) -> dict[str, Any]:
         "title": viewed.title,
         "limit": 1e3 * viewed.limit,
         "fitting": fitting(viewed),
-        "spacing": shell.net.spacing,
         "strength": bool(np.isfinite(shell.rod.strength)),
         "force": max(float(pull.max(initial=0.0)) for pull in pulls),
-        "middle": [_short(value) for value in middle],
-        "box": [
-            [_short(value) for value in end]
-            for end in (place.min(axis=0) - middle, place.max(axis=0) - middle)
-        ],
-        "target": _floats(place - middle),
-        "flat": _floats(laid_out(grid.flat, place) - middle),
-        "crossings": grid.crossing_nodes.tolist(),
-        "supports": shell.net.supports.tolist(),
-        "rods": [
-            {
-                "name": f"{rod.direction.upper()}{number}",
-                "nodes": rod.nodes.tolist(),
-                "length": round(1e3 * rod.length, 3),
-                "crossings": len(rod.crossings),
-            }
-            for number, rod in enumerate(grid.rods)
-        ],
+        **_geometry(shell.net, middle, place),
         "cables": {
             "ends": shell.cable_ends.tolist(),
             "joints": [[joint_of[int(n)] for n in pair] for pair in shell.cable_ends],
@@ -160,6 +144,71 @@ def _design(viewed: ViewedShell, name: str) -> dict[str, Any]:
         "cables": np.flatnonzero(design.present).tolist(),
         "rest": np.round(1e3 * cables.rest_length, 4).tolist(),
         "states": states,
+    }
+
+
+def net_data(net: Net, title: str, told: str, cable_ends: Indices) -> dict[str, Any]:
+    """The same of a net that bears nothing yet, or of a gridshell's target: coloured by its rods' curvature, 1/m,
+    with all candidate cables slack; `told` is said of it."""
+    grid, place = net.grid, net.target.positions
+    middle = 0.5 * (place.min(axis=0) + place.max(axis=0))
+    bent = np.zeros(net.node_count)
+    np.maximum.at(bent, grid.rod_ends, net.curvature)
+    joint_of = {int(node): k for k, pair in enumerate(grid.crossing_nodes) for node in pair}
+    count = len(cable_ends)
+    lengths = np.linalg.norm(place[cable_ends[:, 1]] - place[cable_ends[:, 0]], axis=1)
+    state = {
+        "positions": _floats(place - middle),
+        "utilisation": _floats(np.zeros(net.node_count)),
+        "length": np.round(1e3 * lengths, 4).tolist(),
+        "force": [0.0] * count,
+        "rods": [[0.0, 0.0] for _ in grid.rods],
+    }
+    design = {
+        "name": "target", "title": "Target", "radius": 0.02 * net.spacing, "cables": list(range(count)),
+        "rest": state["length"], "states": {"none": state},
+    }  # fmt: skip
+    return {
+        "title": title,
+        "told": told,
+        "limit": 1.0,
+        "fitting": 1.0,
+        "strength": False,
+        "force": 0.0,
+        "curved": _floats(bent),
+        "curvature": _short(bent.max()),
+        **_geometry(net, middle, place),
+        "cables": {
+            "ends": cable_ends.tolist(),
+            "joints": [[joint_of[int(n)] for n in pair] for pair in cable_ends],
+        },
+        "surface": {"vertices": "", "triangles": ""},
+        "loads": [{"name": "none", "title": "no load", "points": []}],
+        "designs": [design],
+        "best": 0,
+    }
+
+
+def _geometry(net: Net, middle: Reals, place: Reals) -> dict[str, Any]:
+    """What doesn't depend on the design."""
+    grid = net.grid
+    return {
+        "spacing": net.spacing,
+        "middle": [_short(value) for value in middle],
+        "box": [[_short(v) for v in end] for end in (place.min(axis=0) - middle, place.max(axis=0) - middle)],
+        "target": _floats(place - middle),
+        "flat": _floats(laid_out(grid.flat, place) - middle),
+        "crossings": grid.crossing_nodes.tolist(),
+        "supports": net.supports.tolist(),
+        "rods": [
+            {
+                "name": f"{rod.direction.upper()}{number}",
+                "nodes": rod.nodes.tolist(),
+                "length": round(1e3 * rod.length, 3),
+                "crossings": len(rod.crossings),
+            }
+            for number, rod in enumerate(grid.rods)
+        ],
     }
 
 

@@ -42,6 +42,12 @@ class Surface:
         put(self, "triangles", indices("triangles", self.triangles, (None, 3), below=count))
         put(self, "normals", reals("normals", self.normals, (count, 3)))
 
+    def __repr__(self) -> str:
+        size = " × ".join(f"{each:.3g}" for each in self.size)
+        return (
+            f"Surface({len(self.triangles)} triangles, {size} m{f', {self.source}' if self.source else ''})"
+        )
+
     @property
     def area(self) -> float:
         """m², of the triangles."""

@@ -13,7 +13,7 @@ function profile(view) { // an SVG in the plane of the cut
     const p = [0, 1, 2].map((k) => at(skin, corners[t + k])), found = [0, 1, 2].map((k) => meets(p[k], p[(k + 1) % 3])).filter(Boolean);
     if (found.length > 1) lines.push([flat(found[0]), flat(found[1])]);
   }
-  const values = view.show.colour === "stress" ? view.used.map((share) => 100 * share) : view.deviation;
+  const { values } = view;
   view.run.rods.forEach((rod) => rod.nodes.slice(1).forEach((b, k) => {
     const a = rod.nodes[k], found = meets(view.node(a), view.node(b));
     if (found) dots.push([flat(found), view.viridisAt(0.5 * (values[a] + values[b]) / view.scale)]);

@@ -72,7 +72,13 @@ class View {
     return { design: this.run.fitting, case: this.run.limit }[this.show.scale] || Math.max(largest(this.deviation || [0]), 1e-6);
   }
 
-  get scale() { // end of the colours: mm, or % of the strength
+  get values() { // of the nodes, as they are coloured: mm, % of the strength, or 1/m
+    if (this.show.colour === "stress") return this.used.map((share) => 100 * share);
+    return this.show.colour === "curvature" ? this.decoded("curved", this.run) : this.deviation;
+  }
+
+  get scale() { // end of the colours
+    if (this.show.colour === "curvature") return Math.max(this.run.curvature, 1e-9);
     return this.show.colour === "stress" ? 100 : Math.max(...[this, ...this.twins].map((view) => view.ownScale));
   }
 
@@ -104,7 +110,7 @@ class View {
     const [low, mid, high, picked] = ["cable-low", "cable-mid", "cable-high", "picked"].map(colour);
     const thick = Math.max(this.design.radius, 0.0016 * this.reach);
     const add = (a, ra, b, rb, ca, cb, least = 0, plain = 0) => rows.push(...a, ra, ...b, rb, ...ca, ...cb, least, plain);
-    const values = show.colour === "stress" ? this.used.map((share) => 100 * share) : this.deviation;
+    const { values } = this;
     const shade = (k) => this.viridisAt(values[k] / this.scale);
     run.rods.forEach((rod, index) => {
       const own = this.picked?.kind === "rod" && this.picked.index === index;
@@ -298,7 +304,7 @@ class View {
     this.tip.hidden = !found;
     this.canvas.classList.toggle("over", Boolean(found));
     if (!found) return;
-    const away = `${this.deviation[found.node].toFixed(2)} mm off`, k = this.design.cables.indexOf(found.index);
+    const away = this.show.colour === "curvature" ? `${this.values[found.node].toPrecision(3)} 1/m` : `${this.deviation[found.node].toFixed(2)} mm off`, k = this.design.cables.indexOf(found.index);
     this.tip.textContent = found.kind === "cable" ? `Cable C${k}: ${newtons(this.force[k])} N` : `Rod ${this.run.rods[found.index].name}: ${away}`;
     const top = this.canvas.offsetTop + y - 36, left = Math.min(x + 12, this.canvas.clientWidth - this.tip.offsetWidth - 8);
     Object.assign(this.tip.style, { left: `${left}px`, top: `${Math.max(top, 4)}px` });

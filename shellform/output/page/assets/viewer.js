@@ -18,6 +18,8 @@ class Viewer {
       exaggerate: 1, moment: 1, cut: null, measured: [], measuring: false, scale: find("[name=scale]").value,
     };
     if (!this.run.strength) find("option[value=stress]").remove();
+    if (this.run.curved) find("[name=colour]").value = this.show.colour = "curvature";
+    else find("option[value=curvature]").remove();
     for (const [value, title] of this.others()) find("[name=beside]").append(new Option(title, value));
     find(".controls").addEventListener("change", (event) => {
       const { name, value } = event.target;
@@ -168,6 +170,7 @@ class Viewer {
       const { from, to, share } = view.between;
       return share === 0 || share === 1 ? `${design.title} design: ${(share ? to : from).title}.` : `${design.title} design between ${from.title} and ${to.title}: drawn straight between these two states, which are computed.`;
     }
+    if (view.run.told) return view.run.told;
     const off = view.deviation, slack = view.state.force.flatMap((force, k) => (force <= 0 ? [`C${k}`] : []));
     const mean = off.reduce((sum, value) => sum + value, 0) / off.length, count = design.cables.length;
     const named = slack.length <= 6 ? slack.join(", ") : `${slack.slice(0, 6).join(", ")} and ${slack.length - 6} more`;
@@ -181,9 +184,9 @@ class Viewer {
       frame.replaceChildren(...[0, 0.25, 0.5, 0.75, 1].map((share) => element("span", (share === 1 && over ? "≥ " : "") + (share * end).toFixed(digits))));
     };
     const digits = (end) => Math.max(0, 2 - Math.floor(Math.log10(end / 4 + 1e-12)) - 1), { scale, forceScale } = this.view, stress = this.show.colour === "stress";
-    this.find(".rods-legend figcaption").textContent = stress ? "Rods: bending stress, percent of the strength" : "Rods: distance from the target, millimetres";
-    ticks(".rods-legend", scale, digits(scale), stress || this.show.scale !== "state");
-    this.find(".cables-legend").hidden = !this.design.cables.length;
+    this.find(".rods-legend figcaption").textContent = this.show.colour === "curvature" ? "Rods: curvature, 1/metre" : stress ? "Rods: bending stress, percent of the strength" : "Rods: distance from the target, millimetres";
+    ticks(".rods-legend", scale, digits(scale), this.show.colour !== "curvature" && (stress || this.show.scale !== "state"));
+    this.find(".cables-legend").hidden = !this.design.cables.length || !(forceScale > 1e-9);
     ticks(".cables-legend", forceScale, digits(forceScale), false);
   }
 

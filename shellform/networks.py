@@ -1,0 +1,247 @@
+"""Networks of one's own as models: from plain arrays, from networkx graphs, from COMPAS graphs and meshes.
+
+None of these libraries is imported: what they document is used, `graph.nodes(data=True)` and
+`graph.edges(data=True)` of networkx, `nodes()` or `vertices()`, `edges()`, `node_attribute` and its likes of COMPAS.
+The result is a model (structure/model.py) that `analyse` solves and `write_model` writes, with the keys that its
+nodes had. SI units: m, N.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from shellform.errors import InputError
+from shellform.structure.elements.sections import Section, stiffness
+from shellform.structure.model import Model, parse_model
+
+_HELD = {"pinned": [True] * 3 + [False] * 3, "fixed": [True] * 6}
+Rod = Section | Sequence[float]
+"""A section of a material, or its stiffnesses (EA, GJ, EI_y, EI_z), N and N·m²."""
+
+_Lines = list[tuple[int, int, dict[str, float]]]  # two nodes, and what the line has of its own
+
+
+@dataclass(frozen=True)
+class OwnNetwork:
+    """A `model`, and the `keys` (n,) that its nodes had where they came from, in order."""
+
+    model: Model
+    keys: tuple[Hashable, ...]
+
+    def index(self, key: Hashable) -> int:
+        """The node's number. Raises InputError where there is none."""
+        if key not in self.keys:
+            raise InputError("is no node of the network", where="key", value=key)
+        return self.keys.index(key)
+
+
+def from_arrays(
+    nodes: ArrayLike,
+    rods: ArrayLike = (),
+    cables: ArrayLike = (),
+    *,
+    rod: Rod | None = None,
+    cable: float | None = None,
+    supports: Mapping[int, str] | Sequence[int] = (),
+    loads: Mapping[str, ArrayLike] | None = None,
+    rest_lengths: ArrayLike | None = None,
+) -> OwnNetwork:
+    """A network of `nodes` (n, 3), m, `rods` (m, 2) and `cables` (c, 2) between them; `rod` is their section,
+    `cable` the axial stiffness EA, N; `supports` are node numbers, pinned, or each with "pinned" or "fixed";
+    `loads` by name (n, 3), N; `rest_lengths` (c,), m, of the cables (left out: as they are drawn). Raises
+    InputError naming what is wrong."""
+    places = _numbers("nodes", nodes, 3)
+    beams, ties = _pairs("rods", rods, len(places)), _pairs("cables", cables, len(places))
+    rest = None if rest_lengths is None else np.asarray(rest_lengths, dtype=float)
+    if rest is not None and rest.shape != (len(ties),):
+        raise InputError("has another length than cables", where="rest_lengths", value=rest.shape)
+    held = supports if isinstance(supports, Mapping) else dict.fromkeys(supports, "pinned")
+    forces = {name: _numbers(f"loads[{name!r}]", force, 3) for name, force in (loads or {}).items()}
+    for name, force in forces.items():
+        if len(force) != len(places):
+            raise InputError("needs a row for each node", where=f"loads[{name!r}]", value=force.shape)
+    return _built(
+        range(len(places)),
+        places.tolist(),
+        [(a, b, {}) for a, b in beams],
+        [(a, b, {} if rest is None else {"rest_length": float(rest[k])}) for k, (a, b) in enumerate(ties)],
+        dict(held),
+        {name: dict(enumerate(force.tolist())) for name, force in forces.items()},
+        rod,
+        cable,
+    )
+
+
+def from_networkx(graph: Any, *, rod: Rod | None = None, cable: float | None = None) -> OwnNetwork:
+    """A networkx graph: nodes have their place as `pos` (x, y, z) or as x, y and z, may have a `support` ("pinned",
+    "fixed" or true) and a `load` (fx, fy, fz), N, which makes the load case "load"; edges are rods, or cables where
+    their `kind` is "cable", which may have a `rest_length`, m. Raises InputError naming the node or edge."""
+    if not callable(getattr(graph, "nodes", None)) or not callable(getattr(graph, "edges", None)):
+        raise InputError(
+            "is no graph: it has no nodes() and edges()", where="graph", value=type(graph).__name__
+        )
+    nodes = [(key, dict(data)) for key, data in graph.nodes(data=True)]
+    edges = [(a, b, dict(data)) for a, b, data in graph.edges(data=True)]
+    return _from_attributes(nodes, edges, rod, cable)
+
+
+def from_compas(data: Any, *, rod: Rod | None = None, cable: float | None = None) -> OwnNetwork:
+    """A COMPAS graph, network or mesh: attributes x, y and z, `support` (or `is_support`, `is_anchor`) and `load`
+    of nodes or vertices, `kind` and `rest_length` of edges, as for networkx. Raises InputError naming the node or
+    edge."""
+    kind = next((each for each in ("node", "vertex") if hasattr(data, f"{each}_attribute")), None)
+    if kind is None or not callable(getattr(data, "edges", None)):
+        raise InputError(
+            "is no graph, network or mesh of COMPAS: it has no node_attribute or vertex_attribute",
+            where="data",
+            value=type(data).__name__,
+        )
+    keys: Iterable[Hashable] = data.nodes() if kind == "node" else data.vertices()
+    of: Callable[[Hashable, str], Any] = getattr(data, f"{kind}_attribute")
+
+    def attributes(key: Hashable) -> dict[str, Any]:
+        found = {name: of(key, name) for name in ("x", "y", "z", "load")}
+        held = next(
+            (value for name in ("support", "is_support", "is_anchor") if (value := of(key, name))), None
+        )
+        return {**found, "support": held}
+
+    nodes = [(key, attributes(key)) for key in keys]
+    edges = [
+        (a, b, {name: data.edge_attribute((a, b), name) for name in ("kind", "rest_length")})
+        for a, b in data.edges()
+    ]
+    return _from_attributes(nodes, edges, rod, cable)
+
+
+def _from_attributes(
+    nodes: Sequence[tuple[Hashable, Mapping[str, Any]]],
+    edges: Sequence[tuple[Hashable, Hashable, Mapping[str, Any]]],
+    rod: Rod | None,
+    cable: float | None,
+) -> OwnNetwork:
+    keys = tuple(key for key, _ in nodes)
+    number = {key: k for k, key in enumerate(keys)}
+    places, held, loads = [], {}, {}
+    for k, (key, data) in enumerate(nodes):
+        place = data["pos"] if data.get("pos") is not None else [data.get(axis) for axis in "xyz"]
+        where = f"node {key!r}"
+        places.append(_three(where, place, "Give pos = (x, y, z), or x, y and z."))
+        if data.get("support"):
+            held[k] = "pinned" if data["support"] is True else str(data["support"])
+        if data.get("load") is not None:
+            loads[k] = _three(where, data["load"], "A load has three components.")
+    known = ("rod", "cable", None)
+    for a, b, data in edges:
+        if data.get("kind") not in known:
+            raise InputError(
+                "is neither a rod nor a cable", where=f"edge {a!r}, {b!r}: kind", value=data["kind"]
+            )
+    rods, cables = _Lines(), _Lines()
+    for a, b, data in edges:
+        own = {"rest_length": float(data["rest_length"])} if data.get("rest_length") is not None else {}
+        (cables if data.get("kind") == "cable" else rods).append((number[a], number[b], own))
+    return _built(keys, places, rods, cables, held, {"load": loads} if loads else {}, rod, cable)
+
+
+def _built(
+    keys: Iterable[Hashable],
+    places: Sequence[Sequence[float]],
+    rods: _Lines,
+    cables: _Lines,
+    held: Mapping[int, str],
+    loads: Mapping[str, Mapping[int, Sequence[float]]],
+    rod: Rod | None,
+    cable: float | None,
+) -> OwnNetwork:
+    if rods and rod is None:
+        raise InputError(
+            "is needed: the network has rods", where="rod", remedy="Give a section, or EA, GJ, EI_y, EI_z."
+        )
+    if cables and cable is None:
+        raise InputError(
+            "is needed: the network has cables", where="cable", remedy="Give their axial stiffness EA, N."
+        )
+    values: list[float] = []
+    if rod is not None:
+        values = [float(each) for each in (rod if isinstance(rod, Sequence) else stiffness(rod))]
+    if rod is not None and len(values) != 4:
+        raise InputError("needs four stiffnesses: EA, GJ, EI_y, EI_z", where="rod", value=len(values))
+    of_rods = dict(zip(("EA", "GJ", "EIy", "EIz"), values, strict=False))
+    for node, how in held.items():
+        if how not in _HELD:
+            raise InputError(
+                "is no way to hold a node",
+                where=f"supports[{node}]",
+                value=how,
+                remedy="Known: pinned, fixed.",
+            )
+    model = parse_model(
+        {
+            "format": "shellform-model",
+            "version": 1,
+            "nodes": [list(map(float, place)) for place in places],
+            "beams": [{"nodes": [int(a), int(b)], **of_rods, **own} for a, b, own in rods],
+            "cables": [
+                {
+                    "nodes": [int(a), int(b)],
+                    "EA": float(cable or 0.0),
+                    "rest_length": _length(places, a, b),
+                    **own,
+                }
+                for a, b, own in cables
+            ],
+            "supports": [{"node": int(node), "fixed": _HELD[how]} for node, how in sorted(held.items())],
+            "loads": {
+                name: [
+                    {"node": int(node), "force": list(map(float, force))}
+                    for node, force in sorted(forces.items())
+                    if any(force)
+                ]
+                for name, forces in loads.items()
+            },
+        }
+    )
+    return OwnNetwork(model, tuple(keys))
+
+
+def _length(places: Sequence[Sequence[float]], a: int, b: int) -> float:
+    return float(np.linalg.norm(np.subtract(places[b], places[a])))
+
+
+def _numbers(name: str, given: ArrayLike, width: int) -> np.ndarray:
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError("must be numbers", where=name) from error
+    if values.ndim != 2 or values.shape[1] != width:
+        raise InputError(f"needs rows of {width} numbers", where=name, value=values.shape)
+    return values
+
+
+def _pairs(name: str, given: ArrayLike, count: int) -> list[tuple[int, int]]:
+    values = np.asarray(given)
+    if values.size == 0:
+        return []
+    if values.ndim != 2 or values.shape[1] != 2 or not np.issubdtype(values.dtype, np.integer):
+        raise InputError("needs pairs of node numbers", where=name, value=values.shape)
+    if values.min() < 0 or values.max() >= count:
+        raise InputError(
+            f"names a node that isn't there: there are {count}", where=name, value=int(values.max())
+        )
+    return [(int(a), int(b)) for a, b in values]
+
+
+def _three(where: str, given: Any, remedy: str) -> list[float]:
+    try:
+        values = [float(each) for each in given]
+    except (TypeError, ValueError) as error:
+        raise InputError("has no three numbers", where=where, value=given, remedy=remedy) from error
+    if len(values) != 3:
+        raise InputError("has no three numbers", where=where, value=given, remedy=remedy)
+    return values

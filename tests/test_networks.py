@@ -1,0 +1,138 @@
+"""Networks of one's own: the same model from arrays, from networkx, from COMPAS, whose documented calls stand-ins
+answer here; and honest errors."""
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.structure.answers.analysis import analyse
+from shellform.structure.elements.sections import stiffness
+
+NODES = [[0.0, 0.0, 0.0], [0.5, 0.0, 0.3], [1.0, 0.0, 0.0]]
+ROD = (2.0e6, 6.2, 8.04, 8.04)
+SUPPORTS = {0: "fixed", 2: "pinned"}
+LOAD = [0.0, 0.0, -20.0]
+
+
+class Graph:
+    """What networkx documents of a graph."""
+
+    def __init__(self, nodes, edges):
+        self._nodes, self._edges = nodes, edges
+
+    def nodes(self, data=False):
+        return list(self._nodes.items()) if data else list(self._nodes)
+
+    def edges(self, data=False):
+        return [(a, b, own) if data else (a, b) for a, b, own in self._edges]
+
+
+class Compas:
+    """What COMPAS documents of a graph (nodes) or a mesh (vertices)."""
+
+    def __init__(self, points, edges, kind):
+        self.points, self.lines = points, edges
+        setattr(self, {"node": "nodes", "vertex": "vertices"}[kind], lambda: iter(points))
+        setattr(self, f"{kind}_attribute", lambda key, name: points[key].get(name))
+
+    def edges(self):
+        return ((a, b) for a, b, _ in self.lines)
+
+    def edge_attribute(self, edge, name):
+        return next(own for a, b, own in self.lines if (a, b) == edge).get(name)
+
+
+EDGES = [("a", "top", {}), ("top", "c", {}), ("a", "c", {"kind": "cable", "rest_length": 0.95})]
+
+
+def points(support="support"):
+    found = {"a": {support: "fixed"}, "top": {"load": LOAD}, "c": {support: True}}
+    for key, place in zip(found, NODES, strict=True):
+        found[key] |= dict(zip("xyz", place, strict=True))
+    return found
+
+
+def same(one, other):
+    found = [each.model.network for each in (one, other)]
+    assert found[0].nodes == pytest.approx(found[1].nodes)
+    assert (found[0].beams.ends == found[1].beams.ends).all()
+    assert found[0].cables.rest_length == pytest.approx(found[1].cables.rest_length)
+    assert (found[0].fixed == found[1].fixed).all()
+    assert one.model.loads["load"] == pytest.approx(other.model.loads["load"])
+
+
+def plain():
+    load = np.zeros((3, 3))
+    load[1] = LOAD
+    return sf.networks.from_arrays(
+        NODES, [[0, 1], [1, 2]], [[0, 2]], rod=ROD, cable=187.0, supports=SUPPORTS, loads={"load": load},
+        rest_lengths=[0.95],
+    )  # fmt: skip
+
+
+def test_arrays_networkx_and_compas_give_the_same_model():
+    wanted = plain()
+    graph = sf.networks.from_networkx(Graph(points(), EDGES), rod=ROD, cable=187.0)
+    same(graph, wanted)
+    assert graph.index("top") == 1
+    placed = {"a": {"pos": NODES[0], "support": "fixed"}, "top": {"pos": NODES[1], "load": LOAD}}
+    placed["c"] = {"pos": tuple(NODES[2]), "support": "pinned"}
+    same(sf.networks.from_networkx(Graph(placed, EDGES), rod=ROD, cable=187.0), wanted)
+    same(sf.networks.from_compas(Compas(points(), EDGES, "node"), rod=ROD, cable=187.0), wanted)
+    anchored = Compas(points("is_anchor"), EDGES, "vertex")
+    same(sf.networks.from_compas(anchored, rod=ROD, cable=187.0), wanted)
+
+
+def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
+    section = sf.Rod.round(young=40e9, radius=0.01, strength=255e6).section
+    found = sf.networks.from_arrays(
+        NODES,
+        [[0, 1], [1, 2]],
+        rod=section,
+        supports={0: "fixed", 2: "fixed"},
+        loads={"down": [[0] * 3, LOAD, [0] * 3]},
+    )
+    stiff = sf.networks.from_arrays(
+        NODES,
+        [[0, 1], [1, 2]],
+        rod=(4e6 * np.pi, *stiffness(section)[1:]),
+        supports={0: "fixed", 2: "fixed"},
+        loads={"down": [[0] * 3, LOAD, [0] * 3]},
+    )
+    places = [analyse(each.model, load="down").equilibrium.state.positions for each in (found, stiff)]
+    assert places[0] == pytest.approx(places[1], abs=1e-12), "EA = E pi r²"
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: sf.networks.from_arrays(NODES, [[0, 1]]), "rod: is needed"),
+        (lambda: sf.networks.from_arrays(NODES, cables=[[0, 1]]), "cable: is needed"),
+        (lambda: sf.networks.from_arrays(NODES, [[0, 7]], rod=ROD), "names a node that isn't there"),
+        (lambda: sf.networks.from_arrays(NODES, [[0.5, 1]], rod=ROD), "pairs of node numbers"),
+        (lambda: sf.networks.from_arrays([[0, 0]], rod=ROD), "rows of 3 numbers"),
+        (lambda: sf.networks.from_arrays([["x", 0, 0]]), "must be numbers"),
+        (lambda: sf.networks.from_arrays(NODES, [[0, 1]], rod=(1.0, 2.0)), "four stiffnesses"),
+        (lambda: sf.networks.from_arrays(NODES, [[0, 1]], rod=ROD, supports={0: "glued"}), "no way to hold"),
+        (
+            lambda: sf.networks.from_arrays(NODES, [[0, 1]], rod=ROD, loads={"w": [[0, 0, 1]]}),
+            "a row for each",
+        ),
+        (
+            lambda: sf.networks.from_arrays(NODES, cables=[[0, 1]], cable=1.0, rest_lengths=[1, 2]),
+            "another length",
+        ),
+        (lambda: sf.networks.from_networkx([1, 2]), "is no graph"),
+        (lambda: sf.networks.from_networkx(Graph({"a": {}}, [])), "node 'a': has no three numbers"),
+        (
+            lambda: sf.networks.from_networkx(Graph(points(), [("a", "c", {"kind": "string"})]), rod=ROD),
+            "neither a rod nor a cable",
+        ),
+        (lambda: sf.networks.from_compas(Graph({}, [])), "no node_attribute"),
+        (lambda: plain().index("z"), "is no node"),
+    ],
+)
+def test_what_is_no_network_is_refused_with_where_it_is_wrong(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
