@@ -21,7 +21,7 @@ from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import LOCK, locks_along, rod_bending_stress
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import errors_of, variables
+from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import SOUGHT, Limit
 from shellform.reliability.perfect import perfect_of
@@ -155,7 +155,7 @@ def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
     nominal = perfect_of(model, load, shapes=0)
     workshop = Workshop(nominal)
     members = members_of_model(model)
-    none = errors_of(members, Tolerances(), variables(members, 0, 0))
+    none = drawn(members, Tolerances(), 0, PERFECT)
     known = nominal.factors <= sought
     begin = float(nominal.factors[known][-1]), nominal.states[int(known.sum()) - 1]
     return workshop, workshop.limit(none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=begin)

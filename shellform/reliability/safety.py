@@ -17,7 +17,7 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import errors_of, variables
+from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import Limit
 from shellform.reliability.perfect import perfect, perfect_of
@@ -181,7 +181,7 @@ def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: fl
     model = halved(Model(shell.network(design), {"load": load}, shell.target, supports))
     nominal = perfect_of(model, "load", shapes=0)
     members = members_of_model(model)
-    none = errors_of(members, Tolerances(), variables(members, 0, 0))
+    none = drawn(members, Tolerances(), 0, PERFECT)
     return Workshop(nominal).limit(none, most=sought, step=_STEP, resolution=_RESOLUTION)
 
 
