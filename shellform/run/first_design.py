@@ -221,7 +221,7 @@ class _Search:
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
                 other = possible[_next(placed.net, possible, possible.index(choice), failure)]
-            if other is choice:  # else the load is kept, and rods that leave more of their strength are tried
+            if other == choice:  # else the load is kept, and rods that leave more of their strength are tried
                 share = min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
                 if failure.why is Why.STRENGTH:
                     share = min(max(load_borne(placed.net, choice, failure.stress, _AIMED), 0.5), 0.9)

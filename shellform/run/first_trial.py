@@ -41,7 +41,7 @@ PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond 
 COMPOSITE = 0.5  # how far the rods of an edge beam act together
 _SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
 _TOGETHER = 2  # structures drawn, until one falls: what falls takes ten times as long as what stands
-_SETTLED = 1e-4  # residual: rods too thin for the load are not solved with twice the digits to be told so
+_SETTLED = 1e-3  # residual: rods too thin for the load are not solved with twice the digits to be told so
 _UNLOADED = 120  # factorisations of the unloaded shell; one that stands without load takes five to thirty
 
 

@@ -31,6 +31,7 @@ from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
+_ROUNDED = 10_000  # crossings pulled and solved on surfaces that were rounded
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
@@ -59,7 +60,7 @@ def propose_case(
     try:
         design = first_design(surface, wanted, say)
     except Unbuildable as error:
-        folder, allowance = output.with_name(f"{output.stem}-{BUILDABLE}"), Allowance()
+        folder, allowance = output.with_name(f"{output.stem}-{BUILDABLE}"), Allowance(_ROUNDED)
 
         def again(rounded: Surface) -> None:
             if allowance.left <= 0:
