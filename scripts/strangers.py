@@ -615,41 +615,45 @@ def designed(printed: str) -> dict[str, Any]:
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
-    """The rows in Markdown."""
+    """The rows in Markdown, without columns in which nothing stands."""
     steps = [step for step in ("check", "net", "new", "design") if any(step in row for row in rows)]
-    lines = [
-        f"| file | size, m | {' | '.join(steps)} | spacing | crossings | distance / spacing | spacing error | section | concrete | "
-        "holds | cables | deviation, mm | stand at 1.0 and 1.2 | factor | s | processor s | said |",
-        "| --- " * (16 + len(steps)) + "|",
-    ]
-    for row in rows:
-        ends = " | ".join(
-            "-" if step not in row else {0: "yes", None: "time"}.get(row[step], f"no ({row[step]})")
-            for step in steps
-        )
-        numbers = [
-            f"{row['spacing']:.3g}" if "spacing" in row else str(row.get("proposed", "")),
-            str(row.get("crossings", "")),
-            f"{100 * row['distance']:.2f} %" if "distance" in row else "",
-            f"{100 * row['error']:.2f} %" if "error" in row else "",
-            *(str(row.get(name, "")) for name in ("section", "concrete")),
-            {True: "yes", False: f"no: {row.get('fails')}"}.get(row.get("holds"), ""),  # type: ignore[call-overload]
-            str(row.get("cables", "")),
-            f"{1e3 * row['deviation']:.0f}" if "deviation" in row else "",
-            str(row.get("stands", "")),
-            f"{row['factor']:.2f}" if row.get("factor") else "",
-            " + ".join(
-                f"{row[name]:.0f}" for name in ("seconds", "new_seconds", "design_seconds") if name in row
-            ),
-            " + ".join(f"{row[name]:.0f}" for name in ("new_processor", "design_processor") if name in row),
-        ]
-        lines.append(
-            f"| {row['name']} | {row.get('size', '')} | {ends} | {' | '.join(numbers)} | {row.get('reason', '')[:150]} |"
-        )
+    named = [cells(row, steps) for row in rows]
+    names = [name for name in named[0] if any(each[name] for each in named)] if named else []
+    lines = [f"| {' | '.join(names)} |", "| --- " * len(names) + "|"]
+    lines += [f"| {' | '.join(each[name] for name in names)} |" for each in named]
     for step in steps:
         lines.append("")
         lines.append(f"{step}: {sum(row.get(step, 1) == 0 for row in rows)} of {len(rows)}")
     return "\n".join(lines)
+
+
+def cells(row: dict[str, Any], steps: Sequence[str]) -> dict[str, str]:
+    """A row's cells by the names of their columns."""
+    ends = {
+        step: "-" if step not in row else {0: "yes", None: "time"}.get(row[step], f"no ({row[step]})")
+        for step in steps
+    }
+    took = [f"{row[name]:.0f}" for name in ("seconds", "new_seconds", "design_seconds") if name in row]
+    used = [f"{row[name]:.0f}" for name in ("new_processor", "design_processor") if name in row]
+    return {
+        "file": row["name"],
+        "size, m": row.get("size", ""),
+        **ends,
+        "spacing": f"{row['spacing']:.3g}" if "spacing" in row else str(row.get("proposed", "")),
+        "crossings": str(row.get("crossings", "")),
+        "distance / spacing": f"{100 * row['distance']:.2f} %" if "distance" in row else "",
+        "spacing error": f"{100 * row['error']:.2f} %" if "error" in row else "",
+        "section": row.get("section", ""),
+        "concrete": row.get("concrete", ""),
+        "holds": {True: "yes", False: f"no: {row.get('fails')}"}.get(row.get("holds"), ""),  # type: ignore[call-overload]
+        "cables": row.get("cables", ""),
+        "deviation, mm": f"{1e3 * row['deviation']:.0f}" if "deviation" in row else "",
+        "stand at 1.0 and 1.2": row.get("stands", ""),
+        "factor": f"{row['factor']:.2f}" if row.get("factor") else "",
+        "s": " + ".join(took),
+        "processor s": " + ".join(used),
+        "said": row.get("reason", "")[:250],
+    }
 
 
 def main() -> None:
