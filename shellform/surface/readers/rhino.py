@@ -26,6 +26,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, among, joined
 from shellform.surface.readers.nurbs import Curve, Patch
+from shellform.surface.readers.rhino_bytes import without_date_and_path
 
 _METRES = {
     "Microns": 1e-6, "Millimeters": 1e-3, "Centimeters": 1e-2, "Decimeters": 0.1, "Meters": 1.0,
@@ -52,8 +53,8 @@ class Item:
 
 
 def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -> None:
-    """Writes the items in metres, each layer in its colour (#rrggbb), with the same identifiers each time; the
-    date within is the day's. Raises OSError where the file can't be written.
+    """Writes the items in metres, each layer in its colour (#rrggbb), the same bytes each time, dated 1970. Raises
+    OSError where the file can't be written.
     """
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
@@ -84,6 +85,7 @@ def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -
             model.Objects.AddCurve(_through(item.points), own)
     if not model.Write(str(path), 7):
         raise OSError(f"rhino3dm can't write {path}")
+    path.write_bytes(without_date_and_path(path.read_bytes()))
 
 
 def _through(points: Reals) -> Any:
