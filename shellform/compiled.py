@@ -28,7 +28,27 @@ from numba import prange, set_num_threads
 from numba.core import event
 from numba.core.caching import IndexDataCacheFile
 
+from shellform.work_clock import Work, WorkClock, listener
+
 __all__ = ["njit", "prange", "set_num_threads"]
+
+
+class _Told(event.Listener):  # type: ignore[misc]
+    """Tells who listens (work_clock.py) what is spent on compiling."""
+
+    def __init__(self) -> None:
+        self._heard: list[WorkClock | None] = []
+
+    def on_start(self, event: Any) -> None:
+        clock = listener()
+        self._heard.append(clock)
+        if clock is not None:
+            clock.begin(Work.COMPILING)
+
+    def on_end(self, event: Any) -> None:
+        clock = self._heard.pop()
+        if clock is not None:
+            clock.end()
 
 
 class _Announcement(event.Listener):  # type: ignore[misc]
@@ -102,5 +122,6 @@ def _cache_for_now() -> None:
     os.environ["NUMBA_CACHE_DIR"] = numba.config.CACHE_DIR = folder
 
 
+event.register("numba:compile", _Told())
 if "SHELLFORM_QUIET" not in os.environ:
     event.register("numba:compile", _Announcement())

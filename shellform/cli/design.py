@@ -22,6 +22,9 @@ def design(
         ),
     ] = "report",
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute every stage anew.")] = False,
+    profile: Annotated[
+        bool, typer.Option("--profile", help="Write what each stage takes: profile.json, and on the page.")
+    ] = False,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE in place of an entry.")
     ] = None,
@@ -43,6 +46,7 @@ def design(
         until=until,
         fresh=fresh,
         allow_scripts=allow_scripts,
+        profile=profile,
         report=report,
     )
     report.close()

@@ -13,6 +13,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError
+from shellform.work_clock import Work, told
 
 try:
     import nlopt
@@ -20,6 +21,7 @@ except ImportError as error:  # pragma: no cover
     raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
 
 
+@told(Work.CONVEX)
 def minimise(
     evaluate: Callable[[Reals], tuple[float, Reals, Reals, Reals]],
     start: Reals,

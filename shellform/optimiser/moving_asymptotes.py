@@ -45,6 +45,7 @@ from shellform.problem.paths import follow, without_slack
 from shellform.problem.problem import FEASIBLE, Problem
 from shellform.problem.terms import Term
 from shellform.structure.elements.state import State
+from shellform.work_clock import Work, told
 
 _COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 _NUMBERS = ("stage", "margin", "until", "caution")
@@ -223,6 +224,7 @@ def _run(search: _Search) -> None:
         search.status = reason
 
 
+@told(Work.REST)
 def _tried(search: _Search, x: Reals) -> _Told:
     """A trial evaluated, noted, and remembered where it is stable."""
     _tell(search)

@@ -13,10 +13,12 @@ from cvxopt import matrix, solvers
 from scipy.linalg import cho_factor, cho_solve
 
 from shellform.arrays import Reals
+from shellform.work_clock import Work, told
 
 _REGULAR = 1e-8  # of the mean curvature, where the model has none
 
 
+@told(Work.CONVEX)
 def minimise_quadratic(
     hessian: Reals, slope: Reals, rows: Reals, values: Reals, lower: Reals, upper: Reals
 ) -> Reals | None:

@@ -35,7 +35,7 @@ LOCK = "lock"
 DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished")
 WRITTEN = (
     "case.toml", "summary.json", "stages.json", "history.csv", "surface.npz", "net.npz", "net.json", "designs", "states", "figures",
-    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", LOCK,
+    "drawings", "schedules", "models", "optimise.npz", "report.html", "log.txt", "profile.json", LOCK,
 )  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from shellform.output.page.embed import KINDS, embed
 from shellform.output.page.report import GENERATOR, html
 from shellform.output.page.shown_run import ShownRun
 from shellform.records.history import read_history
+from shellform.records.profile import read_profile
 from shellform.records.progress import Event, Report, unheard
 from shellform.records.stages import read_stages
 from shellform.records.verdict import verdict
@@ -90,6 +91,7 @@ def shown_run(run: Run, budget: int = _BUDGET, *, page: Path | None = None) -> S
         ),
         home="" if page is None else _home(run.folder, page),
         next_size=_next_size(run),
+        profile=read_profile(run.folder).of(read_stages(run.folder)),
     )
 
 

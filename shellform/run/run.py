@@ -12,6 +12,7 @@ import json
 import platform
 import time
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
@@ -40,9 +41,11 @@ from shellform.run.judged import judged
 from shellform.run.keys import stage_keys
 from shellform.run.log import logged
 from shellform.run.pages import FILE, write_page
+from shellform.run.profiling import Profiler
 from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.run.workspace import Workspace
 from shellform.surface.shape.target import Surface
+from shellform.work_clock import listening
 from shellform.written import folder as made_folder
 from shellform.written import write_text
 
@@ -77,15 +80,32 @@ def run_case(
     fresh: bool = False,
     allow_scripts: bool = False,
     wait: bool = False,
+    profile: bool = False,
     report: Report = unheard,
 ) -> Summary:
     """Runs the case's stages up to `until` in `folder` and returns the summary.
 
     Raises InputError for bad input, and where another process is at work in the folder unless it is to `wait`
     for it; NotConverged where a stage finds no result; what was computed stays in the folder. Where pictures, documents or the page fail, the others are still made, `failed` in the summary
-    says what was wrong, and then the first error is raised.
+    says what was wrong, and then the first error is raised. With `profile`, profile.json tells what the stages
+    took that were computed.
     """
-    folder = Path(folder)
+    with listening() if profile else nullcontext() as clock:
+        profiler = None if clock is None else Profiler(clock)
+        return _run(case, Path(folder), until, fresh, allow_scripts, wait, profiler, report)
+
+
+def _run(
+    case: Case,
+    folder: Path,
+    until: str,
+    fresh: bool,
+    allow_scripts: bool,
+    wait: bool,
+    profiler: Profiler | None,
+    report: Report,
+) -> Summary:
+    """As `run_case`."""
     if until not in STAGES:
         raise InputError("is no stage", where="--until", value=until, remedy=f"Stages: {', '.join(STAGES)}.")
     file = Path(case.surface.file)
@@ -101,7 +121,8 @@ def run_case(
         parts = Parts(surface=surface_of(case.surface, allow_scripts=allow_scripts))
         report(Event("surface", f"size {size_text(_there(parts.surface).size)}", Kind.NOTE))
     with alone(folder, wait=wait):
-        return _run_alone(Workspace(case, folder, logged(folder, report), keys), until, fresh, parts, began)
+        workspace = Workspace(case, folder, logged(folder, report), keys, profiler)
+        return _run_alone(workspace, until, fresh, parts, began)
 
 
 def _done(folder: Path, fresh: bool) -> StagesDone:
@@ -171,6 +192,8 @@ def _stages(
         summary = summary.totalled()
         write_summary(workspace.folder, summary)
         write_stages(workspace.folder, done)
+        if workspace.profiler is not None:
+            workspace.profiler.over(workspace.folder, stage, workspace.keys[stage], kept=reusable)
         workspace.say(stage, f"{kind.value} in {spent:.1f} s", kind)
         began = time.perf_counter()
     if failures:

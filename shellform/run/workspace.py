@@ -8,17 +8,19 @@ from pathlib import Path
 
 from shellform.case.case import Case
 from shellform.records.progress import Event, Kind, Report
+from shellform.run.profiling import Profiler
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """The `case` of a run that is being made, its `folder`, whom to `report` events to, and the `keys` of its
-    stages."""
+    """The `case` of a run that is being made, its `folder`, whom to `report` events to, the `keys` of its
+    stages, and what measures them, if anything does."""
 
     case: Case
     folder: Path
     report: Report
     keys: Mapping[str, str]
+    profiler: Profiler | None = None
 
     def path(self, name: str) -> Path:
         """Of a file in the folder."""

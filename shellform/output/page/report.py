@@ -22,6 +22,7 @@ from shellform.gridshell.catalogue import label
 from shellform.optimiser.optimum import Step
 from shellform.output.page import charts
 from shellform.output.page.first_answers import answers
+from shellform.output.page.profile_table import profile_table
 from shellform.output.page.shown_run import ShownRun
 from shellform.output.page.template import filled, part
 from shellform.output.page.view_data import ViewedShell, controls, view_data
@@ -111,6 +112,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "source": "" if summary.surface is None else summary.surface.source,
         "optimisation": summary.optimisation,
         "seconds": dict(sorted(summary.seconds.items(), key=lambda each: each[0] == "total")),
+        "profile": profile_table(run.profile),
         "rod": label(run.shell.rod.resized(run.designs[run.best].radius).section, 2),
         "row": best,
         **controls(viewed(run), _GRADIENT),

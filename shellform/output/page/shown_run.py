@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from shellform.arrays import Reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.optimiser.optimum import Step
 from shellform.output.page.embed import Picture
 from shellform.records.check import Check
+from shellform.records.profile import Profile
 from shellform.records.summary import Summary, VerdictRecord
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
@@ -24,7 +25,8 @@ class ShownRun:
     `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `force_max`, N, limits the
     cables; `notes` say what is missing or to be known; `files` are those of the run folder, which is reached
     from the page by the relative address `home` ("": the page stands in it); `next_size` is the size of the
-    catalogue that the rods to build would be rounded to ("": no catalogue, or none is stiff enough).
+    catalogue that the rods to build would be rounded to ("": no catalogue, or none is stiff enough);
+    `profile` is empty where none was made.
     """
 
     title: str
@@ -47,6 +49,7 @@ class ShownRun:
     files: Sequence[str]
     home: str = ""
     next_size: str = ""
+    profile: Profile = field(default_factory=Profile)
 
     @property
     def shell(self) -> Gridshell:

@@ -15,6 +15,8 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any, TypeVar
 
+from shellform.work_clock import Work, measured
+
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
@@ -46,6 +48,7 @@ def share(loop: Callable[..., Any], count: int, *arguments: Any) -> None:
     (nogil). Side by side with others it runs on its own core.
     """
     number = 1 if getattr(_OWN, "taken", False) else min(cores(), count // _WORTH_SHARING)
+    loop = measured(Work.LOOPS, loop)
     if number < 2:
         loop(0, count, *arguments)
         return

@@ -24,6 +24,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
 from shellform.structure.solve.chords import ChordKeeper
 from shellform.structure.solve.factorisation import Factor, Symmetric
+from shellform.work_clock import Work, told
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,7 @@ class Assembly:
         """The second-order correction of steps; `with_parts` keeps it, its weights needn't be up to date."""
         return ChordKeeper(self.count, self.beams, self.free)
 
+    @told(Work.LOOPS)
     def evaluate(self, state: State, *, tangent: bool = True) -> Balance:
         """Energy, internal forces and, if asked for, the tangent at the state."""
         began = time.perf_counter()

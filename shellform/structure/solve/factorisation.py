@@ -25,6 +25,7 @@ from shellform.arrays import Indices, Reals
 from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure.solve import pardiso
+from shellform.work_clock import Work, told
 
 try:
     from cvxopt import cholmod, matrix, spmatrix
@@ -101,6 +102,7 @@ class Symmetric:
         self._matrix: Any = None
         self._generation = 0
 
+    @told(Work.FACTORISATIONS)
     def factor(self, values: Reals) -> Factor:
         """Cholesky factor of the matrix with lower `values` (nnz,). It serves until the next call of
         `factor`.
@@ -136,6 +138,7 @@ class Symmetric:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
         return _Pardiso(self, self._pardiso, self._generation)
 
+    @told(Work.FACTORISATIONS)
     def solve_kept(self, values: Reals, kept: Indices, right: Reals) -> Reals | None:
         """The solution (k, s) on the degrees of freedom `kept` (k,), ascending, for right-hand sides (k, s)
         on them that are zero elsewhere.
@@ -152,6 +155,7 @@ class Symmetric:
         except pardiso.NotDefinite as error:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
 
+    @told(Work.FACTORISATIONS)
     def factor_thin(self, values: Reals) -> Factor:
         """L D L' of a matrix whose factor has a few entries a column, as the graph of a gridshell's beams:
         the compiled solve takes a sixth of the time that CHOLMOD's blocks do. It serves for good. Raises
@@ -166,6 +170,7 @@ class Symmetric:
         starts, rows, entries = (np.array(each)[:, 0] for each in cholmod.getfactor(symbolic).CCS)
         return _Thin(np.array(order)[:, 0].astype(np.int64), starts, rows, entries)
 
+    @told(Work.FACTORISATIONS)
     def factor_indefinite(self, values: Reals) -> Indefinite:
         """L D L' of a matrix that needn't be positive definite, with its number of negative eigenvalues
         (Sylvester's law).
@@ -190,6 +195,7 @@ class Symmetric:
         """How many eigenvalues are negative."""
         return self.factor_indefinite(values).negative
 
+    @told(Work.FACTORISATIONS)
     def newton(self, values: Reals, right: Reals) -> tuple[Reals, bool]:
         """The solution for `right` (n,) with a matrix that needn't be definite, and whether `right` leaves
         its negative part untouched: whether below 1e-9 of y'|D|y, L D L' = A and L D y = right, comes from
@@ -254,6 +260,7 @@ class _Pardiso:
         self._family, self._factor, self._generation = family, factor, generation
         self.negative = factor.negative
 
+    @told(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         self._family._check(self._generation)
         return self._factor.solve(right)
@@ -263,6 +270,7 @@ class _Cholmod:
     def __init__(self, family: Symmetric, factor: Any, generation: int) -> None:
         self._family, self._factor, self._generation = family, factor, generation
 
+    @told(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         self._family._check(self._generation)
         vector = right.ndim == 1
@@ -277,6 +285,7 @@ class _Indefinite:
     factor: Any
     negative: int
 
+    @told(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         solution = matrix(np.ascontiguousarray(right[:, None] if right.ndim == 1 else right))
         cholmod.solve(self.factor, solution)
@@ -293,6 +302,7 @@ class _Thin:
     rows: Indices
     entries: Reals
 
+    @told(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         columns = right[:, None] if right.ndim == 1 else right
         solution = np.asarray(
@@ -337,5 +347,6 @@ class _SuperLU:
         if definite and not (pivots > 0.0).all():
             raise NotPositiveDefinite("the matrix is not positive definite")
 
+    @told(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         return np.asarray(self._lu.solve(right))
