@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
 from shellform.records.as_built import AsBuilt, critical_checks, standing_checks
 from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, share_of
-from shellform.records.remedies import RodsOf, allow, allow_count
+from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count
 from shellform.records.summary import DesignRecord, LoadRecord, OptimisationRecord, Summary
 from shellform.records.words import constraint_title, load_title, number
 
@@ -31,7 +31,7 @@ class Bounds:
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) `stress`
     over strength, connectors' `turn`, rad, `uplift`, N, of supports under any load, least pull `slack`, N, of
     cables under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as
-    built (`safety`)."""
+    built (`safety`); and how the case gives its `rods`' size."""
 
     force: float
     misfit: float
@@ -42,6 +42,7 @@ class Bounds:
     slack_loads: tuple[str, ...] = ()
     critical: Mapping[str, float] = field(default_factory=dict)
     safety: AsBuilt | None = None
+    rods: RodSizes | None = None
 
 
 def checks(
@@ -54,7 +55,10 @@ def checks(
     factors = {load: row.loads[load].factor for row in rows.values() for load in row.loads}
     largest = {name: max_radius(shells[name].net, shells[name].rod) for name in designs}
     spacing = None if summary.net is None else summary.net.spacing
-    rods = {name: RodsOf(designs[name].radius, largest[name], spacing, summary.thicker) for name in designs}
+    rods = {
+        name: RodsOf(designs[name].radius, largest[name], spacing, summary.thicker, bounds.rods)
+        for name in designs
+    }
 
     def under(
         title: str, limit: str, cell: Callable[[LoadRecord, RodsOf], Cell], chosen: Sequence[str]

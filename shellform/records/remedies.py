@@ -8,38 +8,71 @@ itself.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.words import number
 
 _CLOSER = 0.8  # of the spacing, where rods may not become thicker
+_EQUAL = 1e-9  # relative: radii that count as equal
 _MOST = 100.0  # times the load: what lacks so much isn't mended by thicker rods
+
+
+@dataclass(frozen=True)
+class RodSizes:
+    """How a case gives the size of its rods: the `entries` that grow with it and their values, m; or what is
+    `bought`, from a catalogue: each section's name and the radius, m, of a rod similar to the case's that is
+    as stiff, by rising stiffness."""
+
+    entries: Mapping[str, float]
+    bought: Sequence[tuple[str, float]] = ()
+
+    def at_least(self, radius: float, wanted: float) -> str | None:
+        """What to write for rods as stiff as similar ones of the radius `wanted`, those there are having
+        `radius`, m; None where no catalogue has them."""
+        if self.bought:
+            return next((_section(name) for name, own in self.bought if own >= wanted * (1.0 - _EQUAL)), None)
+        return ", ".join(f"{name} = {_up(value * wanted / radius)}" for name, value in self.entries.items())
+
+    def at_most(self, radius: float, wanted: float) -> str | None:
+        """As `at_least`, for rods no stiffer."""
+        if self.bought:
+            below = [_section(name) for name, own in self.bought if own <= wanted * (1.0 + _EQUAL)]
+            return below[-1] if below else None
+        return ", ".join(f"{name} = {_down(value * wanted / radius)}" for name, value in self.entries.items())
 
 
 @dataclass(frozen=True)
 class RodsOf:
     """The rods of a design: their `radius`, the `largest` that the net allows by equation (1), and its
-    `spacing`, m (None: not known); `thicker` ones with which the initial design was seen to stand."""
+    `spacing`, m (None: not known); `thicker` ones with which the initial design was seen to stand; how the
+    case gives their `sizes` (None: by rod.radius)."""
 
     radius: float
     largest: float
     spacing: float | None
     thicker: ThickerRodsRecord | None = None
+    sizes: RodSizes | None = None
 
     def stronger(self, times: float) -> str:
         """To bear so many times what they bear; rods that were drawn say more than any rule."""
         if self.thicker is not None:
             found = self.thicker
-            return (
-                f"Take rods of {_up(1e3 * found.radius)} mm radius (rod.radius = {_up(found.radius)}): with all "
-                f"cables {found.standing} of {found.drawn} drawn structures stand with them."
+            what = (
+                f"rods of {_up(1e3 * found.radius)} mm radius ({self._sizes.at_least(self.radius, found.radius)})"
+                if found.section is None
+                else f"rods of {found.section} ({_section(found.section)})"
             )
+            return f"Take {what}: with all cables {found.standing} of {found.drawn} drawn structures stand with them."
         if not 1.0 < times < _MOST:
             return self._closer()
         wanted = self.radius * math.sqrt(times)
-        if wanted <= self.largest:
-            return f"Take rods of at least {_up(1e3 * wanted)} mm radius (rod.radius = {_up(wanted)}), or let it be free (optimise.rod_radius = 0.1)."
+        said = self._sizes.at_least(self.radius, wanted)
+        if wanted <= self.largest and said is not None:
+            return f"Take rods of at least {_up(1e3 * wanted)} mm radius ({said}), or let it be free (optimise.rod_radius = 0.1)."
+        if said is None:
+            return f"Rods as stiff as those of {_up(1e3 * wanted)} mm radius would do, and the catalogue has none. {self._closer()}"
         return (
             f"Rods of {_up(1e3 * wanted)} mm radius would do, and the net's curvature allows {number(1e3 * self.largest)} mm (1). "
             + self._closer()
@@ -48,12 +81,23 @@ class RodsOf:
     def thinner(self, times: float) -> str:
         """To have that part of their stress."""
         wanted = self.radius * times
-        return f"Take rods of at most {_down(1e3 * wanted)} mm radius (rod.radius = {_down(wanted)})."
+        said = self._sizes.at_most(self.radius, wanted)
+        if said is None:
+            return f"Rods as stiff as those of {_down(1e3 * wanted)} mm radius would do, and the catalogue has none: take another (rod.catalogue)."
+        return f"Take rods of at most {_down(1e3 * wanted)} mm radius ({said})."
+
+    @property
+    def _sizes(self) -> RodSizes:
+        return self.sizes or RodSizes({"rod.radius": self.radius})
 
     def _closer(self) -> str:
         if self.spacing is None:
             return "Choose a closer grid (net.spacing)."
         return f"Choose a closer grid (net.spacing = {number(_CLOSER * self.spacing)})."
+
+
+def _section(name: str) -> str:
+    return f'rod.section = "{name}"'
 
 
 def allow(entry: str, value: float, *, or_else: str = "") -> str:

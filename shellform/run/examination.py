@@ -16,8 +16,10 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
+from shellform.case.build_rod import stock
 from shellform.case.build_safety import case_tolerances, critical_factors_asked
 from shellform.case.case import Case
+from shellform.case.entries import StockRodEntry
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
@@ -108,8 +110,16 @@ def _thicker(workspace: Workspace, run: Run) -> ThickerRodsRecord | None:
     """Rods with which the initial design stands as often as is asked."""
     workspace.say("safety", "which rods stand", Kind.BEGAN)
     initial, asked = _of_run(run, "initial"), asked_as_built(workspace.case)
-    seed = workspace.case.safety.seed
-    return rods_that_stand(initial.shell, initial.design, initial.loads, initial.tolerances, asked, seed=seed)
+    rod, seed = workspace.case.rod, workspace.case.safety.seed
+    return rods_that_stand(
+        initial.shell,
+        initial.design,
+        initial.loads,
+        initial.tolerances,
+        asked,
+        seed=seed,
+        catalogue=stock(rod, rod.catalogue) if isinstance(rod, StockRodEntry) else None,
+    )
 
 
 def _of_run(run: Run, name: str) -> _Examined:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from shellform.case.build_rod import rod_sizes
 from shellform.case.build_safety import critical_factors_asked, is_required
 from shellform.case.case import Case
 from shellform.records.as_built import AsBuilt
@@ -29,6 +30,7 @@ def run_checks(run: Run) -> list[Check]:
         slack_loads=tuple(limits.slack_loads),
         critical=critical_factors_asked(run.case),
         safety=asked_as_built(run.case),
+        rods=rod_sizes(run.case.rod, run.shell.rod),
     )
     return checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
 
