@@ -25,13 +25,13 @@ from shellform.run.first_net import Allowance
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
 from shellform.run.sizes import DesignWish, RodChoice
 from shellform.run.unbuildable import Unbuildable
-from shellform.run.way_out import BUILDABLE, with_way_out
+from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
-_SHARES = (0.6, 1.0)  # of the radius at which rods bear the load by a cautious estimate
+_SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
 _ROUNDED = 10_000  # crossings pulled and solved on surfaces that were rounded
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
@@ -68,7 +68,7 @@ def propose_case(
                 raise InputError("left untried, since the one before took all the work that is allowed")
             first_design(rounded, wanted, lambda text: say(f"rounded, {text}"), allowance)
 
-        told = with_way_out(error, surface, error.radius, folder, again, say, _SHARES)
+        told = with_way_out(error, surface, error.radius, folder, again, say, _shares(error))
         raise (error.rounded_in_vain() if told is error and not wanted.rod else told) from error
     edges = _edges_told(stretches_of(surface))
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
@@ -84,6 +84,12 @@ def propose_case(
         "edges": edges,
         "case": str(output),
     }
+
+
+def _shares(refusal: Unbuildable) -> list[float]:
+    """What of its radius to round to, one after the other: the least first that nets cover."""
+    least = min(COVERED * refusal.spacing / refusal.radius, 1.0)
+    return sorted({max(least, share) for share in _SHARES})
 
 
 def _text(

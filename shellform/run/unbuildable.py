@@ -226,8 +226,7 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildabl
         f"{choice.catalogue} for one, stand up to {failure.factor:.2f} × the load of {1e3 * failure.thickness:.3g} mm of concrete "
         f"at {failure.spacing:g} m, where {NEEDED:g} is needed",
         where="rod",
-        remedy=f"Round the surface there to {wanted:.2g} m or more, so that thicker rods follow it, or cut it into pieces "
-        "along its creases.",
+        remedy="Round it there, so that thicker rods follow it, or cut it into pieces along its creases.",
         spacing=failure.spacing,
         radius=wanted,
     )
