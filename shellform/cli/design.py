@@ -25,6 +25,9 @@ def design(
     profile: Annotated[
         bool, typer.Option("--profile", help="Write what each stage takes: profile.json, and on the page.")
     ] = False,
+    sketch: Annotated[
+        bool, typer.Option("--sketch", help="A first look in seconds: coarse, not examined, one picture.")
+    ] = False,
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE in place of an entry.")
     ] = None,
@@ -39,6 +42,7 @@ def design(
     from shellform.records.summary import document
     from shellform.run.run import run_case
 
+    first = "figures/sketch.png" if sketch else "report.html"
     report = Spinner(quiet=quiet)
     summary = run_case(
         load_case(case, settings or ()),
@@ -47,6 +51,7 @@ def design(
         fresh=fresh,
         allow_scripts=allow_scripts,
         profile=profile,
+        sketch=sketch,
         report=report,
     )
     report.close()
@@ -56,10 +61,10 @@ def design(
         tell_designs(summary)
         print(
             f"Everything is in {output}"
-            + (f"; look at {output / 'report.html'} first" if until == "report" else "")
+            + (f"; look at {output / first} first" if until == "report" else "")
         )
     judged = summary.verdict
-    if judged is not None and (judged.failed or (not judged.holds and _examined(until))):
+    if judged is not None and (judged.failed or (not judged.holds and not sketch and _examined(until))):
         raise typer.Exit(3)
 
 

@@ -280,8 +280,8 @@ class VerdictRecord:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run found so far; a part is None or empty until its stage is done. `seconds` by stage, and why
-    stages `failed`."""
+    """What a run found so far; a part is None or empty until its stage is done. `seconds` by stage, why
+    stages `failed`, and whether it is a `sketch`."""
 
     format: str = FORMAT
     version: int = VERSION
@@ -299,6 +299,7 @@ class Summary:
     documents: DocumentsRecord | None = None
     verdict: VerdictRecord | None = None
     failed: Mapping[str, str] = field(default_factory=dict, metadata={"if_any": True})
+    sketch: bool = field(default=False, metadata={"if_any": True})
 
     def with_design(self, name: str, design: DesignRecord) -> Summary:
         """With this design added, or in place of the one with its name."""

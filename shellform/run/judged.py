@@ -9,12 +9,14 @@ from shellform.case.build_rod import rod_sizes
 from shellform.case.build_safety import critical_factors_asked, is_required
 from shellform.case.case import Case
 from shellform.records.as_built import AsBuilt
-from shellform.records.check import Check
+from shellform.records.check import Cell, Check
 from shellform.records.checks import Bounds, checks
 from shellform.records.stages import SHOWING
 from shellform.records.summary import VerdictRecord
 from shellform.records.verdict import to_build, verdict
 from shellform.run.folder import Run
+
+_SKETCH = Cell("a sketch: coarse elements, few evaluations, no structures drawn", None)
 
 
 def run_checks(run: Run) -> list[Check]:
@@ -32,7 +34,10 @@ def run_checks(run: Run) -> list[Check]:
         safety=asked_as_built(run.case),
         rods=rod_sizes(run.case.rod, run.shell.rod),
     )
-    return checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
+    found = checks({name: run.shell_of(name) for name in run.designs}, run.designs, run.summary, bounds)
+    if run.summary.sketch:
+        found = [*found, Check("Full job", "done", dict.fromkeys(run.designs, _SKETCH))]
+    return found
 
 
 def asked_as_built(case: Case) -> AsBuilt:

@@ -25,9 +25,9 @@ _NEEDS = {
 }
 
 
-def stage_keys(case: Case) -> dict[str, str]:
+def stage_keys(case: Case, *, sketch: bool = False) -> dict[str, str]:
     """A hash for each stage of all that it depends on; of the surface file that is its name and content,
-    wherever it lies.
+    wherever it lies. The designs of a `sketch` are no others'.
     """
     entries = case.model_dump(mode="json")
     file = Path(case.surface.file)
@@ -51,6 +51,7 @@ def stage_keys(case: Case) -> dict[str, str]:
     keys = {}
     for stage in STAGES:
         digest.update(stock if stage == "initial" else b"")
+        digest.update(b"sketch" if stage == "initial" and sketch else b"")
         digest.update(json.dumps({name: entries[name] for name in _NEEDS[stage]}, sort_keys=True).encode())
         keys[stage] = digest.hexdigest()
     return keys

@@ -165,7 +165,7 @@ def _done(run: Run) -> set[str]:
     """
     kept = read_stages(run.folder)
     file = Path(run.case.surface.file)
-    keys = stage_keys(run.case) if file.is_file() else kept.keys
+    keys = stage_keys(run.case, sketch=run.summary.sketch) if file.is_file() else kept.keys
     return {stage for stage in kept.keys if kept.has(stage, keys.get(stage, ""))}
 
 

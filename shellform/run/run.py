@@ -42,6 +42,7 @@ from shellform.run.keys import stage_keys
 from shellform.run.log import logged
 from shellform.run.pages import FILE, write_page
 from shellform.run.profiling import Profiler
+from shellform.run.sketch import STAGES_OF_SKETCH, draw_sketch, drop_other, refuse_over_full, sketched
 from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.run.workspace import Workspace
 from shellform.surface.shape.target import Surface
@@ -81,6 +82,7 @@ def run_case(
     allow_scripts: bool = False,
     wait: bool = False,
     profile: bool = False,
+    sketch: bool = False,
     report: Report = unheard,
 ) -> Summary:
     """Runs the case's stages up to `until` in `folder` and returns the summary.
@@ -88,11 +90,21 @@ def run_case(
     Raises InputError for bad input, and where another process is at work in the folder unless it is to `wait`
     for it; NotConverged where a stage finds no result; what was computed stays in the folder. Where pictures, documents or the page fail, the others are still made, `failed` in the summary
     says what was wrong, and then the first error is raised. With `profile`, profile.json tells what the stages
-    took that were computed.
+    took that were computed. A `sketch` is a first look (sketch.py).
     """
     with listening() if profile else nullcontext() as clock:
         profiler = None if clock is None else Profiler(clock)
-        return _run(case, Path(folder), until, fresh, allow_scripts, wait, profiler, report)
+        return _run(
+            sketched(case) if sketch else case,
+            Path(folder),
+            until,
+            fresh,
+            allow_scripts,
+            wait,
+            profiler,
+            sketch,
+            report,
+        )
 
 
 def _run(
@@ -103,6 +115,7 @@ def _run(
     allow_scripts: bool,
     wait: bool,
     profiler: Profiler | None,
+    sketch: bool,
     report: Report,
 ) -> Summary:
     """As `run_case`."""
@@ -112,7 +125,7 @@ def _run(
     if not file.is_file():
         raise InputError("there is no such file", where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
-    keys = stage_keys(case)
+    keys = stage_keys(case, sketch=sketch)
     began = time.perf_counter()
     parts = Parts()
     if not _done(folder, fresh).has("surface", keys["surface"]):
@@ -121,7 +134,7 @@ def _run(
         parts = Parts(surface=surface_of(case.surface, allow_scripts=allow_scripts))
         report(Event("surface", f"size {size_text(_there(parts.surface).size)}", Kind.NOTE))
     with alone(folder, wait=wait):
-        workspace = Workspace(case, folder, logged(folder, report), keys, profiler)
+        workspace = Workspace(case, folder, logged(folder, report), keys, profiler, sketch)
         return _run_alone(workspace, until, fresh, parts, began)
 
 
@@ -144,9 +157,10 @@ def _run_alone(workspace: Workspace, until: str, fresh: bool, parts: Parts, bega
             where=str(folder),
             remedy="Run the same command again.",
         )
-    summary = replace(
-        read_summary(folder) if done.keys else Summary(), shellform=shellform.__version__, failed={}
-    )
+    if workspace.sketch:
+        refuse_over_full(folder)
+    summary = read_summary(folder) if done.keys else Summary()
+    summary = replace(summary, shellform=shellform.__version__, failed={}, sketch=workspace.sketch)
     for part in ("designs", "states", "figures", "schedules"):
         made_folder(folder / part)
     workspace.say(
@@ -154,11 +168,12 @@ def _run_alone(workspace: Workspace, until: str, fresh: bool, parts: Parts, bega
     )
     if fresh:
         drop_checkpoint(folder)
-    first = next((stage for stage in STAGES if not done.has(stage, keys[stage])), None)
+    first = next((stage for stage in _wanted(workspace) if not done.has(stage, keys[stage])), None)
     if first is not None:  # whoever reads the folder from now on finds what belongs to the case as it is
         summary, done = _outdated(summary, first), done.before(first)
         write_stages(folder, done)
         write_summary(folder, summary)
+    drop_other(folder, sketch=workspace.sketch)
     write_text(folder / "case.toml", dump_case(workspace.case))
     return _stages(workspace, until, parts, summary, done, began)
 
@@ -169,7 +184,7 @@ def _stages(
     """Stage after stage. Raises the first error of those that only show what was found, once all were tried;
     any other at once."""
     reusable, failures = True, list[Exception]()
-    for stage in STAGES[: STAGES.index(until) + 1]:
+    for stage in _wanted(workspace, until):
         reusable = reusable and done.has(stage, workspace.keys[stage])
         kind = Kind.KEPT if reusable else Kind.DONE
         try:
@@ -199,6 +214,12 @@ def _stages(
     if failures:
         raise failures[0]
     return summary
+
+
+def _wanted(workspace: Workspace, until: str = STAGES[-1]) -> list[str]:
+    """The stages up to one of them."""
+    some = STAGES_OF_SKETCH if workspace.sketch else STAGES
+    return [stage for stage in STAGES[: STAGES.index(until) + 1] if stage in some]
 
 
 def _tell(workspace: Workspace, stage: str, error: ShellformError) -> None:
@@ -340,7 +361,8 @@ def _safety(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) ->
 
 
 def _figures(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
-    complete = keep or draw_everything(read_run(workspace.folder), report=workspace.report)
+    draw = draw_sketch if workspace.sketch else draw_everything
+    complete = keep or draw(read_run(workspace.folder), report=workspace.report)
     return _Ended(parts, summary, complete)
 
 

@@ -14,13 +14,14 @@ from shellform.run.profiling import Profiler
 @dataclass(frozen=True)
 class Workspace:
     """The `case` of a run that is being made, its `folder`, whom to `report` events to, the `keys` of its
-    stages, and what measures them, if anything does."""
+    stages, what measures them, if anything does, and whether it is a `sketch`."""
 
     case: Case
     folder: Path
     report: Report
     keys: Mapping[str, str]
     profiler: Profiler | None = None
+    sketch: bool = False
 
     def path(self, name: str) -> Path:
         """Of a file in the folder."""
