@@ -25,8 +25,8 @@ from shellform.cli.render import render
 from shellform.cli.report import report
 from shellform.cli.study import study
 from shellform.cli.survey import survey
+from shellform.cli.terminal import refusal_words
 from shellform.cli.verify import verify
-from shellform.errors import InputError, NotConverged
 
 _STOPPED = 130
 _KEPT = "stopped; what was computed is kept, and the same command goes on from there"
@@ -103,16 +103,10 @@ def main() -> None:
 
 def _fail(error: Exception) -> None:
     """Says what was wrong, and leaves; an error that is no one's but ours is raised again."""
-    if isinstance(error, InputError):
-        _leave(f"refused: {error}", 2)
-    if isinstance(error, NotConverged):
-        _leave(f"no result: {error}", 3)
-    if isinstance(error, MemoryError):
-        _leave("no result: the memory is full. Choose a larger spacing or fewer elements.", 3)
-    if getattr(error, "exit_code", None) is None:
+    said = refusal_words(error)
+    if said is None:
         raise error
-    said = getattr(error, "format_message", None)  # click's usage errors
-    _leave(f"refused: {said() if said else error}", 2)
+    _leave(*said)
 
 
 def _leave(message: str, status: int) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from shellform.cli.interruption import heed
-from shellform.errors import NotConverged
+from shellform.errors import InputError, NotConverged
 from shellform.records.progress import Event, Kind
 
 if TYPE_CHECKING:
@@ -37,6 +37,21 @@ class Spinner:
     def close(self) -> None:
         """Ends the spinner."""
         self.status.stop()
+
+
+def refusal_words(error: Exception) -> tuple[str, int] | None:
+    """What is said of an error, and the status with which it ends a command; None for one that is no one's but
+    ours."""
+    if isinstance(error, InputError):
+        return f"refused: {error}", 2
+    if isinstance(error, NotConverged):
+        return f"no result: {error}", 3
+    if isinstance(error, MemoryError):
+        return "no result: the memory is full. Choose a larger spacing or fewer elements.", 3
+    if getattr(error, "exit_code", None) is None:
+        return None
+    told = getattr(error, "format_message", None)  # click's usage errors
+    return f"refused: {told() if told else error}", 2
 
 
 def tell_designs(summary: Summary) -> None:
