@@ -38,6 +38,7 @@ STEP = 1.0  # of the load: most structures bear it whole, and others are followe
 MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
 _RELAXING = 15  # of the unloaded state, before it is sought from the target instead
+_RELAXATIONS = 150  # factorisations of a relaxation from the target: what takes more has none
 _PASSES = 2  # of bringing beams to their length
 
 
@@ -163,7 +164,7 @@ class Loading(Branch):
         if found is not None:
             return found
         try:
-            relaxed = find_equilibrium(self.assembly, moved(nominal.start, offset), none)
+            relaxed = find_equilibrium(self.assembly, moved(nominal.start, offset), none, limit=_RELAXATIONS)
         except NotConverged as error:
             self.spent += error.iterations
             return None
