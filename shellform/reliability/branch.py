@@ -12,7 +12,7 @@ from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
-from shellform.structure.solve.residual import OF_LOAD, STAGNANT, ResidualNorm, drowned, held
+from shellform.structure.solve.residual import STAGNANT, ResidualNorm, held
 
 STRAY = 0.01  # of the span from where a step was expected to end: the state belongs to another branch
 ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
@@ -88,21 +88,16 @@ class Branch:
 
     def newton(self, begin: State, load: Reals, *, limit: int, tolerance: float) -> Here | None:
         """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent positive
-        definite, the last one included; None where one isn't. Raises Drowned where rounding hides the load."""
+        definite, the last one included; None where one isn't. Where rounding leaves more than the tolerance,
+        what it leaves counts as none as far as it would on the way."""
         own, state, before = self.assembly, begin, np.inf
         for _ in range(limit):
             here = self.at(state)
             if here is None:
                 return None
             residual = self.measure.residual(here.balance, load)
-            if tolerance > OF_LOAD:  # on the way: the next step starts here, nothing is told of it
-                settled = residual <= tolerance
-            else:
-                stagnant = residual > STAGNANT * before
-                settled = self.measure.balanced(residual, here.balance, state, load, tolerance, stagnant)
-                if not settled and stagnant and self.measure.drowns(here.balance, state, load, tolerance):
-                    raise drowned(own, state, residual, self.spent)
-            if settled:
+            noise = self.measure.rounding(here.balance, state, load) if residual > STAGNANT * before else 0.0
+            if residual <= max(tolerance, min(noise, ON_THE_WAY)):
                 return here
             before = residual
             change = self._solved(here, load)

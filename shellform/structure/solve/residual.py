@@ -18,7 +18,9 @@ HOLDS = np.radians(
     170.0
 )  # the largest local rotation that is accepted: at 180 degrees its measure turns back
 _UNTOLD = np.radians(90.0)  # of twist, up to which it is not told
-OF_LOAD = 1e-6  # of the load (without load: of the stress), the largest residual that is ever told to be none
+OF_LOAD = 1e-6  # of the load, the largest residual that is ever told to be none
+_BOUND = 30.0  # times what rounding leaves, its bound may be
+_OF_STRESS = 1e-5  # of the largest internal force, the same where there is no load
 STAGNANT = 0.1  # ratio of two residuals one after the other: a step that brings less may be down to rounding
 _NO_STRESS = 1e-3  # of the largest internal force: above, what rounding leaves is all there is of it
 _HELD = 1e-10  # share of a rotation's own stiffness that holds a rod free to spin about its axis
@@ -67,11 +69,12 @@ class ResidualNorm:
 
     def most(self, balance: Balance, load: Reals, tolerance: float) -> float:
         """The largest residual of what is told to be an equilibrium: 1e-6 of the `load` (n, 6), or the `tolerance` where
-        it is looser. A structure without load is measured by its own stress: 1e-6 of the largest internal force.
+        it is looser. A structure without load is measured by its own stress: 1e-5 of the largest internal force
+        (what double precision leaves of edge beams beside bent laths; a tenth of it takes twice the digits).
         """
         applied, scale = float(_largest(load.ravel(), self._reach)), self.scale(balance, load)
         share = max(OF_LOAD, tolerance)
-        return share * applied / scale if applied > 0.0 else share
+        return share * applied / scale if applied > 0.0 else max(share, _OF_STRESS)
 
     def balanced(
         self,
@@ -97,8 +100,9 @@ class ResidualNorm:
         return residual <= min(noise, most) or (noise > _NO_STRESS and residual <= noise and not load.any())
 
     def drowns(self, balance: Balance, state: State, load: Reals, tolerance: float) -> bool:
-        """Whether rounding leaves more than the largest residual that may be told to be none."""
-        noise = self.rounding(balance, state, load)
+        """Whether rounding surely leaves more than the largest residual that may be told to be none. Its bound is
+        ten to thirty times what is left in the end: below, steps show whether they stagnate too high."""
+        noise = self.rounding(balance, state, load) / _BOUND
         return bool(noise > self.most(balance, load, tolerance) and (load.any() or noise <= _NO_STRESS))
 
 
