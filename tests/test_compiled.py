@@ -2,6 +2,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 CODE = """
 import numpy as np
 from shellform.structure.elements.rotation import matrix, turned
@@ -22,6 +24,7 @@ def test_compiling_is_announced_once_but_not_to_who_wants_quiet_and_what_the_cac
             ).stderr
         )
     assert told[0].count("compiling its loops") == 1
+    assert "minutes of a free core in all" in told[0]
     assert told[1:] == ["", ""]
 
 
@@ -114,3 +117,23 @@ def test_code_that_an_older_version_of_a_function_left_is_never_taken(tmp_path):
         )
     assert told == ["2.0\n", "30.0\n"]
     assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 1
+
+
+def test_long_compiling_tells_how_far_it_has_come_and_estimates_leave_it_out(tmp_path):
+    code = (
+        "import time\n"
+        "from shellform import compiled\n"
+        "compiled._compilation._next = 0.0\n"
+        "began, still = time.perf_counter(), compiled.clock_without_compiling()\n"
+        + CODE
+        + "passed = time.perf_counter() - began\n"
+        "print(passed, passed - (compiled.clock_without_compiling() - still), compiled._compilation.seconds)\n"
+    )
+    variables = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=variables
+    )
+    assert "1 loop compiled in" in done.stderr
+    passed, left_out, compiling = map(float, done.stdout.split())
+    assert 0.0 < compiling < passed
+    assert left_out == pytest.approx(compiling, abs=1e-2)

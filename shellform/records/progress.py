@@ -22,7 +22,7 @@ class Kind(Enum):
 @dataclass(frozen=True)
 class Event:
     """Something that happened in a `stage`: its `kind`, a `text` without the stage's name, and where they are
-    known the `fraction` of the stage that is done and the `seconds_left` at the most."""
+    known the `fraction` of the stage that is done and the `seconds_left` at the present pace."""
 
     stage: str
     text: str

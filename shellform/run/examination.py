@@ -203,7 +203,7 @@ def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: 
         workspace.report(
             Event(
                 "safety",
-                f"{each.name} design as built: structure {done} of {count} under the load “{load}”, {left:.0f} s left at most",
+                f"{each.name} design as built: structure {done} of {count} under the load “{load}”, {left:.0f} s left at this pace",
                 fraction=clock.fraction(),
                 seconds_left=left,
             )

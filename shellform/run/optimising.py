@@ -36,6 +36,7 @@ from shellform.records.summary import (
 )
 from shellform.run.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
 from shellform.run.designs import followed, forget, keep
+from shellform.run.pace import Pace
 from shellform.run.robustness import robustness
 from shellform.run.workspace import Workspace
 from shellform.tables import Table, table_text
@@ -95,16 +96,17 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
     from shellform.optimiser import optimise as optimiser
 
     entry = workspace.case.optimise
+    pace = Pace(entry.evaluations)
 
     def watch(step: Step) -> None:
         rejected = "" if step.accepted else ", rejected"
-        left = step.seconds / max(step.evaluation, 1) * (entry.evaluations - step.evaluation)
+        left = pace.left(step.evaluation)
+        still = "" if left is None else f", {left:.0f} s left at this pace"
         workspace.report(
             Event(
                 "optimise",
                 f"evaluation {step.evaluation}/{entry.evaluations}: objective {step.objective:.4f}, "
-                f"{step.cables} cables, {100 * step.stage:.0f} % of the additional load{rejected}, "
-                f"{left:.0f} s left at most",
+                f"{step.cables} cables, {100 * step.stage:.0f} % of the additional load{rejected}{still}",
                 fraction=step.evaluation / entry.evaluations,
                 seconds_left=left,
             )

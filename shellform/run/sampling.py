@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 import shellform
 from shellform.arrays import Reals
+from shellform.compiled import clock_without_compiling
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.records.drawn import DrawnPath, read_drawn, write_drawn
@@ -68,7 +68,7 @@ def drawn_of(
     clock.kept(min(len(path.factors), count))
     workshop = None
     while len(path.factors) < count:
-        began = time.perf_counter()
+        began = clock_without_compiling()
         if workshop is None:
             workshop = Workshop(perfect(shell, design, loads[load]))
         first = len(path.factors)
@@ -83,7 +83,7 @@ def drawn_of(
         )
         kept = kept.also(load, path)
         write_drawn(folder, name, kept)
-        clock.took(len(some), time.perf_counter() - began)
+        clock.took(len(some), clock_without_compiling() - began)
         tell(len(path.factors))
     return DrawnPath(path.factors[:count], path.stand[:count])
 
