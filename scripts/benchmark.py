@@ -1,7 +1,8 @@
-"""Speed and memory of the structural core, measured in one go on at most two cores; prints the ratios and
-whether the bars hold.
+"""Speed and memory of the structural core, measured in one go on at most two cores; prints the ratios,
+whether the bars hold, and the change since the run that was committed.
 
     scripts/benchmark [--sizes 12 25 51] [--no-peers] [--million] [--peers-python PYTHON] [--output FILE.json]
+        [--against FILE.json]
 
 Times are medians, and what is compared is measured in turns, because other work on the machine slows both
 down. The models are gridshell_models.gridshell, from their stress-free curved shape to equilibrium under a
@@ -29,6 +30,7 @@ os.environ["OMP_NUM_THREADS"] = str(CORES)
 
 # Libraries count the cores when they are loaded.
 import numpy as np  # noqa: E402
+from benchmark_trend import COMMITTED, committed, trend  # noqa: E402
 from gridshell_models import gridshell  # noqa: E402
 from peers import environment  # noqa: E402
 
@@ -386,6 +388,12 @@ def main() -> int:
     parser.add_argument("--peers-python", help="a Python 3.12 with the peers (also SHELLFORM_PEERS_PYTHON)")
     parser.add_argument("--million", action="store_true", help="a Mannheim Multihalle as well")
     parser.add_argument("--output", type=Path, help="write the table as JSON")
+    parser.add_argument(
+        "--against",
+        type=Path,
+        default=COMMITTED,
+        help="a kept run to tell the trend from (scripts/benchmark.json)",
+    )
     parser.add_argument("--task", nargs="+", help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.task:
@@ -398,8 +406,9 @@ def main() -> int:
     def tell(more: list[Row]) -> None:
         rows.extend(more)
         for row in more:
-            print(row, flush=True)
+            print(row, trend(row.what, row.value, row.holds, before), sep="  ", flush=True)
 
+    before = committed(chosen.against)
     busy = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
     print(
         f"{CORES} cores; load before the start {busy:.1f} (below 0.5 is quiet); factorised by {factorisation.backend_name()}\n",
