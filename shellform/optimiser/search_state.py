@@ -33,6 +33,7 @@ Keep = Callable[[Checkpoint], None]
 
 _FOLLOWED = 1.25  # times what structures in mind are to bear: beyond, steps see no end of their branch
 _MAY_MISS = 0.02  # of an aim: along its edge a step that is judged to the last bit leads nowhere
+_AIM = 0.3  # of a limit's weight
 _NEARLY = 0.01  # of the stiffness left, to which the end of their branch is sought
 
 
@@ -275,8 +276,10 @@ def _in_mind(search: Search) -> int:
 
 
 def merit(search: Search, point: Linearisation) -> float:
-    """The objective and a penalty for the constraint that is broken most."""
-    return point.objective + search.solver.penalty * max(violation(search, point), missed(search, point), 0.0)
+    """The objective and a penalty for the constraint that is broken most, or for the aim that is missed most,
+    which is made up for later more easily than a limit."""
+    penalty = search.solver.penalty
+    return point.objective + penalty * max(violation(search, point), _AIM * missed(search, point), 0.0)
 
 
 def noted(search: Search, it: Iterate, point: Linearisation, accepted: bool) -> Iterate:
