@@ -34,7 +34,9 @@ def profile_table(profile: Profile) -> ProfileTable:
         {kind: _sum([_of(each, kind) for each in every]) for kind in kinds},
     )
     rows = tuple((name, _cells(each, kinds)) for name, each in {**stages, "total": total}.items())
-    return ProfileTable(("clock, s", "processor, s", "waiting, s", "memory, MB", *kinds), rows)
+    return ProfileTable(
+        ("clock,\u00a0s", "processor,\u00a0s", "waiting,\u00a0s", "memory,\u00a0MB", *kinds), rows
+    )
 
 
 def _cells(stage: StageProfile, kinds: list[str]) -> tuple[str, ...]:
@@ -47,7 +49,7 @@ def _told(stage: StageProfile, kind: str) -> str:
     each = _of(stage, kind)
     if not each.calls:
         return "–"
-    return f"{each.processor:.2f}" if kind == "other" else f"{each.processor:.2f} ({each.calls:,})"
+    return f"{each.processor:.2f}" if kind == "other" else f"{each.processor:.2f}\u00a0({each.calls:,})"
 
 
 def _of(stage: StageProfile, kind: str) -> WorkRecord:
