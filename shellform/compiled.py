@@ -33,7 +33,7 @@ from shellform.work_clock import Work, WorkClock, listener
 
 __all__ = ["clock_without_compiling", "njit", "prange", "set_num_threads"]
 
-_WHOLE = "one to one and a half minutes of a free core in all"  # 75 to 95 s were measured
+_WHOLE = "one to one and a half minutes of a free core in all"  # 94 s of processor time, measured once beside other work
 _FIRST_TOLD = 10.0  # s of compiling
 
 
