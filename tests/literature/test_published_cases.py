@@ -48,4 +48,13 @@ def test_there_are_at_least_25_cases_and_each_family_is_there():
     assert len(verification.CASES) >= 25
     assert len({case.__name__ for case in verification.CASES}) == len(verification.CASES)
     families = {case.__module__.rpartition(".")[2] for case in verification.CASES}
-    assert families == {"beams", "bent", "buckling", "cables", "invariances", "limit_points"}
+    assert families == {
+        "beams",
+        "bent",
+        "buckling",
+        "cables",
+        "invariances",
+        "limit_points",
+        "suites",
+        "twisted",
+    }
