@@ -30,15 +30,11 @@ from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.trials import sound, standing
 from shellform.reliability.trial_structures import closer, to_bear
 
-_SHARE, _LED = (
-    0.1,
-    0.5,
-)  # of all evaluations, for one turn of a descent and a judgement at the most, and for all
+_SHARE = 0.1  # of all evaluations, for one turn of a descent and a judgement at the most …
+_LED = 0.5  # … and for all turns
 _WORTH = 0.03  # of the objective, gained by a turn, for which another is made
-_WINDOW, _SMALLEST = (
-    0.05,
-    0.004,
-)  # mean tensions: where structures fall depends on steps less evenly than the shape
+_WINDOW = 0.05  # mean tensions, of a turn's first step: what falls first changes within larger ones
+_SMALLEST = 0.004  # mean tensions
 _MOST = 12  # structures in mind
 _OVER = 1.03  # of what they are to bear is aimed for: an aim may be missed by a little
 
