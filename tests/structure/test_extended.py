@@ -15,7 +15,8 @@ from shellform.structure.elements.state import at_rest, from_vectors, moved
 from shellform.structure.elements.state import extended as with_tail
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
-from shellform.structure.solve.extended import ExtendedSymmetric, fit_for
+from shellform.structure.solve import equilibrium
+from shellform.structure.solve.extended import ExtendedSymmetric, fit_for, with_twice_the_digits
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.loading import Drive
 from shellform.structure.solve.residual import ResidualNorm
@@ -151,6 +152,26 @@ def test_a_branch_never_takes_for_none_more_than_states_on_the_way_may_leave():
     branch = Branch(assemble(replace(rod, beams=beams)), load, 1.0)
     found = branch.newton(at_rest(rod.nodes), load, limit=50, tolerance=1e-8)
     assert found is None or branch.measure.residual(found.balance, load) <= ON_THE_WAY
+
+
+def test_where_rounding_may_hide_the_load_only_the_relaxation_finds_out_whether_it_does(monkeypatch):
+    rod = chain(line(20), (1e6, 0.8, 1.0, 1.0), {0: CLAMP})
+    load = load_at(rod, 20, [0.0, 0.0, -0.01])
+    assembly, start = assemble(rod), at_rest(rod.nodes)
+    measure, balance = ResidualNorm(assembly), assembly.evaluate(start)
+    assert 2.0 < measure.rounding(balance, start, load) / measure.most(balance, load, 1e-8) < 10.0
+    taken = []
+
+    def counted(given):
+        taken.append(given)
+        return with_twice_the_digits(given)
+
+    monkeypatch.setattr(equilibrium, "with_twice_the_digits", counted)
+    relaxed = equilibrium.find_equilibrium(assembly, start, load)
+    assert not taken
+    plain = equilibrium.newton(assembly, start, load)  # which couldn't tell a step that stagnates
+    assert len(taken) == 1
+    np.testing.assert_allclose(relaxed.state.positions, plain.state.positions, atol=1e-9)
 
 
 def test_loads_that_cancel_to_their_last_digit_are_none():

@@ -19,7 +19,7 @@ HOLDS = np.radians(
 )  # the largest local rotation that is accepted: at 180 degrees its measure turns back
 _UNTOLD = np.radians(90.0)  # of twist, up to which it is not told
 OF_LOAD = 1e-6  # of the load, the largest residual that is ever told to be none
-_BOUND = 30.0  # times what rounding leaves, its bound may be
+_BOUND = 30.0  # times what rounding usually leaves, its bound
 _OF_STRESS = 1e-5  # of the largest internal force, the same where there is no load
 STAGNANT = 0.1  # ratio of two residuals one after the other: a step that brings less may be down to rounding
 _NO_STRESS = 1e-3  # of the largest internal force: above, what rounding leaves is all there is of it
@@ -99,10 +99,12 @@ class ResidualNorm:
         noise = self.rounding(balance, state, load)
         return residual <= min(noise, most) or (noise > _NO_STRESS and residual <= noise and not load.any())
 
-    def drowns(self, balance: Balance, state: State, load: Reals, tolerance: float) -> bool:
-        """Whether rounding surely leaves more than the largest residual that may be told to be none. Its bound is
-        ten to thirty times what is left in the end: below, steps show whether they stagnate too high."""
-        noise = self.rounding(balance, state, load) / _BOUND
+    def drowns(
+        self, balance: Balance, state: State, load: Reals, tolerance: float, *, surely: bool = False
+    ) -> bool:
+        """Whether rounding may leave more than the largest residual that may be told to be none; whether it does
+        so `surely`, for its bound is ten to thirty times what it usually leaves."""
+        noise = self.rounding(balance, state, load) / (_BOUND if surely else 1.0)
         return bool(noise > self.most(balance, load, tolerance) and (load.any() or noise <= _NO_STRESS))
 
 
