@@ -4,22 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from shellform.case.entries import OwnRodEntry, StockRodEntry
-from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
+from shellform.gridshell.catalogue import Catalogue, label, named, radius_as_stiff, read_catalogue
 from shellform.gridshell.gridshell import Rod
 from shellform.gridshell.layers import TwoLayers
 from shellform.records.remedies import RodSizes
-from shellform.structure.elements.sections import (
-    Material,
-    Rectangle,
-    Round,
-    Section,
-    Tube,
-    isotropic,
-    stiffness,
-)
+from shellform.structure.elements.sections import Material, Rectangle, Round, Section, Tube, isotropic
 
 
 def rod_material(entry: OwnRodEntry | StockRodEntry) -> Material:
@@ -63,15 +53,9 @@ def rod_sizes(entry: OwnRodEntry | StockRodEntry, rod: Rod) -> RodSizes:
     """How the case gives the size of its rods, for remedies that name it."""
     if isinstance(entry, StockRodEntry):
         single = read_catalogue(entry.catalogue).sections
-        return RodSizes({}, [(label(each), _alike(layered(entry, each), rod)) for each in single])
+        return RodSizes({}, [(label(each), radius_as_stiff(rod, layered(entry, each))) for each in single])
     names = ("radius", "wall", "width", "height")
     given = {f"rod.{name}": getattr(entry, name) for name in names}
     return RodSizes(
         {name: value for name, value in given.items() if value is not None} or {"rod.radius": rod.radius}
     )
-
-
-def _alike(section: Section, rod: Rod) -> float:
-    """The radius, m, of a rod similar to `rod` that is as stiff as the section about its weaker axis."""
-    ratio = np.array(stiffness(section)[2:]) / np.array(rod.stiffness[2:])
-    return float(rod.radius * ratio.min() ** 0.25)

@@ -210,19 +210,22 @@ def largest(catalogue: Catalogue, net: Net) -> Section:
 
 def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, float]:
     """Bounds (4), m, of the radius of sections similar to the rod's: from as stiff as the softest section
-    that the net allows to as stiff as the stiffest, so that each can be rounded up. Between two of different
-    shape the stiffness about the weaker axis counts.
+    that the net allows to as stiff as the stiffest, so that each can be rounded up.
 
     Raises InputError where the rod is stiffer than the stiffest.
     """
     sections = allowed(catalogue, net)
-    own = np.array(rod.stiffness[2:])
-    low, high = (
-        rod.radius * float((np.array(stiffness(sections[k])[2:]) / own).min()) ** 0.25 for k in (0, -1)
-    )
+    low, high = (radius_as_stiff(rod, sections[k]) for k in (0, -1))
     if rod.radius > high * (1.0 + _EQUAL):
         raise _too_stiff(rod.radius, catalogue, sections)
     return low, max(high, rod.radius)
+
+
+def radius_as_stiff(rod: Rod, section: Section) -> float:
+    """The radius, m, of a rod similar to `rod` that is as stiff as the section: between two of different shape the
+    stiffness about the weaker axis counts."""
+    own = np.array(rod.stiffness[2:])
+    return rod.radius * float((np.array(stiffness(section)[2:]) / own).min()) ** 0.25
 
 
 def rounded_up(shell: Gridshell, design: Design, catalogue: Catalogue) -> tuple[Gridshell, Design]:

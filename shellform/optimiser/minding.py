@@ -10,6 +10,7 @@ is the sample: what structures in mind bear is an aim and no limit.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -71,17 +72,16 @@ def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterat
                 break
         if search.evaluator.evaluations >= last:
             break
-        it = _turned(search, remembering(search, it) if holds else joined(search, it))
+        it = _turned(search, remembering(search, it) if holds else joined(search, it, it.accepted[-1].built))
     back = last_sound(search, replace(it, accepted=it.accepted[: it.stood]))
     if it.led_to < np.inf:
         return remembering(search, back)
     return restiffened(search, replace(back, mind=None, remembered=None), back.stiffness)
 
 
-def joined(search: Search, it: Iterate) -> Iterate:
-    """With those structures in mind too that fall in the last accepted design."""
-    built = it.accepted[-1].built
-    return minding(search, it, built, falling(search, built))
+def joined(search: Search, it: Iterate, design: Design) -> Iterate:
+    """With those structures in mind too that fall in the design."""
+    return minding(search, it, design, falling(search, design))
 
 
 def _turned(search: Search, it: Iterate) -> Iterate:
@@ -104,7 +104,7 @@ def minding(search: Search, it: Iterate, design: Design, least: dict[int, float]
     """With these structures in mind beside those that are, the latest first, all remembered in the `design`;
     the stiffness to keep goes down to the solver's own. As it was where one of them can't be followed."""
     known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
-    every = dict(list((least | {k: v for k, v in known.items() if k not in least}).items())[:_MOST])
+    every = dict(itertools.islice((least | known | least).items(), _MOST))
     if not every:
         return it
     try:
@@ -119,22 +119,16 @@ def remembering(search: Search, it: Iterate) -> Iterate:
     """With the structures in mind remembered in the present design, and its shapes of imperfection."""
     if it.mind is None:
         return it
-    window = it.window
-    least = {each.number: each.least for each in it.mind.scenarios}
-    it = minding(search, it, it.accepted[-1].built, least)
-    return replace(it, window=window, excess=np.zeros_like(it.excess))
+    return replace(minding(search, it, it.accepted[-1].built, {}), window=it.window)
 
 
 def missed_without(search: Search, it: Iterate, model: StepModel) -> Reals:
     """By what share (c,) of all present cables' the structures in mind would miss more of what they are to
     bear without each of them, to first order: the most that any structure loses when the cable goes slack."""
     assert it.mind is not None
-    evaluator, present = search.evaluator, np.flatnonzero(it.point.design.present)
-    blocks = evaluator.blocks
-    own = next(
-        part for block, part in zip(blocks.variables, blocks.slices, strict=True) if block.of_each_cable
-    )
-    rows = it.point.constraints_by_variables[-len(it.mind.scenarios) :, own][:, present]
-    longer = (model.length - it.point.design.rest_length[present]) / blocks.unit[own][present]
+    blocks, present = search.evaluator.blocks, np.flatnonzero(it.point.design.present)
+    assert blocks.each_cable is not None  # else nothing is thinned
+    rows = it.point.constraints_by_variables[-len(it.mind.scenarios) :, blocks.each_cable][:, present]
+    longer = (model.length - it.point.design.rest_length[present]) / blocks.unit[blocks.each_cable][present]
     misses = np.maximum(rows * longer, 0.0).max(axis=0)
     return np.asarray(misses / max(float(misses.sum()), 1e-300))

@@ -62,7 +62,7 @@ def run(search: Search, it: Iterate) -> Iterate:
         it = replace(_climb(search, it), phase="descend")
     if it.phase == "descend":
         it = last_sound(search, _descend(search, it))
-        each_cable = any(block.of_each_cable for block in search.problem.variables)
+        each_cable = search.evaluator.blocks.each_cable is not None
         if it.accepted and search.solver.thin and each_cable:
             it = _stiffened(search, it)
         else:
@@ -200,8 +200,7 @@ def _made_to_stand(search: Search, it: Iterate, trial: Linearisation) -> tuple[L
         if not more or before <= 0.0 or search.left() <= 0:
             break
         if it.mind is not None:
-            own = (*it.accepted, accepted_design(search, found))
-            it = replace(joined(search, replace(it, point=found, accepted=own)), accepted=it.accepted)
+            it = joined(search, replace(it, point=found), accepted_design(search, found).built)
             trial, it = _repaired(search, it, it.point)
             continue
         it = restiffened(search, replace(it, point=found), solver.stiffer * before)

@@ -270,7 +270,7 @@ def missed(search: Search, point: Linearisation) -> float:
 
 
 def _in_mind(search: Search) -> int:
-    """How many of the constraints, the last ones, are structures that the search keeps in mind."""
+    """How many of the constraints' values, the last ones, are of structures that the search keeps in mind."""
     added = search.evaluator.problem.constraints[len(search.inner.constraints) :]
     return sum(len(part.term.scenarios) for part in added if isinstance(part.term, FactorsAsBuilt))
 
@@ -299,7 +299,7 @@ def record(search: Search, point: Linearisation, stage: float, accepted: bool) -
     constraints |= {
         _column(search, part.term): float(point.constraints[own].max(initial=-np.inf))
         for part, own in zip(problem.constraints, problem.places(), strict=True)
-        if part in search.inner.constraints or not isinstance(part.term, FactorsAsBuilt)
+        if own.stop <= len(point.constraints) - _in_mind(search)
     }
     step = Step(
         search.evaluator.evaluations,

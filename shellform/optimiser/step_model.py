@@ -124,9 +124,7 @@ def step_model(evaluator: Evaluator, point: Linearisation) -> StepModel:
     shell, blocks, design = evaluator.shell, evaluator.blocks, point.design
     state, assembly = point.states[evaluator.base], evaluator.assembly(design)
     cables, present = shell.cables(design), np.flatnonzero(design.present)
-    each = next(
-        (own for block, own in zip(blocks.variables, blocks.slices, strict=True) if block.of_each_cable), None
-    )
+    each = blocks.each_cable
     other = np.ones(blocks.size, dtype=bool)
     if each is not None:
         other[each] = False

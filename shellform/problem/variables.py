@@ -180,6 +180,9 @@ class Blocks:
                 remedy="Leave one out, or let one block hold both.",
             )
         self.moves_radius = bool(owners[-1])
+        own = zip(self.variables, self.slices, strict=True)
+        # where the rest lengths of all cables one by one stand among the variables; None where no block is these
+        self.each_cable = next((place for each, place in own if each.of_each_cable), None)
 
     def values(self, design: Design) -> Reals:
         """The values (s,) of a design, each in its own unit."""

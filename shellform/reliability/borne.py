@@ -53,12 +53,11 @@ _SETTLING = 8  # factorisations of that state in this design
 class BorneFactor:
     """How much of a load a structure bears: the `factor`; by all rest lengths of the present cables
     `factor_by_rest_length` (p,), 1/m, and `factor_by_rate` (k,) by variables on which the beams' stiffness
-    depends. Both are 0 where the branch goes on beyond what was asked for. The `state` under that load."""
+    depends. Both are 0 where the branch goes on beyond what was asked for."""
 
     factor: float
     factor_by_rest_length: Reals
     factor_by_rate: Reals
-    state: State
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def borne(
         )
     low = _point(loading, here, factor)
     if factor >= most and low.stiffness >= left:
-        return BorneFactor(most, np.zeros(len(low.taut)), np.zeros(len(rates)), low.here.state)
+        return BorneFactor(most, np.zeros(len(low.taut)), np.zeros(len(rates)))
     if low.stiffness >= left:
         above, high = factor + _RESOLUTION, None
     else:
@@ -228,7 +227,7 @@ def _derived(loading: Loading, point: _Point, end: _End, rates: Sequence[Part]) 
     along = float(adjoint @ loading.load.ravel()[own.free])
     by_rest = end.by_rest_length - by_rest_length(own, state, _cables(loading)).T @ adjoint
     by_rate = end.by_rate - by_stiffness(own, state, *rates).T @ adjoint
-    return BorneFactor(point.factor, -by_rest / along, -by_rate / along, state)
+    return BorneFactor(point.factor, -by_rest / along, -by_rate / along)
 
 
 def _cables(loading: Loading) -> Cables:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -116,11 +117,10 @@ def scenarios(
 def remembered(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> FactorsAsBuilt:
     """The same with a factor and a state of each scenario in this design, not far from its end. Raises
     NotConverged."""
-    ends = borne_factors(shell, design, asked)
     workshop = _workshop(shell, design, asked)
 
-    def one(work: tuple[Scenario, BorneFactor]) -> Scenario:
-        scenario, end = work
+    def one(scenario: Scenario) -> Scenario:
+        end = _end(workshop, asked, scenario)
 
         def followed(loading: Loading) -> tuple[float, State] | None:
             here, factor = loading.followed(_BEFORE * end.factor, CAREFUL, _BEFORE_RESOLUTION)
@@ -129,7 +129,7 @@ def remembered(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> Facto
         near = workshop.with_structure(scenario.errors, followed, number=scenario.number)
         return replace(scenario, near=near)
 
-    return replace(asked, scenarios=tuple(side_by_side(one, list(zip(asked.scenarios, ends, strict=True)))))
+    return replace(asked, scenarios=tuple(side_by_side(one, list(asked.scenarios))))
 
 
 def borne_factors(
@@ -138,22 +138,19 @@ def borne_factors(
     """The factor of each scenario and its derivatives by the rest lengths and by variables on which the
     beams' stiffness depends at one of the `rates`. Raises NotConverged."""
     workshop = _workshop(shell, design, asked)
+    return side_by_side(partial(_end, workshop, asked, rates=rates), list(asked.scenarios))
 
-    def one(scenario: Scenario) -> BorneFactor:
-        def followed(loading: Loading) -> BorneFactor:
-            built = tuple(built_beams(rate, scenario.errors, asked.imperfections) for rate in rates)
-            return borne(
-                loading,
-                left=asked.left,
-                most=asked.most,
-                rates=built,
-                exact=asked.exact,
-                near=scenario.near,
-            )
 
-        return workshop.with_structure(scenario.errors, followed, number=scenario.number)
+def _end(
+    workshop: Workshop, asked: FactorsAsBuilt, scenario: Scenario, *, rates: tuple[Beams, ...] = ()
+) -> BorneFactor:
+    def followed(loading: Loading) -> BorneFactor:
+        built = tuple(built_beams(rate, scenario.errors, asked.imperfections) for rate in rates)
+        return borne(
+            loading, left=asked.left, most=asked.most, rates=built, exact=asked.exact, near=scenario.near
+        )
 
-    return side_by_side(one, list(asked.scenarios))
+    return workshop.with_structure(scenario.errors, followed, number=scenario.number)
 
 
 def _workshop(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> Workshop:

@@ -117,7 +117,8 @@ class Workshop:
         marks: Sequence[float] = (),
     ) -> Limit:
         """Where the structure with the errors loses stability under its growing load, which with `begin` is
-        known to bear a factor of it in a state, and surely on which side of factors in `marks`; what ends its path is looked into only to `tell` it."""
+        known to bear a factor of it in a state, and surely on which side of factors in `marks`; what ends its
+        path is looked into only to `tell` it."""
 
         def ended(loading: Loading) -> Limit:
             here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks)

@@ -162,9 +162,7 @@ def tried(
         nominal = perfect(shell, design, asked.loads[largest])
         workshop = Workshop(nominal)
         members = nominal.members
-        wanted = 0.0
-        if critical and safety.critical_factor is not None and asked.design_load in shares:
-            wanted = _MESH * safety.critical_factor * shares[asked.design_load]
+        wanted = _critical(asked, shares) if critical else 0.0
 
         def one(
             number: int,
@@ -219,13 +217,20 @@ def to_bear(shell: Gridshell, design: Design, asked: Required) -> dict[int, floa
     found = tried(shell, design, asked, whole=True)
     _, shares = largest_on_path(asked)
     least: dict[int, float] = {}
-    if not found.critical and asked.safety.critical_factor is not None:
-        least[PERFECT] = _MESH * asked.safety.critical_factor * shares[asked.design_load]
+    if not found.critical:
+        least[PERFECT] = _critical(asked, shares)
     for name in sorted(shares, key=lambda each: -shares[each]):
         if len(found.fallen[name]) > asked.fallen[name]:
             for number in found.fallen[name]:
                 least.setdefault(number, shares[name])
     return least
+
+
+def _critical(asked: Required, shares: Mapping[str, float]) -> float:
+    """What the perfect structure is to bear of a path's largest load; 0 where nothing is asked for on it."""
+    if asked.safety.critical_factor is None or asked.design_load not in shares:
+        return 0.0
+    return _MESH * asked.safety.critical_factor * shares[asked.design_load]
 
 
 def stands(shell: Gridshell, design: Design, asked: Required, *, first: Sequence[int] = ()) -> JudgedTrial:

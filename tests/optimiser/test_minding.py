@@ -83,7 +83,7 @@ def test_what_structures_in_mind_bear_is_an_aim_and_no_limit(searching, monkeypa
     assert merit(search, led.point) > led.point.objective + 1.5
     # those that fall later come first
     monkeypatch.setattr(minding, "to_bear", lambda *_: {2: 1.0})
-    assert [each.number for each in joined(search, led).mind.scenarios] == [2, 0, 1]
+    assert [each.number for each in joined(search, led, led.accepted[-1].built).mind.scenarios] == [2, 0, 1]
 
 
 def test_without_a_structure_that_falls_there_is_nothing_to_be_led_by(searching, monkeypatch):
