@@ -18,9 +18,9 @@ from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch
 from shellform.problem.paths import follow
 from shellform.reliability.trial_structures import confirm, stands
 from shellform.structure.elements.state import State
-from shellform.structure.solve.loading import apply_load
+from shellform.structure.solve.loading import SMALLEST, apply_load
 
-_COARSE, _FINE = 0.5, 0.125  # load steps of a search for the end of a branch, the first and the smallest
+_COARSE = 0.5  # the first load step of a search for the end of a branch
 
 
 def task(search: Search, it: Iterate, model: StepModel) -> Task:
@@ -143,7 +143,7 @@ def reach(evaluator: Evaluator, design: Design, state: State, least: float, marg
                 before,
                 after,
                 step=_COARSE,
-                smallest=min(_FINE, margin),
+                smallest=min(SMALLEST, margin),
                 stay=True,
             )
             evaluator.factorisations += loaded.factorisations

@@ -113,7 +113,7 @@ def test_a_start_that_snaps_through_under_the_additional_load_is_led_to_a_design
     start = sf.follow(shell, shell.design(), problem.loads, stay=True)
     assert start["wet"].on_branch
     assert not start["wetter"].on_branch
-    best = sf.optimise(problem, shell.design(), solver=sf.SequentialConvex(thin=False), evaluations=12)
+    best = sf.optimise(problem, shell.design(), solver=sf.SequentialConvex(thin=False), evaluations=30)
     assert best.history[0].stage < 1.0
     assert all(each.on_branch and each.equilibrium.stable for each in best.loaded.values())
     assert max(best.constraints.values()) <= sf.FEASIBLE
