@@ -51,6 +51,8 @@ _COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 _NUMBERS = ("stage", "margin", "until", "caution")
 _TOLD = ("variables", "objective", "slope", "rows", "row_slopes")
 
+# of the further load, to which the end of a branch is sought: stages nearer to it were never left again
+_SMALLEST = 0.125
 _CAUTION = 1e3  # of a later stage, so that MMA needn't find anew how soon trials leave the branch
 
 
@@ -190,7 +192,7 @@ def _begun(
     if all(reached[name].on_branch for name in used):
         states = {name: reached[name].equilibrium.state for name in used}
     else:
-        search.stage = reach(evaluator, start, state, 0.0, search.margin)
+        search.stage = reach(evaluator, start, state, 0.0, search.margin, _SMALLEST)
         states = staged(evaluator, start, state, search.stage)
     search.begin(evaluator.seed(start, states, search.stage))
     return search
@@ -251,7 +253,7 @@ def _raise_stage(search: _Search) -> None:
     where it bears no more than before, MMA's run goes on."""
     evaluator, best, solver = search.evaluator, search.best, search.solver
     state = best.states[search.base]
-    stage = reach(evaluator, best.design, state, search.stage, search.margin)
+    stage = reach(evaluator, best.design, state, search.stage, search.margin, _SMALLEST)
     if stage <= search.stage:
         search.margin = max(0.5 * search.margin, solver.least_margin)
         search.until = len(search.told) + solver.stage

@@ -130,9 +130,16 @@ def _raised(search: Search, it: Iterate) -> Iterate:
     return replace(it, stage=stage, point=point)
 
 
-def reach(evaluator: Evaluator, design: Design, state: State, least: float, margin: float) -> float:
+def reach(
+    evaluator: Evaluator,
+    design: Design,
+    state: State,
+    least: float,
+    margin: float,
+    smallest: float = SMALLEST,
+) -> float:
     """The stage to which the design's stable branch under the further loads allows to go, `margin` before
-    its end and not below `least`."""
+    its end, found in load steps of `smallest` at last, and not below `least`."""
     stages = []
     for name in evaluator.problem.used():
         if name != evaluator.base:
@@ -143,7 +150,7 @@ def reach(evaluator: Evaluator, design: Design, state: State, least: float, marg
                 before,
                 after,
                 step=_COARSE,
-                smallest=min(SMALLEST, margin),
+                smallest=min(smallest, margin),
                 stay=True,
             )
             evaluator.factorisations += loaded.factorisations
