@@ -51,8 +51,7 @@ _COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 _NUMBERS = ("stage", "margin", "until", "caution")
 _TOLD = ("variables", "objective", "slope", "rows", "row_slopes")
 
-# of the further load, to which the end of a branch is sought: stages nearer to it were never left again
-_SMALLEST = 0.125
+_SMALLEST = 0.125  # of the further load, to which a branch's end is sought: nearer stages were never left
 _CAUTION = 1e3  # of a later stage, so that MMA needn't find anew how soon trials leave the branch
 
 
@@ -155,8 +154,7 @@ def minimise_directly(
     keep: Callable[[Checkpoint], None] | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
-    """The best design that MMA finds from `start` within a number of design `evaluations`, without its slack
-    cables.
+    """The best design that MMA finds from `start` in a number of design `evaluations`, without slack cables.
 
     `progress`, `keep` and `resume` as in `optimise`. Raises NotConverged where the start doesn't carry the
     design load, or no design was found that carries the further ones; InputError where the start lies outside

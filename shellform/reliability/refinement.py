@@ -1,10 +1,6 @@
 """How far a design's numbers are off because its rods are cut into straight elements: the same model with
-each rod element halved, solved anew along the documented path.
-
-With q4 and q8 found on the two meshes and an error of order h² (beam.py), Richardson's estimate of the value
-at h = 0 and of the error of each is
-
-    q0 = q8 + (q8 - q4) / 3,   q4 - q0 = 4 (q4 - q8) / 3,   q8 - q0 = (q4 - q8) / 3.
+each rod element halved, solved anew along the documented path; what the two meshes say of the error is
+Richardson's estimate (structure/answers/halved.py).
 
 New nodes lie on the cubic through both ends of an element with their directions, turned halfway. A path that
 the finer mesh leaves much earlier has no error of order h²; the estimate then tells the size of it and
@@ -26,7 +22,7 @@ from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import SOUGHT, Limit
 from shellform.reliability.perfect import perfect_of
 from shellform.reliability.standing import Workshop
-from shellform.structure.answers.halved import with_middles
+from shellform.structure.answers.halved import Refined, with_middles
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.sections import Section
 from shellform.structure.elements.state import State
@@ -35,24 +31,6 @@ from shellform.structure.network import Network
 
 _STEP = 0.125  # of the load, towards the critical factor
 _RESOLUTION = 1e-4  # of the load factor
-
-
-@dataclass(frozen=True)
-class Refined:
-    """One number found on the design's mesh and on the one with rod elements halved."""
-
-    coarse: float
-    fine: float
-
-    @property
-    def extrapolated(self) -> float:
-        """Richardson's estimate at h = 0."""
-        return self.fine + (self.fine - self.coarse) / 3.0
-
-    @property
-    def error(self) -> float:
-        """Of the design's mesh: its number less the estimate."""
-        return self.coarse - self.extrapolated
 
 
 @dataclass(frozen=True)
@@ -75,7 +53,7 @@ def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float =
     supports = tuple(int(node) for node in shell.net.supports)
     model = Model(shell.network(design), {"load": load}, shell.target, supports)
     coarse = _numbers(model, shell.target.positions, section, sought)
-    fine = _numbers(halved(model), shell.target.positions, section, sought)
+    fine = _numbers(rods_halved(model), shell.target.positions, section, sought)
     pairs = [Refined(one, other) for one, other in zip(coarse[:4], fine[:4], strict=True)]
     return MeshError(pairs[0], pairs[1], pairs[2], pairs[3], (coarse[4], fine[4]))
 
@@ -92,7 +70,7 @@ def critical_of(model: Model, load: str = "load", *, sought: float = SOUGHT) -> 
     return _limit(model, load, sought)[1]
 
 
-def halved(model: Model) -> Model:
+def rods_halved(model: Model) -> Model:
     """The model with each beam of the kind "rod" cut in two, and what locks its layers with it, built into
     the start anew; its nodes come first, in their order."""
     network = model.network

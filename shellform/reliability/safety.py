@@ -22,7 +22,7 @@ from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import Limit
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
-from shellform.reliability.refinement import halved
+from shellform.reliability.refinement import rods_halved
 from shellform.reliability.standing import Workshop
 from shellform.structure.model import Model
 
@@ -178,7 +178,7 @@ def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: fl
     """The end of the perfect structure's path on the mesh with rod elements halved, followed up to the factor
     `sought`; 0 where the finer mesh has no unloaded equilibrium."""
     supports = tuple(int(node) for node in shell.net.supports)
-    model = halved(Model(shell.network(design), {"load": load}, shell.target, supports))
+    model = rods_halved(Model(shell.network(design), {"load": load}, shell.target, supports))
     nominal = perfect_of(model, "load", shapes=0)
     members = members_of_model(model)
     none = drawn(members, Tolerances(), 0, PERFECT)

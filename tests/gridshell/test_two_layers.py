@@ -17,7 +17,7 @@ from shellform.problem.engineering import RodUtilisation
 from shellform.problem.paths import deviations, follow
 from shellform.reliability.drawing import errors_of, variables
 from shellform.reliability.members import members_of
-from shellform.reliability.refinement import halved
+from shellform.reliability.refinement import rods_halved
 from shellform.site.erection import erect
 from shellform.structure.elements.beam import joined, make_beams
 from shellform.structure.elements.cable import make_cables
@@ -184,7 +184,7 @@ def test_locks_are_cut_with_their_rods_and_scatter_with_them(shells, solved, tmp
         tmp_path / "m.json", Model(shell.network(shell.design()), {"load": load}, shell.target, supports)
     )
     model = read_model(tmp_path / "m.json")
-    finer = halved(model)
+    finer = rods_halved(model)
     beams = finer.network.beams
     assert beams.of_kind("lock").sum() == beams.of_kind("rod").sum() == 2 * len(shell.net.grid.rod_ends)
     np.testing.assert_allclose(beams.local_forces(finer.start)[beams.of_kind("lock")], 0.0, atol=1e-8)

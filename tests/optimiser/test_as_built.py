@@ -1,7 +1,6 @@
 """A search that is asked for designs that stand as built."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,21 +14,10 @@ ASKED = sf.Safety(ROUGH, critical_factor=None, drawn=10, tried=6, seed=5)
 
 
 @pytest.fixture(scope="module")
-def dome():
-    """The vault with wide cells and two elements a segment."""
-    root = Path(__file__).parent.parent.parent
-    surface = sf.cad.build_surface(root / "surfaces/vault.py", size=0.02)
-    net = sf.pull_net(surface, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
-    rod = sf.Rod.round(young=40e9, radius=0.0012, strength=255e6)
-    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
-    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=surface)
-
-
-@pytest.fixture(scope="module")
-def problem(dome):
-    wet = dome.point_load(4.5, every=2)
+def problem(stout):
+    wet = stout.point_load(4.5, every=2)
     return sf.Problem(
-        dome,
+        stout,
         sf.LoadCase("wet", wet),
         [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
         [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
@@ -38,36 +26,36 @@ def problem(dome):
 
 
 @pytest.fixture(scope="module")
-def found(dome, problem):
+def found(stout, problem):
     kept = []
-    return sf.optimise(problem, dome.design(), evaluations=50, safety=ASKED, keep=kept.append), kept
+    return sf.optimise(problem, stout.design(), evaluations=50, safety=ASKED, keep=kept.append), kept
 
 
-def test_the_design_found_has_fewer_cables_and_stands_as_a_fresh_sample_says(dome, problem, found):
+def test_the_design_found_has_fewer_cables_and_stands_as_a_fresh_sample_says(stout, problem, found):
     best, _ = found
-    assert best.design.present.sum() < 0.8 * dome.design().present.sum()
-    judged = sf.judge(dome, best.design, problem.loads, replace(ASKED, seed=999), design_load="wet")
+    assert best.design.present.sum() < 0.8 * stout.design().present.sum()
+    judged = sf.judge(stout, best.design, problem.loads, replace(ASKED, seed=999), design_load="wet")
     assert judged.holds, judged.failed
 
 
-def test_a_search_with_safety_resumed_in_thinning_ends_with_the_same_design_to_the_bit(dome, problem, found):
+def test_a_search_with_safety_resumed_in_thinning_ends_with_the_same_design_to_the_bit(stout, problem, found):
     whole, kept = found
     for phase in ("descend", "thin"):
         place = [each.numbers["phase"] for each in kept].index(phase)
-        again = sf.optimise(problem, dome.design(), evaluations=50, safety=ASKED, resume=kept[place])
+        again = sf.optimise(problem, stout.design(), evaluations=50, safety=ASKED, resume=kept[place])
         np.testing.assert_array_equal(again.design.rest_length, whole.design.rest_length)
         np.testing.assert_array_equal(again.design.present, whole.design.present)
         assert (again.evaluations, again.status) == (whole.evaluations, whole.status)
 
 
-def test_where_no_accepted_design_stands_the_search_says_so(dome, problem, monkeypatch):
+def test_where_no_accepted_design_stands_the_search_says_so(stout, problem, monkeypatch):
     def falls(shell, design, asked, *, first=()):
         found = stands(shell, design, asked, first=first)
         return replace(found, stands=False)
 
     monkeypatch.setattr(trials, "stands", falls)
     best = sf.optimise(
-        problem, dome.design(), evaluations=4, safety=ASKED, solver=sf.SequentialConvex(thin=False)
+        problem, stout.design(), evaluations=4, safety=ASKED, solver=sf.SequentialConvex(thin=False)
     )
     assert "no design was found that stands as built" in best.status
 
@@ -87,30 +75,30 @@ def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(
     assert polished.status == "no design with less misfit was found"
 
 
-def test_structures_that_fell_before_come_first_and_refuse_early(dome, problem):
+def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem):
     heavy = {"wet": 2.2 * problem.loads["wet"]}
     asked = Required(ASKED, heavy, "wet", {"wet": 6})
-    every = tried(dome, dome.design(), asked)
+    every = tried(stout, stout.design(), asked)
     assert every.fallen["wet"]
     strict = Required(ASKED, heavy, "wet", {"wet": 0})
-    early = tried(dome, dome.design(), strict, first=every.fallen["wet"][-1:])
+    early = tried(stout, stout.design(), strict, first=every.fallen["wet"][-1:])
     assert not early.stands
     assert early.factorisations < every.factorisations
 
 
-def test_no_more_is_asked_of_designs_than_the_start_shows(dome, problem):
+def test_no_more_is_asked_of_designs_than_the_start_shows(stout, problem):
     heavy = {"wet": 1.4 * problem.loads["wet"], "wetter": 2.2 * problem.loads["wet"]}
-    asked = required(dome, dome.design(), heavy, ASKED, design_load="wet")
+    asked = required(stout, stout.design(), heavy, ASKED, design_load="wet")
     assert asked.fallen["wetter"] > 0
-    assert stands(dome, dome.design(), asked).stands
+    assert stands(stout, stout.design(), asked).stands
     named = required(
-        dome, dome.design(), heavy, replace(ASKED, probability_additional=0.99), design_load="wet"
+        stout, stout.design(), heavy, replace(ASKED, probability_additional=0.99), design_load="wet"
     )
     assert named.fallen["wetter"] == 0
 
 
-def test_a_design_is_confirmed_only_with_its_critical_factor_on_the_halved_mesh(dome, problem):
+def test_a_design_is_confirmed_only_with_its_critical_factor_on_the_halved_mesh(stout, problem):
     loads = {"wet": problem.loads["wet"]}
     for factor, holds in ((1.05, True), (5.0, False)):
         safety = replace(ASKED, critical_factor=factor, tried=1)
-        assert confirm(dome, dome.design(), Required(safety, loads, "wet", {"wet": 1})).stands == holds
+        assert confirm(stout, stout.design(), Required(safety, loads, "wet", {"wet": 1})).stands == holds

@@ -22,22 +22,13 @@ ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.
 ASKED = sf.Safety(ROUGH, critical_factor=None, tried=3, enlarged=1.0, seed=5)
 
 
-@pytest.fixture(scope="module")
-def dome(vault):
-    """The vault with wide cells and two elements a segment."""
-    net = sf.pull_net(vault, spacing=0.11, gap=0.002, angle=np.deg2rad(45.0), elements=2)
-    rod = sf.Rod.round(young=40e9, radius=0.0012, strength=255e6)
-    joint = sf.Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
-    return sf.brace(net, rod, joint, sf.Cable(stiffness=187.0), below=vault)
-
-
 @pytest.fixture
-def searching(dome):
+def searching(stout):
     """A search of a problem, its start, and all checkpoints that it handed out."""
-    wet = dome.point_load(4.5, every=2)
+    wet = stout.point_load(4.5, every=2)
     one = Required(ASKED, {"wet": wet}, "wet", {"wet": 0})
     problem = sf.Problem(
-        dome,
+        stout,
         sf.LoadCase("wet", wet),
         [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
         [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
@@ -46,7 +37,7 @@ def searching(dome):
     kept: list[Checkpoint] = []
     search, it = begin(
         problem,
-        dome.design(),
+        stout.design(),
         sf.SequentialConvex(),
         lambda softest: 0.5 * softest,
         12,
@@ -56,17 +47,17 @@ def searching(dome):
     return search, it, kept
 
 
-def test_structures_that_fall_too_often_are_to_bear_their_loads_and_the_perfect_one_its_factor(dome):
-    load = dome.point_load(4.5, every=2)
+def test_structures_that_fall_too_often_are_to_bear_their_loads_and_the_perfect_one_its_factor(stout):
+    load = stout.point_load(4.5, every=2)
     heavy = {"wet": 10.0 * load, "wetter": 12.0 * load}  # nothing bears as much
     asked = Required(replace(ASKED, critical_factor=1.25), heavy, "wet", {"wet": 0, "wetter": 0})
-    found = to_bear(dome, dome.design(), asked)
+    found = to_bear(stout, stout.design(), asked)
     assert found.pop(PERFECT) == pytest.approx(1.25 * 1.01 / 1.2)
     assert found == pytest.approx(dict.fromkeys(range(3), 1.0))
     # what is allowed to fall under the larger load is to bear the design load
     allowed = replace(asked, fallen={"wet": 0, "wetter": 3})
-    assert to_bear(dome, dome.design(), allowed)[0] == pytest.approx(1.0 / 1.2)
-    assert not to_bear(dome, dome.design(), replace(asked, loads={"wet": load}, fallen={"wet": 0}))
+    assert to_bear(stout, stout.design(), allowed)[0] == pytest.approx(1.0 / 1.2)
+    assert not to_bear(stout, stout.design(), replace(asked, loads={"wet": load}, fallen={"wet": 0}))
 
 
 def test_what_structures_in_mind_bear_is_an_aim_and_no_limit(searching, monkeypatch):
@@ -159,8 +150,8 @@ def test_a_cable_counts_for_what_structures_in_mind_would_lose_without_it(search
     assert at[0] - at[1] == pytest.approx(step * rows[:, present[cable]], rel=1e-2)
 
 
-def test_a_search_that_is_led_is_judged_by_more_structures(dome):
-    load = dome.point_load(4.5, every=2)
+def test_a_search_that_is_led_is_judged_by_more_structures(stout):
+    load = stout.point_load(4.5, every=2)
     loads = {"wet": load, "wetter": 1.2 * load}
     one = Required(ASKED, loads, "wet", {"wet": 0, "wetter": 2})
     found = closer(Demand(one, one)).trial

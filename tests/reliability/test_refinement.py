@@ -11,8 +11,9 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.failure import explained, most_likely
 from shellform.reliability.path_of_one import BIFURCATION, BORNE, LIMIT_POINT
 from shellform.reliability.perfect import perfect, perfect_of
-from shellform.reliability.refinement import Refined, critical_factor, critical_of, halved, mesh_error
+from shellform.reliability.refinement import critical_factor, critical_of, mesh_error, rods_halved
 from shellform.reliability.standing import Workshop
+from shellform.structure.answers.halved import Refined
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
@@ -31,7 +32,7 @@ def test_richardsons_estimate_of_a_parabola_in_h_is_exact():
 
 def test_a_halved_model_has_twice_the_rod_elements_on_the_same_joints(dome, nominal):
     model = Model(nominal.network, {"load": nominal.load}, dome.target, ())
-    finer = halved(model)
+    finer = rods_halved(model)
     rods = (model.network.beams.kind == 0).sum()
     assert (finer.network.beams.kind == 0).sum() == 2 * rods
     assert finer.network.nodes[: len(nominal.load)] == pytest.approx(model.network.nodes, abs=0.0)
@@ -45,7 +46,7 @@ def test_the_deviation_moves_by_a_quarter_as_much_when_rods_are_halved_again(dom
     states = []
     for _ in range(4):
         states.append(perfect_of(model, "load", shapes=0).states[-1].positions[: len(nominal.load)])
-        model = halved(model)
+        model = rods_halved(model)
     steps = [np.linalg.norm(b - a) for a, b in pairwise(states)]
     assert steps[1] / steps[2] == pytest.approx(4.0, rel=0.15)
 

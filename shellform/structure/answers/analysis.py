@@ -20,7 +20,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
-from shellform.structure.answers.halved import MeshNote, critical_error
+from shellform.structure.answers.halved import Refined, critical_error
 from shellform.structure.answers.request import (
     check_imposed_turns,
     check_request,
@@ -54,8 +54,8 @@ class Analysis:
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
     `converged`; `increments` as the contract has them, each with the `steps` it took; `modes` and `critical`
     where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable branch
-    from the start; None where the method (Newton's) doesn't tell. `critical_mesh`: what straight beams leave of the
-    critical factor.
+    from the start; None where the method (Newton's) doesn't tell. `critical_mesh`: the critical factor on
+    this mesh and with beams halved.
     """
 
     model: Model
@@ -71,7 +71,7 @@ class Analysis:
     critical: Critical | None = None
     critical_sought: float = 0.0
     on_branch: bool | None = None
-    critical_mesh: MeshNote | None = None
+    critical_mesh: Refined | None = None
 
 
 def analyse(
@@ -367,14 +367,15 @@ class _Analysis:
         return lambda factorisations, residual: tell(factor, self.spent + factorisations)
 
 
-def _coarse(mesh: MeshNote | None) -> list[str]:
+def _coarse(mesh: Refined | None) -> list[str]:
     """What has to be said of a critical factor that the size of the elements decides, in a sentence."""
-    if mesh is None or abs(mesh.share) <= _COARSE:
+    if mesh is None or abs(mesh.error) <= _COARSE * mesh.coarse:
         return []
+    share = 100.0 * abs(mesh.error) / mesh.coarse
     side = "high" if mesh.error > 0.0 else "low"
     return [
-        f"The critical factor {mesh.factor:.6g} is about {100.0 * abs(mesh.share):.1f} % too {side}, by the same with "
-        f"beams halved (extrapolated {mesh.factor - mesh.error:.6g}): divide the rods into more elements."
+        f"The critical factor {mesh.coarse:.6g} is about {share:.1f} % too {side}, by the same with "
+        f"beams halved (extrapolated {mesh.extrapolated:.6g}): divide the rods into more elements."
     ]
 
 

@@ -1,7 +1,9 @@
-"""A model with each beam cut in two, and what a critical factor is off because beams are straight.
+"""A model with each beam cut in two, and what numbers are off because beams are straight.
 
-With f4 and f8 found on the two meshes and an error of order h² (elements/beam.py), Richardson's estimate of the error
-of f4 is 4 (f4 - f8) / 3.
+With q4 and q8 found on the two meshes and an error of order h² (elements/beam.py), Richardson's estimate of the value
+at h = 0 and of the error of each is
+
+    q0 = q8 + (q8 - q4) / 3,   q4 - q0 = 4 (q4 - q8) / 3,   q8 - q0 = (q4 - q8) / 3.
 
 Where beams stand for a curve, halves of the chords would keep the polygon. The curvature at a node where two beams
 of one kind meet, k = (t' - t) / l with their directions and mean length, belongs to a beam as far as both its ends have
@@ -30,23 +32,28 @@ _CORNER = np.radians(30.0)  # between two beams that don't stand for a curve
 
 
 @dataclass(frozen=True)
-class MeshNote:
-    """What a critical `factor` is too high by, `error`, negative where it is too low."""
+class Refined:
+    """One number found on a mesh, `coarse`, and on the one with beams halved, `fine`."""
 
-    factor: float
-    error: float
+    coarse: float
+    fine: float
 
     @property
-    def share(self) -> float:
-        """The error over the factor."""
-        return self.error / self.factor
+    def extrapolated(self) -> float:
+        """Richardson's estimate at h = 0."""
+        return self.fine + (self.fine - self.coarse) / 3.0
+
+    @property
+    def error(self) -> float:
+        """Of the coarse mesh: its number less the estimate, negative where it is too low."""
+        return self.coarse - self.extrapolated
 
 
 def critical_error(
     model: Model, drive: Drive, factor: float, *, goal: float, tolerance: float
-) -> MeshNote | None:
-    """The error of the critical `factor` of the model under the drive, found up to `goal`; None where no beam can be
-    halved or the finer model has no critical factor up to 1.5 times the goal.
+) -> Refined | None:
+    """The critical `factor` of the model under the drive, found up to `goal`, beside that of the finer one; None where
+    no beam can be halved or the finer model has no critical factor up to 1.5 times the goal.
     """
     finer = halved(model)
     more = len(finer.network.nodes) - len(model.network.nodes)
@@ -62,7 +69,7 @@ def critical_error(
         found = critical_load(assembly, state, wider, goal=1.5 * goal, first=0.1 / 1.5, tolerance=tolerance)
     except NotConverged:
         return None
-    return None if found is None else MeshNote(factor, 4.0 * (factor - found.factor) / 3.0)
+    return None if found is None else Refined(factor, found.factor)
 
 
 def halved(model: Model) -> Model:
