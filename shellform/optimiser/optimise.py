@@ -233,7 +233,7 @@ def begin(
     it = Iterate(
         point,
         (accepted_design(search, point),),
-        (record(search, point, stage, True),),
+        (record(search, point, stage, True, "climb"),),
         stiffness,
         stage,
         search.first_window,

@@ -18,8 +18,8 @@ from shellform.structure.solve.loading import Loaded
 @dataclass(frozen=True)
 class Step:
     """One trial in the history: `objective` and its weighted `terms`, `constraints` by name (largest value of
-    each), the `cables` in tension, the `stage` of the additional loads, whether it was `accepted`, and
-    `seconds` since the start."""
+    each), the `cables` in tension, the `stage` of the additional loads, whether it was `accepted`,
+    `seconds` since the start, and the `phase` of the search, "" where it has none or it isn't known."""
 
     evaluation: int
     objective: float
@@ -29,6 +29,7 @@ class Step:
     stage: float
     accepted: bool
     seconds: float
+    phase: str = ""
 
 
 @dataclass(frozen=True)

@@ -284,10 +284,10 @@ def merit(search: Search, point: Linearisation) -> float:
 
 def noted(search: Search, it: Iterate, point: Linearisation, accepted: bool) -> Iterate:
     """With a trial added to the history, and told."""
-    return replace(it, history=(*it.history, record(search, point, it.stage, accepted)))
+    return replace(it, history=(*it.history, record(search, point, it.stage, accepted, it.phase)))
 
 
-def record(search: Search, point: Linearisation, stage: float, accepted: bool) -> Step:
+def record(search: Search, point: Linearisation, stage: float, accepted: bool, phase: str) -> Step:
     """A trial as a step of the history, told to who watches."""
     problem, pull = search.evaluator.problem, tensions(search, point)
     terms = {
@@ -310,6 +310,7 @@ def record(search: Search, point: Linearisation, stage: float, accepted: bool) -
         stage,
         accepted,
         time.perf_counter() - search.began,
+        phase,
     )
     if search.progress is not None:
         search.progress(step)
@@ -333,7 +334,7 @@ def finish(search: Search, it: Iterate) -> Optimum:
         )
     design = without_slack(shell, it.point.design, it.point.states[search.base])
     loaded = follow(shell, design, {"none": none, **problem.loads})
-    last = _judged(search, design, loaded)
+    last = _judged(search, design, loaded, it.phase)
     return Optimum(
         problem,
         design,
@@ -353,6 +354,6 @@ def finish(search: Search, it: Iterate) -> Optimum:
     )
 
 
-def _judged(search: Search, design: Design, loaded: Mapping[str, Loaded]) -> Step:
+def _judged(search: Search, design: Design, loaded: Mapping[str, Loaded], phase: str) -> Step:
     states = {name: loaded[name].equilibrium.state for name in search.problem.loads}
-    return record(search, search.evaluator.seed(design, states, 1.0), 1.0, True)
+    return record(search, search.evaluator.seed(design, states, 1.0), 1.0, True, phase)

@@ -46,6 +46,7 @@ from shellform.reliability.standing import Workshop
 from shellform.run.figures import FAILURE
 from shellform.run.folder import Run, read_run
 from shellform.run.judged import asked_as_built, judged, run_checks
+from shellform.run.pace import time_words
 from shellform.run.sampling import Clock, drawn_of
 from shellform.run.thicker import rods_that_stand
 from shellform.run.workspace import Workspace
@@ -203,7 +204,7 @@ def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: 
         workspace.report(
             Event(
                 "safety",
-                f"{each.name} design as built: structure {done} of {count} under the load “{load}”, {left:.0f} s left at this pace",
+                f"{each.name} design as built: structure {done} of {count} under the load “{load}”, about {time_words(left)} left of this stage",
                 fraction=clock.fraction(),
                 seconds_left=left,
             )

@@ -4,7 +4,7 @@ polished.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 
 import numpy as np
@@ -36,11 +36,13 @@ from shellform.records.summary import (
 )
 from shellform.run.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
 from shellform.run.designs import followed, forget, keep
-from shellform.run.pace import Pace
+from shellform.run.pace import POLISHING, WITHOUT_LOADS, Pace, time_words
 from shellform.run.robustness import robustness
 from shellform.run.workspace import Workspace
 from shellform.tables import Table, table_text
 from shellform.written import write_text
+
+_UNLOADED = 15  # evaluations at most, of the design without regard to the loads
 
 
 def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals], summary: Summary) -> Summary:
@@ -96,12 +98,13 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
     from shellform.optimiser import optimise as optimiser
 
     entry = workspace.case.optimise
-    pace = Pace(entry.evaluations)
+    polishes = entry.polish > 0 and entry.method != "paper"
+    pace = Pace(entry.evaluations, POLISHING * polishes + WITHOUT_LOADS * entry.unloaded)
 
     def watch(step: Step) -> None:
         rejected = "" if step.accepted else ", rejected"
-        left = pace.left(step.evaluation)
-        still = "" if left is None else f", {left:.0f} s left at this pace"
+        left = pace.left(step.evaluation, step.phase)
+        still = "" if left is None else f", about {time_words(left)} left of this stage"
         workspace.report(
             Event(
                 "optimise",
@@ -166,7 +169,10 @@ def _polished(
         return None, "no cable is left"
     workspace.say("optimise", "polishing the cables that are left")
     try:
-        polished = optimiser.polish(last, evaluations=workspace.case.optimise.polish, groups=groups)
+        most = workspace.case.optimise.polish
+        polished = optimiser.polish(
+            last, evaluations=most, groups=groups, progress=_telling(workspace, "polishing", most)
+        )
     except NotConverged as error:  # averaged lengths may not bear the loads; the design before them stands
         workspace.say("optimise", f"not polished: {error.what}", Kind.NOTE)
         return None, error.what
@@ -208,7 +214,22 @@ def _without_loads(workspace: Workspace, shell: Gridshell, start: Design, none: 
         [AtMost(cable.force_max, CableForces("none"))],
         variables=[RestLengths(entry.rest_length_min, entry.rest_length_max)],
     )
-    return optimiser.optimise(problem, start, solver=SequentialConvex(thin=False), evaluations=15).design
+    return optimiser.optimise(
+        problem,
+        start,
+        solver=SequentialConvex(thin=False),
+        evaluations=_UNLOADED,
+        progress=_telling(workspace, "without the loads", _UNLOADED),
+    ).design
+
+
+def _telling(workspace: Workspace, what: str, most: int) -> Callable[[Step], None]:
+    """Tells each trial of a search that isn't the main one."""
+
+    def tell(step: Step) -> None:
+        workspace.say("optimise", f"{what}: evaluation {step.evaluation}/{most} at most")
+
+    return tell
 
 
 def _rounded(

@@ -1,9 +1,9 @@
-"""How long is left is told by the pace of the steps themselves."""
+"""How long is left is told by the pace of each phase, with what comes after the search."""
 
 import pytest
 
 from shellform.run import pace
-from shellform.run.pace import Pace
+from shellform.run.pace import Pace, time_words
 
 
 @pytest.fixture
@@ -22,16 +22,43 @@ def test_what_came_before_the_first_step_is_not_taken_for_its_pace(at):
     assert search.left(1) == pytest.approx(59.0)
 
 
-def test_a_search_that_slows_down_is_told_by_its_last_steps_and_one_that_speeds_up_by_all(at):
-    slow, fast = Pace(40), Pace(40)
+def test_a_phase_has_its_own_pace_whatever_those_before_it_took(at):
+    search = Pace(1000)
     for step in range(21):
-        at(float(step) if step <= 10 else 10.0 + 4.0 * (step - 10))
-        left = slow.left(step)
-    assert left == pytest.approx(4.0 * 20)
+        at(float(step))
+        search.left(step, "descend")
+    for step in range(21, 121):
+        at(20.0 + 4.0 * (step - 20))
+        left = search.left(step, "thin")
+    assert left == pytest.approx(4.0 * 880, rel=0.05)
+
+
+def test_a_phase_that_has_just_begun_is_taken_to_go_on_as_the_one_before(at):
+    search = Pace(40)
     for step in range(21):
-        at(4.0 * step if step <= 10 else 40.0 + step - 10)
-        left = fast.left(step)
-    assert left == pytest.approx(2.5 * 20)
+        at(float(step))
+        search.left(step, "descend")
+    at(30.0)  # one structure after the other was drawn
+    assert 20.0 < search.left(20, "thin") < 100.0
+
+
+def test_the_judgement_at_the_end_and_what_follows_the_search_are_counted(at):
+    search = Pace(30, afterwards=35)
+    for step in range(11):
+        at(2.0 * step)
+        search.left(step, "descend")
+    for step in range(11, 31):
+        at(20.0 + 8.0 * (step - 10))
+        left = search.left(step, "thin")
+    assert left == pytest.approx(2.0 * 35 + 8.0, rel=0.05)
+
+
+def test_a_search_that_is_gone_on_with_is_told_by_what_it_takes_now(at):
+    search = Pace(100)
+    at(3.0)
+    assert search.left(60, "thin") is None
+    at(5.0)
+    assert search.left(61, "thin") == pytest.approx(78.0)
 
 
 def test_more_steps_than_planned_leave_nothing(at):
@@ -40,3 +67,13 @@ def test_more_steps_than_planned_leave_nothing(at):
         at(float(step))
         left = search.left(step)
     assert left == 0.0
+
+
+def test_times_are_told_no_finer_than_they_are_known():
+    assert [time_words(each) for each in (4.2, 99.0, 130.0, 5400.0, 9000.0)] == [
+        "4 s",
+        "99 s",
+        "2 min",
+        "90 min",
+        "2 h",
+    ]
