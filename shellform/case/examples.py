@@ -28,7 +28,13 @@ class Example:
 
 EXAMPLES = {
     "vault": Example(
-        "the paper's scale model, 0.9 × 0.55 m, rods of 2 mm",
+        "a first design: a vault of 0.9 × 0.55 m, rods of 2.4 mm",
+        ("vault.toml",),
+        "vault.ply",
+        "shellform design vault.toml --output run",
+    ),
+    "paper": Example(
+        "the paper's scale model: the same vault, rods of 2 mm, nearly too thin for it",
         ("scale_model.toml",),
         "vault.py",
         "shellform design scale_model.toml --output run",

@@ -38,16 +38,16 @@ def test_an_example_is_laid_with_all_it_needs_and_is_taken_there_unasked(name, t
 
 
 def test_nothing_of_a_user_s_is_overwritten(tmp_path):
-    lay_example("vault", tmp_path)
-    lay_example("vault", tmp_path)
+    lay_example("radius", tmp_path)
+    lay_example("radius", tmp_path)
     (tmp_path / "vault.py").write_text("# mine", encoding="utf-8")
     with pytest.raises(InputError, match=r"vault.py: is there already"):
-        lay_example("vault", tmp_path)
+        lay_example("radius", tmp_path)
     assert (tmp_path / "vault.py").read_text(encoding="utf-8") == "# mine"
 
 
 def test_a_laid_script_that_was_changed_is_not_run_unasked(tmp_path):
-    lay_example("vault", tmp_path)
+    lay_example("radius", tmp_path)
     script = tmp_path / "vault.py"
     script.write_text(script.read_text(encoding="utf-8") + "\n", encoding="utf-8")
     with pytest.raises(InputError, match="--allow-scripts"):
@@ -55,8 +55,19 @@ def test_a_laid_script_that_was_changed_is_not_run_unasked(tmp_path):
 
 
 def test_an_unknown_example_is_refused_with_those_that_there_are(tmp_path):
-    with pytest.raises(InputError, match="Known: vault, radius"):
+    with pytest.raises(InputError, match="Known: vault, paper, radius"):
         lay_example("tower", tmp_path)
+
+
+def test_the_vault_s_mesh_is_its_script_s_and_is_read_without_gmsh(tmp_path):
+    lay_example("vault", tmp_path)
+    code = f"""import sys
+sys.modules["gmsh"] = None
+import shellform as sf
+print(sf.read_surface(r"{tmp_path / "vault.ply"}").area)"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    built = sf.cad.build_surface(ROOT / "surfaces/vault.py", size=0.01, length=0.90, width=0.55, height=0.21)
+    assert float(done.stdout) == pytest.approx(built.area, rel=1e-6)
 
 
 def test_the_wheel_holds_every_case_and_surface(tmp_path):
