@@ -32,6 +32,7 @@ PAGES = ROOT / "shellform/documentation"
 PICTURES = ROOT / "scripts/pictures"
 SPEED = ROOT / "scripts/benchmark.json"
 WORKER = ROOT / "scripts/iframe-worker.js"
+OURS = (ROOT / "scripts/site.css", ROOT / "scripts/site.js")
 SITE = ROOT / "shellform/_site"
 
 
@@ -39,6 +40,8 @@ def gather(folder: Path) -> None:
     """Puts all pages into a folder, those that are written anew and the pictures too."""
     shutil.copytree(PAGES, folder, dirs_exist_ok=True)
     shutil.copytree(PICTURES, folder / "pictures")
+    for file in OURS:
+        shutil.copy(file, folder)
     for name, text in {
         "reference/commands.md": commands(),
         "reference/case.md": case_file(),

@@ -95,7 +95,7 @@ def tell_verdict(verdict: VerdictRecord) -> None:
 def tell_as_built(summary: Summary) -> None:
     """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one
     to build fails first."""
-    from shellform.records.words import critical_words, standing_words
+    from shellform.records.words import cause_title, critical_words, standing_words
 
     for name, design in summary.designs.items():
         for load, row in design.loads.items():
@@ -113,7 +113,7 @@ def tell_as_built(summary: Summary) -> None:
         cables = f"; {', '.join(found.cables)} go slack" if found.cables else ""
         print(
             f"fails first: structure {found.number} at {found.factor:.2f} of the load “{found.load}” ({found.kind}), "
-            f"driven by {found.driver.replace('_', ' ')}, without which it bears {found.without[found.driver]:.2f}{cables}"
+            f"driven by {cause_title(found.driver)}, without which it bears {found.without[found.driver]:.2f}{cables}"
         )
 
 

@@ -24,6 +24,25 @@ _CONSTRAINTS = {
     "uplift": "uplift of supports",
 }
 
+_CAUSES = {
+    "cable_length": "the cables' lengths",
+    "cable_stiffness": "the cables' stiffness",
+    "supports": "the supports' places",
+    "marks": "the marks on the rods",
+    "rod_stiffness": "the rods' stiffness",
+    "rod_bow": "the rods' bow",
+    "connectors": "the connectors' stiffness",
+    "load_each": "the load's error at each crossing",
+    "load_all": "the error of the whole load",
+    "load_uneven": "more load on one half",
+    "shape": "the shape's imperfection",
+}
+
+
+def cause_title(name: str) -> str:
+    """A cause of error (gridshell/tolerances.py) in words."""
+    return _CAUSES.get(name, name.replace("_", " "))
+
 
 def load_title(name: str, factor: float | None = None) -> str:
     """A load case in words."""

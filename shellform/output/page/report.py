@@ -92,6 +92,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
             next_size=run.next_size,
         ),
         "failure": summary.failure,
+        "failure_driver": "" if summary.failure is None else words.cause_title(summary.failure.driver),
         "failure_load": "" if summary.failure is None else words.load_title(summary.failure.load),
         "designs": rows,
         "shown_first": sorted(rows, key=lambda each: each[0] != run.best),
