@@ -305,6 +305,8 @@ def speed() -> str:
         for row in found["rows"]
     ]
     told = "; ".join([*found["notes"], f"load of the machine before: {found['load_before']:g}"])
+    missed = [row["what"] for row in found["rows"] if row["holds"] is False]
+    told += f". Aims not met: {'; '.join(missed)}" if missed else ""
     notes = (PAGES / "speed.md").read_text(encoding="utf-8")
     return notes + f"\n## The numbers\n\n{told}.\n\n" + table(["what", "value", "unit", "aim"], cells) + "\n"
 
