@@ -65,9 +65,9 @@ def _free_port():
 
 
 def own_shell(here):
-    """my_shell.3dm: a dome of 11 m in plan on the layer Shell."""
+    """my_shell.3dm: a dome of 2.2 m on the layer Shell."""
     dome = sf.read_surface(ROOT / "surfaces/dome.3dm", layer="Shell")
-    item = Item("Shell", "shell", 12.0 * dome.vertices, dome.triangles)
+    item = Item("Shell", "shell", 2.4 * dome.vertices, dome.triangles)
     write_rhino(here / "my_shell.3dm", [item], {"Shell": "#336699"})
 
 

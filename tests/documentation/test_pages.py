@@ -39,7 +39,7 @@ GENERATED = {"reference/commands.md", "reference/case.md", "reference/python.md"
 SHIM = """#!/usr/bin/env bash
 small=()
 case "$1 $2" in
-  design*) small=(--set net.elements=2 --set optimise.evaluations=2 --set optimise.polish=0 --set surface.size=0.03
+  design*) small=(--set net.elements=2 --set optimise.evaluations=2 --set optimise.polish=2 --set surface.size=0.03
     --set optimise.unloaded=false --set cable.without=false --set safety.drawn=4 --set safety.compared=1) ;;&
   "design scale_model"*|"design vault"*) small+=(--set net.spacing=0.11 --set load.force=2.0) ;;
 esac
