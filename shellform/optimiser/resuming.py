@@ -40,6 +40,8 @@ def tell(search: Search, it: Iterate) -> None:
     }
     for name, state in it.point.states.items():
         arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
+        if state.tail is not None:
+            arrays[f"{name} tail"] = state.tail
     numbers["radius"], numbers["mind"] = design.radius, {}
     if it.mind is not None and it.remembered is not None:
         numbers["mind"] = {str(each.number): each.least for each in it.mind.scenarios}
@@ -64,7 +66,7 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
         mind = kept_in_mind(search, remembered, least)
     search.evaluator.problem = aimed(search.inner, numbers["stiffness"], mind)
     states = {
-        name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"])
+        name: State(arrays[f"{name} positions"], arrays[f"{name} quaternions"], arrays.get(f"{name} tail"))
         for name in search.evaluator.problem.used()
     }
     point = search.evaluator.seed(design, states, numbers["stage"])

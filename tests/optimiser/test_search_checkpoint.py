@@ -1,9 +1,14 @@
 """An optimisation that is broken off goes on from where it stood, to the same design."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import shellform as sf
+from shellform.optimiser.optimise import begin
+from shellform.optimiser.resuming import resumed, tell
+from shellform.structure.elements.state import extended, moved
 
 
 @pytest.fixture(scope="module")
@@ -64,3 +69,38 @@ def test_a_search_resumed_thinning_ends_with_the_same_design_and_history_to_the_
     assert len(thinning) > 1
     for place in (thinning[0], thinning[-1]):  # before the first batch, and with the memory of some
         assert_resumed_alike(least, shell.design(), place, whole, **settings)
+
+
+def test_a_search_led_by_drawn_structures_and_resumed_ends_with_the_same_design_to_the_bit(shell):
+    # More is asked of the perfect structure than stiffness leads to; the search descends no further than it has to.
+    wet = shell.point_load(4.5, every=2)
+    problem = sf.Problem(
+        shell,
+        sf.LoadCase("wet", wet),
+        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
+        [sf.AtMost(9.0, sf.CableForces("wet"))],
+    )
+    settings = {
+        "solver": sf.SequentialConvex(settled=10.0),
+        "safety": sf.Safety(sf.Tolerances(supports=1e-4), critical_factor=1.9, drawn=2, tried=2, enlarged=1.0),
+        "evaluations": 12,
+    }
+    kept = []
+    whole = sf.optimise(problem, shell.design(), keep=kept.append, **settings)
+    phases = [each.numbers["phase"] for each in kept]
+    for place in (phases.index("lead") + 1, len(kept) - 1):
+        assert_resumed_alike(problem, shell.design(), kept[place], whole, **settings)
+
+
+def test_a_search_resumed_with_states_of_twice_the_digits_has_all_of_them(shell, problem):
+    kept = []
+    search, it = begin(
+        problem, shell.design(), sf.SequentialConvex(), lambda softest: softest, 1, keep=kept.append
+    )
+    step = np.full((shell.node_count, 6), 1e-17)
+    states = {name: moved(extended(state), step) for name, state in it.point.states.items()}
+    tell(search, replace(it, point=replace(it.point, states=states)))
+    again = resumed(search, kept[-1])[1].point.states
+    for name, state in states.items():
+        assert state.tail.any()
+        np.testing.assert_array_equal(again[name].tail, state.tail)

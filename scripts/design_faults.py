@@ -1,0 +1,221 @@
+"""SIGKILL to a design at random moments of all its stages and phases, each resumed to the end; and the same design
+undisturbed.
+
+    scripts/design_faults.py [--kills 60] [--folder DIR] [--seed 1] [--set ENTRY=VALUE …]
+
+Passes when every disturbed run ends like the undisturbed one, with the same bytes but for seconds, and with no
+traceback, torn or further file. The case is the vault with wide cells, whose search is led by structures that fall
+before it thins.
+
+Each run is a process forked from this one, which has loaded the program: what a kill leaves is the same, and a run
+is begun again in no time. Moments are counted in processor time, which other work on the machine doesn't change.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import re
+import signal
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+from shellform.errors import InputError  # noqa: E402
+from shellform.run.checkpoint import FILE as CHECKPOINT  # noqa: E402
+from shellform.written import is_partial  # noqa: E402
+
+CASE = ROOT / "scripts/scale_model.toml"
+SETTINGS = [
+    "surface.size=0.03",
+    "net.spacing=0.11",
+    "net.elements=2",
+    "load.force=4.5",
+    "safety.critical_factor=1.9",
+    "safety.drawn=4",
+    "safety.compared=2",
+    "optimise.evaluations=24",
+    "optimise.polish=3",
+]
+_UNLIKE = ("log.txt", "lock")  # times of day, and how often it was begun
+_TICK = 1.0 / os.sysconf("SC_CLK_TCK")
+_LOOK = 0.02  # s between two looks
+
+
+def main() -> int:
+    """Runs the trial; status 0 where it passes."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--kills", type=int, default=60)
+    parser.add_argument("--folder", type=Path, default=None)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--set", action="append", default=[], help="beside the settings of the small vault")
+    asked = parser.parse_args()
+    place = asked.folder or Path(tempfile.mkdtemp(prefix="design_faults"))
+    place.mkdir(parents=True, exist_ok=True)
+    settings, chance = [*SETTINGS, *asked.set], random.Random(asked.seed)
+    whole, times = place / "whole", Counter[str]()
+    end = run(whole, settings, times=times)
+    print(
+        "undisturbed, s of processor time: " + ", ".join(f"{k} {v:.1f}" for k, v in times.items()), flush=True
+    )
+    kills, runs, failed = Counter[str](), 0, 0
+    while kills.total() < asked.kills:
+        runs += 1
+        out, places = place / f"out{runs}", list(times)
+        at, ended = 0, None
+        while ended is None:
+            if kills.total() == asked.kills:
+                ended = run(out, settings)
+                break
+            at = min(len(places) - 1, at + chance.randrange(2))
+            moment = chance.uniform(0.0, 1.0) * times[places[at]]
+            ended, reached = disturbed(out, settings, set(places[at:]), moment)
+            if ended is None:
+                kills[reached] += 1
+                at = max(at, places.index(reached))
+                print(f"{kills.total()} kills, the last in {reached}", flush=True)
+        wrong = [] if ended == end else [f"status {ended} instead of {end}"]
+        wrong += differences(out, whole)
+        failed += bool(wrong)
+        print(f"run {runs}: {'; '.join(wrong) or 'the same bytes'}", flush=True)
+    print(", ".join(f"{count} in {name}" for name, count in sorted(kills.items())))
+    print(
+        f"{kills.total()} kills of {runs} runs, {failed} of which ended otherwise: {'FAIL' if failed else 'pass'}"
+    )
+    return 1 if failed else 0
+
+
+def run(folder: Path, settings: list[str], *, times: Counter[str] | None = None) -> int:
+    """Runs the design to its end and returns its status; adds the processor time of each stage to `times`."""
+    job, before = begin(folder, settings), 0.0
+    while True:
+        now = stage_of(folder)
+        ended, status = os.waitpid(job, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+        spent = processor_time(job)
+        if times is not None:
+            times[now] += spent - before
+        before = spent
+        time.sleep(_LOOK)
+
+
+def disturbed(folder: Path, settings: list[str], places: set[str], moment: float) -> tuple[int | None, str]:
+    """Runs the design until it has been in one of the stages for so many seconds of processor time, and kills it:
+    None and the stage; or its status where it ended before."""
+    job, since = begin(folder, settings), None
+    while True:
+        now = stage_of(folder)
+        ended, status = os.waitpid(job, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status), now
+        spent = processor_time(job)
+        if since is None and now in places:
+            since = spent
+        if since is not None and spent - since >= moment:
+            os.kill(job, signal.SIGKILL)
+            os.waitpid(job, 0)
+            return None, stage_of(folder)
+        time.sleep(_LOOK)
+
+
+def begin(folder: Path, settings: list[str]) -> int:
+    """The command in a process of its own, whose output goes beside the folder; the process."""
+    import shellform.__main__
+    import shellform.cli.design
+    import shellform.output.page.report
+    import shellform.run.documents
+    import shellform.run.figures
+    import shellform.run.optimising
+
+    sys.stdout.flush()
+    job = os.fork()
+    if job:
+        return job
+    told = os.open(folder.with_suffix(".log"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    os.dup2(told, 1)
+    os.dup2(told, 2)
+    sys.argv = ["shellform", "design", str(CASE), "--output", str(folder)]
+    sys.argv += [word for each in settings for word in ("--set", each)]
+    status: object = 1
+    try:
+        shellform.__main__.main()
+        status = 0
+    except SystemExit as end:
+        status = end.code
+    except BaseException:
+        sys.excepthook(*sys.exc_info())
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status if isinstance(status, int) else 0 if status is None else 1)
+
+
+def processor_time(job: int) -> float:
+    """Of a process, s."""
+    words = Path(f"/proc/{job}/stat").read_text().rsplit(")", 1)[1].split()
+    return _TICK * (int(words[11]) + int(words[12]))
+
+
+def stage_of(folder: Path) -> str:
+    """The stage that is under way in a folder; of the optimiser's, its phase too."""
+    from shellform.arrays import read_arrays
+    from shellform.records.stages import STAGES, read_stages
+
+    done = read_stages(folder).keys
+    stage = next((each for each in STAGES if each not in done), STAGES[-1])
+    if stage != "optimise":
+        return stage
+    try:
+        told = json.loads(str(read_arrays(folder / CHECKPOINT)["told"]))
+    except InputError:  # none yet, or none any more
+        begun = (folder / "history.csv").exists()
+        return "optimise, after the search" if begun else "optimise, before the search"
+    if (folder / "history.csv").exists():
+        return "optimise, after the search"
+    return f"optimise, phase {told['numbers']['phase']}"
+
+
+def differences(out: Path, whole: Path) -> list[str]:
+    """What a folder has otherwise than another, but for seconds; and tracebacks."""
+    found = []
+    one, two = (
+        {file.relative_to(each) for file in each.rglob("*") if file.is_file()} for each in (out, whole)
+    )
+    found += [f"only undisturbed: {name}" for name in sorted(two - one)]
+    found += [f"{'torn' if is_partial(name) else 'only disturbed'}: {name}" for name in sorted(one - two)]
+    found += [
+        f"other bytes: {name}"
+        for name in sorted(one & two)
+        if str(name) not in _UNLIKE and timeless(out / name) != timeless(whole / name)
+    ]
+    if "Traceback" in out.with_suffix(".log").read_text(encoding="utf-8"):
+        found.append("a traceback")
+    return found
+
+
+def timeless(file: Path) -> bytes:
+    """A file's bytes without what was measured on the clock."""
+    data = file.read_bytes()
+    if file.name == "summary.json":
+        told = json.loads(data)
+        del told["seconds"]
+        return json.dumps(told).encode()
+    if file.name == "history.csv":
+        return b"\n".join(line.rsplit(b",", 1)[0] for line in data.splitlines())
+    if file.name == "report.html":
+        return re.sub(rb'"seconds": ?(\{[^}]*\}|\[[^]]*\]|[-+.\de]+)', b"", data)
+    return data
+
+
+if __name__ == "__main__":
+    sys.exit(main())
