@@ -82,7 +82,9 @@ def test_a_search_led_by_drawn_structures_and_resumed_ends_with_the_same_design_
     )
     settings = {
         "solver": sf.SequentialConvex(settled=10.0),
-        "safety": sf.Safety(sf.Tolerances(supports=1e-4), critical_factor=1.9, drawn=2, tried=2, enlarged=1.0),
+        "safety": sf.Safety(
+            sf.Tolerances(supports=1e-4), critical_factor=1.9, drawn=2, tried=2, enlarged=1.0
+        ),
         "evaluations": 12,
     }
     kept = []
