@@ -8,8 +8,8 @@ listed with its line; what nobody could notice stands with its reason in scripts
 fewer than 90 % of the others are caught. A test that notices is run without any fault, too: one that fails then is
 left out and told.
 
-A loop that is compiled lies inlined in others' machine code, too, whose own files don't change: a fault in one is run
-with a cache of its own.
+What is compiled here is copied along. A loop that is compiled lies inlined in others' machine code, too, whose own
+files don't change: a fault in one is run with a cache of its own.
 
 The tools that are at hand (mutmut, cosmic-ray) run all tests on each fault or know one process's modules; here
 a compiled loop has to be compiled anew, and the tests take a quarter of an hour.
@@ -178,7 +178,7 @@ def likeliest(fault: Fault) -> list[str]:
 def caught_by(fault: Fault, copy: Path, files: Sequence[str], left_out: Sequence[str] = ()) -> str:
     """The test in the `files`, without those `left_out`, that notices a fault; "" where none does."""
     file = copy / fault.file
-    whole = file.read_bytes()
+    whole, then = file.read_bytes(), file.stat()
     lines = whole.decode().splitlines(keepends=True)
     starts = [0]
     for line in lines:
@@ -190,17 +190,20 @@ def caught_by(fault: Fault, copy: Path, files: Sequence[str], left_out: Sequence
         return failed(copy, files, own, left_out)
     finally:
         file.write_bytes(whole)
+        os.utime(file, ns=(then.st_atime_ns, then.st_mtime_ns))  # by which Numba knows what it has compiled
         if own is not None:
             shutil.rmtree(own)
 
 
 def failed(copy: Path, files: Sequence[str], cache: str | None = None, left_out: Sequence[str] = ()) -> str:
-    """The first test in the `files` that fails, but for those `left_out`, with compiled loops in a `cache` other
-    than all others' where given."""
+    """The first test in the `files` that fails, but for those `left_out`, with compiled loops in a `cache` where
+    given, else beside the copy's modules."""
     if not files:
         return ""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider"]
-    environment = {**os.environ, "PYTHONPATH": str(copy), "NUMBA_CACHE_DIR": cache or str(copy / "compiled")}
+    environment = {**os.environ, "PYTHONPATH": str(copy)} | (
+        {} if cache is None else {"NUMBA_CACHE_DIR": cache}
+    )
     try:
         done = subprocess.run(
             [*command, *(f"--deselect={each}" for each in left_out), *files], cwd=copy, env=environment, capture_output=True, text=True, timeout=WAITING,
