@@ -73,10 +73,10 @@ def main() -> int:
         out, places = place / f"out{runs}", list(times)
         at, ended = 0, None
         while ended is None:
-            if kills.total() == asked.kills:
+            at += chance.randrange(2)
+            if at == len(places) or kills.total() == asked.kills:
                 ended = run(out, settings)
                 break
-            at = min(len(places) - 1, at + chance.randrange(2))
             moment = chance.uniform(0.0, 1.0) * times[places[at]]
             ended, reached = disturbed(out, settings, set(places[at:]), moment)
             if ended is None:
