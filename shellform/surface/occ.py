@@ -29,7 +29,9 @@ try:
 except (ImportError, OSError) as error:  # a shared library that gmsh's wheel needs isn't there
     raise InputError(
         f"gmsh can't be loaded: {error}",
-        remedy="On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 "
+        remedy="Allow more memory (ulimit -v): its library takes 1 GB of addresses."
+        if "map segment" in str(error) or "allocate memory" in str(error)
+        else "On Debian and Ubuntu: apt-get install libgl1 libglu1-mesa libxrender1 libxcursor1 libxft2 "
         "libxinerama1",
     ) from error
 

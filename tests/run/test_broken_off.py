@@ -38,6 +38,7 @@ def test_a_run_without_a_design_tells_cause_remedy_and_what_was_found(tmp_path, 
     assert read_summary(tmp_path / "run").failed == {"initial": str(refused.value)}
     run_case(small_case(ROOT), tmp_path / "run", until="initial")
     assert not read_summary(tmp_path / "run").failed, "and it goes on once the cause is gone"
+    assert not (tmp_path / "run/report.html").exists(), "without the page that tells of it"
 
 
 def test_a_run_with_a_design_that_deforms_too_much_shows_it_and_says_so_first(tmp_path):

@@ -293,8 +293,15 @@ def test_gmsh_is_closed_after_success_and_failure_and_never_taken_from_another()
         gmsh.finalize()
 
 
-def test_missing_system_libraries_are_named_in_one_line(tmp_path):
-    (tmp_path / "gmsh.py").write_text("raise OSError('libGL.so.1: cannot open shared object file')\n")
+@pytest.mark.parametrize(
+    ("cause", "remedy"),
+    [
+        ("libGL.so.1: cannot open shared object file", "apt-get install libgl1 libglu1-mesa"),
+        ("libgmsh.so.4.15: failed to map segment from shared object", "Allow more memory (ulimit -v)"),
+    ],
+)
+def test_why_gmsh_can_not_be_loaded_is_told_in_one_line(tmp_path, cause, remedy):
+    (tmp_path / "gmsh.py").write_text(f"raise OSError({cause!r})\n")
     code = (
         "import shellform.errors as e\ntry:\n    import shellform.surface.cad\n"
         "except e.InputError as error:\n    print(error)"
@@ -307,8 +314,8 @@ def test_missing_system_libraries_are_named_in_one_line(tmp_path):
         check=True,
         env={**os.environ, "PYTHONPATH": path},
     )
-    assert "libGL.so.1" in run.stdout
-    assert "apt-get install libgl1 libglu1-mesa" in run.stdout
+    assert cause in run.stdout
+    assert remedy in run.stdout
     assert run.stdout.count("\n") == 1
 
 
