@@ -4,7 +4,8 @@ leaves no torn file.
     scripts/fuzz.py [--count 10000] [--seed 1] [--kind KIND …]
 
 Good files of each kind are damaged at random: bits turned, pieces cut, doubled, moved and filled with junk,
-numbers made huge, negative, not a number, values of JSON exchanged for others. A child process reads them, so
+numbers made huge, negative, not a number, values of JSON exchanged for others or for one another, keys swapped and
+doubled, references led round in circles, text written as other systems do. A child process reads them, so
 that a crash or a hang costs nobody anything but is counted. What fails is kept in a folder that is named at
 the end.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 
 import argparse
 import collections
+import contextlib
 import io
 import json
 import random
@@ -39,7 +41,11 @@ _NUMBERS = [
     b"inf",
     b"-inf",
     b"1e308",
+    b"-1e308",
     b"1e-308",
+    b"9" * 5000,
+    b"-0",
+    b"true",
     b"99999999999999999999",
     b"0.5",
     b"2147483648",
@@ -53,8 +59,10 @@ _VALUES = [
     -1,
     0,
     1e308,
+    -1e308,
     float("nan"),
     float("inf"),
+    10**400,
     "",
     "x",
     [],
@@ -88,15 +96,16 @@ _SHARES = {
     "json": 7,
     "scan": 6,
 }
+_SHARES |= {"analyse": 10, "report": 1}  # whole commands, on what their readers let pass
 _SHARES |= {"catalogue": 4, "sections": 3, "run": 4, "log": 4, "design": 1} | dict.fromkeys(
     sorted(_FOREIGN), 0.25
 )
 
 
-def damaged(data: bytes, chance: random.Random) -> bytes:
-    """A file's bytes after one to four accidents."""
+def damaged(data: bytes, chance: random.Random, *, numbers: bool = False) -> bytes:
+    """A file's bytes after one to four accidents, to its `numbers` alone where a command is to go on from them."""
     for _ in range(chance.choice([1, 1, 1, 2, 4])):
-        data = chance.choice(_ACCIDENTS)(data, chance)
+        data = (_number if numbers else chance.choice(_ACCIDENTS))(data, chance)
     return data
 
 
@@ -140,7 +149,12 @@ def _number(data: bytes, chance: random.Random) -> bytes:
     if not found:
         return _bits(data, chance)
     one = chance.choice(found)
-    return data[: one.start()] + chance.choice(_NUMBERS) + data[one.end() :]
+    other = chance.choice(_NUMBERS)
+    if chance.random() < 0.5:  # one that may be meant
+        other = (
+            f"{float(one[0]) * chance.choice([-1, 1, 1]) * 10.0 ** chance.randrange(-12, 13):.6g}".encode()
+        )
+    return data[: one.start()] + other + data[one.end() :]
 
 
 def _lines(data: bytes, chance: random.Random) -> bytes:
@@ -168,11 +182,54 @@ def _value(data: bytes, chance: random.Random) -> bytes:
     if not places:
         return data
     branch, key = chance.choice(places)
-    if chance.random() < 0.2:
+    what = chance.random()
+    if what < 0.2:
         del branch[key]  # type: ignore[attr-defined]
+    elif what < 0.4:  # what stands elsewhere in the document; a reference may come to lead back to itself
+        other, place = chance.choice(places)
+        branch[key], other[place] = other[place], branch[key]  # type: ignore[index]
+    elif what < 0.5:
+        branch[key] = chance.randrange(-1, 70)  # type: ignore[index]
+    elif what < 0.6 and isinstance(branch[key], list):  # type: ignore[index]
+        branch[key] = 2 * branch[key]  # type: ignore[index]
     else:
         branch[key] = chance.choice(_VALUES)  # type: ignore[index]
-    return json.dumps(tree).encode()
+    try:
+        return json.dumps(tree).encode()
+    except (ValueError, RecursionError):  # a branch was put into itself
+        return data
+
+
+def _keys(data: bytes, chance: random.Random) -> bytes:
+    """Two keys of a TOML or JSON document swapped, or one doubled or in another's place."""
+    found = list(
+        re.finditer(rb'(?m)^[ \t]*[\w.]+(?= *=)|"[^"\n]{1,40}"(?= *:)|^\[+[\w.]+\]+', data[:200_000])
+    )
+    if len(found) < 2:
+        return _lines(data, chance)
+    first, second = sorted(chance.sample(found, 2), key=lambda each: each.start())
+    a, b = chance.choice(
+        [(second[0], first[0]), (first[0], first[0]), (second[0], second[0]), (first[0], second[0] + b"x")]
+    )
+    return data[: first.start()] + a + data[first.end() : second.start()] + b + data[second.end() :]
+
+
+def _written(data: bytes, chance: random.Random) -> bytes:
+    """As other systems and editors write text."""
+    how = chance.randrange(6)
+    if how == 0:
+        return b"\xef\xbb\xbf" + data
+    if how == 1:
+        return data.replace(b"\n", b"\r\n")
+    if how == 2:
+        return data.replace(b"\n", b"\r")
+    if how == 3:
+        return data.rstrip(b"\n")
+    try:
+        text = data.decode()
+    except UnicodeDecodeError:
+        return data.replace(b".", b",")
+    return text.encode("utf-16") if how == 4 else text.replace(".", ",").encode()
 
 
 _ACCIDENTS: list[Callable[[bytes, random.Random], bytes]] = [
@@ -185,6 +242,10 @@ _ACCIDENTS: list[Callable[[bytes, random.Random], bytes]] = [
     _lines,
     _value,
     _value,
+    _value,
+    _keys,
+    _keys,
+    _written,
 ]
 
 
@@ -231,6 +292,7 @@ def sound(folder: Path) -> dict[str, list[Path]]:
     ]:
         (folder / name).write_text(json.dumps(model))
         files["model"].append(folder / name)
+    files["analyse"] = files["model"]
     (folder / "scan.csv").write_text(
         "# x y z\n" + "\n".join(f"{k},{0.5 * k},{0.1 * k * k}" for k in range(30))
     )
@@ -247,6 +309,7 @@ def sound(folder: Path) -> dict[str, list[Path]]:
         for file in run.rglob("*")
         if file.suffix in (".json", ".npz", ".toml") and "states" not in file.parts
     ]
+    files["report"] = files["run"]
     with Log(folder / "results.jsonl") as log:
         log.add([Outcome(f"{k:032d}", Status.DONE, values={"x": k}) for k in range(20)])
     files["log"] = [folder / "results.jsonl"]
@@ -259,11 +322,11 @@ def attempt(kind: str, number: int, files: dict[str, list[Path]], place: Path) -
 
     chance = random.Random(f"{kind} {number}")
     good = chance.choice(files[kind])
-    data = damaged(good.read_bytes(), chance)
+    data = damaged(good.read_bytes(), chance, numbers=kind == "analyse" and number % 4 > 0)
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     bad = place / good.name
-    if kind == "run":
+    if kind in ("run", "report"):
         run = next(each for each in good.parents if (each / "case.toml").is_file())
         shutil.copytree(run, place / "run")
         bad = place / "run" / good.relative_to(run)
@@ -274,7 +337,11 @@ def attempt(kind: str, number: int, files: dict[str, list[Path]], place: Path) -
         _read(kind, bad, place)
     except (InputError, NotConverged) as error:
         said = str(error)
-        return "refused" if said.strip() and "\n" not in said[:40] else f"BAD no message: {said!r}"
+        return (
+            "refused"
+            if said.strip() and "\n" not in said[:40] and "Traceback" not in said
+            else f"BAD no message: {said!r}"
+        )
     except RecursionError:
         return "BAD RecursionError"
     except Exception:  # what the readers must never raise
@@ -297,6 +364,11 @@ def _read(kind: str, bad: Path, place: Path) -> None:
         plan = read_study(bad)
         for own, _ in zip(changes(plan), range(5), strict=False):
             resolved(plan, own)
+    elif kind == "analyse":
+        way = ["--critical", "3"] if len(bad.read_bytes()) % 2 else ["--increments", "2"]
+        _command("analyse", bad, "--load", "tip", *way, "--output", place / "found.json")
+    elif kind == "report":
+        _command("report", place / "run", "--output", place / "page.html")
     elif kind == "model":
         from shellform.structure.model import read_model
 
@@ -336,6 +408,25 @@ def _read(kind: str, bad: Path, place: Path) -> None:
         from shellform.surface.readers.reading import read_surface
 
         read_surface(bad)
+
+
+def _command(*words: str | Path) -> None:
+    """A command line in this process. Raises InputError where it ends with the status of bad input or of no result,
+    and what it raises itself."""
+    from shellform.cli import program
+    from shellform.errors import InputError
+
+    sys.argv, told = ["shellform", *map(str, words)], io.StringIO()
+    status: object = 0
+    with contextlib.redirect_stderr(told):
+        try:
+            program.main()
+        except SystemExit as end:
+            status = end.code
+    if status in (2, 3):
+        raise InputError(told.getvalue())
+    if status:
+        raise RuntimeError(f"status {status}: {told.getvalue()[-300:]}")
 
 
 def child(folder: Path) -> None:
