@@ -1,11 +1,13 @@
 """Models with their beams cut in two: what stands for a curve is cut on it, what is straight stays straight."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shellform.structure.answers.analysis import analyse
 from shellform.structure.answers.halved import halved
-from shellform.structure.elements.state import at_rest
+from shellform.structure.elements.state import at_rest, from_vectors
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
 from shellform.verification.models import CLAMP, PIN, chain, in_plane, line, load_at, polyline
@@ -67,3 +69,18 @@ def test_a_bent_start_is_cut_on_the_cubic_through_its_ends():
     radius = 0.125 / (2.0 * np.sin(0.125))
     away = np.linalg.norm(finer.start.positions - [0.0, 0.0, -radius], axis=1)
     np.testing.assert_allclose(away, radius, atol=0.02 * radius * (1.0 - np.cos(0.125)))
+
+
+@pytest.mark.parametrize("turns", [(0.02, 0.10), (-0.10, 0.10), (0.05, 0.05), (0.0, 0.12)])
+def test_halves_of_a_bent_beam_go_on_with_its_moments_though_its_ends_are_bent_differently(turns):
+    """Two halves of the cubic bear m(s) = m_a (1 - s) + m_b s of the whole beam, so the same at the new node:
+    to small angles, with 1 % of the largest."""
+    points = line(1)
+    whole = model(points, {0: PIN, 1: PIN})
+    state = from_vectors(points, [[0.0, turn, 0.0] for turn in turns])
+    finer = halved(replace(whole, start=state))
+    one = whole.network.beams.local_forces(state)[0, [2, 5]]
+    first, second = finer.network.beams.local_forces(finer.start)[:, [2, 5]]
+    largest = np.abs(one).max()
+    assert first == pytest.approx([one[0], 0.5 * (one[1] - one[0])], abs=0.01 * largest)
+    assert second == pytest.approx([0.5 * (one[0] - one[1]), one[1]], abs=0.01 * largest)

@@ -114,7 +114,8 @@ def halved(model: Model) -> Model:
 
 
 def with_middles(state: State, beams: Beams, cut: Indices) -> State:
-    """The state with the middles of the beams `cut` on the cubic through their ends, turned halfway."""
+    """The state with the middles of the beams `cut` on the cubic through their ends: along it, and turned about it
+    halfway."""
     a, b = beams.ends[cut].T
     one, other = state.positions[a], state.positions[b]
     length = np.linalg.norm(other - one, axis=1)[:, None]
@@ -123,11 +124,24 @@ def with_middles(state: State, beams: Beams, cut: Indices) -> State:
         np.einsum("eij,ej->ei", rotation.matrices(state.quaternions[node]), axis) * length for node in (a, b)
     ]
     middle = 0.5 * (one + other) + 0.125 * (along[0] - along[1])
+    tangent = 1.5 * (other - one) - 0.25 * (along[0] + along[1])
     first, second = state.quaternions[a], state.quaternions[b]
     same = np.where((first * second).sum(axis=1, keepdims=True) < 0.0, -1.0, 1.0)
     half = first + same * second
     half /= np.linalg.norm(half, axis=1, keepdims=True)
+    half = _turned_along(half, axis, tangent)
     return State(np.vstack([state.positions, middle]), np.vstack([state.quaternions, half]))
+
+
+def _turned_along(quaternions: Reals, axis: Reals, direction: Reals) -> Reals:
+    """The quaternions (k, 4) turned on by the least rotation that brings what was `axis` (k, 3) into the
+    `direction` (k, 3) of any length."""
+    now = np.einsum("eij,ej->ei", rotation.matrices(quaternions), axis)
+    wanted = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    cosine = (now * wanted).sum(axis=1, keepdims=True)
+    least = np.hstack([1.0 + cosine, np.cross(now, wanted)])
+    least /= np.linalg.norm(least, axis=1, keepdims=True)
+    return rotation.product(least, quaternions)
 
 
 def _bulge(nodes: Reals, beams: Beams) -> Reals:
