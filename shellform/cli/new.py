@@ -32,6 +32,9 @@ def new(
             help="2: rods of two laths or tubes, bent one by one, then locked by shear blocks; left out: where one falls."
         ),
     ] = None,
+    edges: Annotated[
+        str, typer.Option(help="wall: the outer edge stands on walls all round; auto: on what is found.")
+    ] = "auto",
     allow_scripts: Scripts = False,
     quiet: Quiet = False,
 ) -> None:
@@ -46,7 +49,7 @@ def new(
             output,
             surface_options,
             allow_scripts=allow_scripts,
-            wish=DesignWish(rod, spacing, thickness, angle, layers),
+            wish=DesignWish(rod, spacing, thickness, angle, layers, edges),
             report=report,
         )
     finally:

@@ -22,7 +22,7 @@ from shellform.gridshell.gridshell import Rod, erection_stress
 from shellform.gridshell.joints import following, usual_gap
 from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
-from shellform.net.edges import stand
+from shellform.net.edges import Edges, stand
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
@@ -30,6 +30,7 @@ from shellform.run.first_trial import (
     DRAWN,
     NEEDED,
     PULLED,
+    STRESSED,
     FirstParts,
     Followed,
     drawn_standing,
@@ -70,9 +71,10 @@ THICKNESS, LEAST_THICKNESS = 0.05, 0.015  # m: usual; a first layer of sprayed c
 _SLENDER = 80.0  # thicknesses across the larger side of a model, on which 50 mm would be a block
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
-_STRESSED = 0.95  # of the strength, at the most, under the additional load
 _AIMED = 0.92  # of it, for which concrete is thinned
 _STEPS = 4  # sections tried on one net
+_EASED = 5  # times that cables are eased, by less prestrain or thicker strands
+_SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 _THINNER = 8  # thicknesses tried
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
 Say = Callable[[str], None]
@@ -120,7 +122,8 @@ class _Search:
         self.surface, self.wish, self._say, self.allowance = surface, wish, say, allowance
         self.told: list[str] = []
         self.best: Obstacle | None = None
-        self.reason = "as asked"
+        self.reasons: dict[float, str] = {}
+        self.edges = Edges(outer=wish.edges)
         one = (1,) if wish.rod else (1, 2)
         self.layers: Sequence[int] = one if wish.layers is None else (wish.layers,)
         self.angles: Sequence[float] = ANGLES  # worth trying; with a finer spacing only those that were best
@@ -130,14 +133,16 @@ class _Search:
         self._say(text)
 
     def found(self) -> FirstDesign:
-        spacing, self.reason = self._first_spacing()
+        spacing, reason = self._first_spacing()
+        self.reasons[spacing] = reason
         thickness = self.wish.thickness or usual_thickness(self.surface)
         for number in range(_SPACINGS):
             if number:
                 finer = practical(_FINER * spacing)
                 if self.wish.spacing is not None or self._vain(spacing, finer):
                     break
-                spacing, self.reason = finer, f"finer than {spacing:g} m, with which the shell falls"
+                self.reasons[finer] = f"finer than {spacing:g} m, with which the shell falls"
+                spacing = finer
             design = self._on_net(spacing, thickness)
             if design is not None:
                 return design
@@ -155,7 +160,7 @@ class _Search:
         if self.best is None:
             raise refused(self.surface, None, self.wish)
         crossings = self.surface.area / finer**2
-        if self.allowance.left <= 0:
+        if self.allowance.left <= 0 or self.best.spacing > spacing:  # a coarser net came nearer
             return True
         if crossings > (CURVED if self.best.why is Why.NET else MOST_CROSSINGS):
             return True
@@ -215,18 +220,20 @@ class _Search:
         placed, choice, nearest = failure.placed, failure.choice, failure
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
+        seen = {choice}
         for _ in range(_THINNER):
             if failure.factor == 0.0 or self.allowance.left <= 0:  # without any concrete it doesn't stand
                 break
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
                 other = possible[_next(placed.net, possible, possible.index(choice), failure)]
-            if other == choice:  # else the load is kept, and rods that leave more of their strength are tried
+            if other in seen:  # else the load is kept, and rods that leave more of their strength are tried
                 share = min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
                 if failure.why is Why.STRENGTH:
                     share = min(max(load_borne(placed.net, choice, failure.stress, _AIMED), 0.5), 0.9)
-                thinner = _whole_mm(share * thinner)
-            choice = other
+                thinner, other = _whole_mm(share * thinner), choice
+            seen.add(other)
+            choice, before = other, failure
             if thinner < 0.002:
                 break
             result = self._stands(placed, choice, failure.spacing, thinner)
@@ -237,6 +244,9 @@ class _Search:
                 return result
             failure, placed = result, result.placed or placed
             if failure.why is Why.NET:
+                break
+            if failure.breaks_unloaded(before, STRESSED):
+                nearest = failure
                 break
         raise refused(self.surface, nearest, self.wish)
 
@@ -258,7 +268,7 @@ class _Search:
             f"net at {best.angle:g}° and {spacing:g} m: {len(best.net.grid.lattice)} crossings, "
             f"rods bend to a radius of {bends_to(best.net):.3g} m"
         )
-        placed = replace(best, net=stand(best.net, self.surface))
+        placed = replace(best, net=stand(best.net, self.surface, self.edges))
         refuse_tipping(placed.net)
         return placed
 
@@ -276,7 +286,7 @@ class _Search:
         self, placed: Placed, choice: RodChoice, bundle: int, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design, where it stands with the gap that follows its rods too."""
-        parts = FirstParts(choice, bundle, rest_ratio_for(self.surface, spacing))
+        parts = FirstParts(choice, bundle, rest_ratio_for(self.surface, spacing), rope_for(spacing))
         parts, tried, failure = self._solved(placed, parts, spacing, thickness)
         what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
         if placed.net.edges:
@@ -284,7 +294,7 @@ class _Search:
         gap = following(Rod(choice.section)).gap
         if failure is None and not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
             try:
-                placed = with_gap(self.surface, placed, spacing, gap, self._say)
+                placed = with_gap(self.surface, placed, spacing, gap, self.edges, self._say)
             except (NoNet, Stalled) as error:
                 return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             parts, tried, failure = self._solved(placed, parts, spacing, thickness)
@@ -306,7 +316,7 @@ class _Search:
         material = choice.section.material
         allowed = placed.net.max_radius(young=material.young, strength=material.strength)
         return FirstDesign(
-            spacing, self.reason, placed, choice, rope_for(spacing), bundle, parts.rest_ratio, thickness, tried,
+            spacing, self.reasons[spacing], placed, choice, parts.rope, bundle, parts.rest_ratio, thickness, tried,
             standing, DRAWN, allowed, tuple(self.told),
         )  # fmt: skip
 
@@ -314,22 +324,33 @@ class _Search:
         self, placed: Placed, parts: FirstParts, spacing: float, thickness: float
     ) -> tuple[FirstParts, Followed, Obstacle | None]:
         """The parts with cables below their limit, what the design came to, and what it fails by, if it does."""
-        self.allowance.spend(len(placed.net.grid.lattice))
-        tried = followed(placed.net, self.surface, parts, thickness)
-        if tried.factor >= NEEDED and tried.pull > PULLED:
-            parts = parts.eased(tried.pull)
-            tried = followed(placed.net, self.surface, parts, thickness)
+        tried = self._followed(placed, parts, thickness)
+        for turn in range(_EASED):
+            easier = parts.easier(tried, PULLED if turn == 0 else STRESSED)
+            if easier is None:
+                break
+            before = tried
+            parts, tried = easier, self._followed(placed, easier, thickness)
+            if tried.stress > max(STRESSED, _SPARED * before.stress):
+                break
         why = None
         if tried.factor < NEEDED:  # what breaks before any load has no stability to speak of
             why = Why.STRENGTH if tried.factor == 0.0 and tried.stress > 1.0 else Why.STABILITY
-        elif max(tried.stress, tried.edge) > _STRESSED:
-            why = Why.STRENGTH if tried.stress > _STRESSED else Why.EDGES
+        elif max(tried.stress, tried.edge) > STRESSED:
+            why = Why.STRENGTH if tried.stress > STRESSED else Why.EDGES
+        elif tried.pull > 1.0:
+            why = Why.CABLES
         if why is None:
             return parts, tried, None
-        stress = tried.edge if why is Why.EDGES else tried.stress
+        stress = {Why.EDGES: tried.edge, Why.CABLES: tried.pull}.get(why, tried.stress)
+        place = tried.most_stressed if why is Why.STRENGTH else tried.where
         return parts, tried, Obstacle(
-            why, spacing, thickness, tried.factor, parts.choice, placed, tried.where, stress
+            why, spacing, thickness, tried.factor, parts.choice, placed, place, stress
         )  # fmt: skip
+
+    def _followed(self, placed: Placed, parts: FirstParts, thickness: float) -> Followed:
+        self.allowance.spend(len(placed.net.grid.lattice))
+        return followed(placed.net, self.surface, parts, thickness)
 
     def _too_curved(self, placed: Placed, spacing: float, thickness: float) -> Obstacle:
         """The failure of a net on which every section breaks, or is too deep for the spacing."""
@@ -343,7 +364,7 @@ class _Search:
 
     def _keep(self, failure: Obstacle) -> Obstacle:
         """The failure, kept if it came nearer than those before."""
-        if self.best is None or failure.factor >= self.best.factor:
+        if self.best is None or failure.near(NEEDED) >= self.best.near(NEEDED):
             self.best = failure
         return failure
 
@@ -364,7 +385,7 @@ def _next(net: Net, possible: Sequence[RodChoice], at: int, failure: Obstacle) -
     times = 0.0
     if failure.why is not Why.STRENGTH:
         times = max(1.3, (1.1 * NEEDED / max(failure.nearness(NEEDED), 0.1)) ** 1.3)
-    return next_choice(net, possible, at, failure.stress, times, _STRESSED)
+    return next_choice(net, possible, at, failure.stress, times, STRESSED)
 
 
 def _whole_mm(thickness: float) -> float:

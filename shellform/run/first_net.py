@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from shellform.net.chebyshev import NetTuning, pull_net
-from shellform.net.edges import stand
+from shellform.net.edges import Edges, stand
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.orientation import cost
@@ -95,8 +95,8 @@ def least_bent_net(
     return Placed(net, math.degrees(given.angle), given.offset), []
 
 
-def with_gap(surface: Surface, placed: Placed, spacing: float, gap: float, tell: Say) -> Placed:
-    """The net pulled anew with another gap, on its supports. Raises NoNet or Stalled."""
+def with_gap(surface: Surface, placed: Placed, spacing: float, gap: float, edges: Edges, tell: Say) -> Placed:
+    """The net pulled anew with another gap, its edges standing on what `edges` say. Raises NoNet or Stalled."""
     net, given = climbed_net(
         surface,
         {"spacing": spacing, "gap": gap, "elements": ELEMENTS},
@@ -105,7 +105,7 @@ def with_gap(surface: Surface, placed: Placed, spacing: float, gap: float, tell:
         most=_worth(surface, spacing),
         progress=tell,
     )
-    return Placed(stand(net, surface), math.degrees(given.angle), given.offset)
+    return Placed(stand(net, surface, edges), math.degrees(given.angle), given.offset)
 
 
 def bends_to(net: Net) -> float:

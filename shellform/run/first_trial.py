@@ -26,7 +26,7 @@ from shellform.problem.paths import deviations
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.reliability.trial_structures import enlarged
-from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, RodChoice, rope_for
+from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, RodChoice, Rope, thicker
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -37,6 +37,7 @@ ELEMENTS = 2
 NEEDED = 1.5  # times the design load, which the perfect structure bears: drawn ones fall earlier
 ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path the design load then is
 DRAWN, SEED, ENLARGED = 16, 1, 1.25
+STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
 COMPOSITE = 0.5  # how far the rods of an edge beam act together
 _SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
@@ -47,25 +48,45 @@ _UNLOADED = 120  # factorisations of the unloaded shell; one that stands without
 
 @dataclass(frozen=True)
 class FirstParts:
-    """What a first design is made of: the `choice` of rods, how many rods an edge beam has (`bundle`), and the
-    cables' `rest_ratio`."""
+    """What a first design is made of: the `choice` of rods, how many rods an edge beam has (`bundle`), the
+    cables' `rest_ratio` and what `rope` they are."""
 
     choice: RodChoice
     bundle: int
     rest_ratio: float
+    rope: Rope
 
-    def eased(self, pull: float) -> FirstParts:
+    def easier(self, tried: Followed, most: float) -> FirstParts | None:
+        """What to try after a design that bears its load, `tried`, with rods that are stressed too much or cables that are
+        pulled to more than `most` of their limit: the same with slacker cables, or thicker ones; else None.
+
+        Where the last cells end short of the edge, prestressed cables bend the rods' ends in the surface, load or none.
+        """
+        if tried.factor < NEEDED:
+            return None
+        if tried.stress > STRESSED:
+            slacker = round(1.0 - max(0.5 * (1.0 - self.rest_ratio), LEAST_PRESTRAIN), 4)
+            return replace(self, rest_ratio=slacker) if slacker > self.rest_ratio else None
+        return self.eased(tried.pull) if tried.edge <= STRESSED and tried.pull > most else None
+
+    def eased(self, pull: float) -> FirstParts | None:
         """The same with so much less prestrain that cables whose largest force is `pull` times their limit
-        come down to `PULLED`."""
+        come down to `PULLED`; with the next thicker strand where they have the least already; None where there
+        is none."""
         prestrain = 1.0 - self.rest_ratio - (pull - PULLED) * STRAINED
-        return replace(self, rest_ratio=round(1.0 - max(prestrain, LEAST_PRESTRAIN), 4))
+        least = round(1.0 - max(prestrain, LEAST_PRESTRAIN), 4)
+        if least > self.rest_ratio:
+            return replace(self, rest_ratio=least)
+        rope = thicker(self.rope)
+        return None if rope is None else replace(self, rope=rope)
 
 
 @dataclass(frozen=True)
 class Followed:
     """What a design came to: the `factor` of its load up to which it stands; under the additional load the
-    stress over the strength of its rods (`stress`) and of its edge beams (`edge`), and the cables' largest force
-    over its limit (`pull`); the largest `deviation`, m, at the last state, and `where` that is (3,), m."""
+    stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge beams
+    (`edge`), and the cables' largest force over its limit (`pull`); the largest `deviation`, m, at the last state, and
+    `where` that is (3,), m."""
 
     factor: float
     stress: float
@@ -73,6 +94,7 @@ class Followed:
     pull: float
     deviation: float
     where: Reals
+    most_stressed: Reals
 
 
 def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> Followed:
@@ -98,13 +120,16 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     except NotConverged as error:
         state = error.state if isinstance(error.state, State) else state
     away, beams = deviations(shell, state), shell.beams(design.radius)
+    stress = shell.utilisation(design, stressed)
+    breaks = net.grid.rod_ends[int(np.argmax(stress))]
     return Followed(
         factor,
-        float(shell.utilisation(design, stressed).max()),
+        float(stress.max()),
         edge_utilisation(shell, beams, beams.local_forces(stressed)),
-        float(shell.cables(design).tension(stressed).max(initial=0.0)) / rope_for(net.grid.scale).force_max,
+        float(shell.cables(design).tension(stressed).max(initial=0.0)) / parts.rope.force_max,
         float(away.max()),
         shell.target.positions[int(np.argmax(away))],
+        shell.target.positions[breaks].mean(axis=0),
     )
 
 
@@ -125,7 +150,7 @@ def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: flo
 
 def _shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> tuple[Gridshell, Reals]:
     """The gridshell and its load (n, 6), N; the joint's gap is the net's."""
-    rope, section = rope_for(net.grid.scale), parts.choice.section
+    rope, section = parts.rope, parts.choice.section
     rod = Rod(section)
     fitting = following(rod)
     joint = Joint(fitting.axial, fitting.torsion, fitting.bending, net.grid.gap)

@@ -13,26 +13,22 @@ from pathlib import Path
 from typing import Any
 
 from shellform.case.build_net import size_text, surface_of
-from shellform.errors import InputError
+from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.layers import layers_of, single
-from shellform.net.edges import stretches_of
+from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import THICKNESS, FirstDesign, first_design, usual_thickness
 from shellform.run.first_look import surface_entry
-from shellform.run.first_net import Allowance
+from shellform.run.first_refusal import with_ways_out
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
 from shellform.run.sizes import DesignWish, RodChoice
-from shellform.run.unbuildable import Unbuildable
-from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
-_SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
-_ROUNDED = 10_000  # crossings pulled and solved on surfaces that were rounded
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
@@ -60,17 +56,9 @@ def propose_case(
 
     try:
         design = first_design(surface, wanted, say)
-    except Unbuildable as error:
-        folder, allowance = output.with_name(f"{output.stem}-{BUILDABLE}"), Allowance(_ROUNDED)
-
-        def again(rounded: Surface) -> None:
-            if allowance.left <= 0:
-                raise InputError("left untried, since the one before took all the work that is allowed")
-            first_design(rounded, wanted, lambda text: say(f"rounded, {text}"), allowance)
-
-        told = with_way_out(error, surface, error.radius, folder, again, say, _shares(error))
-        raise (error.rounded_in_vain() if told is error and not wanted.rod else told) from error
-    edges = _edges_told(stretches_of(surface))
+    except (InputError, NotConverged) as error:
+        raise with_ways_out(error, surface, wanted, output, say) from error
+    edges = _edges_told(stretches_of(surface, Edges(outer=wanted.edges)))
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
     write_text(output, _text(file, entries, surface, design, wanted, edges))
     return {
@@ -84,12 +72,6 @@ def propose_case(
         "edges": edges,
         "case": str(output),
     }
-
-
-def _shares(refusal: Unbuildable) -> list[float]:
-    """What of its radius to round to, one after the other: the least first that nets cover."""
-    least = min(COVERED * refusal.spacing / refusal.radius, 1.0)
-    return sorted({max(least, share) for share in _SHARES})
 
 
 def _text(
@@ -134,7 +116,7 @@ force_max = {_short(rope.force_max)!r}     # N, constraint (5): half of what bre
 without = false      # true: show too what the grid does without cables
 
 [edges]              # found: {edges}
-outer = "auto"       # ground where the edge is low, elsewhere an edge beam; "fill" brings it down to the ground, "free" lets rods end
+outer = "{wish.edges}"       # {_outer(wish)}auto: ground where the edge is low, elsewhere an edge beam; "fill" brings it down to the ground, "free" lets rods end
 openings = "auto"    # [[edges.stretch]] names walls and abutments by height, box or curve
 
 [edges.beam]
@@ -185,6 +167,10 @@ def _thickness_told(surface: Surface, design: FirstDesign, wish: DesignWish) -> 
     return "what these rods bear; pour it first, and the rest when it has hardened"
 
 
+def _outer(wish: DesignWish) -> str:
+    return "" if wish.edges == "auto" else "as asked; "
+
+
 def _edges_stressed(design: FirstDesign) -> str:
     return f"stressed to {design.tried.edge:.0%} of their strength; " if design.placed.net.edges else ""
 
@@ -221,9 +207,9 @@ def _check(output: Path) -> None:
 def _edges_told(stretches: Sequence[Stretch]) -> str:
     """What was found, in a line: "2 stretches on the ground, 2 edge beams, 1 of them round an opening"."""
     beams = [each for each in stretches if each.kind == "beam"]
-    standing = len(stretches) - len(beams)
+    standing, walls = len(stretches) - len(beams), all(each.kind in ("wall", "beam") for each in stretches)
     rings = sum(each.opening for each in beams)
-    told = f"{standing} {'stretch' if standing == 1 else 'stretches'} on the ground"
+    told = f"{standing} {'stretch' if standing == 1 else 'stretches'} on {'walls' if walls else 'the ground'}"
     if not beams:
         return told
     ground = min(float(each.points[:, 2].min()) for each in stretches)

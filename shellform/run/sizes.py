@@ -19,7 +19,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
@@ -27,7 +26,7 @@ from shellform.gridshell.layers import TwoLayers, layers_of, locked_bending
 from shellform.gridshell.tolerances import tolerances_of_size
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length
-from shellform.surface.shape.target import Surface, curvature
+from shellform.surface.shape.target import Surface, curvature, vertex_areas
 
 SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
 _USUALLY = 0.75  # of its area: what is curved more may be creases, which bear nothing
@@ -40,13 +39,28 @@ _USUAL = 1.0  # m, of rods on site
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
 _LATHS = "timber_laths"  # whose rods are built in two layers
-_ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008)  # m, diameters in stock
+_ROPES = (
+    0.0003,
+    0.0005,
+    0.001,
+    0.0015,
+    0.002,
+    0.003,
+    0.004,
+    0.005,
+    0.006,
+    0.008,
+    0.010,
+    0.012,
+)  # m, in stock
+_MOST_ROPE = 0.008  # m, to begin with
 _ROPE = 0.006  # of the spacing, a rope's diameter
 _ROPE_AREA, _ROPE_YOUNG, _ROPE_STRENGTH = 0.597, 120e9, 1380e6  # of the diameter's square; Pa; Pa at breaking
 STRAINED = 0.5 * _ROPE_STRENGTH / _ROPE_YOUNG  # of a rope under the largest force that it is let bear
 _BUCKLING = 1.4
 LEAST_PRESTRAIN, _MOST_PRESTRAIN = 0.001, 0.004  # of the cables
 _AMPLE = 2.0  # times what is needed, by the estimate of buckling: there the sections begin
+EDGES = ("auto", "wall")
 _BENT = 0.65  # of a rod's strength, that bending it into the net takes at the most of the first that is tried
 
 
@@ -96,13 +110,15 @@ class RodChoice:
 @dataclass(frozen=True)
 class DesignWish:
     """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m,
-    an `angle`, degrees, rods in so many `layers`; None: to be found, of a named rod one layer."""
+    an `angle`, degrees, rods in so many `layers`; None: to be found, of a named rod one layer. `edges` says what the
+    outer edge stands on: "auto", what the geometry says, or "wall", walls all round up to it."""
 
     rod: str | None = None
     spacing: float | None = None
     thickness: float | None = None
     angle: float | None = None
     layers: int | None = None
+    edges: str = "auto"
 
     def __post_init__(self) -> None:
         for name in ("spacing", "thickness"):
@@ -113,6 +129,8 @@ class DesignWish:
             raise InputError("must be degrees or auto", where="--angle", value=self.angle)
         if self.layers not in (None, 1, 2):
             raise InputError("must be 1 or 2", where="--layers", value=self.layers)
+        if self.edges not in EDGES:
+            raise InputError(f"must be {' or '.join(EDGES)}", where="--edges", value=self.edges)
         wished(self.rod)
 
 
@@ -139,15 +157,6 @@ def curvature_usual(surface: Surface) -> float:
     bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface)
     order = np.argsort(bent)
     return float(bent[order][np.searchsorted(np.cumsum(weight[order]), _USUALLY * weight.sum())])
-
-
-def vertex_areas(surface: Surface) -> Reals:
-    """A third (v,), m², of the triangles at each vertex."""
-    corner = surface.vertices[surface.triangles]
-    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-    result = np.zeros(len(surface.vertices))
-    np.add.at(result, surface.triangles, (area / 3.0)[:, None])
-    return result
 
 
 def first_spacing(surface: Surface) -> tuple[float, str]:
@@ -180,8 +189,14 @@ def practical(spacing: float) -> float:
 
 
 def rope_for(spacing: float) -> Rope:
-    """The stock strand nearest to 6 mm at a metre's spacing."""
-    return Rope(min(_ROPES, key=lambda each: abs(math.log(each / (_ROPE * spacing)))))
+    """The stock strand nearest to 6 mm at a metre's spacing, with which to begin."""
+    usual = [each for each in _ROPES if each <= _MOST_ROPE]
+    return Rope(min(usual, key=lambda each: abs(math.log(each / (_ROPE * spacing)))))
+
+
+def thicker(rope: Rope) -> Rope | None:
+    """The next strand in stock; None after the last."""
+    return next((Rope(each) for each in _ROPES if each > rope.diameter), None)
 
 
 def rest_ratio_for(surface: Surface, spacing: float) -> float:

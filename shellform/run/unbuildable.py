@@ -35,23 +35,31 @@ _UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 
 
 class Unbuildable(InputError):
-    """A surface that no net of the `spacing`, m, covers, or that no rod follows there; rounded to the
-    `radius`, m, it may be built."""
+    """A surface that no net of the `spacing`, m, covers, or that no rod follows there, for the reason `why`; rounded
+    to the `radius`, m, it may be built."""
 
-    def __init__(self, what: str, *, where: str, remedy: str, spacing: float, radius: float) -> None:
-        self.spacing, self.radius = spacing, radius
+    def __init__(
+        self, what: str, *, why: Why, where: str, remedy: str, spacing: float, radius: float
+    ) -> None:
+        self.why, self.spacing, self.radius = why, spacing, radius
         super().__init__(what, where=where, remedy=remedy)
 
-    def rounded_in_vain(self) -> Unbuildable:
-        """The same, where no rounding was found that helps."""
+    def in_vain(self) -> Unbuildable:
+        """The same, where none of the ways out that were tried led to a design."""
         return Unbuildable(
             f"{self.what}; no surface near it that is rounded there to {self.radius:.2g} m or more was found on which a "
             "design stands",
+            why=self.why,
             where=self.where,
-            remedy="Cut it into pieces there, each with an edge of its own, or give it more rise and rounder edges.",
+            remedy="What else may help wasn't tried: pieces with edges of their own, cut there and brought one by one, or a "
+            "rounder form.",
             spacing=self.spacing,
             radius=self.radius,
         )
+
+
+class Tips(InputError):
+    """A shell on supports in one line, about which it tips."""
 
 
 class Why(Enum):
@@ -62,6 +70,7 @@ class Why(Enum):
     CURVATURE = "curvature"
     STRENGTH = "strength"
     EDGES = "strength of edge beams"
+    CABLES = "strength of cables"
     STABILITY = "stability"
     SCATTER = "stability of structures as built"
 
@@ -82,11 +91,26 @@ class Obstacle:
     stress: float = 0.0
     error: NoNet | Stalled | None = None
 
+    def near(self, needed: float) -> tuple[float, float]:
+        """By which failures are ranked: the factor up to the one that is `needed`, and of those that reach it
+        how little they are stressed."""
+        if self.factor < needed:
+            return self.factor, 0.0
+        return needed, 0.0 if self.why is Why.SCATTER else -self.stress
+
     def nearness(self, needed: float) -> float:
         """The factor from which to step on: structures as built fall a little below the one that is
         `needed`.
         """
         return min(self.factor, 0.9 * needed) if self.why is Why.SCATTER else self.factor
+
+    def breaks_unloaded(self, before: Obstacle, most: float) -> bool:
+        """Whether this failure and the one `before`, of the same rods under more concrete, say that these would be
+        stressed to more than `most` of their strength without any."""
+        less = before.thickness - self.thickness
+        if less <= 0.0 or before.choice != self.choice or not before.why == self.why == Why.STRENGTH:
+            return False
+        return self.stress - (before.stress - self.stress) * self.thickness / less > most
 
 
 def refuse_size(surface: Surface) -> None:
@@ -130,7 +154,7 @@ def refuse_tipping(net: Net) -> None:
     apart = float(np.ptp(net.target.positions[:, :2], axis=0).max())
     if len(feet) > 2 and away[1] > _IN_A_LINE * apart:
         return
-    raise InputError(
+    raise Tips(
         f"reason: supports. Its edge comes to the ground at {_at(net.target.positions[net.supports[0]])} and "
         f"{_at(net.target.positions[net.supports[-1]])} only, in one line, about which it tips",
         where="edges",
@@ -154,8 +178,9 @@ def refused(
         return Unbuildable(
             f"reason: {Why.NET.value}. No net of {spacing:g} m covers it{'' if error is None else f' ({_said(error)})'}; it is "
             f"curved most at {_at(most)}, to a radius of {radius:.3g} m",
+            why=Why.NET,
             where="net.spacing",
-            remedy=f"Round the surface there to {needed:.2g} m or more, or cut it into pieces along its creases.",
+            remedy=f"Round the surface there to {needed:.2g} m or more.",
             spacing=spacing,
             radius=needed,
         )
@@ -178,6 +203,7 @@ def refused(
         return Unbuildable(
             f"reason: {failure.why.value}. {choice.label} of {choice.catalogue} would be stressed to {stress:.0%} of its "
             f"strength{place}, at a spacing of {failure.spacing:g} m",
+            why=failure.why,
             where="rod",
             remedy=_thinner_rods(wish)
             if wish.rod
@@ -187,10 +213,13 @@ def refused(
                 _SPARE * max(stress, 1.0) * bends, 0.0 if wish.rod else _rounding(surface, failure, wish)
             ),
         )
+    bearing = {Why.EDGES: "edge beams", Why.CABLES: "cables"}.get(failure.why, "rods")
+    falls = failure.factor < NEEDED or failure.why is Why.SCATTER
     what = (
         f"reason: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
         f"{failure.spacing:g} m; with {1e3 * failure.thickness:.3g} mm of concrete it stands up to {failure.factor:.2f} × its load, "
-        f"where 1.5 is needed, its rods at {stress:.0%} of their strength, and gives way first{place}"
+        f"where {NEEDED:g} is needed, its {bearing} at {stress:.0%} of {'what they may bear' if failure.why is Why.CABLES else 'their strength'}"
+        f"{f', and gives way first{place}' if falls else ''}"
     )
     if bears is not None:
         layer = (
@@ -225,8 +254,9 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildabl
         f"reason: curvature. At {_at(sharpest(net))} rods bend to a radius of {radius:.3g} m: those that can, {choice.label} of "
         f"{choice.catalogue} for one, stand up to {failure.factor:.2f} × the load of {1e3 * failure.thickness:.3g} mm of concrete "
         f"at {failure.spacing:g} m, where {NEEDED:g} is needed",
+        why=Why.CURVATURE,
         where="rod",
-        remedy="Round it there, so that thicker rods follow it, or cut it into pieces along its creases.",
+        remedy="Round it there, so that thicker rods follow it.",
         spacing=failure.spacing,
         radius=wanted,
     )

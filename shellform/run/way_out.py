@@ -58,7 +58,7 @@ def with_way_out(
                     trial = Path(place) / SURFACE
                     write_mesh(trial, found.surface)
                     again(read_surface(trial))  # the very file that is offered
-                return _renewed(refusal, _offer(found, wanted, folder))
+                return renewed(refusal, _offer(found, wanted, folder))
         except (InputError, NotConverged) as error:
             say(f"rounded to {wanted:.3g} m: {error}")
         else:
@@ -104,7 +104,7 @@ def _step(path: Path, surface: Surface) -> str:
     return f", {path.name}"
 
 
-def _renewed(refusal: InputError | NotConverged, offer: str) -> InputError | NotConverged:
+def renewed(refusal: InputError | NotConverged, offer: str) -> InputError | NotConverged:
     """The same refusal with the offer before its remedy."""
     remedy = f"{offer}. {f'Or: {refusal.remedy}' if refusal.remedy else ''}".strip()
     if isinstance(refusal, NoNet):

@@ -19,7 +19,7 @@ from shellform.problem.paths import follow
 from shellform.run import first_trial
 from shellform.run.first_design import first_design, usual_thickness
 from shellform.run.first_net import Allowance
-from shellform.run.first_trial import NEEDED, PULLED, FirstParts
+from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
 from shellform.run.propose import propose_case
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
@@ -120,7 +120,7 @@ def test_a_case_is_not_overwritten_nor_written_under_another_name_or_to_nowhere(
 
 
 def test_what_is_wished_for_is_checked():
-    for wish in ({"spacing": 0.0}, {"thickness": -1.0}, {"angle": np.nan}):
+    for wish in ({"spacing": 0.0}, {"thickness": -1.0}, {"angle": np.nan}, {"edges": "air"}):
         with pytest.raises(InputError, match=next(iter(wish))):
             DesignWish(**wish)
     with pytest.raises(InputError, match="--rod"):
@@ -222,10 +222,68 @@ def test_two_layers_are_stiffer_across_the_surface_and_bent_like_one(net):
 
 
 def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996)
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0))
     assert 1.0 - parts.eased(PULLED + 0.2).rest_ratio == pytest.approx(0.004 - 0.2 * STRAINED, abs=1e-4)
-    assert parts.eased(3.0).rest_ratio == 1.0 - LEAST_PRESTRAIN
+    slack = parts.eased(3.0)
+    assert slack.rest_ratio == 1.0 - LEAST_PRESTRAIN
+    assert slack.rope == parts.rope
     assert 1.0 - rest_ratio_for(dish(), 0.4) > 1.0 - rest_ratio_for(dish(), 4.0)
+
+
+def test_cables_pulled_too_much_with_the_least_prestrain_become_thicker_as_far_as_there_are_strands():
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 1.0 - LEAST_PRESTRAIN, rope_for(1.0))
+    diameters = []
+    while parts is not None:
+        diameters.append(parts.rope.diameter)
+        parts = parts.eased(1.2)
+    assert diameters == [0.006, 0.008, 0.010, 0.012]
+    assert rope_for(2.0).diameter == 0.008, "none begins with more"
+
+
+def test_of_failures_that_bear_the_load_the_least_stressed_came_nearest():
+    falls, breaks, breaks_less = (
+        Obstacle(Why.STABILITY, 0.5, 0.05, 1.4, stress=0.2),
+        Obstacle(Why.STRENGTH, 0.5, 0.05, NEEDED, stress=1.5),
+        Obstacle(Why.STRENGTH, 0.7, 0.05, NEEDED, stress=0.98),
+    )
+    as_built = Obstacle(Why.SCATTER, 0.5, 0.05, NEEDED, stress=0.9)
+    ranked = [falls, breaks, breaks_less, as_built]
+    assert sorted(reversed(ranked), key=lambda each: each.near(NEEDED)) == ranked
+
+
+def test_rods_that_less_concrete_does_not_spare_are_not_tried_with_still_less():
+    rods = wished("gfrp_rods/6 mm")[0]
+    breaks = Obstacle(Why.STRENGTH, 0.5, 0.05, NEEDED, rods, stress=1.40)
+    half = replace(breaks, thickness=0.025, stress=1.38)
+    assert half.breaks_unloaded(breaks, 0.95)
+    assert not replace(half, stress=1.10).breaks_unloaded(breaks, 0.95)
+    assert not replace(breaks, stress=1.38).breaks_unloaded(breaks, 0.95)
+    assert not half.breaks_unloaded(replace(breaks, why=Why.STABILITY), 0.95)
+
+
+def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_before_anything_else():
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0))
+    breaks = Followed(NEEDED, 1.4, 0.5, 2.0, 0.01, np.zeros(3), np.zeros(3))
+    assert parts.easier(breaks, PULLED).rest_ratio == pytest.approx(0.998)
+    assert parts.easier(breaks, PULLED).easier(breaks, PULLED).rest_ratio == 1.0 - LEAST_PRESTRAIN
+    assert replace(parts, rest_ratio=1.0 - LEAST_PRESTRAIN).easier(breaks, PULLED) is None
+    assert parts.easier(replace(breaks, factor=1.2), PULLED) is None, "slacker cables bear no more"
+    assert parts.easier(replace(breaks, stress=0.5, pull=0.8), PULLED) is None
+    assert parts.easier(replace(breaks, stress=0.5), PULLED) == parts.eased(2.0)
+
+
+def test_a_shell_that_tips_is_refused_with_walls_all_round_on_which_its_case_then_stands(tmp_path):
+    flat = dish(size=6.0, count=13)
+    x, y, _ = flat.vertices.T
+    saddle = make_surface(np.column_stack([x, y, 1.0 + 0.1 * x * y]), flat.triangles)
+    file, case = as_obj(tmp_path / "saddle.obj", saddle), tmp_path / "case.toml"
+    wish = DesignWish(spacing=0.6, angle=0.0)
+    with pytest.raises(InputError, match="tips") as refused:
+        propose_case(file, case, {}, allow_scripts=False, wish=wish)
+    assert "With --edges wall this goes on" in refused.value.remedy
+    told = propose_case(file, case, {}, allow_scripts=False, wish=replace(wish, edges="wall"))
+    assert "wall" in told["edges"]
+    assert load_case(case).edges.outer == "wall"
 
 
 def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_after_it(monkeypatch, net):
@@ -241,7 +299,7 @@ def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_afte
 
     monkeypatch.setattr(first_trial, "Workshop", Bench)
     monkeypatch.setattr(first_trial, "perfect", lambda *_: None)
-    parts = FirstParts(wished("gfrp_rods/2 mm")[0], 19, 0.998)
+    parts = FirstParts(wished("gfrp_rods/2 mm")[0], 19, 0.998, rope_for(0.1))
     assert first_trial.drawn_standing(net, barrel(), parts, 0.002) == 5
     assert drawn == [0, 1, 2, 3, 4, 5]
 

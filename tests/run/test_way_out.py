@@ -11,9 +11,10 @@ from shellform.errors import InputError
 from shellform.net.refusal import NoNet, Stalled
 from shellform.records.progress import unheard
 from shellform.run.first_look import net_alone
-from shellform.run.propose import _shares, propose_case
+from shellform.run.first_refusal import shares
+from shellform.run.propose import propose_case
 from shellform.run.sizes import DesignWish
-from shellform.run.unbuildable import Unbuildable
+from shellform.run.unbuildable import Unbuildable, Why
 from shellform.run.way_out import with_way_out
 from shellform.surface.readers.reading import read_surface
 from tests.run.test_propose import as_obj
@@ -71,11 +72,11 @@ def test_a_surface_that_can_not_be_rounded_is_not_rounded_further(tmp_path):
 
 def test_surfaces_are_rounded_to_what_nets_cover_before_what_is_sure_to_bear_the_load():
     def refusal(spacing, radius):
-        return Unbuildable("no", where="rod", remedy="Round it.", spacing=spacing, radius=radius)
+        return Unbuildable("no", why=Why.NET, where="rod", remedy="Round it.", spacing=spacing, radius=radius)
 
-    assert _shares(refusal(0.75, 13.5)) == [0.2, 0.5, 1.0]
-    assert _shares(refusal(1.0, 4.0)) == [0.75, 1.0]
-    assert _shares(refusal(1.0, 2.0)) == [1.0]
+    assert shares(refusal(0.75, 13.5)) == [0.2, 0.5, 1.0]
+    assert shares(refusal(1.0, 4.0)) == [0.75, 1.0]
+    assert shares(refusal(1.0, 2.0)) == [1.0]
 
 
 @pytest.mark.slow

@@ -134,6 +134,14 @@ def largest_curvature(surface: Surface) -> float:
     return float(np.percentile(bent[inner], 99.5)) if inner.any() else 0.0
 
 
+def vertex_areas(surface: Surface) -> Reals:
+    """A third (v,), m², of the triangles at each vertex."""
+    area = np.linalg.norm(_area_vectors(surface.vertices, surface.triangles), axis=1)
+    result = np.zeros(len(surface.vertices))
+    np.add.at(result, surface.triangles, (area / 3.0)[:, None])
+    return result
+
+
 def _cleaned(
     points: Reals, faces: Indices, normals: Reals | None
 ) -> tuple[Reals, Indices, Reals | None, list[str]]:

@@ -1,0 +1,84 @@
+"""What `shellform new` says of a shell that it can't design: the reason, and a way out that it went itself.
+
+Two are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
+round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a rounded surface,
+where its rods are bent too much (way_out.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from shellform.errors import InputError, NotConverged
+from shellform.net.edges import stretches_of
+from shellform.run.first_design import first_design
+from shellform.run.first_net import Allowance
+from shellform.run.sizes import DesignWish
+from shellform.run.unbuildable import Tips, Unbuildable, Why
+from shellform.run.way_out import BUILDABLE, COVERED, renewed, with_way_out
+from shellform.surface.shape.target import Surface
+
+_SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
+_WORK = 10_000  # crossings pulled and solved on rounded surfaces
+_WALLED = 15_000  # on walls, with which large nets are tried once
+Refusal = InputError | NotConverged
+Say = Callable[[str], None]
+
+
+def with_ways_out(refusal: Refusal, surface: Surface, wish: DesignWish, output: Path, say: Say) -> Refusal:
+    """The refusal with the first way out that leads to a design as its remedy; else saying which were tried. What is
+    offered as a surface is written into a folder beside `output`. `say` hears what is tried."""
+    folder = output.with_name(f"{output.stem}-{BUILDABLE}")
+    if _walls_may_help(refusal, surface, wish):
+        told = _on_walls(refusal, surface, wish, say)
+        if told is not refusal or not isinstance(refusal, Unbuildable):
+            return told
+    if not isinstance(refusal, Unbuildable) or wish.rod:
+        return refusal
+    again = _trial("rounded", wish, Allowance(_WORK), say)
+    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, shares(refusal))
+    return refusal.in_vain() if told is refusal else told
+
+
+def shares(refusal: Unbuildable) -> list[float]:
+    """What of its radius to round to, one after the other: the least first that nets cover."""
+    least = min(COVERED * refusal.spacing / refusal.radius, 1.0)
+    return sorted({max(least, share) for share in _SHARES})
+
+
+def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callable[[Surface], None]:
+    """All of the search on another surface, within the allowance of all such trials."""
+
+    def again(surface: Surface) -> None:
+        if allowance.left <= 0:
+            raise InputError("left untried, since the one before took all the work that is allowed")
+        first_design(surface, wish, lambda text: say(f"{how}, {text}"), allowance)
+
+    return again
+
+
+def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:
+    """Whether walls all round may: where something but its curvature is the reason, and its outer edge doesn't stand
+    on the ground."""
+    if wish.edges != "auto" or (isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH):
+        return False
+    if not isinstance(refusal, (Unbuildable, Tips, NotConverged)):
+        return False
+    return any(each.kind == "beam" and not each.opening for each in stretches_of(surface))
+
+
+def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say) -> Refusal:
+    """The refusal with walls as its remedy; as it was, where no design stands on them either."""
+    try:
+        _trial("on walls", replace(wish, edges="wall"), Allowance(_WALLED), say)(surface)
+    except (InputError, NotConverged) as error:
+        say(f"on walls: {error}")
+        return refusal
+    outer = surface.vertices[surface.boundary[0], 2]
+    return renewed(
+        refusal,
+        f"With --edges wall this goes on: walls all round, up to {outer.max() - outer.min():.3g} m above the lowest of its "
+        "edge",
+    )
