@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +21,47 @@ from shellform.net.orientation import oriented_net
 from shellform.records.summary import EdgeRecord, NetRecord, SurfaceRecord
 from shellform.surface.shape.target import Surface
 
+FAR = 100.0  # of a surface's larger side, from its origin: there `new` takes one near it
+_DISTANT = 5000.0  # no net is sure to be pulled: at 21 500 none is
+
 
 def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
     """The surface of a builder script, or of a file in any format, as its entry says."""
+    found = _read(entry, allow_scripts=allow_scripts)
+    return found if entry.origin is None else counted_from(found, entry.origin)
+
+
+def counted_from(surface: Surface, origin: Sequence[float]) -> Surface:
+    """The surface in coordinates that count from `origin` (3,), m."""
+    return replace(surface, vertices=surface.vertices - np.array(origin))
+
+
+def distant_origin(surface: Surface, sides: float) -> tuple[float, float, float] | None:
+    """A round origin near a surface that lies more than so many of its larger `sides` away from its own, m; None for
+    others."""
+    lowest, side = surface.vertices.min(axis=0), float(surface.size.max())
+    if float(np.abs(surface.vertices).max()) <= sides * side:
+        return None
+    step = 10.0 ** math.floor(math.log10(side))
+    x, y, z = (step * np.floor(lowest / step)).tolist()
+    return x, y, z
+
+
+def refuse_distant(surface: Surface) -> None:
+    """Raises InputError for a surface so far from its origin that rounding hides what loads do."""
+    origin = distant_origin(surface, _DISTANT)
+    if origin is None:
+        return
+    told = ", ".join(f"{each:.9g}" for each in origin)
+    raise InputError(
+        f"lies {float(np.abs(surface.vertices).max()):.4g} m from the origin, {_DISTANT:g} times its size or more: beside "
+        "such coordinates rounding hides the load",
+        where="surface",
+        remedy=f"Count from a point near it: origin = [{told}] in [surface], or --origin {told.replace(',', '')}.",
+    )
+
+
+def _read(entry: SurfaceEntry, *, allow_scripts: bool) -> Surface:
     file = Path(entry.file)
     check_script(file, allow_scripts=allow_scripts)
     if file.suffix.lower() == ".py":
@@ -82,6 +121,7 @@ def net_of(
     case: Case, surface: Surface, *, progress: Callable[[str], None] = lambda text: None
 ) -> tuple[Net, float, tuple[float, float]]:
     """The case's net with its angle, rad, and offset."""
+    refuse_distant(surface)
     entry = case.net
     net, angle, offset = oriented_net(
         surface,

@@ -47,6 +47,11 @@ class SurfaceEntry(Entry):
     ground: float | None = Field(
         None, description="height to which open edges are closed, m; left out: the edge's lowest"
     )
+    origin: tuple[float, float, float] | None = Field(
+        None,
+        description="of a survey's coordinates, m: what all others of the case and of what is written count from; "
+        "left out: the file's own",
+    )
     dimensions: dict[str, PositiveFloat] = Field({}, description="named dimensions of a builder script, m")
 
 

@@ -19,6 +19,10 @@ Face = Annotated[str | None, typer.Option(help="Face of a solid: upper or lower.
 Piece = Annotated[int | None, typer.Option(help="Number of a separate piece, 1 the largest.")]
 Fill = Annotated[str | None, typer.Option(help="Openings to close: holes, edges or all.")]
 Ground = Annotated[float | None, typer.Option(help="Height to which open edges are closed, m.")]
+Origin = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(help="X Y Z of a survey's coordinates, m, that all others count from."),
+]
 _SURFACE = {
     "unit": Unit,
     "up": Up,
@@ -29,6 +33,7 @@ _SURFACE = {
     "piece": Piece,
     "fill": Fill,
     "ground": Ground,
+    "origin": Origin,
 }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import ValidationError
 
 import shellform
-from shellform.case.build_net import net_record, size_text, surface_of, surface_record
+from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
 from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
 from shellform.errors import InputError
@@ -182,6 +182,8 @@ def net_alone(
 
     def say(text: str) -> None:
         report(Event("net", text))
+
+    refuse_distant(surface)
 
     def pulled(target: Surface) -> tuple[Net, float, tuple[float, float]]:
         return oriented_net(target, settings, angle=_angle(angle), progress=say)

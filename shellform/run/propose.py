@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from shellform.case.build_net import size_text, surface_of
+from shellform.case.build_net import FAR, counted_from, distant_origin, size_text, surface_of
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.layers import layers_of, single
@@ -49,6 +49,11 @@ def propose_case(
     _check(output)
     wanted = wish or DesignWish()
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
+    origin = distant_origin(surface, FAR)
+    if origin is not None:
+        surface, before = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
+        options = {**options, "origin": [a + b for a, b in zip(before, origin, strict=True)]}
+        report(Event("surface", f"coordinates count from {options['origin']} m", Kind.NOTE))
     report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
 
     def say(text: str) -> None:

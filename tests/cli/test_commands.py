@@ -2,6 +2,7 @@
 
 import html
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -9,9 +10,11 @@ import sys
 import numpy as np
 import pytest
 
+from shellform.case.build_net import FAR, counted_from, distant_origin
 from shellform.cli import program
 from shellform.records.stages import STAGES
 from tests.command import ROOT, begin, shellform, shellform_process
+from tests.run.test_propose import as_obj, dish
 from tests.stubs import CASE
 
 MODEL = {
@@ -145,6 +148,36 @@ def test_a_refused_surface_leaves_nothing_behind(tmp_path):
     refused(shellform("design", case, "--output", tmp_path / "run"), "bad.stl")
     refused(shellform("check", bad), "bad.stl")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bad.stl", "case.toml"]
+
+
+def test_a_surface_in_a_survey_s_coordinates_is_refused_with_an_origin_from_which_its_net_is_the_same(
+    tmp_path,
+):
+    lines = []
+    for name, (x, y, z) in {"near": (0.0, 0.0, 0.0), "far": (430000.0, 81000.0, 400.0)}.items():
+        as_obj(tmp_path / f"{name}.obj", counted_from(dish(count=13), (-x, -y, -z)))
+        lines.append([tmp_path / f"{name}.obj", "--spacing", 0.8, "--angle", 0, "--output", tmp_path / name])
+    near, far = lines
+    assert shellform("net", *near).returncode == 0
+    refused = shellform("net", *far)
+    assert refused.returncode == 2
+    assert "rounding hides the load" in refused.stderr
+    origin = re.search(r"--origin (\S+ \S+ \S+)\.$", refused.stderr.strip()).group(1).split()
+    assert shellform("net", *far, "--origin", *origin).returncode == 0
+    curved = [
+        json.loads((tmp_path / name / "summary.json").read_text())["net"]["curvature_max"]
+        for name in ("near", "far")
+    ]
+    assert curved[1] == pytest.approx(curved[0], rel=1e-3)
+
+
+def test_only_what_lies_far_from_its_origin_gets_one_near_it_and_the_same_one_again():
+    surface = dish()
+    assert distant_origin(surface, FAR) is None
+    origin = distant_origin(counted_from(surface, (-4e5, 2e4, 0.0)), FAR)
+    moved = counted_from(counted_from(surface, (-4e5, 2e4, 0.0)), origin)
+    assert np.abs(moved.vertices).max() < 3.0 * surface.size.max()
+    assert distant_origin(moved, FAR) is None
 
 
 def test_net_alone_writes_the_contract_s_file_for_a_mesh(tmp_path):
