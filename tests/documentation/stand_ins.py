@@ -1,4 +1,4 @@
-"""What a page's reader has and the tests haven't: a shell of one's own, finished runs, scans, a cluster."""
+"""What a page's reader has and the tests haven't: finished runs, scans, a cluster."""
 
 import shutil
 import socket
@@ -12,7 +12,6 @@ import shellform as sf
 from shellform.case.examples import lay_example
 from shellform.run.folder import read_run
 from shellform.run.pages import write_report
-from shellform.surface.readers.rhino import Item, write_rhino
 from tests.run.small_run import begin, finish
 
 ROOT = Path(__file__).parent.parent.parent
@@ -64,13 +63,6 @@ def _free_port():
         return one.getsockname()[1]
 
 
-def own_shell(here):
-    """my_shell.3dm: a dome of 2.2 m on the layer Shell."""
-    dome = sf.read_surface(ROOT / "surfaces/dome.3dm", layer="Shell")
-    item = Item("Shell", "shell", 2.4 * dome.vertices, dome.triangles)
-    write_rhino(here / "my_shell.3dm", [item], {"Shell": "#336699"})
-
-
 def tutorial_s_study(here):
     """study.toml of the tutorial, cut to two designs, and its case."""
     from tests.documentation.test_pages import blocks, cut_short
@@ -118,7 +110,6 @@ def _table(path, head, rows):
 
 
 _MADE = {
-    "how-to/rods.md": own_shell,
     "how-to/cluster.md": tutorial_s_study,
     "how-to/calibrate.md": measured_run,
     "how-to/site.md": measured_run,
