@@ -52,6 +52,7 @@ from shellform.gridshell.gridshell import Rod
 from shellform.gridshell.joints import following
 from shellform.gridshell.tolerances import SOURCES, Tolerances
 
+_NAME = 255  # bytes, of a file or folder on the systems in use
 _RodEntry = Annotated[
     Annotated[OwnRodEntry, Tag("own")] | Annotated[StockRodEntry, Tag("stock")],
     Discriminator(lambda entry: "stock" if _has(entry, "catalogue") else "own"),
@@ -161,7 +162,10 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
         case = Case.model_validate(_with_joint(data, file))
     except ValidationError as error:
         raise refusal(error, Case, file) from error
-    place = (file.parent / case.surface.file).resolve()
+    name = case.surface.file
+    if "\0" in name or max(len(part.encode()) for part in ("", *Path(name).parts)) > _NAME:
+        raise InputError("is no file's name", where="surface.file", value=f"{name[:30]} …")
+    place = (file.parent / name).resolve()
     fill = _fill(case)
     found: dict[str, Any] = {
         "surface": case.surface.model_copy(update={"file": str(place)} | ({"fill": fill} if fill else {}))

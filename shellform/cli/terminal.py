@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +49,8 @@ def refusal_words(error: Exception) -> tuple[str, int] | None:
         return f"no result: {error}", 3
     if isinstance(error, MemoryError):
         return "no result: the memory is full. Choose a larger spacing or fewer elements.", 3
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        return f"refused: {str(error.filename)[:30]} …: the file's name is too long", 2
     if getattr(error, "exit_code", None) is None:
         return None
     told = getattr(error, "format_message", None)  # click's usage errors

@@ -274,6 +274,20 @@ def test_a_number_of_five_thousand_digits_is_refused(tmp_path):
     )
 
 
+def test_names_that_no_file_can_have_are_refused(tmp_path):
+    long = 400 * "a"
+    for words in (
+        ["analyse", f"{long}.json"],
+        ["design", f"{long}.toml", "--output", tmp_path],
+        ["check", long],
+    ):
+        refused(shellform(*words), "aaa")
+    for name in (long, "a\\u0000b"):
+        text = (ROOT / "scripts/scale_model.toml").read_text(encoding="utf-8")
+        (tmp_path / "case.toml").write_text(text.replace("../surfaces/vault.py", name), encoding="utf-8")
+        refused(shellform("design", tmp_path / "case.toml", "--output", tmp_path / "run"), "surface.file")
+
+
 def test_an_angle_that_is_no_number_is_refused(tmp_path):
     arguments = ["net", "surfaces/hypar.obj", "--spacing", 0.5, "--output", tmp_path / "net", "--angle"]
     for angle in ("nan", "inf", "steep"):
