@@ -2,7 +2,7 @@
 each rod element halved, solved anew along the documented path; what the two meshes say of the error is
 Richardson's estimate (structure/answers/halved.py).
 
-New nodes lie on the cubic through both ends of an element with their directions, turned halfway. A path that
+New nodes lie on the cubic through both ends of an element with their directions (structure/answers/halved.py). A path that
 the finer mesh leaves much earlier has no error of order h²; the estimate then tells the size of it and
 nothing more.
 """

@@ -6,9 +6,8 @@ from dataclasses import dataclass, replace
 
 from shellform.compiled import clock_without_compiling
 
-_BELIEVED = (
-    5  # evaluations' worth that the pace of the phase before counts for in a phase that has just begun
-)
+# evaluations' worth that the pace of the phase before counts for in a phase that has just begun
+_BELIEVED = 5
 _CONFIRMING = 1  # of the time between two notes of the last phase: a fresh sample's judgement at the end
 # In evaluations of the first phase, measured on 22 searches (vaults, full-size shells, strangers' surfaces):
 POLISHING = 30  # polishing, which judges as built too

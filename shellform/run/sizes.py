@@ -39,20 +39,8 @@ _USUAL = 1.0  # m, of rods on site
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
 _LATHS = "timber_laths"  # whose rods are built in two layers
-_ROPES = (
-    0.0003,
-    0.0005,
-    0.001,
-    0.0015,
-    0.002,
-    0.003,
-    0.004,
-    0.005,
-    0.006,
-    0.008,
-    0.010,
-    0.012,
-)  # m, in stock
+# m, diameters in stock
+_ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008, 0.010, 0.012)
 _MOST_ROPE = 0.008  # m, to begin with
 _ROPE = 0.006  # of the spacing, a rope's diameter
 _ROPE_AREA, _ROPE_YOUNG, _ROPE_STRENGTH = 0.597, 120e9, 1380e6  # of the diameter's square; Pa; Pa at breaking
@@ -145,7 +133,7 @@ class Placed:
 
 def curvature_shown(surface: Surface) -> float:
     """The larger principal curvature, 1/m, that all but a twentieth of the surface keeps."""
-    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface)
+    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface.vertices, surface.triangles)
     order = np.argsort(bent)
     share = np.cumsum(weight[order]) / weight.sum()
     return float(bent[order][min(int(np.searchsorted(share, SHOWN)), len(bent) - 1)])
@@ -154,7 +142,7 @@ def curvature_shown(surface: Surface) -> float:
 def curvature_usual(surface: Surface) -> float:
     """The larger principal curvature, 1/m, that three quarters of the surface keep: how it would be curved
     without its creases."""
-    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface)
+    bent, weight = np.abs(curvature(surface)).max(axis=1), vertex_areas(surface.vertices, surface.triangles)
     order = np.argsort(bent)
     return float(bent[order][np.searchsorted(np.cumsum(weight[order]), _USUALLY * weight.sum())])
 
@@ -321,6 +309,10 @@ def _radius(choice: RodChoice) -> float:
 
 def buckling_load(surface: Surface, spacing: float, bending: float, rope: Rope) -> float:
     """About what load, N/m², the braced grid of rods with EI `bending`, N·m², buckles under."""
-    mean = float(np.average((curvature(surface) ** 2).mean(axis=1), weights=vertex_areas(surface)))
+    mean = float(
+        np.average(
+            (curvature(surface) ** 2).mean(axis=1), weights=vertex_areas(surface.vertices, surface.triangles)
+        )
+    )
     across, shear = bending / spacing, rope.stiffness / (math.sqrt(2.0) * spacing)
     return _BUCKLING * math.sqrt(across * shear) * mean

@@ -103,12 +103,14 @@ def _raised(
         raise InputError("must be positive", where="rise", value=rise)
     if load not in ("surface", "plan"):
         raise InputError("must be surface or plan", where="load", value=load)
+    from shellform.surface.shape.target import vertex_areas
+
     free = ~held
     solver = _definite(_stiffness(len(place), ends, density)[free][:, free])
     shape = np.column_stack([place, np.zeros(len(place))])
     for _ in range(_ROUNDS):
         raised = np.zeros(len(place))
-        raised[free] = solver.solve(_tributary_areas(shape, faces)[free])
+        raised[free] = solver.solve(vertex_areas(shape, faces)[free])
         raised *= rise / raised.max()
         change = float(np.abs(raised - shape[:, 2]).max())
         if change < _SETTLED * rise or load == "plan":
@@ -188,7 +190,7 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
     The force densities are those that leave the least unbalanced force on the surface as it is, none below
     `least` of their mean, so that all stays in compression. Raises InputError where nothing is held.
     """
-    from shellform.surface.shape.target import make_surface
+    from shellform.surface.shape.target import make_surface, vertex_areas
 
     points, faces = surface.vertices, surface.triangles
     level = float(points[:, 2].min()) if ground is None else ground
@@ -205,7 +207,7 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
     edges = np.unique(
         np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1), axis=0
     )
-    weight = np.column_stack([np.zeros((len(points), 2)), -_tributary_areas(points, faces)])
+    weight = np.column_stack([np.zeros((len(points), 2)), -vertex_areas(points, faces)])
     density = fitted_densities(points, edges, weight, held, least=least)
     return make_surface(
         force_density(points, edges, density, weight, held),
@@ -358,13 +360,3 @@ def _isotropic_thrust(plan: Reals, triangles: Indices) -> tuple[Indices, Reals]:
         weights.append(0.5 * np.sum(first * second, axis=1) / np.abs(cross))
         edges.append(np.column_stack([b, c]))
     return np.vstack(edges), np.concatenate(weights)
-
-
-def _tributary_areas(points: Reals, triangles: Indices) -> Reals:
-    """A third of the area of every triangle to each of its vertices (v,), m²."""
-    corner = points[triangles]
-    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-    total = np.zeros(len(points))
-    for k in range(3):
-        np.add.at(total, triangles[:, k], area / 3.0)
-    return total

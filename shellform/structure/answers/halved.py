@@ -138,10 +138,14 @@ def _turned_along(quaternions: Reals, axis: Reals, direction: Reals) -> Reals:
     `direction` (k, 3) of any length."""
     now = np.einsum("eij,ej->ei", rotation.matrices(quaternions), axis)
     wanted = direction / np.linalg.norm(direction, axis=1, keepdims=True)
+    return rotation.product(_least_turn(now, wanted), quaternions)
+
+
+def _least_turn(now: Reals, wanted: Reals) -> Reals:
+    """Quaternions (k, 4) of the least rotations that bring the unit vectors `now` (k, 3) onto those `wanted`."""
     cosine = (now * wanted).sum(axis=1, keepdims=True)
     least = np.hstack([1.0 + cosine, np.cross(now, wanted)])
-    least /= np.linalg.norm(least, axis=1, keepdims=True)
-    return rotation.product(least, quaternions)
+    return np.asarray(least / np.linalg.norm(least, axis=1, keepdims=True))
 
 
 def _bulge(nodes: Reals, beams: Beams) -> Reals:
@@ -189,10 +193,5 @@ def _curvature(nodes: Reals, beams: Beams, direction: Reals, length: Reals) -> t
 
 def _turned_to(frames: Reals, axis: Reals) -> Reals:
     """Frames (k, 2, 3, 3) turned by the least rotation that brings their x axes onto `axis` (k, 3)."""
-    sine = np.cross(frames[:, 0, :, 0], axis)
-    cosine = (frames[:, 0, :, 0] * axis).sum(axis=1)
-    cross = np.zeros((len(axis), 3, 3))
-    cross[:, [2, 0, 1], [1, 2, 0]] = sine
-    cross[:, [1, 2, 0], [2, 0, 1]] = -sine
-    turn = np.eye(3) + cross + cross @ cross / (1.0 + cosine)[:, None, None]
+    turn = rotation.matrices(_least_turn(frames[:, 0, :, 0], axis))
     return np.asarray(turn[:, None] @ frames)

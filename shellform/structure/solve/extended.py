@@ -38,10 +38,8 @@ class ExtendedAssembly(Assembly):
     """The same as `plain`, a model of beams and cables, with twice the digits."""
 
     def __init__(self, plain: Assembly) -> None:
-        own = {
-            name: value for name, value in plain.__dict__.items() if name != "chords"
-        }  # made before, of its digits
-        self.__dict__.update(own)
+        self.__dict__.update(plain.__dict__)
+        self.__dict__.pop("chords", None)  # those of plain digits, where they were made before
         self.matrix: Symmetric = ExtendedSymmetric(plain.matrix)
 
     last_digit = 16.0 * Assembly.last_digit**2

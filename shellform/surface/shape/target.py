@@ -134,11 +134,11 @@ def largest_curvature(surface: Surface) -> float:
     return float(np.percentile(bent[inner], 99.5)) if inner.any() else 0.0
 
 
-def vertex_areas(surface: Surface) -> Reals:
-    """A third (v,), m², of the triangles at each vertex."""
-    area = np.linalg.norm(_area_vectors(surface.vertices, surface.triangles), axis=1)
-    result = np.zeros(len(surface.vertices))
-    np.add.at(result, surface.triangles, (area / 3.0)[:, None])
+def vertex_areas(points: Reals, triangles: Indices) -> Reals:
+    """A third (v,), m², of the triangles (t, 3) at each of the points (v, 3)."""
+    area = np.linalg.norm(_area_vectors(points, triangles), axis=1)
+    result = np.zeros(len(points))
+    np.add.at(result, triangles, (area / 3.0)[:, None])
     return result
 
 
