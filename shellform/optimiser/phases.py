@@ -156,7 +156,8 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
     begun = _ready_to_thin(search, it)
     if search.asked is None:
         return begun
-    found, other = _made_to_stand(search, replace(begun, tensioned=_tensioned(search, it)), it.point)
+    tensioned = replace(begun, tensioned=_tensioned(search, it))
+    found, other = _made_to_stand(search, tensioned, it.point, budget=np.inf)
     if found is not None:
         return _ready_to_thin(search, accepted(search, other, found))
     fell = it.accepted[-1].built
@@ -177,16 +178,20 @@ def _ready_as_it_is(search: Search, it: Iterate) -> Iterate:
     return _ready_to_thin(search, _aiming_for(search, it, max(it.stiffness, stiffness_of(search, it.point))))
 
 
-def _made_to_stand(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation | None, Iterate]:
+def _made_to_stand(
+    search: Search, it: Iterate, trial: Linearisation, budget: float
+) -> tuple[Linearisation | None, Iterate]:
     """The trial where it breaks no limit more than the iterate does and stands as built; where it only
     falls, one near it, for which more stiffness is asked, and repaired for, until it stands. None, and the
-    iterate with the stiffness that it kept, where it comes to nothing.
+    iterate with the stiffness that it kept, where it comes to nothing within the `budget` of the objective.
 
     Where designs are judged as built, the stiffness to keep is no limit but what repairs aim for: it comes
     down to what a trial that stands has, and not below the solver's own.
     """
     solver, begun = search.solver, it
     for more in reversed(range(solver.stiffenings + 1)):
+        if trial.objective > budget:
+            break
         trial, it = _aiming_lower(search, it, trial)
         if violation(search, trial) > max(violation(search, begun.point), 0.0):
             break
@@ -266,15 +271,14 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         tensioned[leaving] = False
         it = replace(it, tensioned=tensioned, fell=False)
         trial, found = attempt_without(search, it, model, leaving), None
-        if search.asked is not None and trial is not None and trial.objective <= budget:
-            found, it = _made_to_stand(search, it, trial)
+        if search.asked is not None and trial is not None:
+            found, it = _made_to_stand(search, it, trial, budget)
         # constraints that it breaks are the repair's business; but repairs serve the objective too, with what
         # made a design stand
         if found is None and not it.fell and trial is not None:
             if trial.objective < 2.0 * budget:
                 trial, it = _repaired(search, it, trial)
-            if trial.objective <= budget:
-                found, it = _made_to_stand(search, it, trial)
+            found, it = _made_to_stand(search, it, trial, budget)
         if found is None:
             it = noted(search, it, trial or it.point, False)
             alone = len(leaving) == 1
@@ -323,15 +327,15 @@ def _without_slack(search: Search, it: Iterate) -> Iterate:
 
 def _repaired(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation, Iterate]:
     """A few steps from the trial with the cables that are left, none of which may go slack; and the iterate
-    with the window and the curvature that they found."""
+    with the window and the curvature that they found. What a step costs is no reason to refuse it: the first
+    one after more stiffness is asked for costs much, which the next one gets back."""
     solver, point = search.solver, it.point
     it = replace(it, point=trial)
     for _ in range(min(solver.repairs, search.left())):
         model = search.models.at(it.point)
         y, _ = propose(task(search, it, model))
         better, it = attempt(search, it, model, y)
-        dear = better is not None and better.objective > max(it.thrifty, it.point.objective)
-        if better is None or dear or merit(search, better) >= merit(search, it.point):
+        if better is None or merit(search, better) >= merit(search, it.point):
             it = replace(it, window=it.window * solver.shrink)
         else:
             it = replace(it, window=it.window * solver.grow, point=better)

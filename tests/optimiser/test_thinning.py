@@ -9,9 +9,9 @@ import pytest
 import shellform as sf
 from shellform.optimiser import phases, trials
 from shellform.optimiser.optimise import begin
-from shellform.optimiser.phases import _made_to_stand, _thin
+from shellform.optimiser.phases import _made_to_stand, _repaired, _thin
 from shellform.optimiser.proposal import _as_far_as_can_be
-from shellform.optimiser.search_state import stiffness_of, violation
+from shellform.optimiser.search_state import restiffened, stiffness_of, violation
 from shellform.reliability.trial_structures import Demand, JudgedTrial, Required
 
 ASKED = sf.Safety(sf.Tolerances(cable_length=1e-4), critical_factor=None, tried=1)
@@ -83,17 +83,42 @@ def test_a_design_that_falls_is_made_stiffer_until_it_stands(stout, monkeypatch)
     before = stiffness_of(search, it.point)
     answers = iter([False, True])
     monkeypatch.setattr(trials, "stands", lambda *_, **__: told(next(answers)))
-    found, after = _made_to_stand(search, replace(it, thrifty=np.inf), it.point)
+    found, after = _made_to_stand(search, it, it.point, budget=np.inf)
     assert found is not None
     assert stiffness_of(search, found) > 1.01 * before
     assert after.stiffness > it.stiffness
+
+
+def descended(stout, stiffness):
+    """A search whose rods are as thin as the stiffness asked for allows, as good as a descent gets them."""
+    wet = stout.point_load(4.5, every=2)
+    search, it = searched(stout, 0.005, stiffness=stiffness, evaluations=60, asked=demanded({"wet": wet}))
+    it = phases._descend(replace(search, evaluations=40), replace(it, guarded=False))
+    return search, phases._ready_to_thin(search, it)
+
+
+def test_a_step_towards_more_stiffness_may_cost_what_the_next_one_gets_back(stout):
+    search, it = descended(stout, 0.5)
+    before = stiffness_of(search, it.point)
+    stiffer = restiffened(search, replace(it, thrifty=0.0), 1.5 * before)
+    found, _ = _repaired(search, stiffer, stiffer.point)
+    assert found.objective > it.point.objective
+    assert stiffness_of(search, found) > 1.1 * before
+
+
+def test_a_design_that_stands_only_at_a_cost_beyond_the_budget_is_not_taken(stout, monkeypatch):
+    search, it = descended(stout, 0.5)
+    for budget, taken in ((it.point.objective, False), (np.inf, True)):
+        answers = iter([False, True])
+        monkeypatch.setattr(trials, "stands", lambda *_, own=answers, **__: told(next(own)))
+        assert (_made_to_stand(search, it, it.point, budget)[0] is not None) == taken
 
 
 def test_where_nothing_stands_the_stiffness_asked_for_is_as_before(stout, monkeypatch):
     wet = stout.point_load(4.5, every=2)
     search, it = searched(stout, 0.005, asked=demanded({"wet": wet}))
     monkeypatch.setattr(trials, "stands", lambda *_, **__: told(False))
-    found, after = _made_to_stand(search, replace(it, thrifty=np.inf), it.point)
+    found, after = _made_to_stand(search, it, it.point, budget=np.inf)
     assert found is None
     assert after.stiffness == it.stiffness
     np.testing.assert_array_equal(after.point.constraints, it.point.constraints)
@@ -104,10 +129,11 @@ def test_a_design_that_stands_may_have_less_stiffness_than_was_aimed_for(stout, 
     search, it = searched(stout, 0.005, stiffness=5.0, asked=demanded({"wet": wet}))
     assert violation(search, it.point) > 0.0
     monkeypatch.setattr(trials, "stands", lambda *_, **__: told(True))
-    found, after = _made_to_stand(search, it, it.point)
+    found, after = _made_to_stand(search, it, it.point, budget=np.inf)
     assert found is not None
     assert violation(search, found) <= 0.0
     # the smooth least of several modes, whose sharpness goes with the stiffness asked for
     assert after.stiffness == pytest.approx(stiffness_of(search, found), rel=1e-4)
     without = replace(search, asked=None)
-    assert _made_to_stand(without, replace(it, point=it.point), it.point)[0] is not None  # no worse than it
+    found, _ = _made_to_stand(without, replace(it, point=it.point), it.point, budget=np.inf)
+    assert found is not None  # no worse than it
