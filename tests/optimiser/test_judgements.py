@@ -10,10 +10,14 @@ import pytest
 import shellform as sf
 from shellform.optimiser import going_back, phases, search_state, trials
 from shellform.optimiser.search_state import Accepted, Iterate, merit, missed, stiffness_of, violation
-from shellform.optimiser.thinning import removable
+from shellform.optimiser.thinning import kept_stiffness, removable
 from shellform.problem.engineering import ModalStiffness
 from shellform.problem.evaluation import OffBranch
 from shellform.problem.problem import FEASIBLE
+from shellform.structure.elements.state import at_rest
+from shellform.structure.network import assemble
+from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.verification.invariances import basket
 
 NONE = np.zeros(0)
 
@@ -482,3 +486,28 @@ def test_cables_that_go_leave_every_direction_its_share_of_stiffness_and_no_furt
     assert 0 < len(whole) < 12
     assert removable(kept, order, 2, least).tolist() == gone[:2]
     assert removable(kept, order, 0, least).tolist() == []
+
+
+def test_what_is_kept_of_the_stiffness_is_that_of_the_tangent_without_the_cables():
+    network, load = basket()
+    longer = network.cables.rest_length * [1.0, 1.0, 1.2]
+    network = replace(network, cables=replace(network.cables, rest_length=longer))
+    assembly = assemble(network)
+    state = find_equilibrium(assembly, at_rest(network.nodes), load).state
+    kept = kept_stiffness(assembly, state, network.cables)
+    np.testing.assert_array_equal(network.cables.tension(state) > 0.0, [True, True, False])
+    np.testing.assert_array_equal(kept[2], [0.0, 0.0, 1.0])
+    one = np.asfortranarray(np.eye(len(assembly.free)))
+    tangent = np.linalg.inv(assembly.factor(state).solve(one))
+    elastic = []
+    for (one, other), rest in zip(network.cables.ends, network.cables.rest_length, strict=True):
+        pull = state.positions[other] - state.positions[one]
+        column = np.zeros(6 * len(network.nodes))
+        column[6 * one : 6 * one + 3], column[6 * other : 6 * other + 3] = -pull, pull
+        column = column[assembly.free] / np.linalg.norm(pull)
+        elastic.append(3.0 / rest * np.outer(column, column))
+    for gone in ([0], [1], [0, 1]):
+        without = tangent - sum(elastic[k] for k in gone)
+        share = np.exp(np.linalg.slogdet(without)[1] - np.linalg.slogdet(tangent)[1])
+        assert np.linalg.det(kept[np.ix_(gone, gone)]) == pytest.approx(share, rel=1e-6)
+        assert share < 0.9
