@@ -11,7 +11,7 @@ from shellform.records.checks import Bounds, checks
 from shellform.records.remedies import RodSizes, RodsOf, allow
 from shellform.records.summary import CableCountRecord, StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
-from shellform.records.verdict import failed, headline, verdict
+from shellform.records.verdict import failed, headline, to_build, verdict
 from shellform.records.words import critical_words, load_title, number, standing_words
 from tests.records.made import design, load, optimisation, summary
 
@@ -258,3 +258,8 @@ def test_the_headline_counts_the_checks_that_fail(shell, designs):
     assert (
         headline(verdict(made, "polished")) == "The polished design is not examined: 2 checks are still open."
     )
+
+
+def test_before_anything_is_optimised_the_initial_design_is_to_be_built_or_the_last_there_is():
+    assert to_build([], ["unbraced", "initial", "unloaded"]) == "initial"
+    assert to_build([], ["one", "two", "three"]) == "three"
