@@ -37,6 +37,10 @@ def test_dead_cables_stay_at_their_longest_and_taut_ones_as_they_are(dome, dead)
     np.testing.assert_array_equal(model.origin[slack], 0.0)
     np.testing.assert_allclose(model.longest, 1.1 * dome.design().rest_length)
     np.testing.assert_allclose(model.design(model.origin).rest_length, it.point.design.rest_length)
+    # the most that a cable may pull is what it would at its shortest
+    length = dome.cables(it.point.design).lengths(it.point.states["wet"])
+    np.testing.assert_allclose(model.upper, 187.0 * (length / 0.01 - 1.0))
+    np.testing.assert_array_equal(model.lower, 0.0)
     # a tension below a millionth of the stiffness is none, one above it is
     y = model.origin.copy()
     taut = np.flatnonzero(~slack)[:2]
