@@ -1,15 +1,19 @@
 """Small faults planted one at a time, and whether the tests notice: signs, factors, comparisons, least and most.
 
-    python scripts/mutants.py [--count 200] [--seed 1] [--rooms optimiser records ...] [--output FILE.json]
+    python scripts/mutants.py [--count 200] [--seed 1] [--rooms optimiser output/workshop ...] [--output FILE.json]
+                              [--quick] [--tests TEST-FILE ...]
 
-Each fault is planted in a copy of the repository, and the likeliest test files are run on it: those of the
-same room that name the module, then others that do, then all of the room. A fault that no test notices is
-listed with its line; what nobody could notice stands with its reason in scripts/mutants.toml. Status 1 where
-fewer than 90 % of the others are caught. A test that notices is run without any fault, too: one that fails then is
-left out and told.
+The likeliest test files of a fault are those of the same room that name the module, then others that do, then all of
+the room. They are run once without any fault, in one process, which tells what fails anyhow and is left out, and
+which of the package's functions each test calls. Then the process is forked for each fault: the child puts the
+faulty function in the sound one's place and runs the tests that call it, those that do so themselves before those
+whose fixtures do, and the quickest first. A fault that no test notices is listed with its line; what nobody could
+notice stands with its reason in scripts/mutants.toml. Status 1 where fewer than 90 % of the others are caught.
 
-What is compiled here is copied along. A loop that is compiled lies inlined in others' machine code, too, whose own
-files don't change: a fault in one is run with a cache of its own.
+A fault in a compiled loop, or where nothing can be put in its place, is planted in a copy of the repository, and whole
+test files are run on it, each in a process of its own: minutes for each fault, left out by --quick. What is compiled
+here is copied along. A compiled loop lies inlined in others' machine code, too, whose own files don't change: a fault
+in one is run with a cache of its own. A test that notices is run without any fault, too.
 
 The tools that are at hand (mutmut, cosmic-ray) run all tests on each fault or know one process's modules; here
 a compiled loop has to be compiled anew, and the tests take a quarter of an hour.
@@ -19,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import gc
 import json
 import os
 import random
@@ -27,11 +32,16 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from types import CodeType, FrameType, FunctionType
+from typing import TextIO
+
+import pytest
 
 ROOT = Path(__file__).parent.parent
 KNOWN = Path(__file__).with_suffix(".toml")
@@ -39,6 +49,7 @@ CAUGHT = 0.9  # of the faults that could be noticed
 LONGEST = 600  # processor seconds of one process in the tests of one fault; one that runs on is noticed
 WAITING = 3600.0  # seconds on the clock, the same for one that waits for ever
 FILES = 4  # test files, at most, that are run on a fault
+ENOUGH = 60.0  # processor seconds of the tests that are run on a fault in a function, as they took without it
 _LEFT_OUT = ("verification", "__pycache__")  # published numbers are no behaviour
 _COPIED = (
     "shellform",
@@ -56,6 +67,7 @@ _COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
 _COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
 }  # fmt: skip
+_NEXT = "\n"  # between what a child tells
 _CALLED = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "any": "all", "all": "any"}
 
 
@@ -143,7 +155,7 @@ def sample(count: int, seed: int, rooms: Sequence[str]) -> list[Fault]:
     for file in sorted((ROOT / "shellform").rglob("*.py")):
         if not any(part in _LEFT_OUT for part in file.parts):
             for fault in faults(file):
-                if fault.name not in known and (not rooms or fault.room in rooms):
+                if fault.name not in known and (not rooms or _is_within(fault, rooms)):
                     found.setdefault(fault.room, []).append(fault)
     chance = random.Random(seed)
     for each in found.values():
@@ -154,6 +166,12 @@ def sample(count: int, seed: int, rooms: Sequence[str]) -> list[Fault]:
             if each and len(chosen) < count:
                 chosen.append(each.pop())
     return chosen
+
+
+def _is_within(fault: Fault, rooms: Sequence[str]) -> bool:
+    """Whether it is in one of the rooms, parts of rooms or modules."""
+    module = Path(fault.file).with_suffix("").as_posix().removeprefix("shellform/")
+    return any(module == room or module.startswith(f"{room}/") for room in rooms)
 
 
 def likeliest(fault: Fault) -> list[str]:
@@ -175,16 +193,223 @@ def likeliest(fault: Fault) -> list[str]:
     return [file.relative_to(ROOT).as_posix() for file in order[:FILES]]
 
 
+def with_fault(fault: Fault, whole: bytes) -> bytes:
+    """A file's text with the fault in it."""
+    starts = [0]
+    for line in whole.splitlines(keepends=True):
+        starts.append(starts[-1] + len(line))
+    begin, end = starts[fault.line - 1] + fault.column, starts[fault.end_line - 1] + fault.end_column
+    return whole[:begin] + f"({fault.after})".encode() + whole[end:]
+
+
+def plant(fault: Fault) -> bool:
+    """Puts what has the fault in the sound one's place, in this process; whether that could be done."""
+    file = ROOT / fault.file
+    text = with_fault(fault, file.read_bytes())
+    module = sys.modules[fault.file.removesuffix(".py").replace("/", ".").removesuffix(".__init__")]
+    faulty = {_key(code): code for code in _codes(compile(text, str(file), "exec"))}
+    for each in gc.get_objects():
+        if isinstance(each, FunctionType) and each.__code__.co_filename == str(file):
+            first, last = _lines(each.__code__)
+            other = faulty.get(_key(each.__code__))
+            if first <= fault.line <= last and other is not None and other != each.__code__:
+                each.__code__ = other
+                return True
+    for node in ast.parse(text).body:
+        if isinstance(node, ast.Assign) and node.lineno <= fault.line <= fault.end_line <= (
+            node.end_lineno or 0
+        ):
+            value = eval(compile(ast.Expression(node.value), str(file), "eval"), dict(vars(module)))
+            name = ast.unparse(node.targets[0])
+            before = getattr(module, name, None)
+            for key, other_module in list(sys.modules.items()):
+                if key.startswith("shellform") and getattr(other_module, name, module) is before:
+                    setattr(other_module, name, value)
+            return before is not None
+    return False
+
+
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield each
+            yield from _codes(each)
+
+
+def _key(code: CodeType) -> tuple[str, int]:
+    return code.co_qualname, code.co_firstlineno
+
+
+def _lines(code: CodeType) -> tuple[int, int]:
+    """First and last line of a function, those of functions in it included."""
+    inner = [_lines(each)[1] for each in code.co_consts if isinstance(each, CodeType)]
+    own = [line for _, _, line in code.co_lines() if line is not None]
+    return code.co_firstlineno, max([*own, *inner], default=code.co_firstlineno)
+
+
+class Planter:
+    """A plug-in for pytest that runs the tests as they are, and then on each of the `faults` in a process forked
+    from there. `rows` are what becomes of each, told to `told`; `rest` those that couldn't be planted."""
+
+    def __init__(self, faults: Sequence[Fault], told: TextIO) -> None:
+        self.faults, self.told = faults, told
+        self.rows: dict[Fault, str] = {}
+        self.rest: list[Fault] = []
+        self.failed = ""
+        self._now: set[tuple[str, int]] = set()
+        self._shared: set[tuple[str, int]] = set()
+        self._fixtures: dict[str, set[tuple[str, int]]] = {}
+        self._itself: dict[str, set[tuple[str, int]]] = {}
+        self._seconds: dict[str, float] = {}
+        self._kept: list[pytest.FixtureDef[object]] = []
+
+    def _trace(self, frame: FrameType, event: str, value: object) -> None:
+        code = frame.f_code
+        if code.co_filename.startswith(str(ROOT / "shellform")):
+            self._now.add((code.co_filename, code.co_firstlineno))
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """After a test's fixtures, after it, and after what clears them away."""
+        if report.failed:
+            self.failed = report.nodeid
+        file = report.nodeid.split("::")[0]
+        if report.when == "setup":
+            self._fixtures.setdefault(file, set()).update(self._now)
+        if report.when == "call":
+            self._itself[report.nodeid] = self._now
+        self._now = set()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef[object]) -> Iterator[None]:
+        """Those of the whole session are kept for all faults that they don't meet."""
+        found = yield
+        if fixturedef.scope == "session":
+            self._shared |= self._now
+            self._kept.append(fixturedef)
+        return found
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """All tests, then all faults."""
+        items = [*session.items]
+        for k, item in enumerate(items):
+            began, self.failed = time.process_time(), ""
+            sys.settrace(self._trace)
+            self._run(item, items[(k + 1) % len(items)])
+            sys.settrace(None)
+            self._seconds[item.nodeid] = time.process_time() - began
+            if self.failed:
+                print(f"left out: {self.failed} fails without any fault", file=self.told, flush=True)
+                self._itself.pop(item.nodeid, None)
+        spent = sum(self._seconds.values())
+        print(f"{len(items)} tests, {spent:.0f} s of processor time", file=self.told, flush=True)
+        by_name = {item.nodeid: item for item in items}
+        for fault in self.faults:
+            told = self._forked(fault, [by_name[name] for name in self._calling(fault)], items[0])
+            if told is None:
+                self.rest.append(fault)
+                continue
+            self.rows[fault] = told
+            tell(fault, told, self.told)
+        return True
+
+    def _run(self, item: pytest.Item, following: pytest.Item) -> None:
+        item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+
+    def _calling(self, fault: Fault) -> list[str]:
+        """The tests that call the function that a fault lies in."""
+        first, last = _function(fault)
+        near = []
+        for name, seconds in self._seconds.items():
+            for far, called in enumerate((self._itself.get(name, ()), self._fixtures[name.split("::")[0]])):
+                if name in self._itself and any(_is_in(fault, first, last, each) for each in called):
+                    near.append((bool(far), seconds, name))
+                    break
+        spent, names = 0.0, []
+        for _, seconds, name in sorted(near):
+            if not names or spent + seconds <= ENOUGH:
+                spent += seconds
+                names.append(name)
+        return names
+
+    def _forked(self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item) -> str | None:
+        """The test that notices a fault, "" where none does; None where it can't be planted."""
+        if not items:
+            return None
+        reading, writing = os.pipe()
+        child = os.fork()
+        if not child:
+            os.close(reading)
+            told = "a crash"
+            try:
+                told = self._child(fault, items, last, writing)
+            finally:
+                os.write(writing, f"{_NEXT}{told}".encode())
+                os._exit(0)
+        os.close(writing)
+        with os.fdopen(reading, "rb") as pipe:
+            found = pipe.read().decode()
+        status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        if status:
+            return f"status {status} in {found.split(_NEXT)[-1]}"
+        found = found.split(_NEXT)[-1]
+        return None if found == "not planted" else found
+
+    def _child(self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item, told: int) -> str:
+        longest = int(time.process_time() + 10.0 * sum(self._seconds[item.nodeid] for item in items)) + 60
+        resource.setrlimit(resource.RLIMIT_CPU, (longest, longest))
+        try:
+            if not plant(fault):
+                return "not planted"
+        except Exception as error:  # where a module stops with it before any test
+            return f"{type(error).__name__} when it is planted"
+        first, end = _function(fault)
+        if any(_is_in(fault, first, end, each) for each in self._shared):
+            for fixture in self._kept:
+                fixture.cached_result = None
+        for k, item in enumerate(items):
+            self.failed = ""
+            os.write(told, f"{_NEXT}{item.nodeid}".encode())
+            self._run(item, items[k + 1] if k + 1 < len(items) else last)
+            if self.failed:
+                return self.failed
+        return ""
+
+
+def _is_in(fault: Fault, first: int, last: int, called: tuple[str, int]) -> bool:
+    return called[0] == str(ROOT / fault.file) and first <= called[1] <= last
+
+
+def _function(fault: Fault) -> tuple[int, int]:
+    """First and last line of the innermost function that a fault lies in; of its file, outside of all."""
+    tree = ast.parse((ROOT / fault.file).read_text(encoding="utf-8"))
+    around = [
+        (min([node.lineno, *(each.lineno for each in node.decorator_list)]), node.end_lineno or 0)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and node.lineno <= fault.line <= (node.end_lineno or 0)
+    ]
+    return max(around, default=(1, sys.maxsize))
+
+
+def is_compiled(fault: Fault) -> bool:
+    """Whether it lies in a file of compiled loops."""
+    return "njit" in (ROOT / fault.file).read_text(encoding="utf-8")
+
+
+def in_one_process(faults: Sequence[Fault], tests: Sequence[str], told: TextIO) -> Planter:
+    """What the tests notice of faults in functions."""
+    planter = Planter(faults, told)
+    files = tests or sorted({file for fault in faults for file in likeliest(fault)})
+    os.chdir(ROOT)
+    words = ["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist"]
+    pytest.main([*words, *files], plugins=[planter])
+    return planter
+
+
 def caught_by(fault: Fault, copy: Path, files: Sequence[str], left_out: Sequence[str] = ()) -> str:
     """The test in the `files`, without those `left_out`, that notices a fault; "" where none does."""
     file = copy / fault.file
     whole, then = file.read_bytes(), file.stat()
-    lines = whole.decode().splitlines(keepends=True)
-    starts = [0]
-    for line in lines:
-        starts.append(starts[-1] + len(line.encode()))
-    begin, end = starts[fault.line - 1] + fault.column, starts[fault.end_line - 1] + fault.end_column
-    file.write_bytes(whole[:begin] + f"({fault.after})".encode() + whole[end:])
+    file.write_bytes(with_fault(fault, whole))
     own = tempfile.mkdtemp(prefix="mutant-") if b"njit" in whole else None
     try:
         return failed(copy, files, own, left_out)
@@ -234,6 +459,23 @@ def noticed(fault: Fault, copy: Path, sound: dict[str, bool]) -> str:
             return told
 
 
+def tell(fault: Fault, told: str, output: TextIO) -> None:
+    """What became of a fault."""
+    kept = "caught  " if told else "SURVIVES"
+    print(f"{kept} {fault.file}:{fault.line}  {fault.before}  ->  {fault.after}", file=output, flush=True)
+
+
+def in_copies(faults: Sequence[Fault]) -> Iterator[tuple[Fault, str]]:
+    """What the tests notice of faults that have to be planted in files."""
+    with tempfile.TemporaryDirectory(prefix="mutants-") as place:
+        for name in _COPIED:
+            source = ROOT / name
+            (shutil.copytree if source.is_dir() else shutil.copy2)(source, Path(place) / name)
+        sound: dict[str, bool] = {}
+        for fault in faults:
+            yield fault, noticed(fault, Path(place), sound)
+
+
 def main() -> int:
     """Plants, runs, tells."""
     asked = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -241,28 +483,30 @@ def main() -> int:
     asked.add_argument("--seed", type=int, default=1)
     asked.add_argument("--rooms", nargs="*", default=[])
     asked.add_argument("--output", type=Path)
+    asked.add_argument("--quick", action="store_true", help="only what is planted in functions")
+    asked.add_argument(
+        "--tests", nargs="*", default=[], help="test files that are run instead of the likeliest"
+    )
     given = asked.parse_args()
-    chosen = sample(given.count, given.seed, given.rooms)
-    rows, by_room = [], Counter[tuple[str, bool]]()
-    with tempfile.TemporaryDirectory(prefix="mutants-") as place:
-        for name in _COPIED:
-            source = ROOT / name
-            (shutil.copytree if source.is_dir() else shutil.copy2)(source, Path(place) / name)
-        sound: dict[str, bool] = {}
-        for fault in chosen:
-            told = noticed(fault, Path(place), sound)
-            rows.append({**asdict(fault), "caught_by": told})
-            by_room[fault.room, bool(told)] += 1
-            print(
-                f"{'caught  ' if told else 'SURVIVES'} {fault.file}:{fault.line}  {fault.before}  ->  {fault.after}",
-                flush=True,
-            )
-            if given.output:
-                given.output.write_text(json.dumps(rows, indent=1), encoding="utf-8")
+    taken = sample(given.count, given.seed, given.rooms)
+    output = os.fdopen(os.dup(1), "w")
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what pytest tells of every child
+    planter = in_one_process([fault for fault in taken if not is_compiled(fault)], given.tests, output)
+    rows = dict(planter.rows)
+    rest = [] if given.quick else [fault for fault in taken if fault not in rows]
+    for fault, told in in_copies(rest) if rest else ():
+        rows[fault] = told
+        tell(fault, told, output)
+    if given.output:
+        told_of = [{**asdict(fault), "caught_by": told} for fault, told in rows.items()]
+        given.output.write_text(json.dumps(told_of, indent=1), encoding="utf-8")
+    by_room = Counter((fault.room, bool(told)) for fault, told in rows.items())
     for room in sorted({room for room, _ in by_room}):
-        print(f"{room:14} {by_room[room, True]:4d} of {by_room[room, True] + by_room[room, False]}")
-    share = sum(bool(row["caught_by"]) for row in rows) / max(1, len(rows))
-    print(f"{100.0 * share:.0f} % of {len(rows)} faults are caught")
+        both = by_room[room, True] + by_room[room, False]
+        print(f"{room:14} {by_room[room, True]:4d} of {both}", file=output)
+    share = sum(map(bool, rows.values())) / max(1, len(rows))
+    left = "" if len(rows) == len(taken) else f"; {len(taken) - len(rows)} were not planted"
+    print(f"{100.0 * share:.0f} % of {len(rows)} faults are caught{left}", file=output, flush=True)
     return 0 if share >= CAUGHT else 1
 
 

@@ -12,10 +12,14 @@ import shellform as sf
 from shellform.case.build_problem import case_problem, shown
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.reactions import reactions
 from shellform.optimiser import rounding
 from shellform.problem.robust import RobustMisfit
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
+from shellform.structure.answers.stability import modes
+from shellform.structure.elements.rotation import matrices
+from shellform.structure.network import assemble
 
 ROOT = Path(__file__).parent.parent.parent
 CASE = ROOT / "scripts/scale_model.toml"
@@ -58,6 +62,63 @@ def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loa
     plain = case_problem(load_case(CASE), shell, loads, shell.design())
     assert list(plain.loads) == ["design", "none", "additional"]
     assert len(plain.constraints) == 3
+
+
+def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
+    case = load_case(
+        CASE,
+        [
+            *LIMITS,
+            "limits.thrust=3.0",
+            'limits.critical_loads=["design","additional"]',
+            'limits.slack_loads=["none"]',
+            "robust.supports=1e-4",
+            "robust.limit=0.003",
+            "cable.force_max=18.0",
+            "optimise.misfit_rms_additional=0.004",
+        ],
+    )
+    problem = case_problem(case, shell, loads, shell.design())
+    found = {(type(each.term).__name__, each.term.load): each for each in problem.constraints}
+    assert len(found) == len(problem.constraints)
+
+    def above(kind, load):
+        assert found[kind, load].lower == -np.inf
+        return found[kind, load].upper
+
+    for load in ("none", "design", "additional"):
+        assert above("RodUtilisation", load) == 0.9
+        assert above("ConnectorTurn", load) == 0.4
+        assert above("Uplift", load) == 7.0
+        assert found["Uplift", load].scale == pytest.approx(14.0)
+        assert above("Thrust", load) == 3.0
+    assert above("CableForces", "design") == 18.0
+    assert above("LargestCableForce", "additional") == 18.0
+    assert above("RmsMisfit", "additional") == pytest.approx(0.004**2)
+    assert above("RobustMisfit", "design") == pytest.approx(0.003**2 * shell.node_count)
+    least = found["LeastTension", "none"]
+    assert (least.lower, least.upper, least.term.scale) == (0.05, np.inf, 0.05)
+    assert least.term.let_out == pytest.approx(
+        0.5 * (1.0 + case.cable.rest_ratio * case.optimise.rest_length_max)
+    )
+    states = sf.follow(shell, shell.design(), {"design": loads["design"]})
+    softest = modes(assemble(shell.network(shell.design())), states["design"].equilibrium.state, 1).stiffness
+    for load in ("critical design", "critical additional"):
+        kept = found["ModalStiffness", load]
+        assert kept.lower == pytest.approx((0.25 * softest[0]) ** 2, rel=1e-6)
+        assert kept.upper == np.inf
+        np.testing.assert_allclose(problem.loads[load], 1.25 * loads[load.removeprefix("critical ")])
+    assert problem.decisive == "critical design"
+    assert problem.built_under == ("design", "additional")
+
+
+def test_an_uplift_is_measured_against_what_a_support_bears_where_less_is_allowed(shell, loads):
+    case = load_case(CASE, ["limits.uplift=0.1"])
+    problem = case_problem(case, shell, loads, shell.design())
+    bears = 4.0 * np.count_nonzero(loads["design"][:, 2]) / len(shell.net.supports)
+    for each in problem.constraints:
+        if type(each.term).__name__ == "Uplift":
+            assert (each.term.scale, each.scale) == pytest.approx((bears, bears + 0.1))
 
 
 def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
@@ -111,6 +172,25 @@ def test_what_is_shown_of_a_design_without_load_is_its_prestress(shell, loads):
     assert seen["cables_slack"] == 0
     assert seen["cable_force_min"] > 1.0
     assert 0.7 < seen["stress_utilisation_max"] < 0.8
+
+
+def test_what_is_shown_of_a_loaded_design_is_what_its_supports_cables_and_connectors_bear(shell, loads):
+    rest = shell.design().rest_length.copy()
+    rest[5] = 1.2 * shell.cable_lengths[5]
+    design, load = dataclasses.replace(shell.design(), rest_length=rest), loads["design"]
+    state = sf.follow(shell, design, {"design": load})["design"].equilibrium.state
+    seen = shown(shell, design, state, load)
+    pull = shell.cables(design).tension(state)
+    assert (seen["cable_force_max"], seen["cable_force_min"]) == (pull.max(), pull.min())
+    assert seen["cables_slack"] == np.count_nonzero(pull <= 0.0) >= 1
+    bears = np.array([each.force for each in reactions(shell, design, state, load).supports])
+    assert seen["uplift_max"] == pytest.approx(max(-bears[:, 2].min(), 0.0))
+    assert seen["thrust_max"] == pytest.approx(np.sqrt((bears[:, :2] ** 2).sum(axis=1)).max())
+    # frames that lay along x in the flat grid turn against each other, nearly all about the connector
+    one, other = (matrices(state.quaternions[shell.net.grid.crossing_nodes[:, k]])[:, :, 0] for k in (0, 1))
+    turn = np.arccos(np.clip(np.sum(one * other, axis=1), -1.0, 1.0))
+    assert seen["connector_turn_max"] == pytest.approx(turn.max(), rel=0.02)
+    assert seen["edge_utilisation_max"] == 0.0
 
 
 def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):

@@ -8,9 +8,10 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, lengths, mass, weight
-from shellform.gridshell.reactions import reactions, write_reactions
+from shellform.gridshell.reactions import Reactions, Support, reactions, write_reactions
 from shellform.net.edges import stand
 from shellform.output.exchange.opensees import opensees_script
+from shellform.output.workshop.edge_schedule import edge_table
 from shellform.problem.paths import follow
 from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.elements.sections import Material, Rectangle, isotropic
@@ -68,6 +69,56 @@ def test_reactions_add_up_to_the_load(arches, solved):
     assert found.thrust == max(each.thrust for each in found.supports)
     for each in found.supports:
         assert each.pressure * each.uplift == 0.0
+
+
+def test_a_support_is_pressed_lifted_and_pushed_by_its_own_force():
+    down, up, side = (
+        Support(k, 0, "ground", "", (0.0, 0.0, 0.0), force)
+        for k, force in enumerate([(3.0, -4.0, 2.0), (0.0, 1.0, -1.5), (6.0, 8.0, 0.0)])
+    )
+    assert (down.pressure, down.uplift, down.thrust) == (2.0, 0.0, 5.0)
+    assert (up.pressure, up.uplift, up.thrust) == (0.0, 1.5, 1.0)
+    assert (side.pressure, side.uplift, side.thrust) == (0.0, 0.0, 10.0)
+    every = Reactions((down, up, side))
+    assert (every.pressure, every.uplift, every.thrust) == (2.0, 1.5, 10.0)
+    assert every.total == (9.0, 5.0, 0.5)
+
+
+def test_the_schedule_of_edge_beams_is_in_equilibrium_and_names_the_rods_that_are_clamped(arches, solved):
+    shell, _ = arches
+    grid, place = shell.net.grid, shell.target.positions
+    names = [f"R{k}" for k in range(len(grid.rods))]
+    table = edge_table(shell, shell.design(), solved, names)
+    rows = list(zip(*(table.column(head) for head in table.columns), strict=True))
+    assert len(rows) == sum(len(line.nodes) for line in shell.net.edges)
+    beams = shell.beams(shell.rod.radius)
+    forces = beams.local_forces(solved["design"])[beams.kind == beams.kinds.index("edge")]
+    at, element = 0, 0
+    for k, line in enumerate(shell.net.edges):
+        own = rows[at : at + len(line.nodes)]
+        assert {row[0] for row in own} == {f"E{k}"}
+        np.testing.assert_allclose([row[2:5] for row in own], place[line.nodes])
+        steps = np.linalg.norm(np.diff(place[line.nodes], axis=0), axis=1)
+        np.testing.assert_allclose([row[1] for row in own], np.append(0.0, np.cumsum(steps)))
+        clamped = dict(np.asarray(line.clamps).tolist())
+        for row, node in zip(own, line.nodes.tolist(), strict=True):
+            rod, _, side = str(row[5]).partition(" ")
+            assert bool(rod) == (node in clamped)
+            if rod:
+                end = grid.rods[int(rod[1:])].nodes[{"first": 0, "second": -1}[side]]
+                assert end == clamped[node]
+        last = len(line.ends)
+        # the axial force, and the moments as they turn both ends: what one element begins with the one before ends with
+        for j in range(1, last):  # the moment, torsion with it, goes on where nothing is clamped
+            if int(line.nodes[j]) not in clamped:
+                before, after = forces[element + j - 1], forces[element + j]
+                assert np.hypot(own[j][9], after[1]) == pytest.approx(np.linalg.norm(before[4:]), rel=1e-5)
+        assert own[last][8] == pytest.approx(forces[element + last - 1][0])
+        assert own[last][9] == pytest.approx(np.hypot(*forces[element + last - 1][5:]))
+        assert own[0][9] == pytest.approx(np.hypot(*forces[element][2:4]))
+        at, element = at + len(line.nodes), element + last
+    assert table.columns[8:] == ("design: axial force [N]", "design: bending moment [N m]")
+    assert f"{mass(shell.net, BUNDLE) / 2.0:.3g} kg" in " ".join(table.notes)
 
 
 def test_reactions_are_written_a_line_a_support_and_load(arches, solved, tmp_path):

@@ -1,9 +1,12 @@
 """Joints that follow their rods."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.gridshell.joints import doubts, following
+from shellform.gridshell.joints import doubts, following, usual_gap
 from shellform.structure.elements.sections import Rectangle, isotropic
 
 
@@ -32,3 +35,24 @@ def test_a_joint_of_other_rods_is_doubted_entry_by_entry():
     assert [each.name for each in found] == ["torsion", "bending", "gap"]
     assert found[2].fitting == pytest.approx(0.02)
     assert "joint.gap is 0.04" in found[2].told()
+
+
+@pytest.mark.parametrize(("name", "most"), [("axial", 4.0), ("torsion", 4.0), ("bending", 4.0), ("gap", 1.5)])
+def test_a_joint_is_doubted_from_four_times_what_fits_on_and_a_gap_from_half_as_much_again(name, most):
+    rod = sf.Rod.round(young=40e9, radius=0.01)
+    fitting = following(rod)
+    for times, doubted in ((0.99 * most, 0), (1.01 * most, 1), (1.01 / most, 0), (0.99 / most, 1)):
+        joint = replace(fitting, **{name: times * getattr(fitting, name)})
+        assert [each.name for each in doubts(joint, rod)] == doubted * [name]
+
+
+def test_before_rods_are_chosen_the_gap_is_the_paper_s_in_proportion_to_the_spacing():
+    assert usual_gap(0.055) == pytest.approx(0.002)
+    assert usual_gap(1.1) == pytest.approx(0.04)
+
+
+def test_the_joint_of_laths_has_the_mean_of_both_their_bending_stiffnesses():
+    rod = sf.Rod(Rectangle(0.05, 0.03, isotropic(young=11e9)))
+    _, _, about_y, about_z = rod.stiffness
+    paper = 40e9 * np.pi * 0.001**4 / 4.0
+    assert following(rod).bending == pytest.approx(7.85e-4 * (about_y + about_z) / 2.0 / paper)

@@ -26,6 +26,16 @@ def test_the_scale_model_is_built_more_closely_than_a_shell_of_eighteen_metres(s
     assert (large.load_uneven, large.shape) == (0.05, 5e-4)
 
 
+def test_what_stiffnesses_rods_and_loads_are_off_by_is_as_the_sources_say_whatever_the_size():
+    small = tolerances_of_size(1.99, longest_rod=2.0, longest_cable=0.1)
+    large = tolerances_of_size(2.0, longest_rod=2.0, longest_cable=0.1)
+    assert small.supports == 1e-4
+    assert large.supports == 5e-3, "a scale model is below 2 m"
+    for found in (small, large):
+        assert (found.cable_stiffness, found.rod_stiffness, found.connectors) == (0.05, 0.03, 0.1)
+        assert (found.rod_bow, found.load_each, found.load_all) == (0.001, 0.1, 0.05)
+
+
 def test_a_longer_rod_is_marked_less_closely():
     found = [tolerances_of_size(10.0, longest_rod=length, longest_cable=1.0).marks for length in (5.0, 30.0)]
     assert found[1] > found[0]
@@ -50,6 +60,9 @@ def test_a_tolerance_that_is_negative_or_no_number_is_refused(value):
 def test_a_share_given_in_percent_is_refused():
     with pytest.raises(InputError, match=r"Write 0\.1 for 10 %"):
         Tolerances(load_each=10.0)
+    with pytest.raises(InputError, match=r"must not exceed 0\.5"):
+        Tolerances(shape=0.51)
+    assert Tolerances(shape=0.5, supports=0.51).supports == 0.51  # m
 
 
 def test_a_size_without_extent_is_refused():

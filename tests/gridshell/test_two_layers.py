@@ -1,5 +1,6 @@
 """Rods in two layers: bent as single laths, locked by shear blocks, stressed by both."""
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import TwoLayers, locked_bending, locks_along, rod_stress
 from shellform.gridshell.tolerances import Tolerances
-from shellform.output.workshop.block_schedule import block_table
+from shellform.output.workshop.block_schedule import block_marks, block_table
 from shellform.output.workshop.nesting import cut
 from shellform.problem.engineering import RodUtilisation
 from shellform.problem.paths import deviations, follow
@@ -110,6 +111,23 @@ def test_two_layers_are_bent_as_easily_as_one_and_stand_stiffer(shells, solved):
         for name, own in solved.items()
     }
     assert sunk["locked"] < 0.6 * sunk["loose"] < 0.6 * sunk["single"]
+
+
+def test_shear_blocks_are_marked_in_the_middle_between_neighbouring_crossings(shells):
+    found, _ = shells
+    assert block_marks(found["single"]) == []
+    shell = found["locked"]
+    grid, marks = shell.net.grid, block_marks(shell)
+    wanted = []
+    for rod in grid.rods:
+        first, last = 1e3 * grid.flat[rod.nodes[[0, -1]], :2]
+        share = 1e3 * rod.marks / np.linalg.norm(last - first)
+        places = first + share[:, None] * (last - first)
+        wanted += [(a + b) / 2.0 for a, b in itertools.pairwise(places)]
+    strokes = np.array([mark.points for mark in marks])
+    np.testing.assert_allclose(strokes.mean(axis=1), wanted, atol=1e-6)
+    length = np.linalg.norm(strokes[:, 1] - strokes[:, 0], axis=1)
+    np.testing.assert_allclose(length, 0.04 * 1e3 * min(grid.spacing, grid.spacing_v))
 
 
 def test_locks_have_no_stress_in_the_target_and_local_axes_of_their_rods(shells, solved):

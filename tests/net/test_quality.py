@@ -74,20 +74,73 @@ def test_a_net_that_lies_on_itself_is_refused(plane):
         quality.refuse_folds(Locator(plane), ring, at_rest(wound))
 
 
-def test_a_net_off_its_surface_is_refused(plane, grid):
-    raised = grid.flat + np.array([0.0, 0.0, 0.2])
-    found = quality.measure(
-        plane,
-        Locator(plane),
-        grid,
-        at_rest(raised),
-        np.zeros((len(grid.rod_ends), 2, 2)),
-        np.zeros(grid.node_count),
-        0,
-    )
+def measured(plane, grid, places, *, curvature=None, pull=None):
+    bent = np.zeros((len(grid.rod_ends), 2, 2)) if curvature is None else curvature
+    pull = np.zeros(grid.node_count) if pull is None else pull
+    return quality.measure(plane, Locator(plane), grid, at_rest(places), bent, pull, 0)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_net_off_its_surface_is_refused_above_and_below(plane, grid, side):
+    raised = grid.flat + np.array([0.0, 0.0, 0.2 * side])
+    found = measured(plane, grid, raised)
+    np.testing.assert_allclose(found.distance, 0.2 * side)
+    assert (found.distance_max, found.distance_mean) == pytest.approx((0.2, 0.2))
     with pytest.raises(InputError, match=r"0\.2 m off the surface at \["):
         quality.refuse_distance(found, grid, at_rest(raised))
-    quality.refuse_distance(dataclasses.replace(found, distance_max=0.01), grid, at_rest(raised))
+    assert grid.scale == pytest.approx(np.sqrt(0.3 * 0.4))
+    for share, off in ((0.099, False), (0.101, True)):
+        near = dataclasses.replace(found, distance_max=share * grid.scale)
+        if off:
+            with pytest.raises(InputError, match="off the surface"):
+                quality.refuse_distance(near, grid, at_rest(raised))
+        else:
+            quality.refuse_distance(near, grid, at_rest(raised))
+
+
+def test_a_net_half_above_and_half_below_its_surface_is_off_by_as_much_in_the_mean(plane, grid):
+    tilted = grid.flat.copy()
+    tilted[:, 2] = 0.1 * np.sign(tilted[:, 0] - 0.7)
+    found = measured(plane, grid, tilted)
+    assert found.distance_mean == pytest.approx(0.1)
+    assert sorted({round(float(each), 9) for each in found.distance}) == [-0.1, 0.1]
+
+
+def test_a_stretched_net_s_spacing_error_has_its_sign_and_the_largest_counts_whatever_it_is(plane, grid):
+    for stretch, error in (([1.02, 1.0, 1.0], 0.02), ([1.01, 0.97, 1.0], 0.03)):
+        found = measured(plane, grid, grid.flat * stretch)
+        assert found.spacing_error_max == pytest.approx(error)
+        assert found.spacing_error.max() == pytest.approx(stretch[0] - 1.0)
+        assert found.spacing_error.min() == pytest.approx(min(stretch[1] - 1.0, 0.0), abs=1e-12)
+
+
+def test_curvature_and_pull_are_the_largest_and_the_mean_of_what_is_given(plane, grid):
+    bent = np.zeros((len(grid.rod_ends), 2, 2))
+    bent[3, 0], bent[5, 1], bent[7, 0] = [-3.0, 4.0], [4.5, 0.0], [0.0, -4.2]
+    pull = np.zeros(grid.node_count)
+    pull[2], pull[4] = 0.5, 0.1
+    found = measured(plane, grid, grid.flat, curvature=bent, pull=pull)
+    assert found.curvature_max == pytest.approx(5.0)
+    assert (found.curvature_out_of_plane_max, found.curvature_in_plane_max) == (4.5, 4.2)
+    assert (found.pull_max, found.pull_mean) == pytest.approx((0.5, 0.6 / grid.node_count))
+
+
+@pytest.mark.parametrize(("share", "refused"), [(0.39, True), (0.41, False)])
+def test_parts_of_a_net_lie_on_one_another_nearer_than_two_fifths_of_the_smaller_spacing(
+    plane, share, refused
+):
+    """Two strips of two columns, the second one laid so near to the first one."""
+    strip = lattice_grid(
+        np.array([(i, j) for i in (0, 1, 4, 5) for j in range(2)]), spacing=(0.3, 0.4), gap=0.0, elements=1
+    )
+    apart = strip.flat.copy()
+    far = apart[:, 0] > 0.9
+    apart[far, 0] += 0.3 * (1.0 + share) - 1.2
+    if refused:
+        with pytest.raises(InputError, match="lie on one another in 2 places"):
+            quality.refuse_folds(Locator(plane), strip, at_rest(apart))
+    else:
+        quality.refuse_folds(Locator(plane), strip, at_rest(apart))
 
 
 def test_the_resultant_curvature_is_made_of_its_two_parts(net):

@@ -217,6 +217,20 @@ def test_cables_are_tightened_from_the_supports_to_the_crown(read, built):
     assert mean[0] < mean[1]
 
 
+def test_a_cable_s_round_is_how_many_crossings_it_lies_from_the_nearest_end_of_a_rod(built):
+    grid, table = built.grid, schedules.cables(built)
+    near = {}
+    for rod in grid.rods:
+        for k, crossing in enumerate(rod.crossings.tolist()):
+            away = min(k, len(rod.crossings) - 1 - k)
+            near[crossing] = min(near.get(crossing, away), away)
+    ends = zip(table.column("from crossing"), table.column("to crossing"), strict=True)
+    own = [min(near[int(a)], near[int(b)]) for a, b in ends]
+    ranks = {step: k for k, step in enumerate(sorted(set(own)), 1)}
+    assert len(ranks) > 2
+    assert [ranks[step] for step in own] == [int(each) for each in table.column("tensioning round")]
+
+
 def test_supports_and_survey_targets_stand_where_the_net_has_them(read, built):
     net = built.shell.net
     for number, row in enumerate(read["supports"]):

@@ -2,7 +2,8 @@
 
 MKL's PARDISO is the fastest Cholesky that pip installs; CHOLMOD's supernodal one, from the `cvxopt` wheel,
 takes its place where there is no MKL, and SciPy's SuperLU in symmetric mode without pivoting where there is
-neither. SHELLFORM_SOLVER=mkl, cholmod or superlu asks for one of them. A Cholesky factorisation that fails is
+neither, or where a limit on memory leaves no room for them. SHELLFORM_SOLVER=mkl, cholmod or superlu asks for
+one of them. A Cholesky factorisation that fails is
 information (the state is no stable equilibrium), so it is an exception of its own.
 
 Whether CHOLMOD makes a supernodal L L', which fails where the matrix isn't positive definite, or a simplicial
@@ -25,11 +26,17 @@ from shellform.arrays import Indices, Reals
 from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure.solve import pardiso
+from shellform.structure.solve.addresses import has_room
 from shellform.work_clock import Work, told
 
 try:
     from cvxopt import cholmod, matrix, spmatrix
 except ImportError:  # no wheel for this platform: SuperLU serves
+    cholmod = None
+_BLAS = (
+    240_000_000  # bytes of addresses: where 211e6 were left here, CHOLMOD crashed later; with 252e6 it ran
+)
+if cholmod is not None and not has_room(_BLAS):
     cholmod = None
 
 _SUPERNODAL, _SIMPLICIAL = 2, 0  # values of CHOLMOD's option: L L' by blocks, L D L' column by column

@@ -24,6 +24,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.structure.elements.threads import cores
+from shellform.structure.solve.addresses import has_room
 
 _POSITIVE_DEFINITE, _INDEFINITE = 2, -2
 _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
@@ -32,6 +33,9 @@ _DISSECTION_FROM = 300_000  # degrees of freedom
 _TWO_THREADS_FROM = 200_000  # degrees of freedom
 _STRICT = 0x10002  # MKL_CBWR_AUTO | MKL_CBWR_STRICT; kept as it is where the processor has no such mode
 _ANALYSIS = 96  # bytes an entry: 51 to 62 were measured for cubes of rods of 50,000 to 3,300,000 entries
+_PARTS = (
+    320_000_000  # bytes of addresses: 260e6 of files that it loads for the newest processors, and its buffers
+)
 _BESIDE = 64_000_000  # bytes that a phase takes beside what it tells of; 31e6 were measured
 # right-hand sides, which are solved side by side without waiting; each comes out the same on one thread
 _MANY = 16
@@ -46,7 +50,9 @@ class NotDefinite(ArithmeticError):
 
 @cache
 def library() -> Any:
-    """The loaded library, or None where it isn't installed."""
+    """The loaded library, or None where it isn't installed, or where a limit on memory leaves no room for its
+    parts: it would end the program, not say so.
+    """
     try:
         listed = files("mkl") or []
     except PackageNotFoundError:
@@ -55,6 +61,8 @@ def library() -> Any:
         if file.name.startswith(("libmkl_rt.so", "mkl_rt")) and file.name.endswith(
             (".so", ".dll", ".1", ".2", ".3")
         ):
+            if not has_room(_PARTS):
+                return None
             # OpenMP's threads spin for 200 ms after each call unless told otherwise, on the cores that the
             # assembly needs.
             os.environ.setdefault("KMP_BLOCKTIME", "0")

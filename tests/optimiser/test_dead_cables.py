@@ -1,0 +1,98 @@
+"""Cables without tension in the model that a search steps by, and what is read off them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.optimiser.optimise import begin
+from shellform.optimiser.phases import _without_slack
+from shellform.problem.paths import in_tension, without_slack
+
+
+@pytest.fixture(scope="module")
+def dead(dome):
+    """A search of the dome, and its iterate in a design whose every seventh cable is as long as may be."""
+    wet = dome.point_load(2.0, every=2)
+    problem = sf.Problem(
+        dome,
+        sf.LoadCase("wet", wet),
+        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
+        [sf.AtMost(20.0, sf.CableForces("wet"))],
+    )
+    search, it = begin(problem, dome.design(), sf.SequentialConvex(), lambda softest: 0.0, 10)
+    rest = it.point.design.rest_length.copy()
+    rest[::7] *= 1.1
+    design = replace(it.point.design, rest_length=rest)
+    point = search.evaluator.evaluate(design, it.point.states, 1.0)
+    return search, replace(it, point=point), wet
+
+
+def test_dead_cables_stay_at_their_longest_and_taut_ones_as_they_are(dome, dead):
+    search, it, _ = dead
+    model = search.models.at(it.point)
+    slack = dome.cables(it.point.design).tension(it.point.states["wet"]) <= 0.0
+    np.testing.assert_array_equal(slack, np.arange(len(slack)) % 7 == 0)
+    np.testing.assert_array_equal(model.origin[slack], 0.0)
+    np.testing.assert_allclose(model.longest, 1.1 * dome.design().rest_length)
+    np.testing.assert_allclose(model.design(model.origin).rest_length, it.point.design.rest_length)
+    # the most that a cable may pull is what it would at its shortest
+    length = dome.cables(it.point.design).lengths(it.point.states["wet"])
+    np.testing.assert_allclose(model.upper, 187.0 * (length / 0.01 - 1.0))
+    np.testing.assert_array_equal(model.lower, 0.0)
+    # a tension below a millionth of the stiffness is none, one above it is
+    y = model.origin.copy()
+    taut = np.flatnonzero(~slack)[:2]
+    y[taut] = np.array([0.9e-6, 1.1e-6]) * dome.cable.stiffness
+    rest = model.design(y).rest_length[taut]
+    assert rest[0] == model.longest[taut[0]]
+    assert rest[1] < model.longest[taut[1]] - 1e-4
+
+
+def test_the_model_tells_what_a_dead_cable_s_first_tension_does_to_second_order(dome, dead):
+    search, it, wet = dead
+    model = search.models.at(it.point)
+    chance = np.random.default_rng(4)
+    change = np.where(model.origin > 0.3, 0.04 * chance.normal(size=len(model.origin)), 0.0)
+    change[np.flatnonzero(model.origin == 0.0)[:4]] = [0.1, 0.05, 0.12, 0.08]
+    errors = []
+    for size in (1.0, 0.5):
+        y = model.origin + size * change
+        design = model.design(y)
+        found = search.evaluator.settle(search.evaluator.assembly(design), model.predicted(y), wet)
+        errors.append(np.abs(dome.cables(design).tension(found) - y).max())
+    assert errors[1] < 0.1 * np.abs(change).max()
+    assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3
+
+
+def test_a_cable_counts_as_taut_beyond_a_millionth_of_its_length_and_absent_ones_never(dome):
+    design, state = dome.design(), dome.target
+    lengths = dome.cables(design).lengths(state)
+    rest = lengths.copy()
+    rest[0] /= 1.0 + 0.9e-6
+    rest[1] /= 1.0 + 1.1e-6
+    rest[2] *= 1.01
+    rest[3:] /= 1.01
+    present = np.ones(len(rest), dtype=bool)
+    present[5] = False
+    design = replace(design, rest_length=rest, present=present)
+    taut = in_tension(dome, design, state)
+    np.testing.assert_array_equal(taut[:7], [False, True, False, True, True, False, True])
+    assert taut[7:].all()
+    np.testing.assert_array_equal(without_slack(dome, design, state).present, taut)
+
+
+def test_cables_that_are_slack_under_every_load_leave_the_search_once_they_are_a_fifth(dome, dead):
+    search, it, _ = dead
+    count = int(it.point.design.present.sum())
+    marked = replace(it, tensioned=np.arange(count) % 2 == 0, needed=np.arange(count) % 3 == 0)
+    assert _without_slack(search, marked) is marked, "a seventh is few"
+    few = replace(search, solver=sf.SequentialConvex(idle=0.1))
+    found = _without_slack(few, marked)
+    left = np.arange(count) % 7 != 0
+    np.testing.assert_array_equal(found.point.design.present[it.point.design.present], left)
+    np.testing.assert_array_equal(found.tensioned, marked.tensioned[left])
+    np.testing.assert_array_equal(found.needed, marked.needed[left])
+    assert len(found.accepted) == len(marked.accepted)
+    assert found.accepted[-1].design is found.point.design

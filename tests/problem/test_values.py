@@ -1,0 +1,143 @@
+"""What terms, limits and variables amount to: their values and units, which gradients alone don't tell."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.errors import InputError
+from shellform.gridshell.reactions import reactions
+from shellform.problem.constraints import count, residual_rows, residuals
+from shellform.problem.engineering import ConnectorTurn, LargestCableForce, Thrust, Uplift
+from shellform.problem.terms import LoadedDesign
+from shellform.problem.variables import Blocks
+
+
+@pytest.fixture
+def moved(dome):
+    """The dome's design without its cables 3 and 8, its nodes off by known distances."""
+    away = np.random.default_rng(5).normal(size=dome.target.positions.shape) * 1e-3
+    state = replace(dome.target, positions=dome.target.positions + away)
+    present = np.ones(len(dome.cable_ends), dtype=bool)
+    present[[3, 8]] = False
+    design = replace(dome.design(rest_ratio=0.97), present=present)
+    return LoadedDesign(dome, design, state, dome.point_load(2.0, every=2)), away
+
+
+def test_the_misfit_is_the_sum_of_squared_distances_and_its_mean_has_limits_as_lengths(moved):
+    at, away = moved
+    assert sf.Misfit("wet").measure(at).value == pytest.approx([(away**2).sum()])
+    rms = sf.RmsMisfit("wet")
+    assert rms.measure(at).value == pytest.approx([(away**2).sum() / len(away)])
+    assert rms.at_limit(0.005) == pytest.approx(2.5e-5)
+    slope = sf.RmsMisfit("wet").measure(at).by_dof.toarray().reshape(-1, 6)
+    np.testing.assert_allclose(slope[:, :3], 2.0 * away / len(away))
+    np.testing.assert_array_equal(slope[:, 3:], 0.0)
+
+
+def test_cable_forces_are_stiffness_times_strain_and_absent_cables_have_none(moved):
+    at, _ = moved
+    ends = at.state.positions[at.shell.cable_ends]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    force = np.maximum(187.0 * (length / at.design.rest_length - 1.0), 0.0) * at.design.present
+    assert sf.CableForces("wet").measure(at).value == pytest.approx(force)
+    assert sf.CableForces("wet", (8, 1)).measure(at).value == pytest.approx([0.0, force[1]])
+    assert sf.CableForce("wet").measure(at).value == pytest.approx([force.sum()])
+    largest = LargestCableForce("wet", 5.0).measure(at).value[0]
+    assert force.max() - 1e-9 <= largest <= force.max() + 5.0 * np.log(len(force)) / 200.0
+    assert sf.RodRadius().measure(at).value == pytest.approx([at.design.radius])
+    assert (force[at.design.present] > 0.0).sum() > 40
+
+
+def test_limits_are_told_as_shares_of_themselves_above_and_below():
+    term = sf.RodRadius()
+    values = np.array([3.0, 5.0])
+    assert residuals(sf.AtMost(4.0, term), values) == pytest.approx([-0.25, 0.25])
+    assert residuals(sf.AtLeast(4.0, term), values) == pytest.approx([0.25, -0.25])
+    assert residuals(sf.AtMost(4.0, term, of=8.0), values) == pytest.approx([-0.125, 0.125])
+    assert residuals(sf.AtMost(0.0, term, of=2.0), values) == pytest.approx([1.5, 2.5])
+    assert residuals(sf.Between(3.5, 4.5, term), values) == pytest.approx([-1.5, 0.5, 0.5, -1.5])
+    rows = np.array([[1.0, 2.0]])
+    np.testing.assert_allclose(residual_rows(sf.AtMost(4.0, term), rows), [[0.25, 0.5]])
+    np.testing.assert_allclose(residual_rows(sf.AtLeast(4.0, term), rows), [[-0.25, -0.5]])
+    np.testing.assert_allclose(residual_rows(sf.Between(3.5, 4.5, term), rows), [[1.0, 2.0], [-1.0, -2.0]])
+
+
+def test_residuals_are_counted_by_value_and_side(dome):
+    forces = sf.CableForces("wet")
+    assert count(sf.AtMost(4.0, forces), dome) == len(dome.cable_ends)
+    assert count(sf.AtLeast(4.0, forces), dome) == len(dome.cable_ends)
+    assert count(sf.Between(1.0, 4.0, forces), dome) == 2 * len(dome.cable_ends)
+    assert count(sf.AtMost(4.0, sf.CableForces("wet", (1, 2, 3))), dome) == 3
+
+
+def test_connectors_turns_and_supports_forces_are_those_of_the_state(dome):
+    load = dome.point_load(2.0, every=2)
+    design = dome.design()
+    state = sf.follow(dome, design, {"wet": load})["wet"].equilibrium.state
+    at = LoadedDesign(dome, design, state, load)
+    bears = np.array([each.force for each in reactions(dome, design, state, load).supports])
+    lifts, pushes = -bears[:, 2].min(), np.hypot(bears[:, 0], bears[:, 1]).max()
+    uplift, thrust = Uplift("wet", 2.0).measure(at).value[0], Thrust("wet", 5.0).measure(at).value[0]
+    assert lifts <= uplift <= lifts + 2.0 * np.log(len(bears)) / 200.0
+    assert pushes <= thrust <= pushes + 5.0 * np.log(len(bears)) / 200.0
+    turn = ConnectorTurn("wet").measure(at).value[0]
+    nodes = dome.net.grid.crossing_nodes
+    one, other = (matrix_x(state.quaternions[nodes[:, k]]) for k in (0, 1))
+    largest = np.arccos(np.clip((one * other).sum(axis=1), -1.0, 1.0)).max()
+    assert 0.98 * largest <= turn <= 1.02 * largest + 0.1 * np.log(len(nodes)) / 200.0
+
+
+def matrix_x(quaternions):
+    """The x axis of each frame."""
+    w, x, y, z = quaternions.T
+    return np.column_stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + z * w), 2.0 * (x * z - y * w)])
+
+
+def test_rest_lengths_go_from_a_centimetre_to_a_tenth_more_and_the_radius_from_a_quarter(dome):
+    start = dome.design(rest_ratio=0.98)
+    blocks = Blocks([sf.RestLengths(), sf.FreeRadius()], dome, start)
+    lower, upper = blocks.value_bounds()
+    cables = len(dome.cable_ends)
+    np.testing.assert_allclose(lower, [*np.full(cables, 0.01), 0.25 * start.radius])
+    np.testing.assert_allclose(upper, [*(1.1 * start.rest_length), start.radius])
+    unit = np.array([*dome.cable_lengths, start.radius])
+    np.testing.assert_allclose(blocks.unit, unit)
+    np.testing.assert_allclose(np.array(blocks.bounds()), [lower / unit, upper / unit])
+    np.testing.assert_allclose(blocks.of(start), [*np.full(cables, 0.98), 1.0])
+    again = blocks.design(0.9 * blocks.of(start), start.present)
+    np.testing.assert_allclose(again.rest_length, 0.9 * start.rest_length)
+    assert again.radius == pytest.approx(0.9 * start.radius)
+    assert blocks.step(start)[-1] == pytest.approx(0.1 * start.radius)
+    assert (blocks.moves_radius, blocks.each_cable) == (True, slice(0, cables))
+    only = Blocks([sf.RestLengths()], dome, start)
+    assert (only.moves_radius, only.each_cable) == (False, slice(0, cables))
+    given = sf.FreeRadius(0.0004, 0.002).bounds(dome, start)
+    np.testing.assert_allclose(given, [[0.0004], [0.002]])
+
+
+def test_a_radius_s_bounds_may_meet_and_not_cross(dome):
+    start = dome.design()
+    assert sf.FreeRadius(0.001, 0.001).bounds(dome, start)[0] == 0.001
+    for least, most in ((0.0011, 0.001), (0.0, 0.001), (-0.001, 0.001)):
+        with pytest.raises(InputError, match=r"variables\.radius"):
+            sf.FreeRadius(least, most).bounds(dome, start)
+
+
+def test_a_problem_uses_the_loads_of_its_terms_and_looks_at_the_largest(dome):
+    wet = dome.point_load(2.0, every=2)
+    cases = [sf.LoadCase(name, share * wet) for name, share in (("more", 1.2), ("idle", 3.0), ("less", 0.5))]
+    shares = [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("less"))]
+    limits = [sf.AtMost(20.0, sf.CableForces("wet")), sf.Between(1e-4, 0.005, sf.RmsMisfit("more"))]
+    problem = sf.Problem(dome, sf.LoadCase("wet", wet), shares, limits, cases)
+    assert problem.used() == ["wet", "more", "less"]
+    assert problem.decisive_load() == "more"
+    assert replace(problem, decisive="less").decisive_load() == "less"
+    assert replace(problem, decisive="idle").decisive_load() == "more"
+    cables = len(dome.cable_ends)
+    assert problem.places() == [slice(0, cables), slice(cables, cables + 2)]
+    for wrong in (0.2, 0.3 + 2e-9):
+        with pytest.raises(InputError, match="must add up to 1"):
+            replace(problem, minimise=[shares[0], sf.Share(wrong, sf.CableForce("less"))])
+    replace(problem, minimise=[shares[0], sf.Share(0.3 + 5e-10, sf.CableForce("less"))])

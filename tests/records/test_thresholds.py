@@ -1,0 +1,265 @@
+"""What a check lets pass, to its last digit, and the numbers that its remedies name."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shellform.records.as_built import AsBuilt, critical_checks, falls, standing_checks
+from shellform.records.check import SLACK, below, share_of
+from shellform.records.checks import Bounds, checks
+from shellform.records.remedies import RodSizes, RodsOf, allow
+from shellform.records.summary import CableCountRecord, StandingRecord
+from shellform.records.thicker_rods import ThickerRodsRecord
+from shellform.records.verdict import failed, headline, to_build, verdict
+from shellform.records.words import critical_words, load_title, number, standing_words
+from tests.records.made import design, load, optimisation, summary
+
+RODS = RodsOf(0.001, 0.002, 0.1)
+BOUNDS = Bounds(20.0, 0.005)
+
+
+@pytest.fixture
+def designs(shell):
+    return {"polished": shell.design(rest_ratio=0.98)}
+
+
+def found(shell, designs, *changed, bounds=BOUNDS, **changes):
+    """The checks by name, of the polished design with a change to one load's record."""
+    made = checks({"polished": shell}, designs, summary(designs, *changed, **changes), bounds)
+    return {check.name: check.cells["polished"] for check in made}
+
+
+def test_a_limit_is_passed_by_a_thousandth_and_no_more():
+    assert SLACK == 1e-3
+    assert share_of(1.0009).holds
+    assert not share_of(1.0011).holds
+    assert below(20.019, 20.0, "N").holds
+    assert not below(20.021, 20.0, "N").holds
+    assert below(-30.0, 20.0, "N").holds
+    for unknown in (share_of(np.nan), share_of(np.inf), below(None, 1.0, "N"), below(np.nan, 1.0, "N")):
+        assert unknown.holds is None
+
+
+@pytest.mark.parametrize(("pull", "holds"), [(0.6, True), (0.4996, True), (0.4994, False), (-0.6, False)])
+def test_a_cable_s_least_pull_may_lack_a_thousandth_of_what_is_asked_for(shell, designs, pull, holds):
+    asked = replace(BOUNDS, slack=0.5, slack_loads=("none",))
+    made = found(shell, designs, "none", bounds=asked, cable_force_min=pull)
+    assert made["Least pull of a cable under no load"].holds is holds
+
+
+def test_without_a_pull_the_limit_of_pulls_is_left_out(shell, designs):
+    asked = replace(BOUNDS, slack=0.5, slack_loads=("none",))
+    made = found(shell, designs, "none", bounds=asked, cable_force_min=0.0)
+    assert "0.01" in made["Least pull of a cable under no load"].remedy
+    made = found(shell, designs, "none", bounds=asked, cable_force_min=0.41)
+    assert made["Least pull of a cable under no load"].remedy == "Allow limits.slack_min = 0.41."
+
+
+@pytest.mark.parametrize(("residual", "holds"), [(0.99e-6, True), (1.01e-6, False), (1e-3, False)])
+def test_forces_are_in_equilibrium_to_a_millionth_of_the_largest(shell, designs, residual, holds):
+    assert found(shell, designs, "none", residual=residual)["In equilibrium under no load"].holds is holds
+
+
+@pytest.mark.parametrize(
+    ("stable", "on_branch", "words"),
+    [
+        (True, True, "stands"),
+        (True, False, "snapped through"),
+        (False, True, "unstable"),
+        (False, False, "unstable"),
+    ],
+)
+def test_a_design_stands_where_it_is_stable_and_did_not_snap_through(
+    shell, designs, stable, on_branch, words
+):
+    cell = found(shell, designs, "design", stable=stable, on_branch=on_branch)["Stands under the design load"]
+    assert (cell.found, cell.holds) == (words, words == "stands")
+
+
+def test_rods_that_would_bear_the_load_are_thicker_by_the_root_of_what_lacks(shell, designs):
+    cell = found(shell, designs, "design", stable=False, critical_factor=0.64)["Stands under the design load"]
+    assert "at least 1.3 mm radius (rod.radius = 0.0013)" in cell.remedy  # 1 mm / 0.8 = 1.25 mm
+
+
+def test_the_stress_is_the_larger_one_of_both_meshes(shell, designs):
+    coarse = found(shell, designs, "none", rod_utilisation_max=0.96, rod_utilisation_error=0.04)
+    fine = found(shell, designs, "none", rod_utilisation_max=0.96, rod_utilisation_error=-0.08)
+    assert coarse["Rods under no load"].found == "96 %"
+    assert fine["Rods under no load"].found == "102 %"
+    assert fine["Rods under no load"].holds is False
+    assert "at most 0.98 mm" in fine["Rods under no load"].remedy
+
+
+@pytest.mark.parametrize(
+    ("coarse", "fine", "holds"),
+    [
+        (1.2489, 1.2489, True),
+        (1.2486, 1.3, False),
+        (1.3, 1.2486, False),
+        (1.3, None, None),
+        (1.2486, None, False),
+    ],
+)
+def test_a_critical_factor_may_lack_a_thousandth_of_what_is_asked_for(coarse, fine, holds):
+    rows = {
+        "one": design(
+            "design", critical_factor=coarse, critical_factor_halved=fine, critical_kind="limit point"
+        )
+    }
+    (check,) = critical_checks(rows, {"one": RODS}, {"design": 1.25})
+    assert check.cells["one"].holds is holds
+    if holds is False:
+        assert "at least 1.1 mm radius (rod.radius = 0.0011)" in check.cells["one"].remedy
+
+
+def standing(drawn, number, lowest=None):
+    return StandingRecord(drawn, number, 0.9, 0.95, 0, lowest=lowest)
+
+
+@pytest.mark.parametrize(("fallen", "falls_by"), [(0, False), (2, False), (3, True)])
+def test_a_design_falls_where_more_of_its_structures_do_than_may(fallen, falls_by):
+    asked = AsBuilt(0.99, None, 200)
+    rows = {"one": design("design", stands=standing(200, 200 - fallen))}
+    assert falls(rows, "one", asked) is falls_by
+    # of a smaller sample what has fallen counts, not the share
+    assert falls({"one": design("design", stands=standing(20, 20 - fallen))}, "one", asked) is falls_by
+
+
+def test_no_more_has_to_stand_under_another_load_than_under_the_design_load():
+    rows = {"initial": design("additional", stands=standing(20, 20))}
+    for share, least in ((0.95, 190), (0.99, 198)):
+        made = standing_checks(
+            rows, {"initial": RODS}, ["design", "additional"], {"design": 1.0, "additional": 1.2},
+            AsBuilt(share, None, 200),
+        )  # fmt: skip
+        assert [check.limit for check in made] == [f"at least {least} of 200"] * 2
+    made = standing_checks(
+        rows, {"initial": RODS}, ["additional"], {"additional": 1.2}, AsBuilt(0.9, 0.5, 200)
+    )
+    assert made[0].limit == "at least 100 of 200"
+    assert standing_checks(rows, {"initial": RODS}, ["additional"], {"additional": 1.2}, None) == []
+
+
+def test_a_remedy_gives_the_entry_in_the_entry_s_own_unit(shell, designs):
+    asked = replace(BOUNDS, stress=0.9, turn=0.1, uplift=1.0)
+    stress = found(shell, designs, "none", bounds=asked, stress_utilisation_max=0.95)
+    assert stress["Rods' stress with axial force under any load"].remedy == "Allow limits.utilisation = 0.95."
+    turn = found(shell, designs, "none", bounds=asked, connector_turn_max=0.2)
+    assert turn["Connectors' turning under any load"].remedy == "Allow limits.connector_turn = 0.2."
+    uplift = found(shell, designs, "none", bounds=asked, uplift_max=1.51)
+    assert uplift["Uplift of a support under any load"].remedy == "Allow limits.uplift = 1.6."
+    off = found(shell, designs, "additional", deviation_rms=0.0061)
+    assert off["Deviation under 1.2 × the load, root mean square (6)"].remedy == (
+        "Allow optimise.misfit_rms_additional = 0.0061, or take thicker rods."
+    )
+    edges = found(shell, designs, "none", edge_utilisation_max=1.4)
+    assert "1.4 times as strong" in edges["Edge beams under no load"].remedy
+
+
+def test_the_largest_cable_force_is_that_of_the_worst_load_but_for_none(shell, designs):
+    name = "Largest cable force under the design load and those beyond it (5)"
+    loads = {
+        each: load(each, cable_force_max=force)
+        for each, force in (("none", 30.0), ("design", 4.0), ("additional", 6.0))
+    }
+    made = summary(designs).with_design("polished", design(loads=loads, cable_force_max=30.0))
+    cell = {c.name: c for c in checks({"polished": shell}, designs, made, BOUNDS)}[name].cells["polished"]
+    assert cell.found == "6 N"
+    assert found(shell, designs)[name].found == "7 N", "the design's own where no load's is known"
+
+
+@pytest.mark.parametrize(("most", "holds"), [(99, False), (100, True), (101, True)])
+def test_cables_are_counted_against_what_was_asked_for(shell, designs, most, holds):
+    record = optimisation(cables_max=CableCountRecord(most, 100, False))
+    given = replace(summary(designs), optimisation=record)
+    made = {each.name: each for each in checks({"polished": shell}, designs, given, BOUNDS)}
+    cell = made["Number of cables"].cells["polished"]
+    assert (cell.found, cell.holds) == ("100", holds)
+
+
+def test_thicker_rods_are_named_up_to_what_the_net_allows_and_not_beyond():
+    assert "at least 2 mm radius (rod.radius = 0.002)" in RODS.stronger(3.999)
+    assert "the net's curvature allows 2 mm (1). Choose a closer grid (net.spacing = 0.08)." in RODS.stronger(
+        4.5
+    )
+    for beyond in (1.0, 0.5, 100.0, np.inf):
+        assert RODS.stronger(beyond) == "Choose a closer grid (net.spacing = 0.08)."
+    wide = replace(RODS, largest=1.0)
+    assert "at least 10 mm radius" in wide.stronger(99.0)
+    assert replace(RODS, spacing=None).stronger(0.5) == "Choose a closer grid (net.spacing)."
+    assert RODS.thinner(0.956) == "Take rods of at most 0.95 mm radius (rod.radius = 0.00095)."
+    seen = replace(RODS, thicker=ThickerRodsRecord(0.00123, 19, 20, None))
+    assert "1.3 mm radius (rod.radius = 0.0013)" in seen.stronger(1.1)
+    assert "19 of 20" in seen.stronger(1.1)
+
+
+def test_of_sections_that_are_sold_the_next_one_is_named_an_equal_one_included():
+    sold = RodSizes({}, [("S", 0.001), ("M", 0.0011), ("L", 0.0012)])
+    assert sold.at_least(0.001, 0.0011) == 'rod.section = "M"'
+    assert sold.at_least(0.001, 0.0011 * (1.0 + 1e-12)) == 'rod.section = "M"'
+    assert sold.at_least(0.001, 0.0011 * (1.0 + 1e-8)) == 'rod.section = "L"'
+    assert sold.at_least(0.001, 0.00121) is None
+    assert sold.at_most(0.001, 0.0011) == 'rod.section = "M"'
+    assert sold.at_most(0.001, 0.0011 * (1.0 - 1e-12)) == 'rod.section = "M"'
+    assert sold.at_most(0.001, 0.0011 * (1.0 - 1e-8)) == 'rod.section = "S"'
+    assert sold.at_most(0.001, 0.00099) is None
+
+
+def test_numbers_of_remedies_are_rounded_to_the_side_on_which_they_hold():
+    own = RodSizes({"rod.width": 0.05, "rod.height": 0.025})
+    assert own.at_least(0.01, 0.0121) == "rod.width = 0.061, rod.height = 0.031"
+    assert own.at_most(0.01, 0.0079) == "rod.width = 0.039, rod.height = 0.019"
+    assert allow("cable.force_max", 21.0) == "Allow cable.force_max = 21."
+    assert allow("cable.force_max", 21.01) == "Allow cable.force_max = 22."
+    assert allow("limits.uplift", 0.0) == "Allow limits.uplift = 0."
+
+
+def test_numbers_are_told_with_three_digits_and_powers_of_ten_only_where_they_must():
+    told = {
+        0.0: "0",
+        0.001: "0.001",
+        0.000999: "0.000999",
+        0.00012345: "0.000123",
+        1.23e-5: "1.23e-05",
+        1234.0: "1\u202f234",
+        999999.0: "999\u202f999",
+        1e6: "1e+06",
+        1.5e6: "1.5e+06",
+        -2.5: "-2.5",
+        100.0: "100",
+        0.5: "0.5",
+    }
+    assert {value: number(value) for value in told} == told
+    assert number(np.inf) == number(np.nan) == "?"
+    assert number(1.23456, 5) == "1.2346"
+
+
+def test_words_of_loads_paths_and_structures_keep_their_numbers():
+    assert load_title("additional", 1.2) == "1.2 × the load"
+    assert load_title("additional") == "the additional load"
+    assert load_title("design", 1.2) == "the design load"
+    assert load_title("wind", 1.2) == "“wind”"
+    assert critical_words(3.0, "none") == "beyond 3 ×"
+    assert critical_words(1.31, "bifurcation") == "1.310 × (bifurcation)"
+    assert standing_words(200, 199, 0.9769, 0.95) == (
+        "199 of 200 structures as built stand (at least 97 % with 95 % confidence)"
+    )
+
+
+def test_the_headline_counts_the_checks_that_fail(shell, designs):
+    made = checks(
+        {"polished": shell}, designs, summary(designs, "none", stable=False, rod_utilisation_max=1.5), BOUNDS
+    )
+    assert len(failed(made, "polished")) == 2
+    assert headline(verdict(made, "polished")) == "The polished design does not hold: 2 checks fail."
+    asked = replace(BOUNDS, critical={"design": 1.5, "additional": 1.2})
+    made = checks({"polished": shell}, designs, summary(designs), asked)
+    assert (
+        headline(verdict(made, "polished")) == "The polished design is not examined: 2 checks are still open."
+    )
+
+
+def test_before_anything_is_optimised_the_initial_design_is_to_be_built_or_the_last_there_is():
+    assert to_build([], ["unbraced", "initial", "unloaded"]) == "initial"
+    assert to_build([], ["one", "two", "three"]) == "three"
