@@ -18,6 +18,7 @@ from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
 from shellform.net.saved import load_net, save_net
 from shellform.surface.shape.target import make_surface
 from tests.net.test_settings import ball, bowl
+from tests.surface.test_fairing import sheet
 
 SETTINGS = {"spacing": 0.9, "gap": 0.9 / 27.5, "elements": 2}
 
@@ -153,3 +154,13 @@ def test_a_relaxation_that_comes_no_nearer_is_ended_early_but_not_one_on_its_way
     falling = _watched(None, 5.0)
     for k in range(300):
         falling(k, 1e-3 * 0.99**k)
+
+
+def test_a_corrugated_barrel_is_covered_at_an_angle_where_rods_run_far_past_its_edge_before_others_reach_it():
+    """Rods askew to the corrugation leave the surface spacings before those of the other direction do."""
+    x, y, _ = (sheet(lambda x, y: 0.0 * x, size=15.0, count=61).vertices * [2.0, 1.0, 1.0]).T
+    height = 3.0 + 0.7 * np.cos(x) - 2.5 * (y / 7.5) ** 2
+    surface = make_surface(np.column_stack([x, y, height]), sheet(lambda x, y: 0.0 * x, count=61).triangles)
+    settings = {"spacing": 0.9, "gap": 0.03, "elements": 2, "method": "compass"}
+    net = sf.pull_net(surface, angle=np.pi / 4, **settings)
+    assert net.quality.uncovered_area < 0.01 * surface.area
