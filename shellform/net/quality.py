@@ -174,7 +174,7 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
             f"two parts of the net lie on one another in {int(apart.sum())} places, first at {place}",
             where="net.spacing",
             value=float(grid.spacing),
-            remedy="Choose another angle or offset, or cover the surface by several nets.",
+            remedy="Choose another angle or offset.",
         )
 
 

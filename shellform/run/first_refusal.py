@@ -1,8 +1,8 @@
 """What `shellform new` says of a shell that it can't design: the reason, and a way out that it went itself.
 
-Two are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
+Three are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
 round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a rounded surface,
-where its rods are bent too much (way_out.py).
+where its rods are bent too much (way_out.py); and as much concrete as these bear, where no rounded surface helps.
 """
 
 from __future__ import annotations
@@ -31,15 +31,18 @@ def with_ways_out(refusal: Refusal, surface: Surface, wish: DesignWish, output: 
     """The refusal with the first way out that leads to a design as its remedy; else saying which were tried. What is
     offered as a surface is written into a folder beside `output`. `say` hears what is tried."""
     folder = output.with_name(f"{output.stem}-{BUILDABLE}")
+    left = Allowance(_WORK)
     if _walls_may_help(refusal, surface, wish):
-        told = _on_walls(refusal, surface, wish, say)
+        walled = Allowance(_WALLED)
+        told = _on_walls(refusal, surface, wish, walled, say)
         if told is not refusal or not isinstance(refusal, Unbuildable):
             return told
+        left.left = max(_WORK - (_WALLED - walled.left) // 2, _WORK // 2)
     if not isinstance(refusal, Unbuildable) or wish.rod:
         return refusal
-    again = _trial("rounded", wish, Allowance(_WORK), say)
+    again = _trial("rounded", wish, left, say)
     told = with_way_out(refusal, surface, refusal.radius, folder, again, say, shares(refusal))
-    return refusal.in_vain() if told is refusal else told
+    return _poured_first(refusal.in_vain(), surface, wish, say) if told is refusal else told
 
 
 def shares(refusal: Unbuildable) -> list[float]:
@@ -60,19 +63,21 @@ def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callab
 
 
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:
-    """Whether walls all round may: where something but its curvature is the reason, and its outer edge doesn't stand
-    on the ground."""
-    if wish.edges != "auto" or (isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH):
+    """Whether walls all round may: where something but the want of a net is the reason, and its outer edge doesn't
+    stand on the ground."""
+    if wish.edges != "auto" or (isinstance(refusal, Unbuildable) and refusal.why is Why.NET):
         return False
     if not isinstance(refusal, (Unbuildable, Tips, NotConverged)):
         return False
     return any(each.kind == "beam" and not each.opening for each in stretches_of(surface))
 
 
-def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say) -> Refusal:
+def _on_walls(
+    refusal: Refusal, surface: Surface, wish: DesignWish, allowance: Allowance, say: Say
+) -> Refusal:
     """The refusal with walls as its remedy; as it was, where no design stands on them either."""
     try:
-        _trial("on walls", replace(wish, edges="wall"), Allowance(_WALLED), say)(surface)
+        _trial("on walls", replace(wish, edges="wall"), allowance, say)(surface)
     except (InputError, NotConverged) as error:
         say(f"on walls: {error}")
         return refusal
@@ -81,4 +86,20 @@ def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say) ->
         refusal,
         f"With --edges wall this goes on: walls all round, up to {outer.max() - outer.min():.3g} m above the lowest of its "
         "edge",
+    )
+
+
+def _poured_first(refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say) -> Refusal:
+    """The refusal with a first layer of concrete as its remedy; as it was, where none is known to be borne."""
+    if refusal.bears is None or wish.thickness is not None:
+        return refusal
+    how = f"with {1e3 * refusal.bears:g} mm"
+    try:
+        _trial(how, replace(wish, thickness=refusal.bears), Allowance(_WORK), say)(surface)
+    except (InputError, NotConverged) as error:
+        say(f"{how}: {error}")
+        return refusal
+    return renewed(
+        refusal,
+        f"With --thickness {refusal.bears:g} this goes on: pour that first, and the rest when it has hardened",
     )

@@ -36,12 +36,20 @@ _UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 
 class Unbuildable(InputError):
     """A surface that no net of the `spacing`, m, covers, or that no rod follows there, for the reason `why`; rounded
-    to the `radius`, m, it may be built."""
+    to the `radius`, m, it may be built, or with the thickness of concrete, m, that it `bears`, if one was found."""
 
     def __init__(
-        self, what: str, *, why: Why, where: str, remedy: str, spacing: float, radius: float
+        self,
+        what: str,
+        *,
+        why: Why,
+        where: str,
+        remedy: str,
+        spacing: float,
+        radius: float,
+        bears: float | None = None,
     ) -> None:
-        self.why, self.spacing, self.radius = why, spacing, radius
+        self.why, self.spacing, self.radius, self.bears = why, spacing, radius, bears
         super().__init__(what, where=where, remedy=remedy)
 
     def in_vain(self) -> Unbuildable:
@@ -51,10 +59,10 @@ class Unbuildable(InputError):
             "design stands",
             why=self.why,
             where=self.where,
-            remedy="What else may help wasn't tried: pieces with edges of their own, cut there and brought one by one, or a "
-            "rounder form.",
+            remedy="It takes a rounder form there.",
             spacing=self.spacing,
             radius=self.radius,
+            bears=self.bears,
         )
 
 
@@ -187,7 +195,7 @@ def refused(
     choice, stress = failure.choice, failure.stress
     assert choice is not None
     much = bears is not None and bears >= 0.5 * failure.thickness
-    crease = None if much else _crease(surface, failure, wish)
+    crease = None if much else _crease(surface, failure, wish, bears)
     if crease is not None:
         return crease
     place = "" if failure.where is None else f" at {_at(failure.where)}"
@@ -239,7 +247,7 @@ def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
     return min(wanted, _OPEN / max(curvature_usual(surface), 1e-12))
 
 
-def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildable | None:
+def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float | None) -> Unbuildable | None:
     """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the load,
     while nearly all of it takes thicker ones; None where that isn't so."""
     placed, choice = failure.placed, failure.choice
@@ -259,6 +267,7 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildabl
         remedy="Round it there, so that thicker rods follow it.",
         spacing=failure.spacing,
         radius=wanted,
+        bears=bears,
     )
 
 
