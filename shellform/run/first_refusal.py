@@ -16,11 +16,12 @@ from shellform.net.edges import stretches_of
 from shellform.run.first_design import first_design
 from shellform.run.first_net import Allowance
 from shellform.run.sizes import DesignWish
-from shellform.run.unbuildable import Tips, Unbuildable, Why
+from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
 from shellform.run.way_out import BUILDABLE, COVERED, renewed, with_way_out
 from shellform.surface.shape.target import Surface
 
 _SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
+_FLAT_SHARES = (1.0, 1.8)  # of a radius that makes a vault of flat pieces
 _WORK = 10_000  # crossings pulled and solved on rounded surfaces
 _WALLED = 15_000  # on walls, with which large nets are tried once
 Refusal = InputError | NotConverged
@@ -31,17 +32,15 @@ def with_ways_out(refusal: Refusal, surface: Surface, wish: DesignWish, output: 
     """The refusal with the first way out that leads to a design as its remedy; else saying which were tried. What is
     offered as a surface is written into a folder beside `output`. `say` hears what is tried."""
     folder = output.with_name(f"{output.stem}-{BUILDABLE}")
-    left = Allowance(_WORK)
     if _walls_may_help(refusal, surface, wish):
-        walled = Allowance(_WALLED)
-        told = _on_walls(refusal, surface, wish, walled, say)
+        told = _on_walls(refusal, surface, wish, say)
         if told is not refusal or not isinstance(refusal, Unbuildable):
             return told
-        left.left = max(_WORK - (_WALLED - walled.left) // 2, _WORK // 2)
     if not isinstance(refusal, Unbuildable) or wish.rod:
         return refusal
-    again = _trial("rounded", wish, left, say)
-    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, shares(refusal))
+    again = _trial("rounded", wish, Allowance(_WORK), say)
+    tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
+    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, tried)
     return _poured_first(refusal.in_vain(), surface, wish, say) if told is refusal else told
 
 
@@ -63,21 +62,19 @@ def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callab
 
 
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:
-    """Whether walls all round may: where something but the want of a net is the reason, and its outer edge doesn't
-    stand on the ground."""
-    if wish.edges != "auto" or (isinstance(refusal, Unbuildable) and refusal.why is Why.NET):
+    """Whether walls all round may: where something but its curvature is the reason, and its outer edge doesn't stand
+    on the ground."""
+    if wish.edges != "auto" or (isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH):
         return False
     if not isinstance(refusal, (Unbuildable, Tips, NotConverged)):
         return False
     return any(each.kind == "beam" and not each.opening for each in stretches_of(surface))
 
 
-def _on_walls(
-    refusal: Refusal, surface: Surface, wish: DesignWish, allowance: Allowance, say: Say
-) -> Refusal:
+def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say) -> Refusal:
     """The refusal with walls as its remedy; as it was, where no design stands on them either."""
     try:
-        _trial("on walls", replace(wish, edges="wall"), allowance, say)(surface)
+        _trial("on walls", replace(wish, edges="wall"), Allowance(_WALLED), say)(surface)
     except (InputError, NotConverged) as error:
         say(f"on walls: {error}")
         return refusal

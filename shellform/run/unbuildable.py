@@ -28,6 +28,7 @@ SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _RATHER = 1.5  # times the least radius, where that alone isn't the reason
 _SPARE = 1.05  # times the radius that rods just bear
 _OPEN = 0.9  # of the radius that three quarters of a surface keep: rounded further it would be another one
+_ARCHED = 0.5  # of its larger side: a radius that makes a vault of a roof of flat pieces
 _WORTH = 1.3  # times the radius to which rods bend now, at the least, for rounding to be worth while
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
@@ -241,10 +242,18 @@ def refused(
 
 def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
     """The radius, m, to which creases are to be rounded so that rods follow them that bear the load, but no more
-    than nearly what three quarters of the surface keep."""
+    than nearly what three quarters of the surface keep; of flat pieces so far that they become a vault."""
     needed = NEEDED * pressure(failure.thickness, 2500.0)
+    if flat_between_creases(surface):
+        return _ARCHED * float(surface.size[:2].max())
     wanted = radius_for(surface, failure.spacing, needed, wish)
     return min(wanted, _OPEN / max(curvature_usual(surface), 1e-12))
+
+
+def flat_between_creases(surface: Surface) -> bool:
+    """Whether three quarters of the surface are hardly curved, as roofs of flat pieces are: rounded creases alone leave
+    it flat, and a flat grid bears nothing."""
+    return float(surface.size[:2].max()) * curvature_usual(surface) < 1.0
 
 
 def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float | None) -> Unbuildable | None:
