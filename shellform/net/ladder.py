@@ -18,6 +18,7 @@ from shellform.net.chebyshev import NetTuning, pull_net
 from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Progress
+from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
 from shellform.surface.shape.target import Surface, largest_curvature
 
@@ -108,6 +109,7 @@ def climbed_net(
                 tuning=rung.tuning,
                 progress=watch,
             )
+            refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
             attempts.append(Attempt(rung.change, turned, shifted, error.reason))
             progress(attempts[-1].sentence())
