@@ -19,6 +19,7 @@ from shellform.net.edges import Edges, Place, stand
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
 from shellform.records.summary import EdgeRecord, NetRecord, SurfaceRecord
+from shellform.surface.shape.cut import cut_off
 from shellform.surface.shape.target import Surface
 
 FAR = 100.0  # of a surface's larger side, from its origin: there `new` takes one near it
@@ -28,12 +29,15 @@ _DISTANT = 5000.0  # no net is sure to be pulled: at 21 500 none is
 def surface_of(entry: SurfaceEntry, *, allow_scripts: bool = False) -> Surface:
     """The surface of a builder script, or of a file in any format, as its entry says."""
     found = _read(entry, allow_scripts=allow_scripts)
-    return found if entry.origin is None else counted_from(found, entry.origin)
+    found = found if entry.origin is None else counted_from(found, entry.origin)
+    return found if entry.above is None else cut_off(found, entry.above)
 
 
 def counted_from(surface: Surface, origin: Sequence[float]) -> Surface:
-    """The surface in coordinates that count from `origin` (3,), m."""
-    return replace(surface, vertices=surface.vertices - np.array(origin))
+    """The surface in coordinates that count from `origin` (3,), m, which it tells with what was mended."""
+    place = ", ".join(f"{each:.9g}" for each in origin)
+    told = f"coordinates, here and in all that is written, count from ({place}) m of the file's"
+    return replace(surface, vertices=surface.vertices - np.array(origin), mended=(*surface.mended, told))
 
 
 def distant_origin(surface: Surface, sides: float) -> tuple[float, float, float] | None:

@@ -52,6 +52,9 @@ class SurfaceEntry(Entry):
         description="of a survey's coordinates, m: what all others of the case and of what is written count from; "
         "left out: the file's own",
     )
+    above: float | None = Field(
+        None, description="level, m, up to which plinths or walls reach: what lies lower is cut off"
+    )
     dimensions: dict[str, PositiveFloat] = Field({}, description="named dimensions of a builder script, m")
 
 

@@ -23,6 +23,10 @@ Origin = Annotated[
     tuple[float, float, float] | None,
     typer.Option(help="X Y Z of a survey's coordinates, m, that all others count from."),
 ]
+Above = Annotated[
+    float | None,
+    typer.Option(help="Level, m, up to which plinths or walls reach: what lies lower is cut off."),
+]
 _SURFACE = {
     "unit": Unit,
     "up": Up,
@@ -34,6 +38,7 @@ _SURFACE = {
     "fill": Fill,
     "ground": Ground,
     "origin": Origin,
+    "above": Above,
 }
 
 

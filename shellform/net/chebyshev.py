@@ -38,7 +38,7 @@ from shellform.surface.shape.target import Surface
 MERGE = 0.2  # of the spacing
 ELEMENTS = 4  # a segment, as in section 4.1
 # Spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
-_MARGINS = (1.5, 2.5, 4.0)
+_MARGINS = (1.5, 2.5, 4.0, 6.5, 10.0)
 _BEYOND = 1.5  # spacings that the surface goes on past the margin
 
 

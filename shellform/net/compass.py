@@ -260,7 +260,7 @@ def _broken(
         f"{2 * math.pi:.2f})",
         where="net.spacing",
         value=spacing[0],
-        remedy="Choose another net.angle or net.offset, or cover the surface by several nets.",
+        remedy="Try another net.angle or net.offset; where none helps it takes a flatter form.",
     )
 
 

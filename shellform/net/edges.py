@@ -37,7 +37,7 @@ from shellform.surface.shape.target import Surface
 
 HELD = ("ground", "wall", "abutment", "pin")  # kinds of stretches that hold the rods' ends
 KINDS = (*HELD, "beam", "free")
-_LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
+LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
 _LONGEST = 0.5  # of the spacing: edge beams' elements aren't longer
 _CLOSE = 0.05  # of the spacing: ends nearer to each other share a node of the edge beam
 
@@ -164,7 +164,7 @@ def _low(surface: Surface, edges: Edges) -> float:
     """The level, m, up to which an edge stands on the ground."""
     outer = surface.vertices[surface.boundary[0]]
     level = float(outer[:, 2].min()) if edges.ground is None else edges.ground
-    return level + _LOW * float(surface.size[:2].max())
+    return level + LOW * float(surface.size[:2].max())
 
 
 def _sort_out(loop: Rim, edges: Edges, low: float) -> None:

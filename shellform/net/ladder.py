@@ -18,6 +18,7 @@ from shellform.net.chebyshev import NetTuning, pull_net
 from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Progress
+from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
 from shellform.surface.shape.target import Surface, largest_curvature
 
@@ -97,6 +98,7 @@ def climbed_net(
             continue
         turned = angle + rung.turn
         shifted = (offset[0] + rung.shift[0], offset[1] + rung.shift[1])
+        taken = 0
         try:
             if failed is not None and not attempts:
                 raise failed
@@ -108,12 +110,14 @@ def climbed_net(
                 tuning=rung.tuning,
                 progress=watch,
             )
+            taken = net.quality.factorisations
+            refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
             attempts.append(Attempt(rung.change, turned, shifted, error.reason))
             progress(attempts[-1].sentence())
             reasons.add(error.reason)
             first = first or error
-            spent += error.iterations if isinstance(error, Stalled) else 0
+            spent += error.iterations if isinstance(error, Stalled) else taken
             if spent > most:
                 break
             continue

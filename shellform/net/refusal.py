@@ -22,6 +22,7 @@ class Reason(Enum):
     FOLDED = "the net folds"
     OVERLAPPING = "parts of the net lie on one another"
     OFF = "the net stays off the surface"
+    NEAR = "crossings come nearer than their spacing"
     EMPTY = "no rod keeps two joints"
 
 

@@ -30,6 +30,7 @@ def built_design(run: Run) -> Built:
         run.case.title,
         run.case.cable.adjustment,
         TitleBlock(block.date, block.revision, block.author),
+        run.case.surface.origin,
     )
 
 

@@ -17,6 +17,7 @@ from shellform.net.edges import Edges, stand
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.orientation import cost
+from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_trial import ELEMENTS
 from shellform.run.sizes import Placed
@@ -63,6 +64,7 @@ def least_bent_net(
         where, tuning = f"net at {angle:g}°, {spacing:g} m", NetTuning(limit=_PULL)
         try:
             net = pull_net(surface, **settings, angle=math.radians(angle), offset=offset, tuning=tuning)
+            refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
             say(f"{where}: {error.reason.value}")
             allowance.spend(crossings, _STALLED if isinstance(error, Stalled) else 1)

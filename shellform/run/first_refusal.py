@@ -1,8 +1,8 @@
 """What `shellform new` says of a shell that it can't design: the reason, and a way out that it went itself.
 
-Two are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
+Three are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
 round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a rounded surface,
-where its rods are bent too much (way_out.py).
+where its rods are bent too much (way_out.py); and as much concrete as these bear, where no rounded surface helps.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from shellform.net.edges import stretches_of
 from shellform.run.first_design import first_design
 from shellform.run.first_net import Allowance
 from shellform.run.sizes import DesignWish
-from shellform.run.unbuildable import Tips, Unbuildable, Why
+from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
 from shellform.run.way_out import BUILDABLE, COVERED, renewed, with_way_out
 from shellform.surface.shape.target import Surface
 
 _SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
+_FLAT_SHARES = (1.0, 1.8)  # of a radius that makes a vault of flat pieces
 _WORK = 10_000  # crossings pulled and solved on rounded surfaces
 _WALLED = 15_000  # on walls, with which large nets are tried once
 Refusal = InputError | NotConverged
@@ -38,8 +39,9 @@ def with_ways_out(refusal: Refusal, surface: Surface, wish: DesignWish, output: 
     if not isinstance(refusal, Unbuildable) or wish.rod:
         return refusal
     again = _trial("rounded", wish, Allowance(_WORK), say)
-    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, shares(refusal))
-    return refusal.in_vain() if told is refusal else told
+    tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
+    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, tried)
+    return _poured_first(refusal.in_vain(), surface, wish, say) if told is refusal else told
 
 
 def shares(refusal: Unbuildable) -> list[float]:
@@ -81,4 +83,20 @@ def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say) ->
         refusal,
         f"With --edges wall this goes on: walls all round, up to {outer.max() - outer.min():.3g} m above the lowest of its "
         "edge",
+    )
+
+
+def _poured_first(refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say) -> Refusal:
+    """The refusal with a first layer of concrete as its remedy; as it was, where none is known to be borne."""
+    if refusal.bears is None or wish.thickness is not None:
+        return refusal
+    how = f"with {1e3 * refusal.bears:g} mm"
+    try:
+        _trial(how, replace(wish, thickness=refusal.bears), Allowance(_WORK), say)(surface)
+    except (InputError, NotConverged) as error:
+        say(f"{how}: {error}")
+        return refusal
+    return renewed(
+        refusal,
+        f"With --thickness {refusal.bears:g} this goes on: pour that first, and the rest when it has hardened",
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from shellform.run.first_design import THICKNESS, FirstDesign, first_design, usu
 from shellform.run.first_look import surface_entry
 from shellform.run.first_refusal import with_ways_out
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
+from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish, RodChoice
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
@@ -59,15 +61,23 @@ def propose_case(
     def say(text: str) -> None:
         report(Event("new", text, Kind.NOTE))
 
+    plinths = plinths_for(surface) if "above" not in options else None
+    if plinths is not None:
+        surface, options = plinths.surface, {**options, "above": plinths.above}
+        say(plinths.told)
+
     try:
         design = first_design(surface, wanted, say)
     except (InputError, NotConverged) as error:
         raise with_ways_out(error, surface, wanted, output, say) from error
     edges = _edges_told(stretches_of(surface, Edges(outer=wanted.edges)))
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
+    if plinths is not None:
+        design = replace(design, told=(plinths.told, *design.told))
     write_text(output, _text(file, entries, surface, design, wanted, edges))
     return {
         "size": size_text(surface.size),
+        **({} if plinths is None else {"plinths": plinths.told}),
         "spacing": f"{design.spacing:g} m, {design.reason}: {len(design.placed.net.grid.lattice)} crossings",
         "angle": f"{design.placed.angle:g}°",
         "rods": f"{design.choice.label} of {design.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",

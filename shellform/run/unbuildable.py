@@ -28,6 +28,7 @@ SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _RATHER = 1.5  # times the least radius, where that alone isn't the reason
 _SPARE = 1.05  # times the radius that rods just bear
 _OPEN = 0.9  # of the radius that three quarters of a surface keep: rounded further it would be another one
+_ARCHED = 0.5  # of its larger side: a radius that makes a vault of a roof of flat pieces
 _WORTH = 1.3  # times the radius to which rods bend now, at the least, for rounding to be worth while
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
@@ -36,12 +37,20 @@ _UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 
 class Unbuildable(InputError):
     """A surface that no net of the `spacing`, m, covers, or that no rod follows there, for the reason `why`; rounded
-    to the `radius`, m, it may be built."""
+    to the `radius`, m, it may be built, or with the thickness of concrete, m, that it `bears`, if one was found."""
 
     def __init__(
-        self, what: str, *, why: Why, where: str, remedy: str, spacing: float, radius: float
+        self,
+        what: str,
+        *,
+        why: Why,
+        where: str,
+        remedy: str,
+        spacing: float,
+        radius: float,
+        bears: float | None = None,
     ) -> None:
-        self.why, self.spacing, self.radius = why, spacing, radius
+        self.why, self.spacing, self.radius, self.bears = why, spacing, radius, bears
         super().__init__(what, where=where, remedy=remedy)
 
     def in_vain(self) -> Unbuildable:
@@ -51,10 +60,10 @@ class Unbuildable(InputError):
             "design stands",
             why=self.why,
             where=self.where,
-            remedy="What else may help wasn't tried: pieces with edges of their own, cut there and brought one by one, or a "
-            "rounder form.",
+            remedy="It takes a rounder form there.",
             spacing=self.spacing,
             radius=self.radius,
+            bears=self.bears,
         )
 
 
@@ -187,7 +196,7 @@ def refused(
     choice, stress = failure.choice, failure.stress
     assert choice is not None
     much = bears is not None and bears >= 0.5 * failure.thickness
-    crease = None if much else _crease(surface, failure, wish)
+    crease = None if much else _crease(surface, failure, wish, bears)
     if crease is not None:
         return crease
     place = "" if failure.where is None else f" at {_at(failure.where)}"
@@ -233,13 +242,21 @@ def refused(
 
 def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
     """The radius, m, to which creases are to be rounded so that rods follow them that bear the load, but no more
-    than nearly what three quarters of the surface keep."""
+    than nearly what three quarters of the surface keep; of flat pieces so far that they become a vault."""
     needed = NEEDED * pressure(failure.thickness, 2500.0)
+    if flat_between_creases(surface):
+        return _ARCHED * float(surface.size[:2].max())
     wanted = radius_for(surface, failure.spacing, needed, wish)
     return min(wanted, _OPEN / max(curvature_usual(surface), 1e-12))
 
 
-def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildable | None:
+def flat_between_creases(surface: Surface) -> bool:
+    """Whether three quarters of the surface are hardly curved, as roofs of flat pieces are: rounded creases alone leave
+    it flat, and a flat grid bears nothing."""
+    return float(surface.size[:2].max()) * curvature_usual(surface) < 1.0
+
+
+def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float | None) -> Unbuildable | None:
     """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the load,
     while nearly all of it takes thicker ones; None where that isn't so."""
     placed, choice = failure.placed, failure.choice
@@ -259,6 +276,7 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish) -> Unbuildabl
         remedy="Round it there, so that thicker rods follow it.",
         spacing=failure.spacing,
         radius=wanted,
+        bears=bears,
     )
 
 

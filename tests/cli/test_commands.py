@@ -178,6 +178,7 @@ def test_only_what_lies_far_from_its_origin_gets_one_near_it_and_the_same_one_ag
     moved = counted_from(counted_from(surface, (-4e5, 2e4, 0.0)), origin)
     assert np.abs(moved.vertices).max() < 3.0 * surface.size.max()
     assert distant_origin(moved, FAR) is None
+    assert any("count from (" in each for each in moved.mended)
 
 
 def test_net_alone_writes_the_contract_s_file_for_a_mesh(tmp_path):

@@ -18,6 +18,7 @@ from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
 from shellform.net.saved import load_net, save_net
 from shellform.surface.shape.target import make_surface
 from tests.net.test_settings import ball, bowl
+from tests.surface.test_fairing import sheet
 
 SETTINGS = {"spacing": 0.9, "gap": 0.9 / 27.5, "elements": 2}
 
@@ -35,6 +36,12 @@ def umbrella():
     )
 
 
+@pytest.fixture
+def bent_as_may_be(monkeypatch):
+    """Crossings may come as near as creases make them."""
+    monkeypatch.setattr("shellform.net.quality.SPACING_ERROR", 1.0)
+
+
 def test_where_the_first_attempt_succeeds_nothing_is_changed():
     surface, settings = bowl(), {"spacing": 0.25, "gap": 0.005, "elements": 2}
     plain = sf.pull_net(surface, **settings, angle=0.3)
@@ -46,6 +53,7 @@ def test_where_the_first_attempt_succeeds_nothing_is_changed():
     assert (net.quality.curvature == plain.quality.curvature).all()
 
 
+@pytest.mark.usefixtures("bent_as_may_be")
 def test_an_attempt_that_is_known_to_fail_is_not_made_again(umbrella):
     heard = []
     known = NoNet(Reason.OFF, "the net stays off the surface")
@@ -62,6 +70,7 @@ def test_no_further_rung_is_climbed_once_failed_pulls_took_what_they_may(umbrell
         climbed_net(umbrella, SETTINGS, angle=math.pi / 4, failed=known, most=100)
 
 
+@pytest.mark.usefixtures("bent_as_may_be")
 def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tmp_path):
     with pytest.raises(NoNet) as caught:
         sf.pull_net(umbrella, **SETTINGS, angle=math.pi / 4)
@@ -153,3 +162,18 @@ def test_a_relaxation_that_comes_no_nearer_is_ended_early_but_not_one_on_its_way
     falling = _watched(None, 5.0)
     for k in range(300):
         falling(k, 1e-3 * 0.99**k)
+
+
+def test_a_corrugated_barrel_is_covered_at_an_angle_where_rods_run_far_past_its_edge_before_others_reach_it():
+    """Rods askew to the corrugation leave the surface spacings before those of the other direction do."""
+    x, y, _ = (sheet(lambda x, y: 0.0 * x, size=15.0, count=61).vertices * [2.0, 1.0, 1.0]).T
+    height = 3.0 + 0.7 * np.cos(x) - 2.5 * (y / 7.5) ** 2
+    surface = make_surface(np.column_stack([x, y, height]), sheet(lambda x, y: 0.0 * x, count=61).triangles)
+    settings = {"spacing": 0.9, "gap": 0.03, "elements": 2, "method": "compass"}
+    net = sf.pull_net(surface, angle=np.pi / 4, **settings)
+    assert net.quality.uncovered_area < 0.01 * surface.area
+
+
+def test_a_net_that_creases_bring_nearer_than_its_spacing_is_refused_after_all_that_was_tried(umbrella):
+    with pytest.raises(NoNet, match="nearer than their spacing"):
+        climbed_net(umbrella, SETTINGS, angle=math.pi / 4)

@@ -1,5 +1,6 @@
 """What is measured of a net, and what is refused."""
 
+import contextlib
 import dataclasses
 
 import numpy as np
@@ -7,7 +8,9 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.net import quality
+from shellform.net.chebyshev import pull_net
 from shellform.net.grid import cells, lattice_grid
+from shellform.net.refusal import NoNet
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State, at_rest
 from shellform.surface.shape.locate import Locator
@@ -173,3 +176,20 @@ def test_hazzidakis_formula_holds_over_every_rectangle_of_the_net(vault, net):
             assert missing == pytest.approx(total, abs=0.01 + 0.03 * abs(total))
             tried += 1
     assert tried > 100
+
+
+def test_a_net_whose_crossings_come_nearer_than_their_spacing_is_refused_with_the_place_and_one_that_bends_less_is_not():
+    """A rod of length s on a cylinder of radius R has a chord of 2 R sin(s / 2R): 0.5 % less at s = 0.35 R."""
+    for radius, refused in ((2.7, True), (3.3, False)):
+        around, along = np.linspace(-1.2, 1.2, 31), np.linspace(-3.0, 3.0, 31)
+        t, y = (each.ravel() for each in np.meshgrid(around, along, indexing="ij"))
+        i = np.arange(31 * 31).reshape(31, 31)
+        a, b, c, d = (each.ravel() for each in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+        faces = np.vstack([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+        barrel = make_surface(np.column_stack([radius * np.sin(t), y, radius * np.cos(t)]), faces)
+        net = pull_net(barrel, spacing=1.0, gap=0.001, elements=4)
+        told = (
+            pytest.raises(NoNet, match="nearer than their spacing") if refused else contextlib.nullcontext()
+        )
+        with told:
+            quality.refuse_nearness(net.quality, net.grid, net.target)

@@ -16,6 +16,7 @@ from shellform import tables
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
+from shellform.output.workshop.setting_out import support_plan
 
 
 @pytest.fixture(scope="module")
@@ -388,3 +389,11 @@ def test_the_files_speak_of_millimetres_and_degrees(built, tmp_path):
                 assert not isinstance(value, float) or float(cell) == pytest.approx(
                     factor * value, abs=5.1e-4
                 )
+
+
+def test_coordinates_that_count_from_a_survey_s_origin_say_so_wherever_they_are_listed(built):
+    moved = replace(built, origin=(430000.0, 81000.25, 400.0))
+    told = "Coordinates count from (430000, 81000.25, 400) m: add it for those of the survey."
+    for make in (schedules.supports, schedules.survey, support_plan):
+        assert told in make(moved).notes
+        assert not any("count from" in note for note in make(built).notes)

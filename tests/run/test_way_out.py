@@ -10,8 +10,12 @@ import shellform as sf
 from shellform.errors import InputError
 from shellform.net.refusal import NoNet, Stalled
 from shellform.records.progress import unheard
+from shellform.run import first_refusal
+from shellform.run.first_design import first_design
 from shellform.run.first_look import net_alone
 from shellform.run.first_refusal import shares
+from shellform.run.propose import propose_case
+from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Unbuildable, Why
 from shellform.run.way_out import with_way_out
 from shellform.surface.readers.reading import read_surface
@@ -85,3 +89,44 @@ def test_net_names_a_surface_with_which_it_goes_on(tmp_path):
     with pytest.raises((NoNet, Stalled)) as refused:
         net_alone(file, tmp_path / "net", {}, **settings)
     net_alone(named(refused.value), tmp_path / "again", {}, **settings)
+
+
+@pytest.mark.parametrize(
+    ("stands", "remedy"), [(True, "With --thickness 0.012 this goes on"), (False, "rounder form")]
+)
+def test_where_no_rounded_surface_helps_a_first_layer_of_concrete_is_offered_if_a_design_stood_with_it(
+    tmp_path, monkeypatch, stands, remedy
+):
+    tried = []
+
+    def search(surface, wish, say, allowance):
+        tried.append(wish.thickness)
+        if not (stands and wish.thickness):
+            raise InputError("no", where="rod")
+
+    monkeypatch.setattr(first_refusal, "first_design", search)
+    refusal = Unbuildable(
+        "no", why=Why.CURVATURE, where="rod", remedy="Round it.", spacing=0.8, radius=2.0, bears=0.012
+    )
+    told = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
+    )
+    assert tried[-1] == 0.012
+    assert remedy in told.remedy
+    assert ("--thickness" in told.remedy) == stands
+    other = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(thickness=0.05), tmp_path / "case.toml", lambda text: None
+    )
+    assert "--thickness" not in other.remedy, "another was asked for"
+
+
+@pytest.mark.slow
+def test_a_roof_of_flat_pieces_is_refused_for_its_crease_with_a_vault_on_which_new_goes_on(tmp_path):
+    file = as_obj(tmp_path / "roof.obj", sheet(lambda x, y: 3.0 - 0.45 * np.abs(x), count=29))
+    with pytest.raises(Unbuildable, match="curvature") as refused:
+        first_design(read_surface(file), DesignWish())
+    assert refused.value.radius == pytest.approx(4.0)
+    with pytest.raises(InputError) as told:
+        propose_case(file, tmp_path / "roof.toml", {}, allow_scripts=False)
+    propose_case(named(told.value), tmp_path / "vault.toml", {}, allow_scripts=False)
+    assert (tmp_path / "vault.toml").is_file()

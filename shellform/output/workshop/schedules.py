@@ -21,8 +21,7 @@ segments from its ends to the nearest rod end along the rods, the smaller of bot
 feet and the curvature is set there first, so that each round pulls against a part that is braced already, and
 the crown, the softest part, stays free to settle until the end. Within a round the cables stand in the order
 in which they go round the plan, and are best tightened on opposite sides at a time. On the optimised vault no
-round loses stability (erection.py), and no cable pulls more than 5.0 N on the way to 4.6 N; the reverse order
-does as well there.
+round loses stability (erection.py), and no cable pulls more than 5.0 N on the way to 4.6 N.
 """
 
 from __future__ import annotations
@@ -64,11 +63,11 @@ class TitleBlock:
 
 @dataclass(frozen=True)
 class Built:
-    """A design to build: the `shell`, its `design`, its `states` by load case, "none" among them, and the
-    state `hung` in which the cables are hung in, the erected grid before bracing (left out: the target).
-    `name` of the design and `title` of the job are for the heads; `adjustment`, m, is the range of the
-    turnbuckles by which cables are let out from the lengths that they are cut to (None: each is cut for
-    itself); `block` is what the drawings' title block says of who drew them and when."""
+    """A design to build: the `shell`, its `design`, its `states` by load case, "none" among them, and the state `hung`
+    in which the cables are hung in, the erected grid before bracing (left out: the target). `name` of the design and
+    `title` of the job are for the heads; `adjustment`, m, is the range of the turnbuckles by which cables are let out
+    from the lengths that they are cut to (None: each is cut for itself); `block` is what the title block says of who
+    drew them and when; `origin` (3,), m, is where coordinates count from in those of a survey (None: the file's)."""
 
     shell: Gridshell
     design: Design
@@ -78,6 +77,7 @@ class Built:
     title: str = ""
     adjustment: float | None = None
     block: TitleBlock = TitleBlock()
+    origin: tuple[float, float, float] | None = None
 
     def __post_init__(self) -> None:
         if "none" not in self.states:
@@ -87,6 +87,14 @@ class Built:
     def grid(self) -> Grid:
         """The net's grid."""
         return self.shell.net.grid
+
+    @property
+    def origin_notes(self) -> tuple[str, ...]:
+        """What is to be added to coordinates, in words; nothing where they are the file's."""
+        if self.origin is None:
+            return ()
+        x, y, z = self.origin
+        return (f"Coordinates count from ({x:.9g}, {y:.9g}, {z:.9g}) m: add it for those of the survey.",)
 
 
 def rod_names(grid: Grid) -> list[str]:
@@ -325,6 +333,7 @@ def supports(built: Built) -> Table:
         "diameters), clash: "
         + (", ".join(f"S{a} and S{b}, {1e3 * apart:.1f} mm" for a, b, apart in clashes) or "none")
         + ".",
+        *built.origin_notes,
     )
     return Table("supports", tuple(heads), tuple(rows), notes)
 
@@ -352,7 +361,8 @@ def survey(built: Built) -> Table:
             if name != "target"
         ]
         rows.append((k, across["u", k], across["v", k], *here, *off))
-    return Table("survey", tuple(heads), tuple(rows), ("Middle between the axes of the two rods.",))
+    notes = ("Middle between the axes of the two rods.", *built.origin_notes)
+    return Table("survey", tuple(heads), tuple(rows), notes)
 
 
 def all_tables(built: Built, cutting: Cutting) -> list[Table]:

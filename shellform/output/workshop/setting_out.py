@@ -75,6 +75,7 @@ def support_plan(built: Built) -> Sheet:
         "Supports are where the rods' axes meet the ground; rods stand as on the target.",
         "Directions of the rods at the supports: schedules/supports.csv. Survey targets: "
         "schedules/survey.csv.",
+        *built.origin_notes,
         *clash_notes(built),
     )
     return Sheet(

@@ -98,7 +98,6 @@ def faired(surface: Surface, radius: float) -> Faired:
         "is left at one place",
         residual=radius / left - 1.0,
         iterations=_ROUNDS * _STEPS,
-        remedy="Give a smaller radius, or cut the surface into pieces along its creases.",
     )
 
 
@@ -327,5 +326,4 @@ def _refuse_folds(start: Surface, at: Reals, radius: float) -> None:
             f"Rounded to {radius:.3g} m the surface folds over",
             residual=float("nan"),
             iterations=_ROUNDS * _STEPS,
-            remedy="Give a smaller radius, or cut the surface into pieces along its creases.",
         )
