@@ -4,31 +4,43 @@ fresh sample says so.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from shellform.optimiser.search_state import Iterate, Search, accepted_design
+from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted_design
 from shellform.optimiser.trials import confirmed, sound, standing
 from shellform.problem.evaluation import Linearisation
 
 
 def last_confirmed(search: Search, it: Iterate) -> Iterate:
-    """Back to the last accepted design of which a fresh sample agrees that it stands, in steps of 1, 2, 4,
-    ...: the search has chosen its designs by their luck with the structures it tried."""
+    """Back to the last accepted design that is found of which a fresh sample agrees that it stands: the
+    search has chosen its designs by their luck with the structures it tried."""
     if search.asked is None or not it.accepted:
         return it
-    back = 0
-    while back < len(it.accepted):
-        own = it.accepted[: len(it.accepted) - back]
-        if confirmed(search, own[-1].built):
-            if back == 0:
-                return it
-            found = last_sound(search, replace(it, accepted=own))
-            if found.accepted and len(found.accepted) == len(own):
-                return replace(found, status=f"{it.status}; the last design that a fresh sample confirms")
-        back = 2 * back + 1
+    stood = _confirmed_among(search, it.accepted)
+    if stood == len(it.accepted) - 1:
+        return it
+    while stood >= 0:
+        found = last_sound(search, replace(it, accepted=it.accepted[: stood + 1]))
+        if len(found.accepted) == stood + 1:
+            return replace(found, status=f"{it.status}; the last design that a fresh sample confirms")
+        stood = _confirmed_among(search, found.accepted)  # its documented path led to another design
     return replace(it, status=f"{it.status}; a fresh sample doesn't confirm that it stands as built")
+
+
+def _confirmed_among(search: Search, accepted: Sequence[Accepted]) -> int:
+    """The number of the last one that is found to be confirmed, -1 where none is: in steps of 1, 2, 4, ...
+    from the end, and between the last two of them by bisection."""
+    stood, fell, back = len(accepted) - 1, len(accepted), 1
+    while stood >= 0 and not confirmed(search, accepted[stood].built):
+        stood, fell, back = max(stood - back, 0) if stood else -1, stood, 2 * back
+    while stood >= 0 and fell - stood > 1:
+        middle = (stood + fell) // 2
+        holds = confirmed(search, accepted[middle].built)
+        stood, fell = (middle, fell) if holds else (stood, middle)
+    return stood
 
 
 def last_standing(search: Search, it: Iterate) -> Iterate:

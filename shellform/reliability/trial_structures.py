@@ -34,7 +34,7 @@ SEED, _CONFIRMED = (
     1,
     100,
 )  # added to the safety's: a search doesn't see the structures that a finished design is judged by
-MOST = 40  # structures by which a search confirms its result
+MOST = 40  # structures by which a search confirms its result, or tries designs without enlarged errors
 _AT_ONCE = 4  # structures between two looks at how many have fallen
 _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a structure falls
 _MESH = 1.01  # over the critical factor asked for: what elements of usual length tell too much, twice over
@@ -81,9 +81,10 @@ def demand(
 ) -> Demand:
     """What is asked of designs that come after `start`, in trials and of a fresh sample under another seed.
     Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
-    at the edge of falling can't tell one design from another. Raises NotConverged where it has no unloaded
-    equilibrium."""
-    trial = None
+    at the edge of falling can't tell one design from another. Where it bears none enlarged, numbers make up
+    for it: a search that tries hundreds of designs on a dozen structures with errors as they are finds one
+    for that dozen. Raises NotConverged where the start has no unloaded equilibrium."""
+    trial, confirming = None, MOST
     for factor in (safety.enlarged, 0.5 * (1.0 + safety.enlarged)):
         own = replace(safety, enlarged=factor)
         most = {name: own.tried for name, load in loads.items() if load.any()}
@@ -94,8 +95,9 @@ def demand(
             trial = _shown(asked, shown)
             break
     if trial is None:
-        trial = required(shell, start, loads, replace(safety, enlarged=1.0), design_load=design_load)
-    fresh = replace(safety, enlarged=1.0, tried=min(safety.drawn, MOST), seed=safety.seed + _CONFIRMED)
+        many = replace(safety, enlarged=1.0, tried=max(MOST, safety.tried))
+        trial, confirming = required(shell, start, loads, many, design_load=design_load), safety.drawn
+    fresh = replace(safety, enlarged=1.0, tried=min(safety.drawn, confirming), seed=safety.seed + _CONFIRMED)
     if any(trial.fallen[name] > _known(fresh, name, design_load) for name in trial.fallen):
         return Demand(trial, required(shell, start, loads, fresh, design_load=design_load))
     known = {name: _known(fresh, name, design_load) for name in trial.fallen}

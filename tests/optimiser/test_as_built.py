@@ -7,7 +7,7 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser import trials
-from shellform.reliability.trial_structures import Required, confirm, required, stands, tried
+from shellform.reliability.trial_structures import MOST, Required, confirm, demand, required, stands, tried
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
 ASKED = sf.Safety(ROUGH, critical_factor=None, drawn=10, tried=6, seed=5)
@@ -84,6 +84,20 @@ def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem)
     early = tried(stout, stout.design(), strict, first=every.fallen["wet"][-1:])
     assert not early.stands
     assert early.factorisations < every.factorisations
+
+
+def test_a_search_tries_more_structures_where_its_start_bears_none_with_enlarged_errors(stout, problem):
+    asked = replace(ASKED, enlarged=1.5, drawn=60)
+    for factor, enlarged, searched, confirming in ((1.0, 1.5, 6, MOST), (2.2, 1.0, MOST, 60)):
+        loads = {"wet": factor * problem.loads["wet"]}
+        found = demand(stout, stout.design(), loads, asked, design_load="wet")
+        trial, fresh = found.trial.safety, found.confirmed.safety
+        assert (trial.enlarged, trial.tried, fresh.enlarged, fresh.tried) == (
+            enlarged,
+            searched,
+            1.0,
+            confirming,
+        )
 
 
 def test_no_more_is_asked_of_designs_than_the_start_shows(stout, problem):

@@ -217,18 +217,20 @@ def test_a_thinner_design_is_kept_only_where_it_breaks_no_limit_more_is_sound_an
 
     monkeypatch.setattr(phases, "standing", judged)
     start = standing_at(Point(1.0, "start", np.array([begun])))
-    found, after = phases._made_to_stand(search, start, end)
+    found, after = phases._made_to_stand(search, start, end, budget=1.0)
     assert (found is end) is taken
     assert len(asked) == (sound and trial <= max(begun, 0.0)), "what is refused is judged no further"
     assert after.point is start.point or taken
 
 
-def test_a_repair_takes_steps_that_lower_the_merit_and_cost_no_more_than_is_thrifty(bare):
+def test_a_repair_takes_steps_that_lower_the_merit_whatever_the_first_one_costs(bare):
     start = standing_at(Point(1.0, "before"), thrifty=1.2)
     trial = Point(1.1, "trial", np.array([0.5]))
     bare.merits = {"trial": 6.1, "dear": 1.3, "better": 1.15, "worse": 6.2}
     for names, end in (
-        ([Point(1.3, "dear"), Point(1.2, "worse")], "trial"),
+        ([Point(1.3, "dear"), Point(1.2, "worse")], "dear"),
+        ([Point(1.3, "dear"), Point(1.15, "better")], "better"),
+        ([Point(1.2, "worse"), None], "trial"),
         ([Point(1.15, "better"), None], "better"),
         ([None, Point(1.15, "better")], "better"),
     ):
@@ -309,7 +311,14 @@ def test_a_search_goes_back_to_the_last_design_that_stands(returning, monkeypatc
     [
         ({6}, {6}, 6, "ended"),
         ({5}, {5}, 5, "ended; the last design that a fresh sample confirms"),
-        ({4, 3, 0}, {3}, 3, "ended; the last design that a fresh sample confirms"),  # back by 1, 3, 7
+        ({4, 3, 0}, {4}, 4, "ended; the last design that a fresh sample confirms"),  # 6, 5, 3, then 4
+        ({0}, {0}, 0, "ended; the last design that a fresh sample confirms"),
+        (
+            {4, 3, 1},
+            {3},
+            3,
+            "ended; the last design that a fresh sample confirms",
+        ),  # 4 isn't where its path leads
         (set(), set(range(7)), 6, "ended; a fresh sample doesn't confirm that it stands as built"),
         ({5}, set(), 6, "ended; a fresh sample doesn't confirm that it stands as built"),
     ],
