@@ -10,7 +10,7 @@ from shellform.optimiser.guards import guard
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _leaving
 from shellform.optimiser.proposal import propose
-from shellform.optimiser.quadratic import LowRank, minimise_quadratic
+from shellform.optimiser.quadratic import LowRank, _low_rank, minimise_quadratic
 from shellform.optimiser.solved_answers import SolvedAnswers
 from shellform.optimiser.step_model import step_model
 from shellform.optimiser.thinning import kept_stiffness
@@ -175,3 +175,14 @@ def test_curvature_of_few_columns_under_constraints_that_contradict_each_other_h
     rows = np.array([[1.0, 0.0], [-1.0, 0.0]])
     few = LowRank(np.ones((2, 1)))
     assert minimise_quadratic(few, np.zeros(2), rows, np.full(2, 0.5), -np.ones(2), np.ones(2)) is None
+
+
+def test_condensed_systems_are_solved_in_full_where_bounds_hardly_weigh():
+    rng = np.random.default_rng(4)
+    columns = rng.normal(size=(400, 100)) * np.logspace(3, -3, 100)
+    rows, bounds, weights = rng.normal(size=(8, 400)), np.full(400, 1e-12), np.logspace(-6, 6, 8)
+    product, condensed = _low_rank(LowRank(columns), rows)
+    right = columns @ (columns.T @ rng.normal(size=400))
+    found = condensed(bounds, weights)(right)
+    left = right - (product(found) + bounds * found + rows.T @ (weights * (rows @ found)))
+    assert np.abs(left).max() < 1e-12 * np.abs(right).max()  # 3e-6 by the formula alone
