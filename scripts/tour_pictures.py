@@ -28,7 +28,7 @@ def main(folder: str) -> None:
     best = panel_of(run, run.best, "design")
     _save(
         "optimised-design",
-        render.image(best, Look(limit=run.case.figures.limit, size=(1200, 750), surface=skin)),
+        render.image(best, Look(limit=float(best.deviation.max()), size=(1200, 750), surface=skin)),
     )
     rows = [
         [panel_of(run, name, load) for load in ("none", "design", "additional")]

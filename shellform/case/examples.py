@@ -63,6 +63,12 @@ EXAMPLES = {
         "dome.3dm",
         "shellform new dome.3dm --layer Shell --output mine.toml",
     ),
+    "rods": Example(
+        "a dome of 2.48 × 1.93 m as a mesh in a Rhino file (in mm), for rods of 8 mm",
+        (),
+        "large_dome.3dm",
+        'shellform new large_dome.3dm --layer Shell --rod "gfrp_rods/8 mm" --output mine.toml',
+    ),
     "model": Example(
         "an arch of one bent rod and a cable as a model file of one's own",
         ("bent_arch.json",),

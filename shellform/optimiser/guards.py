@@ -38,9 +38,11 @@ class Guard:
     tension_by_design: Reals
 
 
-def guard(assembly: Assembly, state: State, cables: Cables, reach: float, *rates: Beams) -> Guard:
-    """The guard of the cables with tensions between 0 and `reach`, N, in the stable `state`; `rates` are the
-    beams' by a free radius.
+def guard(
+    assembly: Assembly, state: State, cables: Cables, reach: float, *rates: Beams, most: int | None = None
+) -> Guard:
+    """The guard of the cables with tensions between 0 and `reach`, N, in the stable `state`, at `most` so many,
+    those with the least; `rates` are the beams' by a free radius.
 
     Raises NotPositiveDefinite.
     """
@@ -49,6 +51,8 @@ def guard(assembly: Assembly, state: State, cables: Cables, reach: float, *rates
     )
     tension = cables.tension(state)
     near = np.flatnonzero((tension > 0.0) & (tension < reach))
+    if most is not None:
+        near = np.sort(near[np.argsort(tension[near], kind="stable")[:most]])
     by_design = adjoint(response, tension_rows(assembly, state, cables)[near])
     by_design[np.arange(len(near)), near] += cables.tension_by_rest_length(state)[near]
     return Guard(tension[near], by_design)

@@ -165,6 +165,7 @@ def polish(
             asked=best.asked,
         )
         search = replace(search, always_guarded=True, groups=alike)
+        search.models.whole = alike is not None
         it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned))
         polished = finish(search, run(search, it))
     better = (
@@ -228,7 +229,7 @@ def begin(
         progress,
         keep,
         began,
-        Models(evaluator, mean),
+        Models(evaluator, solver, mean),
     )
     it = Iterate(
         point,

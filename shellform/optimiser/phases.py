@@ -346,11 +346,17 @@ def _repaired(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linear
 def _leaving(search: Search, it: Iterate, model: StepModel) -> Indices:
     """Taut cables, numbered among those present, that can go at once, from the one with the least use."""
     state = it.point.states[search.evaluator.problem.decisive_load()]
-    kept = kept_stiffness(model.assembly, state, search.problem.shell.cables(it.point.design))
+    cables = search.problem.shell.cables(it.point.design)
+    pull = model.origin[: model.tensions]
+    some = np.arange(len(pull))
+    if len(pull) > search.solver.many:  # those that pull least
+        free = np.flatnonzero((pull > 0.0) & ~it.needed)
+        some = np.sort(free[np.argsort(pull[free], kind="stable")[: search.solver.candidates]])
+    kept = kept_stiffness(model.assembly, state, cables, some)
     loss = 1.0 - np.diag(kept)
-    pull = model.origin[: len(loss)]
+    pull = pull[some]
     score = loss / loss.sum() + pull / pull.sum()
     if it.mind is not None:
-        score += missed_without(search, it, model)
-    free = np.flatnonzero((pull > 0.0) & ~it.needed)
-    return removable(kept, free[np.argsort(score[free], kind="stable")], it.batch, search.solver.kept)
+        score += missed_without(search, it, model)[some]
+    free = np.flatnonzero((pull > 0.0) & ~it.needed[some])
+    return some[removable(kept, free[np.argsort(score[free], kind="stable")], it.batch, search.solver.kept)]

@@ -6,7 +6,7 @@ approximations, 2002, are corrected by theirs, but by a constant, which shrinks 
 are those of the window, of the variables (3), (4) and of cable forces (5) under the design load. NLopt's MMA
 solves it. Where cables are to stay taut under the further loads (guards.py), cables alike keep one length
 (grouping.py), or many structures are kept in mind (minding.py), it has more constraints than MMA's dual comes to
-an end with and goes to the interior-point method (quadratic.py).
+an end with and goes to the interior-point method (quadratic.py); and so it does where cables are thousands.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals
 from shellform.optimiser.convex import minimise
 from shellform.optimiser.guards import Guard
-from shellform.optimiser.quadratic import minimise_quadratic
+from shellform.optimiser.quadratic import LowRank, minimise_quadratic
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.step_model import StepModel
+from shellform.optimiser.whole_answers import WholeAnswers
 from shellform.problem.constraints import Constraint
 
 _WIDE = 1e3  # windows, no bound on a group's step beside those on its cables
@@ -68,7 +69,7 @@ def propose(task: Task) -> tuple[Reals, float]:
     falls, margins = _guarding(task, width)
     scaled_slope, scaled_rows = slope * width, np.vstack([model.constraints_by_y * width, falls])
     values = np.append(values, margins)
-    scaled_curvature = np.asarray(_curvature(model)) * width * width[:, None]
+    scaled_curvature = _curvature(model, width)
 
     low, high = (lower - model.origin) / width, (upper - model.origin) / width
 
@@ -82,7 +83,7 @@ def propose(task: Task) -> tuple[Reals, float]:
         u = _equal_steps(
             task, width, scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high
         )
-    elif task.guards or len(values) > _FEW:
+    elif task.guards or len(values) > _FEW or model.tensions > task.solver.many:
         u = minimise_quadratic(scaled_curvature, scaled_slope, scaled_rows, values, low, high)
         if u is None:
             u = _as_far_as_can_be(task, scaled_curvature, scaled_slope, scaled_rows, values, low, high)
@@ -105,19 +106,23 @@ def propose(task: Task) -> tuple[Reals, float]:
 
 
 def _as_far_as_can_be(
-    task: Task, curvature: Reals, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
+    task: Task, curvature: Reals | LowRank, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
 ) -> Reals | None:
     """The model's optimum in windows (y,) where more is asked for than a step can give. Of what constraints
     are broken by a share t remains, of what guards ask for another, 0 <= t <= 1, each at a price that
     outweighs the objective as it does in judging trials."""
     size, count = len(slope), len(task.model.point.constraints)
+    wider: Reals | LowRank
+    if isinstance(curvature, LowRank):
+        wider = curvature.widened(2)
+    else:
+        wider = np.zeros((size + 2, size + 2))
+        wider[:size, :size] = curvature
     broken = np.zeros((len(values), 2))
     broken[:count, 0] = np.maximum(values[:count], 0.0)
     broken[count:, 1] = np.maximum(values[count:], 0.0)
-    bent = np.zeros((size + 2, size + 2))
-    bent[:size, :size] = curvature
     found = minimise_quadratic(
-        bent,
+        wider,
         np.append(slope, task.solver.penalty * broken.max(axis=0)),
         np.hstack([rows, -broken]),
         values,
@@ -127,13 +132,19 @@ def _as_far_as_can_be(
     return None if found is None else found[:size]
 
 
-def _curvature(model: StepModel) -> Reals | float:
-    """The objective's Gauss-Newton matrix (y, y)."""
-    return sum(
-        weight * own.hessian
-        for weight, own in zip(model.evaluator.weights, model.quadratics, strict=True)
-        if own is not None
-    )
+def _curvature(model: StepModel, width: Reals) -> Reals | LowRank:
+    """The objective's Gauss-Newton matrix (y, y) in windows of a `width` (y,)."""
+    own = [
+        (weight, each.hessian)
+        for weight, each in zip(model.evaluator.weights, model.quadratics, strict=True)
+        if each is not None
+    ]
+    few = [np.sqrt(weight) * each.columns for weight, each in own if isinstance(each, LowRank)]
+    if not own:
+        return LowRank(np.zeros((len(width), 0)))
+    if few:
+        return LowRank(np.hstack(few) * width[:, None])
+    return np.asarray(sum(weight * each for weight, each in own)) * width * width[:, None]
 
 
 def _slope(task: Task) -> Reals:
@@ -141,7 +152,7 @@ def _slope(task: Task) -> Reals:
     share of its own size."""
     model = task.model
     if not task.climbing:
-        return _exact_in_tension(model.point.objective_by_variables @ model.variables_by_y, model)
+        return _exact_in_tension(model.answers.by_variables(model.point.objective_by_variables), model)
     problem = model.evaluator.problem
     slopes = np.vstack(
         [
@@ -151,13 +162,13 @@ def _slope(task: Task) -> Reals:
         ]
     )
     total = (slopes / np.linalg.norm(slopes, axis=1)[:, None]).sum(axis=0)
-    return np.asarray(total @ model.variables_by_y)
+    return model.answers.by_variables(total)
 
 
 def _equal_steps(
     task: Task,
     width: Reals,
-    curvature: Reals,
+    curvature: Reals | LowRank,
     slope: Reals,
     rows: Reals,
     values: Reals,
@@ -168,10 +179,12 @@ def _equal_steps(
     = W⁻¹ (∂l0/∂y)⁻¹ G v.
     """
     assert task.groups is not None
+    assert isinstance(task.model.answers, WholeAnswers)
+    assert isinstance(curvature, np.ndarray)
     count = len(task.groups)
     member = np.zeros((count, int(task.groups.max()) + 1))
     member[np.arange(count), task.groups] = 1.0
-    steps = np.linalg.solve(task.model.parameters_by_y, member) / width[:, None]
+    steps = task.model.answers.of_rest_lengths(member) / width[:, None]
     steps /= np.abs(steps).max(axis=0)
     box = np.vstack([steps, -steps])
     v = minimise_quadratic(
@@ -191,7 +204,7 @@ def _guarding(task: Task, width: Reals) -> tuple[Reals, Reals]:
     rows, values = [np.zeros((0, len(width)))], [np.zeros(0)]
     solver = task.solver
     for held in task.guards:
-        falls = -(held.tension_by_design @ task.model.parameters_by_y) * width
+        falls = -task.model.answers.by_parameters(held.tension_by_design) * width
         scale = np.abs(falls).sum(axis=1)
         asked = np.minimum((task.least - held.tension) / scale, solver.recovery)
         # Where no step within the window lets a cable go slack, there is nothing to guard; of the others the

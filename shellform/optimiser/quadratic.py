@@ -1,11 +1,14 @@
 """Quadratic problems with many constraints: the door to CVXOPT's interior-point method.
 
-Its linear systems are condensed to the variables, so that constraints cost little.
+Its linear systems are condensed to the variables, so that constraints cost little. Where the curvature is L L'
+with few columns, they are condensed further, to those and the constraints: M = D + L L' + G' W G with diagonal
+D and W is solved with by Sherman, Morrison and Woodbury's formula, whose cost is linear in the variables.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,18 +19,36 @@ from shellform.arrays import Reals
 from shellform.work_clock import Work, told
 
 _REGULAR = 1e-8  # of the mean curvature, where the model has none
+_CORRECTIONS = 2  # of what a small diagonal costs the formula in digits
+
+_Linear = Callable[[Reals], Reals]
+# from the bounds' weights (s,) and the constraints' (k,) to the solution of the condensed system
+_Condensed = Callable[[Reals, Reals], _Linear]
+
+
+@dataclass(frozen=True)
+class LowRank:
+    """The matrix L L' of `columns` L (s, r)."""
+
+    columns: Reals
+
+    def __matmul__(self, u: Reals) -> Reals:
+        return np.asarray(self.columns @ (self.columns.T @ u))
+
+    def widened(self, more: int) -> LowRank:
+        """With rows and columns of zeros."""
+        return LowRank(np.vstack([self.columns, np.zeros((more, self.columns.shape[1]))]))
 
 
 @told(Work.CONVEX)
 def minimise_quadratic(
-    hessian: Reals, slope: Reals, rows: Reals, values: Reals, lower: Reals, upper: Reals
+    hessian: Reals | LowRank, slope: Reals, rows: Reals, values: Reals, lower: Reals, upper: Reals
 ) -> Reals | None:
     """The u (s,) with the least slope'u + u'hessian u / 2 where values + rows u <= 0 and lower <= u <= upper;
     None where nothing meets them all. `hessian` (s, s) is positive semidefinite.
     """
     size = len(slope)
-    mean = float(np.diag(hessian).mean())
-    curved = hessian + _REGULAR * max(mean, 1e-300) * np.eye(size)
+    curved, condensed = _dense(hessian, rows) if isinstance(hessian, np.ndarray) else _low_rank(hessian, rows)
 
     def limits(x: Reals) -> Reals:
         return np.concatenate([x, -x, rows @ x])
@@ -48,13 +69,11 @@ def minimise_quadratic(
         """Solves [P G'; G -D²] (x, z) = (bx, bz) by x alone: (P + G' D⁻² G) x = bx + G' D⁻² bz."""
         d = np.array(scaling["d"]).ravel()
         weight = d**-2
-        whole = curved + (rows.T * weight[2 * size :]) @ rows
-        whole[np.diag_indices(size)] += weight[:size] + weight[size : 2 * size]
-        factor = cho_factor(whole, check_finite=False)
+        solved = condensed(weight[:size] + weight[size : 2 * size], weight[2 * size :])
 
         def solve(x: Any, y: Any, z: Any) -> None:
             right = np.array(z).ravel()
-            found = cho_solve(factor, np.array(x).ravel() + pulls(weight * right), check_finite=False)
+            found = solved(np.array(x).ravel() + pulls(weight * right))
             x[:] = matrix(found)
             z[:] = matrix((limits(found) - right) / d)
 
@@ -65,7 +84,7 @@ def minimise_quadratic(
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             answer = solvers.coneqp(
-                products(lambda x: np.asarray(curved @ x)),
+                products(curved),
                 matrix(slope),
                 constrained,
                 matrix(right),
@@ -84,3 +103,54 @@ def minimise_quadratic(
     if answer["status"] != "optimal":
         return None
     return np.clip(np.array(answer["x"]).ravel(), lower, upper)
+
+
+def _dense(hessian: Reals, rows: Reals) -> tuple[_Linear, _Condensed]:
+    """Products with the curvature, and solutions of the condensed systems."""
+    size = len(hessian)
+    mean = float(np.diag(hessian).mean())
+    curved = hessian + _REGULAR * max(mean, 1e-300) * np.eye(size)
+
+    def condensed(of_bounds: Reals, of_rows: Reals) -> _Linear:
+        whole = curved + (rows.T * of_rows) @ rows
+        whole[np.diag_indices(size)] += of_bounds
+        factor = cho_factor(whole, check_finite=False)
+        return lambda right: np.asarray(cho_solve(factor, right, check_finite=False))
+
+    return lambda x: np.asarray(curved @ x), condensed
+
+
+def _low_rank(hessian: LowRank, rows: Reals) -> tuple[_Linear, _Condensed]:
+    """As `_dense`, by the few columns of the curvature and the constraints' rows."""
+    few = np.hstack([hessian.columns, rows.T])
+    count, size = hessian.columns.shape[1], len(hessian.columns)
+    regular = _REGULAR * max(float((hessian.columns**2).sum()) / size, 1e-300)
+
+    def condensed(of_bounds: Reals, of_rows: Reals) -> _Linear:
+        diagonal = regular + of_bounds
+        eased = few / diagonal[:, None]
+        middle = few.T @ eased
+        middle[np.diag_indices(few.shape[1])] += np.append(np.ones(count), 1.0 / of_rows)
+        factor = cho_factor(middle, check_finite=False)
+
+        def near(right: Reals) -> Reals:
+            plain = right / diagonal
+            return np.asarray(plain - eased @ cho_solve(factor, few.T @ plain, check_finite=False))
+
+        def left_of(right: Reals, x: Reals) -> Reals:
+            return np.asarray(right - diagonal * x - hessian @ x - rows.T @ (of_rows * (rows @ x)))
+
+        def solved(right: Reals) -> Reals:
+            found = near(right)
+            left = left_of(right, found)
+            for _ in range(_CORRECTIONS):
+                better = found + near(left)
+                after = left_of(right, better)
+                if not np.abs(after).max() < np.abs(left).max():
+                    break
+                found, left = better, after
+            return found
+
+        return solved
+
+    return lambda x: regular * x + hessian @ x, condensed

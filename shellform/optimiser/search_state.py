@@ -144,17 +144,18 @@ class Iterate:
 
 class Models:
     """Step models and guards, made once for each linearisation: the last one's are kept for another try in a
-    smaller window."""
+    smaller window. Of more cables than are `many` for the solver those with the least tensions are guarded,
+    and models are `whole` only where cables keep one length."""
 
-    def __init__(self, evaluator: Evaluator, reach: float) -> None:
-        self.evaluator, self.reach = evaluator, reach
+    def __init__(self, evaluator: Evaluator, solver: SequentialConvex, reach: float) -> None:
+        self.evaluator, self.solver, self.reach, self.whole = evaluator, solver, reach, False
         self._model: StepModel | None = None
         self._guards: tuple[Linearisation, list[Guard]] | None = None
 
     def at(self, point: Linearisation) -> StepModel:
         """The step model at the point."""
         if self._model is None or self._model.point is not point:
-            self._model = step_model(self.evaluator, point)
+            self._model = step_model(self.evaluator, point, whole=self.whole or not self._many(point))
         return self._model
 
     def guards(self, point: Linearisation) -> list[Guard]:
@@ -168,11 +169,19 @@ class Models:
             names = [
                 name for name in evaluator.problem.used() if name != evaluator.base and loads[name].any()
             ]
+            most = self.solver.guards if self._many(point) else None
             self._guards = (
                 point,
-                [guard(assembly, point.states[name], cables, self.reach, *rates) for name in names],
+                [
+                    guard(assembly, point.states[name], cables, self.reach, *rates, most=most)
+                    for name in names
+                ],
             )
         return self._guards[1]
+
+    def _many(self, point: Linearisation) -> bool:
+        each_cable = self.evaluator.blocks.each_cable is not None
+        return each_cable and int(point.design.present.sum()) > self.solver.many
 
 
 def accepted_design(search: Search, point: Linearisation) -> Accepted:

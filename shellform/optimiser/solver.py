@@ -52,6 +52,7 @@ class SequentialConvex:
     Thinning:
     - `batch`: the first batch takes one in so many of the cables in tension; after it they grow by a third
       while they fit and are cut to a third where not.
+    - `candidates`: of thousands of cables, those that are looked at for a batch.
     - `kept`: of the stiffness in any direction at the decisive load, that a batch must leave: the others'
       lengths are to make up for the rest.
     - `thrift`: of the objective, what cables with little use may cost.
@@ -66,6 +67,8 @@ class SequentialConvex:
     - `softer`: of the stiffness of a design that stands, which the next batch is asked to keep.
 
     The step's problem:
+    - `many`: cables, beyond which its answers come by solves of their own instead of dense matrices: of 1,646
+      those take seven times as long already.
     - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA.
     """
 
@@ -91,6 +94,7 @@ class SequentialConvex:
     recovery: float = 0.1
 
     batch: int = 8
+    candidates: int = 1024
     kept: float = 0.4
     thrift: float = 1.1
     failures: int = 6
@@ -101,6 +105,7 @@ class SequentialConvex:
     stiffenings: int = 3
     softer: float = 0.95
 
+    many: int = 2000
     model_evaluations: int = 2000
 
     def __post_init__(self) -> None:
@@ -126,6 +131,7 @@ _MAY_BE_NONE = (
     "stiffness",
     "most_cables",
     "guards",
+    "many",
     "recovery",
     "repairs",
     "idle",

@@ -26,8 +26,11 @@ from shellform.structure.solve.assembly import Assembly
 _BLOCK = 256  # columns solved for at once
 
 
-def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
-    """The matrix S (c, c) of the cables at the stable `state`; slack cables have rows of the identity.
+def kept_stiffness(
+    assembly: Assembly, state: State, cables: Cables, some: Indices | slice = slice(None)
+) -> Reals:
+    """The matrix S (c, c) of the cables at the stable `state`, or of `some`; slack cables have rows of the
+    identity.
 
     Raises NotPositiveDefinite.
     """
@@ -35,10 +38,10 @@ def kept_stiffness(assembly: Assembly, state: State, cables: Cables) -> Reals:
     length = np.linalg.norm(chord, axis=1)
     stiffness = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
     unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
-    pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))
-    factor, kept = assembly.factor(state), np.eye(len(unit))
-    for first in range(0, len(unit), _BLOCK):
-        own = slice(first, min(first + _BLOCK, len(unit)))
+    pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))[:, some]
+    factor, kept = assembly.factor(state), np.eye(pull.shape[1])
+    for first in range(0, len(kept), _BLOCK):
+        own = slice(first, min(first + _BLOCK, len(kept)))
         kept[:, own] -= pull.T @ factor.solve(np.asfortranarray(pull[:, own].toarray()))
     return kept
 

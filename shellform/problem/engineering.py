@@ -219,15 +219,14 @@ class Uplift(Term):
         assembly = assemble(shell.network(design))
         held = 6 * np.asarray(shell.net.supports) + 2
         reaction = assembly.evaluate(state, tangent=False).force.ravel()[held] - at.load.ravel()[held]
-        rows = -reaction_rows(assembly, state, held).toarray()
-        dofs = np.broadcast_to(assembly.free, rows.shape)
+        rows = -reaction_rows(assembly, state, held)
         rate = shell.beams_by_radius(design.radius)
         change = np.zeros(6 * assembly.count)
         np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
         cables = shell.cables(design)
         if np.isin(cables.ends, shell.net.supports).any():
             raise InputError("cables that end at supports are not provided for", where="uplift")
-        return _largest(shell, self.scale, -reaction, dofs, rows, -change[held])
+        return _largest(shell, self.scale, -reaction, assembly.free, rows, -change[held])
 
 
 @dataclass(frozen=True)
@@ -253,15 +252,14 @@ class Thrust(Term):
         push = internal[held] - at.load.ravel()[held]
         size = np.hypot(push[:, 0], push[:, 1])
         along = push / np.maximum(size, np.finfo(float).tiny)[:, None]
-        by_dof = reaction_rows(assembly, state, held.ravel()).toarray().reshape(len(held), 2, -1)
-        rows = (along[:, :, None] * by_dof).sum(axis=1)
-        dofs = np.broadcast_to(assembly.free, rows.shape)
+        by_dof = reaction_rows(assembly, state, held.ravel())
+        rows = sp.csr_array(sum(sp.diags_array(along[:, k]) @ by_dof[k::2] for k in range(2)))
         rate = shell.beams_by_radius(design.radius)
         change = np.zeros(6 * assembly.count)
         np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
         if np.isin(shell.cables(design).ends, shell.net.supports).any():
             raise InputError("cables that end at supports are not provided for", where="thrust")
-        return _largest(shell, self.scale, size, dofs, rows, (along * change[held]).sum(axis=1))
+        return _largest(shell, self.scale, size, assembly.free, rows, (along * change[held]).sum(axis=1))
 
 
 def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, sign: float) -> Measurement:
@@ -301,17 +299,20 @@ def _largest(
     unit: float,
     values: Reals,
     dofs: np.ndarray,
-    rows: Reals,
+    rows: Reals | sp.csr_array,
     by_radius: Reals,
     cables: np.ndarray | None = None,
     by_rest_length: Reals | None = None,
 ) -> Measurement:
-    """KS of `values` (k,) from their derivatives `rows` (k, q) at `dofs` (k, q), `by_radius` (k,), and
-    each by its own cable's rest length.
+    """KS of `values` (k,) from their derivatives `rows` (k, q) at `dofs` (k, q), or sparse ones at `dofs` (q,),
+    `by_radius` (k,), and each by its own cable's rest length.
     """
     weight, value = _smooth(values, SHARPNESS / unit)
     slope = np.zeros(6 * shell.node_count)
-    np.add.at(slope, dofs, weight[:, None] * rows)
+    if sp.issparse(rows):
+        slope[dofs] = rows.T @ weight
+    else:
+        np.add.at(slope, dofs, weight[:, None] * rows)
     by_rest = np.zeros(len(shell.cable_ends))
     if cables is not None and by_rest_length is not None:
         by_rest[cables] = weight * by_rest_length

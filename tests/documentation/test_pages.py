@@ -30,7 +30,6 @@ ROOT = Path(__file__).parent.parent.parent
 PAGES = ROOT / "shellform/documentation"
 BLOCK = re.compile(r"(?:<!-- ([^>]*) -->\n)?```(\w+)(?: title=\"([^\"]*)\")?\n(.*?)```", re.DOTALL)
 ALONE = {
-    "how-to/rods.md": "a shell that 8 mm rods bear: none ships (the dome's refusal is followed)",
     "start.md": "pip install: tests/test_bare.py does it in a bare Debian",
     "how-to/sketch.md": "--watch, which goes on for ever: tests/cli/test_watch.py",
     "reference/study.md": "the four shipped studies, an hour: tests/study reads and begins them",

@@ -39,6 +39,7 @@ from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import Factor, Symmetric
 
 _MOST = 4000  # degrees of freedom to which K is condensed: a dense matrix of 128 MB
+_AT_ONCE = 2**26  # numbers of a block that is solved for at once: 512 MB
 # degrees of freedom that a design variable and the measures touch, for each variable: two nodes' translations
 # shared by several cables
 _FEW = 3
@@ -171,8 +172,13 @@ def gradients(response: Response, by_state: Reals, by_design: Reals) -> Reals:
 
 def adjoint(response: Response, by_state: Reals | sp.csr_array) -> Reals:
     """-(K⁻¹ ∂g/∂x)' ∂f/∂s (g, s), one solve for each measure."""
-    multipliers = response.factor.solve(_dense(by_state.T))
-    return np.asarray(-(response.force_by_design.T @ multipliers).T)
+    found = np.empty((by_state.shape[0], response.force_by_design.shape[1]))
+    some = max(1, _AT_ONCE // max(by_state.shape[1], 1))
+    for first in range(0, len(found), some):
+        own = slice(first, first + some)
+        multipliers = response.factor.solve(_dense(by_state[own].T))
+        found[own] = -(response.force_by_design.T @ multipliers).T
+    return found
 
 
 def direct(response: Response, by_state: Reals | sp.csr_array) -> Reals:

@@ -1,0 +1,146 @@
+"""Where a step is taken from, and what its model needs to know of it: how cables, nodes and residuals answer.
+
+Two ways to the answers: all of them at once, as dense matrices (whole_answers.py), or each when it is asked
+for, by a solve of its own (solved_answers.py).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Flags, Indices, Reals
+from shellform.optimiser.quadratic import LowRank
+from shellform.problem.evaluation import Evaluator, Linearisation
+from shellform.structure.answers.sensitivity import by_rest_length, element_columns
+from shellform.structure.elements.cable import Cables
+from shellform.structure.elements.state import State
+from shellform.structure.solve.assembly import Assembly
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The `state` under the design load of a `point`, its `assembly` and its present `cables`, numbered
+    `present` (c,) among the candidates.
+
+    y = (tensions (n,) of the present cables; values of the other blocks): `tensions` is n, c or 0, and `other`
+    (s,) says which of the problem's variables are the latter; `each` is where the rest lengths stand among
+    them, None where no block is these. `length` (c,), m, and `tension` (n,), N, of the cables; `pull` (f, n),
+    the forces on the free degrees of freedom by the tensions, and `right` (f, y) by all of y; `rates` (c + 1,
+    s) of rest lengths and radius by the values.
+    """
+
+    evaluator: Evaluator
+    assembly: Assembly
+    point: Linearisation
+    state: State
+    cables: Cables
+    present: Indices
+    tensions: int
+    each: slice | None
+    other: Flags
+    length: Reals
+    tension: Reals
+    pull: sp.csc_array
+    right: sp.csc_array
+    rates: sp.csc_array
+
+    @property
+    def stiffness(self) -> Reals:
+        """EA/l0 (n,), N/m, of the taut cables; 0 of the slack ones."""
+        stiffest = (self.cables.stiffness / self.cables.rest_length)[: self.tensions]
+        return np.where(self.tension > 0.0, stiffest, 0.0)
+
+    @property
+    def parameters(self) -> sp.csr_array:
+        """The rates (c or c + 1, s) of the present rest lengths and, where it moves, of the radius."""
+        last = self.rates.shape[0] - 1
+        kept = np.append(self.present, last) if self.evaluator.blocks.moves_radius else self.present
+        return sp.csr_array(sp.csr_array(self.rates)[kept])
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """A sum of squares in the model: its `slope` (y,) and Gauss-Newton matrix `hessian` (y, y)."""
+
+    slope: Reals
+    hessian: Reals | LowRank
+
+
+class Answers(Protocol):
+    """How the model answers to a change of y. Derivatives by the problem's variables, in their units, or by
+    `Setting.parameters` are chained to y by `by_variables` and `by_parameters`."""
+
+    def lengthened(self, change: Reals) -> Reals:
+        """The cables' changes (c,), m."""
+
+    def moved(self, change: Reals) -> Reals:
+        """The free degrees of freedom's changes (f,)."""
+
+    def by_variables(self, rows: Reals) -> Reals:
+        """(k, y) from (k, s), or (y,) from (s,)."""
+
+    def by_parameters(self, rows: Reals) -> Reals:
+        """(k, y) from (k, p)."""
+
+    @property
+    def quadratics(self) -> Sequence[Quadratic]:
+        """Of the sums of squares under the design load that the answers were made for."""
+
+
+def setting(evaluator: Evaluator, point: Linearisation) -> Setting:
+    """The setting of a step from the point."""
+    shell, blocks, design = evaluator.shell, evaluator.blocks, point.design
+    state, assembly = point.states[evaluator.base], evaluator.assembly(design)
+    cables, present = shell.cables(design), np.flatnonzero(design.present)
+    each = blocks.each_cable
+    other = np.ones(blocks.size, dtype=bool)
+    if each is not None:
+        other[each] = False
+    count = 0 if each is None else len(present)
+    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+    length = np.linalg.norm(chord, axis=1)
+    unit = chord / length[:, None]
+    pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))[:, :count]
+    rates = blocks.rates(design)
+    right = pull
+    if other.any():
+        own_forces = _forces(evaluator, assembly, state, point, sp.csr_array(rates)[:, other])
+        right = sp.csc_array(sp.hstack([pull, own_forces]))
+    return Setting(
+        evaluator,
+        assembly,
+        point,
+        state,
+        cables,
+        present,
+        count,
+        each,
+        other,
+        length,
+        cables.tension(state)[:count],
+        pull,
+        right,
+        rates,
+    )
+
+
+def _forces(
+    evaluator: Evaluator, assembly: Assembly, state: State, point: Linearisation, rate: sp.csr_array
+) -> sp.csc_array:
+    """(f, v): the internal forces by values that change rest lengths and radius by `rate` (c + 1, v)."""
+    shell, design = evaluator.shell, point.design
+    result = sp.csc_array((len(assembly.free), rate.shape[1]))
+    if rate[:-1].nnz:
+        columns = by_rest_length(assembly, state, shell.cables(design))
+        result = result + sp.csc_array(columns @ rate[np.flatnonzero(design.present)])
+    if rate[[-1]].nnz:
+        beams = shell.beams_by_radius(design.radius)
+        change = np.zeros(6 * assembly.count)
+        np.add.at(change, beams.dofs(), beams.evaluate(state, tangent=False).force)
+        result = result + sp.csc_array(change[assembly.free][:, None] * rate[[-1]].toarray())
+    return sp.csc_array(result)

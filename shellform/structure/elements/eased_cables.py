@@ -1,0 +1,42 @@
+"""Cables whose stiffness along them is lessened, at the tensions that they have.
+
+A cable's tangent is (EA/l0 - N/l) e e' + N/l I with e = (x_b - x_a)/l. Without a share s of the first EA/l0 it
+is that of a structure in which the cable's tension answers less to its length: with s = 1 the tension is given
+and doesn't answer at all; with s above 1 a margin is asked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.structure.elements.cable import Cables
+from shellform.structure.elements.parts import Evaluation
+from shellform.structure.elements.state import State
+
+_ROW, _COLUMN = np.tril_indices(6)
+
+
+@dataclass(frozen=True)
+class EasedCables:
+    """The `cables` without a `share` (c,) of their stiffness along them; a part of a model, with their energy
+    and forces."""
+
+    cables: Cables
+    share: Reals
+
+    def dofs(self) -> Indices:
+        """Translations (c, 6) of the two ends."""
+        return self.cables.dofs()
+
+    def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
+        """As the cables', with the lessened tangents (c, 21), N/m."""
+        whole = self.cables.evaluate(state, tangent=tangent, into=into)
+        if whole.tangent is None:
+            return whole
+        along = self.cables.tension_by_position(state)
+        size = self.cables.stiffness / self.cables.rest_length
+        whole.tangent[...] -= (self.share / size)[:, None] * along[:, _ROW] * along[:, _COLUMN]
+        return whole

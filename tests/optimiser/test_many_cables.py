@@ -1,0 +1,188 @@
+"""Steps of designs with thousands of cables: each answer by a solve of its own, curvature of few shapes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.optimiser.guards import guard
+from shellform.optimiser.optimise import begin
+from shellform.optimiser.phases import _leaving
+from shellform.optimiser.proposal import propose
+from shellform.optimiser.quadratic import LowRank, _low_rank, minimise_quadratic
+from shellform.optimiser.solved_answers import SolvedAnswers
+from shellform.optimiser.step_model import step_model
+from shellform.optimiser.thinning import kept_stiffness
+from shellform.optimiser.trials import task
+from shellform.structure.answers.sensitivity import element_columns
+from shellform.structure.elements.eased_cables import EasedCables
+
+
+@pytest.fixture(scope="module")
+def shell(dome):
+    """A small one."""
+    return dome
+
+
+def asked(shell, *, radius=False):
+    wet = shell.point_load(2.0, every=2)
+    shares = [sf.Share(0.5 if radius else 0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))]
+    shares += [sf.Share(0.2, sf.RodRadius())] if radius else []
+    least = 0.8 * shell.rod.radius
+    return sf.Problem(
+        shell,
+        sf.LoadCase("wet", wet),
+        shares,
+        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
+        [sf.LoadCase("wetter", 1.2 * wet)],
+        [sf.RestLengths(), sf.FreeRadius(least, shell.rod.radius)] if radius else [sf.RestLengths()],
+    )
+
+
+def searched(shell, *, radius=False, many=0):
+    solver = sf.SequentialConvex(many=many)
+    return begin(asked(shell, radius=radius), shell.design(), solver, lambda softest: 0.08 * softest, 20)
+
+
+@pytest.mark.parametrize("radius", [False, True])
+def test_answers_by_solves_are_those_of_dense_matrices(shell, radius):
+    search, it = searched(shell, radius=radius)
+    whole = step_model(search.evaluator, it.point, whole=True)
+    solved = search.models.at(it.point)
+    assert isinstance(solved.answers, SolvedAnswers)
+    rng = np.random.default_rng(5)
+    change = rng.normal(size=len(whole.origin)) * np.append(np.ones(whole.tensions), whole.step)
+    rows = rng.normal(size=(3, whole.answers.parameters_by_y.shape[0]))
+    for one, other in [
+        (whole.answers.lengthened(change), solved.answers.lengthened(change)),
+        (whole.answers.moved(change), solved.answers.moved(change)),
+        (whole.answers.by_parameters(rows), solved.answers.by_parameters(rows)),
+        (whole.constraints_by_y, solved.constraints_by_y),
+        (whole.quadratics[0].slope, solved.quadratics[0].slope),
+    ]:
+        np.testing.assert_allclose(other, one, rtol=0.0, atol=1e-8 * np.abs(one).max())
+    slope = it.point.objective_by_variables
+    one, other = whole.answers.by_variables(slope), solved.answers.by_variables(slope)
+    np.testing.assert_allclose(other, one, rtol=0.0, atol=1e-8 * np.abs(one).max())
+
+
+def test_the_few_shapes_hold_the_curvature_and_are_never_above_it(shell):
+    search, it = searched(shell)
+    whole = step_model(search.evaluator, it.point, whole=True).quadratics[0].hessian
+    few = search.models.at(it.point).quadratics[0].hessian
+    assert few.columns.shape[1] < len(whole) or len(whole) < 256
+    left = np.linalg.eigvalsh(whole - few.columns @ few.columns.T) / np.linalg.eigvalsh(whole)[-1]
+    assert left[0] > -1e-8
+    assert left[-1] < 1e-4
+
+
+@pytest.mark.parametrize("guarded", [False, True])
+def test_a_step_by_solves_is_the_step_by_dense_matrices(shell, guarded):
+    predicted = []
+    for many in (0, 10**6):
+        search, it = searched(shell, many=many)
+        it = replace(it, guarded=guarded)
+        predicted.append(propose(task(search, it, search.models.at(it.point)))[1])
+    assert predicted[0] == pytest.approx(predicted[1], rel=1e-3)
+
+
+def test_a_search_by_solves_ends_with_a_design_as_good(shell):
+    found = [
+        sf.optimise(asked(shell), shell.design(), solver=sf.SequentialConvex(many=many), evaluations=20)
+        for many in (0, 10**6)
+    ]
+    for each in found:
+        assert max(each.constraints.values()) <= sf.FEASIBLE
+    assert found[0].objective < 1.02 * found[1].objective
+
+
+def test_cables_eased_in_full_are_those_whose_tensions_are_given(shell):
+    search, it = searched(shell)
+    assembly, state = search.evaluator.assembly(it.point.design), it.point.states["wet"]
+    cables = shell.cables(it.point.design)
+    share = np.random.default_rng(1).uniform(0.0, 1.5, len(cables.ends))
+    eased = assembly.with_parts([*assembly.beams, EasedCables(cables, share)])
+    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
+    unit = chord / np.linalg.norm(chord, axis=1)[:, None]
+    pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit])).toarray()
+    stiffness = np.where(cables.tension(state) > 0.0, cables.stiffness / cables.rest_length, 0.0)
+    whole = assembly.matrix.full(assembly.evaluate(state).tangent).toarray()
+    found = assembly.matrix.full(eased.evaluate(state).tangent).toarray()
+    wanted = whole - (pull * (share * stiffness)) @ pull.T
+    np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-12 * np.abs(whole).max())
+    one, other = (
+        cables.evaluate(state, tangent=False),
+        EasedCables(cables, share).evaluate(state, tangent=False),
+    )
+    np.testing.assert_array_equal(one.force, other.force)
+
+
+def test_of_thousands_of_cables_those_with_the_least_tensions_are_guarded(shell):
+    search, it = searched(shell)
+    cables, state = shell.cables(it.point.design), it.point.states["wetter"]
+    assembly, tension = (
+        search.evaluator.assembly(it.point.design),
+        shell.cables(it.point.design).tension(state),
+    )
+    every = guard(assembly, state, cables, float(tension.max()))
+    least = guard(assembly, state, cables, float(tension.max()), most=5)
+    np.testing.assert_array_equal(np.sort(least.tension), np.sort(every.tension)[:5])
+    rows = [np.flatnonzero(every.tension == each)[0] for each in least.tension]
+    np.testing.assert_allclose(least.tension_by_design, every.tension_by_design[rows], rtol=1e-9, atol=1e-9)
+
+
+def test_what_cables_keep_of_the_stiffness_is_the_same_of_some(shell):
+    search, it = searched(shell)
+    assembly = search.evaluator.assembly(it.point.design)
+    cables, state = shell.cables(it.point.design), it.point.states["wetter"]
+    some = np.array([1, 4, 9])
+    whole = kept_stiffness(assembly, state, cables)
+    np.testing.assert_allclose(
+        kept_stiffness(assembly, state, cables, some), whole[np.ix_(some, some)], rtol=1e-9
+    )
+
+
+def test_of_thousands_of_cables_those_that_pull_least_may_leave(shell):
+    search, it = searched(shell)
+    search = replace(search, solver=replace(search.solver, candidates=6))
+    it = replace(it, batch=4, needed=np.zeros(len(it.tensioned), dtype=bool))
+    model = search.models.at(it.point)
+    leaving = _leaving(search, it, model)
+    pull = model.origin[: model.tensions]
+    assert 0 < len(leaving) <= 4
+    assert (pull[leaving] <= np.sort(pull[pull > 0.0])[5]).all()
+
+
+def test_a_problem_with_curvature_of_few_columns_is_solved_as_the_dense_one():
+    rng = np.random.default_rng(2)
+    columns = LowRank(rng.normal(size=(40, 6)))
+    slope, rows, values = rng.normal(size=40), rng.normal(size=(7, 40)), -rng.uniform(0.1, 1.0, 7)
+    box = -np.ones(40), np.ones(40)
+    one = minimise_quadratic(columns, slope, rows, values, *box)
+    other = minimise_quadratic(columns.columns @ columns.columns.T, slope, rows, values, *box)
+
+    def objective(u):
+        return slope @ u + 0.5 * u @ (columns @ u)
+
+    assert objective(one) == pytest.approx(objective(other), rel=1e-6)
+    assert (values + rows @ one).max() < 1e-6
+    wider = columns.widened(2)
+    np.testing.assert_array_equal((wider @ np.ones(42))[-2:], 0.0)
+
+
+def test_curvature_of_few_columns_under_constraints_that_contradict_each_other_has_no_solution():
+    rows = np.array([[1.0, 0.0], [-1.0, 0.0]])
+    few = LowRank(np.ones((2, 1)))
+    assert minimise_quadratic(few, np.zeros(2), rows, np.full(2, 0.5), -np.ones(2), np.ones(2)) is None
+
+
+def test_condensed_systems_are_solved_in_full_where_bounds_hardly_weigh():
+    rng = np.random.default_rng(4)
+    columns = rng.normal(size=(400, 100)) * np.logspace(3, -3, 100)
+    rows, bounds, weights = rng.normal(size=(8, 400)), np.full(400, 1e-12), np.logspace(-6, 6, 8)
+    product, condensed = _low_rank(LowRank(columns), rows)
+    right = columns @ (columns.T @ rng.normal(size=400))
+    found = condensed(bounds, weights)(right)
+    left = right - (product(found) + bounds * found + rows.T @ (weights * (rows @ found)))
+    assert np.abs(left).max() < 1e-12 * np.abs(right).max()  # 3e-6 by the formula alone
