@@ -15,6 +15,7 @@ from shellform.errors import InputError
 from shellform.net.compass import Finder, Guide, covering_lattice, raised
 from shellform.net.grid import Grid, lattice_grid
 from shellform.net.net import Net
+from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import (
     FROM_COMPASS,
     FROM_FLAT,
@@ -29,7 +30,7 @@ from shellform.net.pull import (
     laid,
     pull,
 )
-from shellform.net.quality import measure, refuse_distance, refuse_folds
+from shellform.net.quality import measure, nearness, refuse_distance, refuse_folds
 from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
 from shellform.surface.shape.locate import Locator
@@ -286,7 +287,9 @@ def _net(surface: Surface, finder: Finder, oversized: Grid, pulled: Pulled, trim
         surface, finder, grid, state, _curvature(oversized, pulled, trimmed), force, pulled.factorisations
     )
     refuse_distance(quality, grid, state)
-    return Net(grid, state, trimmed.supports, quality, trimmed.notes)
+    near = nearness(quality, grid, state)
+    told = (NetNote(NoteKind.NEAR, near),) if near else ()
+    return Net(grid, state, trimmed.supports, quality, (*trimmed.notes, *told))
 
 
 def _curvature(oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Reals:

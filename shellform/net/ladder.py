@@ -78,6 +78,7 @@ def climbed_net(
     tolerance: float = TOLERANCE,
     most: int = _MOST,
     failed: NoNet | Stalled | None = None,
+    near: bool = True,
     progress: Callable[[str], None] = lambda text: None,
     watch: Progress | None = None,
 ) -> tuple[Net, Attempt]:
@@ -85,7 +86,7 @@ def climbed_net(
     turned by at most `tolerance`, rad; and the attempt that gave it.
 
     `most`: factorisations of pulls that fail, all rungs together; `failed`: what the first rung is known to
-    end with. Raises InputError for settings that can't work, NoNet or Stalled where no rung helps.
+    end with; `near`: whether rods may be bent so much that crossings come nearer than their spacing. Raises InputError for settings that can't work, NoNet or Stalled where no rung helps.
     """
     attempts: list[Attempt] = []
     first: NoNet | Stalled | None = None
@@ -111,7 +112,8 @@ def climbed_net(
                 progress=watch,
             )
             taken = net.quality.factorisations
-            refuse_nearness(net.quality, net.grid, net.target)
+            if not near:
+                refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
             attempts.append(Attempt(rung.change, turned, shifted, error.reason))
             progress(attempts[-1].sentence())

@@ -24,7 +24,7 @@ from shellform.surface.shape.target import Surface
 from shellform.surface.shape.tree import Tree
 
 _FAR = 0.1  # of the spacing: a net farther from the surface is refused
-SPACING_ERROR = 0.005  # of the spacing: a net whose neighbours lie farther off it is none; rods bend to 2.9 spacings there
+SPACING_ERROR = 0.005  # of the spacing: more is told, and not proposed; rods bend to 2.9 spacings there
 _OVERLAP = 0.4  # of the spacing: nearer to each other two crossings that aren't neighbours lie on one another
 _BARE = 0.75  # of the spacing: the middle of a cell lies half a spacing from the next rod
 _SAMPLE = 0.25  # of the spacing, between points at which the cover is looked for
@@ -193,20 +193,29 @@ def refuse_distance(quality: Quality, grid: Grid, state: State) -> None:
         )
 
 
-def refuse_nearness(quality: Quality, grid: Grid, state: State) -> None:
-    """Raises NoNet for a net whose neighbouring crossings lie nearer than its spacing or farther, by more than
-    `SPACING_ERROR`: where a rod of length s bends to a radius R its chord is s²/(24 R²) shorter."""
+def nearness(quality: Quality, grid: Grid, state: State) -> str:
+    """Where neighbouring crossings lie nearer than their spacing or farther, by more than `SPACING_ERROR`, in
+    words; empty where none do. Where a rod of length s bends to a radius R its chord is s²/(24 R²) shorter."""
     error = quality.spacing_error
     if quality.spacing_error_max <= SPACING_ERROR:
-        return
+        return ""
     worst = int(np.argmax(np.abs(error)))
     points = crossing_points(grid, state)
     place = points[neighbours(grid)[0][worst]].mean(axis=0).round(3).tolist()
-    raise NoNet(
-        Reason.NEAR,
-        f"crossings at {place} lie {abs(error[worst]):.1%} {'nearer' if error[worst] < 0.0 else 'farther'} than their spacing, "
-        f"where {SPACING_ERROR:.1%} are allowed: rods bend there to less than three spacings",
-        where="net.spacing",
-        value=float(grid.spacing),
-        remedy="Choose a smaller spacing, or a surface without creases.",
+    return (
+        f"crossings at {place} lie {abs(error[worst]):.1%} {'nearer' if error[worst] < 0.0 else 'farther'} than their "
+        f"spacing, where {SPACING_ERROR:.1%} are usual: rods bend there to less than three spacings"
     )
+
+
+def refuse_nearness(quality: Quality, grid: Grid, state: State) -> None:
+    """Raises NoNet for a net whose neighbouring crossings lie nearer than its spacing or farther (nearness)."""
+    told = nearness(quality, grid, state)
+    if told:
+        raise NoNet(
+            Reason.NEAR,
+            told,
+            where="net.spacing",
+            value=float(grid.spacing),
+            remedy="Choose a smaller spacing, or a surface without creases.",
+        )

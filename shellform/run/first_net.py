@@ -92,6 +92,7 @@ def least_bent_net(
         angle=math.radians(angles[first]),
         most=_worth(surface, spacing),
         failed=failed,
+        near=False,
         progress=tell,
     )
     return Placed(net, math.degrees(given.angle), given.offset), []
@@ -105,6 +106,7 @@ def with_gap(surface: Surface, placed: Placed, spacing: float, gap: float, edges
         angle=math.radians(placed.angle),
         offset=placed.offset,
         most=_worth(surface, spacing),
+        near=False,
         progress=tell,
     )
     return Placed(stand(net, surface, edges), math.degrees(given.angle), given.offset)
