@@ -27,8 +27,12 @@ from shellform.cli.study import study
 from shellform.cli.survey import survey
 from shellform.cli.terminal import refusal_words
 from shellform.cli.verify import verify
+from shellform.errors import InputError
 
 _STOPPED = 130
+# bytes of addresses: where fewer were free, libraries ended the program or never came back
+_ROOM_TO_SOLVE, _ROOM_TO_DESIGN = 590_000_000, 1_200_000_000
+_SOLVING, _READING = ("analyse", "verify"), ("docs", "example")
 _KEPT = "stopped; what was computed is kept, and the same command goes on from there"
 
 
@@ -73,11 +77,24 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def _options(
+    context: typer.Context,
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Show versions.")
     ] = False,
 ) -> None:
-    pass
+    if context.invoked_subcommand not in _READING:
+        _require_room(_ROOM_TO_SOLVE if context.invoked_subcommand in _SOLVING else _ROOM_TO_DESIGN)
+
+
+def _require_room(size: int) -> None:
+    from shellform.structure.solve.addresses import has_room
+
+    if not has_room(size):
+        raise InputError(
+            "leaves no room for the libraries that are loaded",
+            where="the limit on memory (ulimit -v)",
+            remedy="Allow 650 MB to analyse a model, 1.5 GB to design.",
+        )
 
 
 def main() -> None:

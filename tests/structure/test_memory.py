@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from shellform.structure.solve import pardiso
+from shellform.structure.solve import addresses, pardiso
 from shellform.structure.solve.addresses import has_room
 
 resource = pytest.importorskip("resource")
@@ -29,12 +29,33 @@ def test_a_solver_whose_parts_find_no_room_is_left_out(monkeypatch):
         pardiso.library.cache_clear()
 
 
-@pytest.mark.parametrize("megabytes", [600, 650, 800])
-def test_a_model_is_analysed_with_600_megabytes_of_addresses(megabytes):
-    """MKL ended the program where it found no room for its parts, and CHOLMOD's BLAS crashed."""
+def test_work_areas_are_taken_only_where_there_is_room_for_them(monkeypatch):
+    monkeypatch.setattr(addresses, "has_room", lambda size: False)
+    with pytest.raises(MemoryError, match="no room for BLAS"):
+        addresses.take_work_areas()
+
+
+@pytest.mark.parametrize("megabytes", [650, 700, 800])
+def test_a_model_is_analysed_with_650_megabytes_of_addresses(megabytes):
+    """MKL ended the program where it found no room for its parts, CHOLMOD's BLAS crashed, SciPy's tried for
+    ever."""
+    done = _under_limit(megabytes, "analyse", "scripts/bent_arch.json", "--load", "snow")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["stable"]
+
+
+@pytest.mark.parametrize(("command", "megabytes"), [("analyse", 200), ("analyse", 600), ("check", 1200)])
+def test_a_limit_that_leaves_no_room_for_the_libraries_is_refused(command, megabytes):
+    done = _under_limit(megabytes, command, "scripts/bent_arch.json")
+    assert done.returncode == 2
+    assert "leaves no room for the libraries" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def _under_limit(megabytes, *arguments):
     most = megabytes * 1_000_000
-    done = subprocess.run(
-        [sys.executable, "-m", "shellform", "analyse", "scripts/bent_arch.json", "--load", "snow"],
+    return subprocess.run(
+        [sys.executable, "-m", "shellform", *arguments],
         cwd=ROOT,
         env={**os.environ, "PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (most, most)),
@@ -43,5 +64,3 @@ def test_a_model_is_analysed_with_600_megabytes_of_addresses(megabytes):
         timeout=300,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["stable"]

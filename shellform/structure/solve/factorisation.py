@@ -26,16 +26,16 @@ from shellform.arrays import Indices, Reals
 from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure.solve import pardiso
-from shellform.structure.solve.addresses import has_room
+from shellform.structure.solve.addresses import has_room, take_work_areas
 from shellform.work_clock import Work, told
 
 try:
     from cvxopt import cholmod, matrix, spmatrix
 except ImportError:  # no wheel for this platform: SuperLU serves
     cholmod = None
-_BLAS = (
-    240_000_000  # bytes of addresses: where 211e6 were left here, CHOLMOD crashed later; with 252e6 it ran
-)
+take_work_areas()  # before MKL and CHOLMOD ask for what is left
+# bytes of addresses: where 211e6 were left here, CHOLMOD crashed later; with 252e6 it ran
+_BLAS = 240_000_000
 if cholmod is not None and not has_room(_BLAS):
     cholmod = None
 

@@ -33,9 +33,8 @@ _DISSECTION_FROM = 300_000  # degrees of freedom
 _TWO_THREADS_FROM = 200_000  # degrees of freedom
 _STRICT = 0x10002  # MKL_CBWR_AUTO | MKL_CBWR_STRICT; kept as it is where the processor has no such mode
 _ANALYSIS = 96  # bytes an entry: 51 to 62 were measured for cubes of rods of 50,000 to 3,300,000 entries
-_PARTS = (
-    320_000_000  # bytes of addresses: 260e6 of files that it loads for the newest processors, and its buffers
-)
+# bytes of addresses: 260e6 of files that it loads for the newest processors, and its buffers
+_PARTS = 320_000_000
 _BESIDE = 64_000_000  # bytes that a phase takes beside what it tells of; 31e6 were measured
 # right-hand sides, which are solved side by side without waiting; each comes out the same on one thread
 _MANY = 16
