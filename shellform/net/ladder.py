@@ -86,7 +86,8 @@ def climbed_net(
     turned by at most `tolerance`, rad; and the attempt that gave it.
 
     `most`: factorisations of pulls that fail, all rungs together; `failed`: what the first rung is known to
-    end with; `near`: whether rods may be bent so much that crossings come nearer than their spacing. Raises InputError for settings that can't work, NoNet or Stalled where no rung helps.
+    end with; `near`: whether rods may be bent so much that crossings come nearer than their spacing. Raises
+    InputError for settings that can't work, NoNet or Stalled where no rung helps.
     """
     attempts: list[Attempt] = []
     first: NoNet | Stalled | None = None

@@ -164,8 +164,8 @@ def polish(
             progress,
             asked=best.asked,
         )
-        search = replace(search, always_guarded=True, groups=alike)
-        search.models.whole = alike is not None
+        models = Models(search.evaluator, solver, search.models.reach, whole=alike is not None)
+        search = replace(search, always_guarded=True, groups=alike, models=models)
         it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned))
         polished = finish(search, run(search, it))
     better = (

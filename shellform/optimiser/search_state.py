@@ -144,11 +144,13 @@ class Iterate:
 
 class Models:
     """Step models and guards, made once for each linearisation: the last one's are kept for another try in a
-    smaller window. Of more cables than are `many` for the solver those with the least tensions are guarded,
-    and models are `whole` only where cables keep one length."""
+    smaller window. Of more cables than are `many` for the solver only those with the least tensions are
+    guarded, and no model is dense unless it is to be `whole`, as where cables keep one length."""
 
-    def __init__(self, evaluator: Evaluator, solver: SequentialConvex, reach: float) -> None:
-        self.evaluator, self.solver, self.reach, self.whole = evaluator, solver, reach, False
+    def __init__(
+        self, evaluator: Evaluator, solver: SequentialConvex, reach: float, *, whole: bool = False
+    ) -> None:
+        self.evaluator, self.solver, self.reach, self.whole = evaluator, solver, reach, whole
         self._model: StepModel | None = None
         self._guards: tuple[Linearisation, list[Guard]] | None = None
 
