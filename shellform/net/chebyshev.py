@@ -34,7 +34,7 @@ from shellform.net.quality import measure, nearness, refuse_distance, refuse_fol
 from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
 from shellform.surface.shape.locate import Locator
-from shellform.surface.shape.target import Surface
+from shellform.surface.shape.target import Surface, triangle_areas
 
 MERGE = 0.2  # of the spacing
 ELEMENTS = 4  # a segment, as in section 4.1
@@ -211,7 +211,7 @@ def _origin(
         plan, halves = _halves(along_u, along_v)
     else:
         corners = surface.vertices[surface.triangles]
-        areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        areas = triangle_areas(surface.vertices, surface.triangles)
         heading = np.array([np.cos(angle), np.sin(angle)])
         shift = offset[0] * steps[0] * heading + offset[1] * steps[1] * np.array([-heading[1], heading[0]])
         plan = (areas @ corners.mean(axis=1) / areas.sum())[:2] + shift

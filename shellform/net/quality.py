@@ -20,7 +20,7 @@ from shellform.net.grid import Grid, cells, crossing_points, neighbours
 from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
-from shellform.surface.shape.target import Surface
+from shellform.surface.shape.target import Surface, triangle_areas
 from shellform.surface.shape.tree import Tree
 
 _FAR = 0.1  # of the spacing: a net farther from the surface is refused
@@ -137,7 +137,7 @@ def uncovered(surface: Surface, grid: Grid, state: State) -> float:
         / parts
     )
     weights = np.column_stack([1.0 - shares.sum(axis=1), shares])
-    area = 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    area = triangle_areas(surface.vertices, surface.triangles)
     bare = 0.0
     for weight in weights:  # one sample of every triangle at a time keeps memory small
         away = rods.nearest(np.tensordot(weight, corner, axes=(0, 1)))[2]

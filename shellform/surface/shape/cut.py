@@ -15,7 +15,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.surface.shape.target import Surface, make_surface
+from shellform.surface.shape.target import Surface, make_surface, triangle_areas
 
 _NEAR = 0.2  # of an edge: nearer to where it crosses the level its end is moved there
 _LEFT = 0.7  # of the surface's area above the level in one piece, at the least
@@ -40,9 +40,9 @@ def cut_off(surface: Surface, above: float) -> Surface:
         )
     points, side = _snapped(surface, above)
     points, faces = _divided(points, surface.triangles, side, above)
-    whole = _areas(points, faces).sum()
+    whole = triangle_areas(points, faces).sum()
     faces = _largest(points, faces)
-    if _areas(points, faces).sum() < _LEFT * whole:
+    if triangle_areas(points, faces).sum() < _LEFT * whole:
         raise InputError(
             "falls into pieces of like size above that height",
             where="surface.above",
@@ -115,15 +115,10 @@ def _divided(points: Reals, faces: Indices, side: Reals, above: float) -> tuple[
     return np.vstack([points, *more]), np.array(kept)
 
 
-def _areas(points: Reals, faces: Indices) -> Reals:
-    corner = points[faces]
-    return 0.5 * np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
-
-
 def _largest(points: Reals, faces: Indices) -> Indices:
     """The triangles of the piece with the largest area."""
     ones = np.ones(3 * len(faces))
     links = csr_array((ones, (faces.ravel(), np.roll(faces, 1, axis=1).ravel())), shape=(len(points),) * 2)
     _, label = connected_components(links, directed=False)
-    area = np.bincount(label[faces[:, 0]], weights=_areas(points, faces))
+    area = np.bincount(label[faces[:, 0]], weights=triangle_areas(points, faces))
     return faces[label[faces[:, 0]] == int(np.argmax(area))]

@@ -33,7 +33,7 @@ import scipy.sparse as sp
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged
 from shellform.structure.solve.factorisation import Factor, Symmetric
-from shellform.surface.shape.target import Surface, make_surface, rough_normals
+from shellform.surface.shape.target import Surface, make_surface, rough_normals, vertex_areas
 
 _MESH = 0.3  # of R: edges that aren't longer show its curvature
 _MOST = 30_000  # vertices of the refined mesh
@@ -220,7 +220,7 @@ def _capped(forms: Reals, most: float) -> Reals:
 def _directions(surface: Surface, radius: float) -> Reals:
     """Unit directions (v, 3) across the surface: normals smoothed over the radius; level on the ground."""
     points, faces = surface.vertices, surface.triangles
-    normals, area = rough_normals(points, faces), _areas(surface)
+    normals, area = rough_normals(points, faces), vertex_areas(surface.vertices, surface.triangles)
     corner = points[faces]
     count = len(points)
     stiff = sp.csr_array((count, count))
@@ -247,17 +247,9 @@ def _factored(matrix: sp.sparray) -> Factor:
 
 def _weights(surface: Surface) -> Reals:
     """Areas (v,), m², at the vertices, those on the ground heavier."""
-    area = _areas(surface)
+    area = vertex_areas(surface.vertices, surface.triangles)
     area[_on_ground(surface)] *= _HEAVY
     return area
-
-
-def _areas(surface: Surface) -> Reals:
-    corner = surface.vertices[surface.triangles]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 6.0
-    result = np.zeros(len(surface.vertices))
-    np.add.at(result, surface.triangles, area[:, None])
-    return result
 
 
 def _on_ground(surface: Surface) -> Flags:

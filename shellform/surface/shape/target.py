@@ -51,7 +51,7 @@ class Surface:
     @property
     def area(self) -> float:
         """m², of the triangles."""
-        return float(np.linalg.norm(_area_vectors(self.vertices, self.triangles), axis=1).sum())
+        return float(triangle_areas(self.vertices, self.triangles).sum())
 
     @property
     def size(self) -> Reals:
@@ -134,9 +134,14 @@ def largest_curvature(surface: Surface) -> float:
     return float(np.percentile(bent[inner], 99.5)) if inner.any() else 0.0
 
 
+def triangle_areas(points: Reals, triangles: Indices) -> Reals:
+    """The areas (t,), m², of the triangles (t, 3) between the points (v, 3)."""
+    return np.asarray(np.linalg.norm(_area_vectors(points, triangles), axis=1))
+
+
 def vertex_areas(points: Reals, triangles: Indices) -> Reals:
     """A third (v,), m², of the triangles (t, 3) at each of the points (v, 3)."""
-    area = np.linalg.norm(_area_vectors(points, triangles), axis=1)
+    area = triangle_areas(points, triangles)
     result = np.zeros(len(points))
     np.add.at(result, triangles, (area / 3.0)[:, None])
     return result
@@ -158,7 +163,7 @@ def _cleaned(
             mended.append(f"{len(points) - len(first)} vertices lay on others and were merged")
         points, faces = points[first[order]], rank[same][faces]
         normals = None if normals is None else normals[first[order]]
-    area = np.linalg.norm(_area_vectors(points, faces), axis=1)
+    area = triangle_areas(points, faces)
     thin = area <= _FLAT * size * size
     if thin.any():
         mended.append(f"{int(thin.sum())} triangles without area were dropped")
