@@ -8,6 +8,7 @@ import pytest
 import shellform as sf
 from shellform.optimiser import trials
 from shellform.reliability.trial_structures import MOST, Required, confirm, demand, required, stands, tried
+from tests.problems import misfit_and_force
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
 ASKED = sf.Safety(ROUGH, critical_factor=None, drawn=10, tried=6, seed=5)
@@ -15,14 +16,7 @@ ASKED = sf.Safety(ROUGH, critical_factor=None, drawn=10, tried=6, seed=5)
 
 @pytest.fixture(scope="module")
 def problem(stout):
-    wet = stout.point_load(4.5, every=2)
-    return sf.Problem(
-        stout,
-        sf.LoadCase("wet", wet),
-        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
-        [sf.LoadCase("wetter", 1.2 * wet)],
-    )
+    return misfit_and_force(stout, 4.5)
 
 
 @pytest.fixture(scope="module")

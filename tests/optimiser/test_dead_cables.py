@@ -9,24 +9,19 @@ import shellform as sf
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _without_slack
 from shellform.problem.paths import in_tension, without_slack
+from tests.problems import misfit_and_force
 
 
 @pytest.fixture(scope="module")
 def dead(dome):
     """A search of the dome, and its iterate in a design whose every seventh cable is as long as may be."""
-    wet = dome.point_load(2.0, every=2)
-    problem = sf.Problem(
-        dome,
-        sf.LoadCase("wet", wet),
-        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(20.0, sf.CableForces("wet"))],
-    )
+    problem = misfit_and_force(dome, 2.0, rms=None)
     search, it = begin(problem, dome.design(), sf.SequentialConvex(), lambda softest: 0.0, 10)
     rest = it.point.design.rest_length.copy()
     rest[::7] *= 1.1
     design = replace(it.point.design, rest_length=rest)
     point = search.evaluator.evaluate(design, it.point.states, 1.0)
-    return search, replace(it, point=point), wet
+    return search, replace(it, point=point), dome.point_load(2.0, every=2)
 
 
 def test_dead_cables_stay_at_their_longest_and_taut_ones_as_they_are(dome, dead):

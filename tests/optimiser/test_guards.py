@@ -7,6 +7,7 @@ import shellform as sf
 from shellform.optimiser.guards import guard
 from shellform.optimiser.quadratic import minimise_quadratic
 from shellform.problem.evaluation import Evaluator
+from tests.problems import misfit_and_force
 
 
 @pytest.fixture(scope="module")
@@ -15,21 +16,9 @@ def shell(dome):
     return dome
 
 
-def loaded(shell, force):
-    """The problem of so many newtons on every second crossing, and 1.2 times that."""
-    wet = shell.point_load(force, every=2)
-    return sf.Problem(
-        shell,
-        sf.LoadCase("wet", wet),
-        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
-        [sf.LoadCase("wetter", 1.2 * wet)],
-    )
-
-
 @pytest.fixture(scope="module")
 def start(shell):
-    problem = loaded(shell, 2.0)
+    problem = misfit_and_force(shell, 2.0)
     evaluator = Evaluator(problem, shell.design())
     states = {name: each.equilibrium.state for name, each in evaluator.begin().items()}
     return evaluator, evaluator.seed(shell.design(), states, 1.0)
@@ -107,7 +96,7 @@ def test_a_quadratic_problem_is_solved_to_its_conditions_of_optimality():
 
 
 def test_a_start_that_snaps_through_under_the_additional_load_is_led_to_a_design_that_bears_it(shell):
-    problem = loaded(shell, 5.4)
+    problem = misfit_and_force(shell, 5.4)
     start = sf.follow(shell, shell.design(), problem.loads, stay=True)
     assert start["wet"].on_branch
     assert not start["wetter"].on_branch

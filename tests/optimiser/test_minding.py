@@ -17,6 +17,7 @@ from shellform.problem.terms import LoadedDesign
 from shellform.reliability.drawing import PERFECT
 from shellform.reliability.scenarios import FactorsAsBuilt
 from shellform.reliability.trial_structures import Demand, JudgedTrial, Required, closer, to_bear
+from tests.problems import misfit_and_force
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
 ASKED = sf.Safety(ROUGH, critical_factor=None, tried=3, enlarged=1.0, seed=5)
@@ -27,13 +28,7 @@ def searching(stout):
     """A search of a problem, its start, and all checkpoints that it handed out."""
     wet = stout.point_load(4.5, every=2)
     one = Required(ASKED, {"wet": wet}, "wet", {"wet": 0})
-    problem = sf.Problem(
-        stout,
-        sf.LoadCase("wet", wet),
-        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(0.005, sf.RmsMisfit("wetter"))],
-        [sf.LoadCase("wetter", 1.2 * wet)],
-    )
+    problem = misfit_and_force(stout, 4.5)
     kept: list[Checkpoint] = []
     search, it = begin(
         problem,

@@ -9,6 +9,7 @@ import shellform as sf
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.resuming import resumed, tell
 from shellform.structure.elements.state import extended, moved
+from tests.problems import misfit_and_force
 
 
 @pytest.fixture(scope="module")
@@ -19,14 +20,8 @@ def shell(dome):
 
 @pytest.fixture(scope="module")
 def problem(shell):
-    wet = shell.point_load(5.4, every=2)  # whose 1.2 times the start doesn't bear: the search climbs first
-    return sf.Problem(
-        shell,
-        sf.LoadCase("wet", wet),
-        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(9.0, sf.CableForces("wet")), sf.AtMost(0.0015, sf.RmsMisfit("wetter"))],
-        [sf.LoadCase("wetter", 1.2 * wet)],
-    )
+    # the start doesn't bear 1.2 times the load: the search climbs first
+    return misfit_and_force(shell, 5.4, most=9.0, rms=0.0015)
 
 
 def told(history):
@@ -73,13 +68,7 @@ def test_a_search_resumed_thinning_ends_with_the_same_design_and_history_to_the_
 
 def test_a_search_led_by_drawn_structures_and_resumed_ends_with_the_same_design_to_the_bit(shell):
     # More is asked of the perfect structure than stiffness leads to; the search descends no further than it has to.
-    wet = shell.point_load(4.5, every=2)
-    problem = sf.Problem(
-        shell,
-        sf.LoadCase("wet", wet),
-        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(9.0, sf.CableForces("wet"))],
-    )
+    problem = misfit_and_force(shell, 4.5, most=9.0, rms=None)
     settings = {
         "solver": sf.SequentialConvex(settled=10.0),
         "safety": sf.Safety(

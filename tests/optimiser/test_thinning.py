@@ -13,6 +13,7 @@ from shellform.optimiser.phases import _made_to_stand, _repaired, _thin
 from shellform.optimiser.proposal import _as_far_as_can_be
 from shellform.optimiser.search_state import restiffened, stiffness_of, violation
 from shellform.reliability.trial_structures import Demand, JudgedTrial, Required
+from tests.problems import misfit_and_force
 
 ASKED = sf.Safety(sf.Tolerances(cable_length=1e-4), critical_factor=None, tried=1)
 
@@ -20,15 +21,7 @@ ASKED = sf.Safety(sf.Tolerances(cable_length=1e-4), critical_factor=None, tried=
 def searched(stout, rms, *, stiffness=0.5, evaluations=6, asked=None):
     """A search that is ready to thin from all cables, the rods' radius free and the root mean square distance
     under more load limited to `rms`, m."""
-    wet = stout.point_load(4.5, every=2)
-    problem = sf.Problem(
-        stout,
-        sf.LoadCase("wet", wet),
-        [sf.Share(0.7, sf.Misfit("wet")), sf.Share(0.3, sf.CableForce("wet"))],
-        [sf.AtMost(20.0, sf.CableForces("wet")), sf.AtMost(rms, sf.RmsMisfit("wetter"))],
-        [sf.LoadCase("wetter", 1.2 * wet)],
-        variables=[sf.RestLengths(), sf.FreeRadius(most=0.0015)],
-    )
+    problem = misfit_and_force(stout, 4.5, rms=rms, variables=[sf.FreeRadius(most=0.0015)])
     search, it = begin(
         problem,
         stout.design(),
