@@ -103,8 +103,7 @@ class SolvedAnswers:
 
 def solved_answers(at: Setting, residuals: Sequence[Squares]) -> SolvedAnswers:
     """The answers in the setting, for these sums of squares."""
-    share = np.ones(len(at.cables.ends))
-    parts = [EasedCables(part, share) if part in at.assembly.cables else part for part in at.assembly.parts]
+    parts = [EasedCables(part) if part in at.assembly.cables else part for part in at.assembly.parts]
     values = at.assembly.with_parts(parts).evaluate(at.state).tangent
     assert values is not None
     # a family of its own, whose factor serves as long as the model does

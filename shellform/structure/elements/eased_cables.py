@@ -1,8 +1,6 @@
-"""Cables whose stiffness along them is lessened, at the tensions that they have.
+"""Cables whose tensions are given: they don't answer to their lengths.
 
-A cable's tangent is (EA/l0 - N/l) e e' + N/l I with e = (x_b - x_a)/l. Without a share s of the first EA/l0 it
-is that of a structure in which the cable's tension answers less to its length: with s = 1 the tension is given
-and doesn't answer at all; with s above 1 a margin is asked for.
+A cable's tangent is (EA/l0 - N/l) e e' + N/l I with e = (x_b - x_a)/l; at a given tension EA/l0 is left out.
 """
 
 from __future__ import annotations
@@ -21,22 +19,20 @@ _ROW, _COLUMN = np.tril_indices(6)
 
 @dataclass(frozen=True)
 class EasedCables:
-    """The `cables` without a `share` (c,) of their stiffness along them; a part of a model, with their energy
-    and forces."""
+    """The `cables` without stiffness along them; a part of a model, with their energy and forces."""
 
     cables: Cables
-    share: Reals
 
     def dofs(self) -> Indices:
         """Translations (c, 6) of the two ends."""
         return self.cables.dofs()
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
-        """As the cables', with the lessened tangents (c, 21), N/m."""
+        """As the cables', with tangents at given tensions (c, 21), N/m."""
         whole = self.cables.evaluate(state, tangent=tangent, into=into)
         if whole.tangent is None:
             return whole
         along = self.cables.tension_by_position(state)
         size = self.cables.stiffness / self.cables.rest_length
-        whole.tangent[...] -= (self.share / size)[:, None] * along[:, _ROW] * along[:, _COLUMN]
+        whole.tangent[...] -= (1.0 / size)[:, None] * along[:, _ROW] * along[:, _COLUMN]
         return whole
