@@ -20,7 +20,6 @@ from shellform.gridshell.gridshell import Rod as Rod
 from shellform.gridshell.gridshell import brace as brace
 from shellform.gridshell.layers import TwoLayers as TwoLayers
 from shellform.gridshell.loads import Region as Region
-from shellform.gridshell.scatter import Scatter as Scatter
 from shellform.gridshell.tolerances import Tolerances as Tolerances
 from shellform.net import refusal as refusal
 from shellform.net.chebyshev import NetTuning as NetTuning

@@ -11,19 +11,17 @@ path ends before F isn't feasible.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from shellform.arrays import Reals
 from shellform.case.build_gridshell import rod_bounds
+from shellform.case.build_safety import case_tolerances, critical_factors_asked
 from shellform.case.case import Case
-from shellform.case.entries import RobustEntry
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.scatter import Scatter
 from shellform.net.grid import CONNECTOR
 from shellform.problem.constraints import AtLeast, AtMost, Constraint
 from shellform.problem.engineering import (
@@ -48,8 +46,6 @@ from shellform.structure.network import assemble
 
 # of the initial design's softest mode under the design load, that is left at the critical factor asked for
 _SOFTEST = 0.25
-_EQUAL = 1e-3  # relative: critical factors that count as equal
-_SOUGHT = 3.0  # critical load factor up to which designs are followed
 
 
 def case_problem(
@@ -65,7 +61,7 @@ def case_problem(
     variables = varied(case, shell, frees_radius=frees_radius)
     if frees_radius:
         shares.append((entry.rod_radius, RodRadius()))
-    robust = robust_misfit(case)
+    robust = robust_misfit(case, shell)
     if robust is not None:
         shares.append((entry.robust, robust))
     total = sum(share for share, _ in shares)
@@ -79,16 +75,16 @@ def case_problem(
     if case.robust is not None and case.robust.limit is not None and robust is not None:
         constraints.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
     used = dict(loads)
-    factor, critical = case.limits.critical_factor, []
-    if factor is not None:
+    further = {name: factor for name, factor in critical_factors_asked(case).items() if name != "design"}
+    _known("safety.critical_further", list(further), others)
+    critical = []
+    if further:
         least = _SOFTEST * _stiffness(shell, start, loads["design"])
-        for each in _known(
-            "limits.critical_loads", case.limits.critical_loads, [name for name in loads if name != "none"]
-        ):
-            critical.append(f"critical {each}")
-            used[critical[-1]] = factor * loads[each]
+        for name, factor in further.items():
+            critical.append(f"critical {name}")
+            used[critical[-1]] = factor * loads[name]
             constraints.append(AtLeast(least, ModalStiffness(critical[-1], least)))
-    order = ["none", *others, *sorted(critical, key="critical design".__eq__)]
+    order = ["none", *others, *critical]
     return Problem(
         shell,
         LoadCase("design", used["design"]),
@@ -112,23 +108,16 @@ def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[V
 
 
 def _decisive(others: Sequence[str], critical: Sequence[str]) -> str:
-    """Where thinning looks at what cables do against buckling: the design load's critical case, else another
-    critical one, else the last additional load, which a case lists by rising severity."""
-    if "critical design" in critical:
-        return "critical design"
+    """Where thinning looks at what cables do against buckling: a critical case, else the last additional load,
+    which a case lists by rising severity."""
     return critical[-1] if critical else (others[-1] if others else "design")
 
 
-def scatter_of(entry: RobustEntry) -> Scatter:
-    """What scatters."""
-    return Scatter(**{each.name: getattr(entry, each.name) for each in fields(Scatter)})
-
-
-def robust_misfit(case: Case) -> RobustMisfit | None:
+def robust_misfit(case: Case, shell: Gridshell) -> RobustMisfit | None:
     """The robust misfit of the case under the design load, if it has one."""
     if case.robust is None:
         return None
-    return RobustMisfit("design", scatter_of(case.robust), case.robust.deviations)
+    return RobustMisfit("design", case_tolerances(case, shell), case.robust.deviations)
 
 
 def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[Constraint]:

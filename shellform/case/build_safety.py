@@ -1,5 +1,4 @@
-"""From a case's tables [tolerances] and [safety], and the limit on critical factors, to what is asked of a
-design as built."""
+"""From a case's tables [tolerances] and [safety] to what is asked of a design as built."""
 
 from __future__ import annotations
 
@@ -40,14 +39,11 @@ def case_safety(case: Case, shell: Gridshell) -> Safety | None:
 
 
 def critical_factors_asked(case: Case) -> dict[str, float]:
-    """The least critical factor by load case: the larger one where both [safety] and [limits] ask for it."""
-    found: dict[str, float] = {}
-    if is_required(case) and case.safety.critical_factor is not None:
-        found["design"] = case.safety.critical_factor
-    if case.limits.critical_factor is not None:
-        for name in case.limits.critical_loads:
-            found[name] = max(found.get(name, 0.0), case.limits.critical_factor)
-    return found
+    """The least critical factor by load case."""
+    if not is_required(case):
+        return {}
+    own = case.safety.critical_factor
+    return ({} if own is None else {"design": own}) | case.safety.critical_further
 
 
 def is_required(case: Case) -> bool:

@@ -45,6 +45,7 @@ from shellform.case.entries import (
     SurfaceEntry,
     TitleBlockEntry,
 )
+from shellform.case.older_names import with_present_names
 from shellform.case.safety_entries import SafetyEntry, TolerancesEntry
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
@@ -99,11 +100,8 @@ class Case(Entry):
 
     @model_validator(mode="after")
     def _robust(self) -> Case:
-        causes = RobustEntry.model_fields.keys() - {"deviations", "limit", "samples", "seed"}
-        if self.robust is not None and not any(getattr(self.robust, name) for name in causes):
-            raise ValueError(f"nothing scatters in [robust]: give one of {', '.join(sorted(causes))}")
         if self.optimise.robust and self.robust is None:
-            raise ValueError("a share robust needs a table [robust] that says what scatters")
+            raise ValueError("a share robust needs a table [robust], which may be empty")
         return self
 
     @model_validator(mode="after")
@@ -159,7 +157,7 @@ def read_toml(file: Path) -> dict[str, Any]:
 def make_case(data: Mapping[str, Any], file: Path) -> Case:
     """As `load_case`, from the tables of a file that are read already."""
     try:
-        case = Case.model_validate(_with_joint(data, file))
+        case = Case.model_validate(_with_joint(with_present_names(data), file))
     except ValidationError as error:
         raise refusal(error, Case, file) from error
     name = case.surface.file

@@ -264,7 +264,10 @@ class OptimiseEntry(Entry):
         0.0, ge=0.0, le=1.0, description="share of the rod radius; above 0 it is a variable"
     )
     robust: float = Field(
-        0.0, ge=0.0, le=1.0, description="share of the misfit's mean and deviation as [robust] says"
+        0.0,
+        ge=0.0,
+        le=1.0,
+        description="share of the misfit's mean and deviation with [tolerances]; needs [robust]",
     )
     rest_length_min: PositiveFloat = Field(0.01, description="bound (3), m")
     rest_length_max: float = Field(1.1, gt=1.0, description="bound (3), times the initial rest length")
@@ -346,14 +349,6 @@ class LimitsEntry(Entry):
     slack_loads: list[str] = Field(
         ["none"], description="load cases in which slack_min holds; none: before any load"
     )
-    critical_factor: float | None = Field(
-        None,
-        gt=1.0,
-        description="of each of critical_loads, up to which its path stays stable; for the design load [safety] has one",
-    )
-    critical_loads: list[str] = Field(
-        ["design"], min_length=1, description="load cases that critical_factor holds for"
-    )
 
 
 class TitleBlockEntry(Entry):
@@ -374,18 +369,8 @@ class TitleBlockEntry(Entry):
 
 
 class RobustEntry(Entry):
-    """Standard deviations of what isn't known exactly, each relative where no unit is named; 0 leaves a cause
-    out.
-    """
+    """How far the shape may be moved by what [tolerances] says that a structure is off by."""
 
-    cable_stiffness: NonNegativeFloat = Field(0.0, description="of each cable")
-    cable_stiffness_all: NonNegativeFloat = Field(0.0, description="of all cables together")
-    rest_length: NonNegativeFloat = Field(0.0, description="of each cable: the error of its prestress, m")
-    supports: NonNegativeFloat = Field(0.0, description="of each coordinate of each support, m")
-    joints: NonNegativeFloat = Field(0.0, description="of each connector's torsion and bending stiffness")
-    joints_all: NonNegativeFloat = Field(0.0, description="of all connectors together")
-    loads: NonNegativeFloat = Field(0.0, description="of the load on each node")
-    loads_all: NonNegativeFloat = Field(0.0, description="of the whole load")
     deviations: NonNegativeFloat = Field(
         1.0,
         description="standard deviations that are added to the mean misfit where it is limited or minimised",

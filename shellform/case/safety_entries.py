@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt, model_validator
 
 from shellform.case.entries import Entry
@@ -44,6 +46,12 @@ class TolerancesEntry(Entry):
     shape: NonNegativeFloat | None = Field(
         None, description=f"amplitude of each soft mode over the span: {_default('shape')}"
     )
+    cable_stiffness_all: NonNegativeFloat | None = Field(
+        None, description=f"share, of all cables together; left out: 0, {SOURCES['cable_stiffness_all']}"
+    )
+    connectors_all: NonNegativeFloat | None = Field(
+        None, description=f"share, of all connectors together; left out: 0, {SOURCES['connectors_all']}"
+    )
 
 
 class SafetyEntry(Entry):
@@ -63,6 +71,9 @@ class SafetyEntry(Entry):
         1.25,
         ge=1.0,
         description="of the perfect structure under the design load, with rod elements halved",
+    )
+    critical_further: dict[str, Annotated[float, Field(gt=1.0)]] = Field(
+        {}, description="the same of further load cases, by name: { half = 1.2 }"
     )
     drawn: PositiveInt = Field(200, description="structures of the design to build")
     compared: PositiveInt = Field(20, description="structures of the designs to compare with")

@@ -1,56 +1,31 @@
-"""What isn't known exactly about a gridshell as built: independent normal variables z of mean 0 and deviation
-1, a group for each cause.
+"""Tolerances to first order: independent normal variables z of mean 0 and deviation 1, a group for each cause.
 
 A group gives what the equilibrium needs: the derivatives F (6 n, k) of the internal forces by its variables
 at a fixed state and, for multipliers y_k, how y_k'F_k changes with the state and with the cables' rest
 lengths; and it varies the structure itself, for sampling. Stiffnesses vary as exp(s z), so that they stay
-positive; lengths, places and loads vary linearly.
+positive; lengths, places and loads vary linearly. Marks, rods and shape have no group: what they do is told
+by drawn structures.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
 from shellform.net.grid import CONNECTOR
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
 
-_JOINT = ("axial", "torsion", "bending_y", "bending_z")
-
-
-@dataclass(frozen=True)
-class Scatter:
-    """Standard deviations; 0 leaves a cause out. Relative ones: `cable_stiffness` of each cable,
-    `cable_stiffness_all` of all together, `joints` of each connector's GJ and EI, `joints_all` of all
-    together, `loads` of each loaded node, `loads_all` of all together. In m: `rest_length` of each cable (the
-    error of its prestress) and `supports` of each coordinate of each support."""
-
-    cable_stiffness: float = 0.0
-    cable_stiffness_all: float = 0.0
-    rest_length: float = 0.0
-    supports: float = 0.0
-    joints: float = 0.0
-    joints_all: float = 0.0
-    loads: float = 0.0
-    loads_all: float = 0.0
-
-    def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if not (value >= 0.0 and np.isfinite(value)):
-                raise InputError("must be finite and not negative", where=f"scatter.{each.name}", value=value)
-        if not any(getattr(self, each.name) for each in fields(self)):
-            raise InputError(
-                "nothing is uncertain", where="scatter", remedy="Give at least one standard deviation."
-            )
+_STIFFNESSES = ("axial", "torsion", "bending_y", "bending_z")
 
 
 @dataclass(frozen=True)
@@ -305,57 +280,84 @@ class Loads:
         return replace(built, load=built.load + self.deviation * np.asarray(self.parts @ z).reshape(-1, 6))
 
 
-def groups_of(shell: Gridshell, design: Design, load: Reals, scatter: Scatter) -> list[Group]:
-    """The groups of all causes that aren't left out."""
-    cables, beams = shell.cables(design), shell.beams(design.radius)
-    every = np.arange(len(cables.ends))
-    result: list[Group] = []
-    if len(every):
-        for name, deviation, together in (
-            ("cable_stiffness", scatter.cable_stiffness, False),
-            ("cable_stiffness_all", scatter.cable_stiffness_all, True),
-        ):
-            if deviation:
-                result.append(Stiffness(name, cables, deviation, together, every, ()))
-        if scatter.rest_length:
-            result.append(Lengths("rest_length", cables, scatter.rest_length))
-    if scatter.supports:
-        supports = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
-        result.append(Supports("supports", supports, scatter.supports))
-    connectors = np.flatnonzero(beams.of_kind(CONNECTOR))
-    for name, deviation, together in (
-        ("joints", scatter.joints, False),
-        ("joints_all", scatter.joints_all, True),
-    ):
-        if deviation:
-            for properties in (("torsion",), ("bending_y", "bending_z")):
-                result.append(
-                    Stiffness(
-                        name,
-                        _only(beams, connectors, properties),
-                        deviation,
-                        together,
-                        connectors,
-                        properties,
-                    )
-                )
-    loaded = np.flatnonzero(load.any(axis=1))
-    nodes = len(load)
-    if len(loaded):
-        columns = np.repeat(np.arange(len(loaded)), 6)
-        rows = (6 * loaded[:, None] + np.arange(6)).ravel()
-        each = sp.csc_array((load[loaded].ravel(), (rows, columns)), shape=(6 * nodes, len(loaded)))
-        if scatter.loads:
-            result.append(Loads("loads", each, scatter.loads))
-        if scatter.loads_all:
-            result.append(Loads("loads_all", sp.csc_array(load.reshape(-1, 1)), scatter.loads_all))
+def groups_of(shell: Gridshell, design: Design, load: Reals, tolerances: Tolerances) -> list[Group]:
+    """The groups of all causes that aren't left out. Raises InputError where that leaves none."""
+    result = [
+        *_of_cables(shell.cables(design), tolerances),
+        *_of_supports(shell, tolerances),
+        *_of_connectors(shell.beams(design.radius), tolerances),
+        *_of_load(shell, load, tolerances),
+    ]
     if not result:
         raise InputError(
-            "nothing of what is uncertain is there",
-            where="scatter",
-            remedy="Give the design cables or the shell a load.",
+            "nothing is off",
+            where="tolerances",
+            remedy="Give one of cable_length, cable_stiffness, supports, connectors, load_each, load_all, "
+            "load_uneven, and to what it is of: the design a cable, the shell a load.",
         )
     return result
+
+
+def _of_cables(cables: Cables, tolerances: Tolerances) -> list[Group]:
+    every = np.arange(len(cables.ends))
+    result: list[Group] = []
+    for name, together in (("cable_stiffness", False), ("cable_stiffness_all", True)):
+        deviation = getattr(tolerances, name)
+        if deviation and len(every):
+            result.append(Stiffness(name, cables, deviation, together, every, ()))
+    if tolerances.cable_length and len(every):
+        result.append(Lengths("cable_length", cables, tolerances.cable_length))
+    return result
+
+
+def _of_supports(shell: Gridshell, tolerances: Tolerances) -> list[Group]:
+    held = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
+    return [Supports("supports", held, tolerances.supports)] if tolerances.supports else []
+
+
+def _of_connectors(beams: Beams, tolerances: Tolerances) -> list[Group]:
+    chosen = np.flatnonzero(beams.of_kind(CONNECTOR))
+    part = _rows(beams, chosen)
+    return [
+        Stiffness(name, part, getattr(tolerances, name), together, chosen, _STIFFNESSES)
+        for name, together in (("connectors", False), ("connectors_all", True))
+        if getattr(tolerances, name)
+    ]
+
+
+def _of_load(shell: Gridshell, load: Reals, tolerances: Tolerances) -> list[Group]:
+    loaded = np.flatnonzero(load.any(axis=1))
+    if not len(loaded):
+        return []
+    crossings, crossing = np.unique(zones_of(shell)[loaded], return_inverse=True)
+    rows = (6 * loaded[:, None] + np.arange(6)).ravel()
+    each = sp.csc_array(
+        (load[loaded].ravel(), (rows, np.repeat(crossing, 6))), shape=(load.size, len(crossings))
+    )
+    uneven = [(load * share[:, None]).ravel() for share in halves(shell.target.positions).T]
+    return [
+        Loads(name, parts, getattr(tolerances, name))
+        for name, parts in (
+            ("load_each", each),
+            ("load_all", sp.csc_array(load.reshape(-1, 1))),
+            ("load_uneven", sp.csc_array(np.column_stack(uneven))),
+        )
+        if getattr(tolerances, name)
+    ]
+
+
+def zones_of(shell: Gridshell) -> Indices:
+    """The crossing (n,) that each node's load is counted to: the nearest in the flat grid."""
+    grid = shell.net.grid
+    middle = grid.flat[grid.crossing_nodes].mean(axis=1)[:, :2]
+    return np.asarray(cKDTree(middle).query(grid.flat[:, :2])[1], dtype=np.int64)
+
+
+def halves(places: Reals) -> Reals:
+    """Shares (n, 2) of a load that make one half of the plan heavier by as much as the other is lighter, in
+    two directions at right angles: a plane each, whose mean size over the nodes at `places` (n, 3) is 1."""
+    plan = places[:, :2] - places[:, :2].mean(axis=0)
+    return np.asarray(plan / np.maximum(np.abs(plan).mean(axis=0), 1e-300))
 
 
 def unpacked(packed: Reals, size: int) -> Reals:
@@ -367,23 +369,13 @@ def unpacked(packed: Reals, size: int) -> Reals:
     return result
 
 
-def _only(beams: Beams, chosen: Indices, properties: tuple[str, ...]) -> Beams:
-    """The chosen beams with their `properties` for stiffness and nothing else."""
-    none = np.zeros(len(chosen))
-    axial, torsion, bending_y, bending_z = (
-        getattr(beams, name)[chosen] if name in properties else none for name in _JOINT
-    )
-    return Beams(
-        beams.ends[chosen],
-        axial,
-        torsion,
-        bending_y,
-        bending_z,
-        beams.rest_length[chosen],
-        beams.frames[chosen],
-        beams.kind[chosen],
-        beams.kinds,
-    )
+def _rows(beams: Beams, chosen: Indices) -> Beams:
+    """Some of the beams."""
+    each = {
+        name: getattr(beams, name)[chosen]
+        for name in (*_STIFFNESSES, "ends", "rest_length", "frames", "kind")
+    }
+    return replace(beams, **each)
 
 
 def _spread(values: Reals, dofs: Indices, state: State, columns: Indices) -> sp.csc_array:

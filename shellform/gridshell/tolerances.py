@@ -47,6 +47,8 @@ SOURCES: Final[Mapping[str, str]] = {
     "scale model: weights are hung crossing by crossing, 1 %",
     "shape": "EN 1993-1-6, 8.7: imperfections in the shape of the softest modes; half of L/1000, what other "
     "causes don't hold; scale model: what callipers leave, 0.1 mm in a metre",
+    "cable_stiffness_all": "the maker's mean modulus is taken as tested, unless a doubt about it is given here",
+    "connectors_all": "the make's mean stiffness is taken as tested, unless a doubt about it is given here",
 }
 
 
@@ -58,8 +60,9 @@ class Tolerances:
     crossing's place along each rod (its ends included). Relative: `cable_stiffness` of each cable,
     `rod_stiffness` of each rod (all four constants), `connectors` of each connector, `load_each` of what each
     crossing carries, `load_all` of the whole load, `load_uneven` of one half of the plan against the other
-    (in either direction of two at right angles). `rod_bow`: rise of each rod's own arc over its length, about
-    either axis. `shape`: amplitude of each of the softest modes over the span.
+    (in either direction of two at right angles), `cable_stiffness_all` and `connectors_all` of all cables and
+    of all connectors together. `rod_bow`: rise of each rod's own arc over its length, about either axis.
+    `shape`: amplitude of each of the softest modes over the span.
     """
 
     cable_length: float = 0.0
@@ -73,6 +76,8 @@ class Tolerances:
     load_all: float = 0.0
     load_uneven: float = 0.0
     shape: float = 0.0
+    cable_stiffness_all: float = 0.0
+    connectors_all: float = 0.0
 
     def __post_init__(self) -> None:
         for each in fields(self):

@@ -1,5 +1,5 @@
-"""Robust design: mean and standard deviation of the misfit where cables, joints, supports and loads scatter
-(the paper's future work).
+"""Robust design: mean and standard deviation of the misfit of structures with tolerances (the paper's future
+work): what their errors do to the shape, to second order. Whether they stand, drawn structures tell.
 
 With independent normal variables z (scatter.py), d the distances from the target at z = 0, and X = dx/dz from
 K X = -F, the misfit q = |d + X z + ...|² has, to second order,
@@ -32,7 +32,8 @@ import scipy.sparse as sp
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.scatter import Group, Realisation, Scatter, groups_of, unpacked
+from shellform.gridshell.scatter import Group, Realisation, groups_of, unpacked
+from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.terms import LoadedDesign, Measurement, Term, distance_squares
 from shellform.structure.answers.sensitivity import by_rest_length
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
@@ -98,11 +99,11 @@ class RobustValue:
     by_rest_length: Reals
 
 
-def spread(shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter) -> Spread:
+def spread(shell: Gridshell, design: Design, state: State, load: Reals, tolerances: Tolerances) -> Spread:
     """The scatter of the misfit at the stable equilibrium `state` of the design under the dead `load` (n, 6).
     Raises NotConverged where it isn't stable.
     """
-    line = _Line(shell, design, state, load, scatter)
+    line = _Line(shell, design, state, load, tolerances)
     motion, away = line.motion, line.away
     places = _places(motion)
     along = places.T @ away.ravel()
@@ -135,14 +136,20 @@ def spread(shell: Gridshell, design: Design, state: State, load: Reals, scatter:
 
 
 def measure(
-    shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter, *, deviations: float = 1.0
+    shell: Gridshell,
+    design: Design,
+    state: State,
+    load: Reals,
+    tolerances: Tolerances,
+    *,
+    deviations: float = 1.0,
 ) -> RobustValue:
     """d'd + tr(X'X) + `deviations` times the Gauss-Newton deviation of the misfit, and its exact derivative
     by the rest lengths. Raises NotConverged.
     """
     if not (deviations >= 0.0 and np.isfinite(deviations)):
         raise InputError("must be finite and not negative", where="deviations", value=deviations)
-    line = _Line(shell, design, state, load, scatter)
+    line = _Line(shell, design, state, load, tolerances)
     part = line.partial(deviations)
     adjoint = line.solved(part.by_state)
     columns = by_rest_length(line.assembly, state, shell.cables(design))
@@ -159,7 +166,7 @@ class RobustMisfit(Term):
 
     name = "robust_misfit"
     load: str
-    scatter: Scatter
+    tolerances: Tolerances
     deviations: float = 1.0
 
     def __post_init__(self) -> None:
@@ -170,7 +177,7 @@ class RobustMisfit(Term):
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m². Raises NotConverged where the state isn't stable."""
-        line = _Line(at.shell, at.design, at.state, at.load, self.scatter)
+        line = _Line(at.shell, at.design, at.state, at.load, self.tolerances)
         part = line.partial(self.deviations)
         by_rest = np.zeros(len(at.design.present))
         by_rest[at.design.present] = part.by_rest_length
@@ -184,14 +191,21 @@ class RobustMisfit(Term):
 
 
 def sample(
-    shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter, *, count: int, seed: int
+    shell: Gridshell,
+    design: Design,
+    state: State,
+    load: Reals,
+    tolerances: Tolerances,
+    *,
+    count: int,
+    seed: int,
 ) -> MisfitSample:
     """Misfits of `count` drawn structures, every equilibrium solved anew on the stable branch from where the
     linear one lies.
     """
     if count < 1:
         raise InputError("must be at least 1", where="sample.count", value=count)
-    line = _Line(shell, design, state, load, scatter)
+    line = _Line(shell, design, state, load, tolerances)
     rng = np.random.default_rng(seed)
     found: list[float] = []
     lost = 0
@@ -219,12 +233,14 @@ class _Partial:
 class _Line:
     """The equilibrium and its linear answer `motion` (6 n, k) to all variables."""
 
-    def __init__(self, shell: Gridshell, design: Design, state: State, load: Reals, scatter: Scatter) -> None:
+    def __init__(
+        self, shell: Gridshell, design: Design, state: State, load: Reals, tolerances: Tolerances
+    ) -> None:
         self.shell, self.state, self.radius = shell, state, design.radius
         self.built = Realisation(
             shell.beams(design.radius), shell.cables(design), np.asarray(load), np.zeros_like(load)
         )
-        self.groups: list[Group] = groups_of(shell, design, load, scatter)
+        self.groups: list[Group] = groups_of(shell, design, load, tolerances)
         self.assembly: Assembly = assemble(shell.network(design))
         self.away = state.positions - shell.target.positions
         nodes = len(state.positions)

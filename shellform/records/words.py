@@ -36,6 +36,8 @@ _CAUSES = {
     "load_all": "the error of the whole load",
     "load_uneven": "more load on one half",
     "shape": "the shape's imperfection",
+    "cable_stiffness_all": "all cables' stiffness",
+    "connectors_all": "all connectors' stiffness",
 }
 
 

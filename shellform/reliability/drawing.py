@@ -32,6 +32,7 @@ import numpy as np
 
 from shellform.arrays import Reals, reals
 from shellform.errors import InputError
+from shellform.gridshell.scatter import halves
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.members import Members
 from shellform.structure.elements import rotation
@@ -89,6 +90,8 @@ def sizes(members: Members) -> dict[str, int]:
         "load_all": 1,
         "load_uneven": 2,
         "shape": SHAPES,
+        "cable_stiffness_all": 1,
+        "connectors_all": 1,
     }
 
 
@@ -114,7 +117,9 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
     supports[members.held] = t.supports * z["supports"]
     length, stiffness = np.zeros(len(members.beam_length)), np.ones(len(members.beam_length))
     curvature = np.zeros((len(members.beam_length), 2))
-    stiffness[members.connectors] = np.exp(t.connectors * z["connectors"])
+    stiffness[members.connectors] = np.exp(
+        t.connectors * z["connectors"] + t.connectors_all * z["connectors_all"]
+    )
     first = 0
     for k, rod in enumerate(members.rods):
         own = t.marks * z["marks"][first : first + len(rod.marks)]
@@ -130,7 +135,7 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
         curvature[rod.elements] = np.column_stack([np.full(len(nominal), bow[0]), rod.sense * bow[1]])
     return Errors(
         t.cable_length * z["cable_length"],
-        np.exp(t.cable_stiffness * z["cable_stiffness"]),
+        np.exp(t.cable_stiffness * z["cable_stiffness"] + t.cable_stiffness_all * z["cable_stiffness_all"]),
         supports.reshape(-1, 6),
         length,
         stiffness,
@@ -185,12 +190,9 @@ def built_load(load: Reals, errors: Errors) -> Reals:
 
 
 def _load_factors(members: Members, t: Tolerances, z: Mapping[str, Reals]) -> Reals:
-    """Factors (n,): each crossing's own, the whole, and a plane over the plan that makes one half heavier by
-    as much as the other is lighter: its mean size over the crossings is 1."""
+    """Factors (n,): each crossing's own, the whole, and one half against the other."""
     each = 1.0 + t.load_each * z["load_each"][members.zone]
-    plan = members.places[:, :2] - members.places[:, :2].mean(axis=0)
-    plane = plan / np.maximum(np.abs(plan).mean(axis=0), 1e-300)
-    uneven = 1.0 + t.load_uneven * plane @ z["load_uneven"]
+    uneven = 1.0 + t.load_uneven * halves(members.places) @ z["load_uneven"]
     return np.asarray(each * uneven * (1.0 + t.load_all * float(z["load_all"][0])))
 
 

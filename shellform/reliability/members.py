@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.layers import LOCK
+from shellform.gridshell.scatter import zones_of
 from shellform.structure.elements.beam import Beams
 from shellform.structure.model import Model
 
@@ -67,15 +67,13 @@ def members_of(shell: Gridshell) -> Members:
         first += count
     connectors = first + np.arange(len(grid.lattice))
     held = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
-    middle = grid.flat[grid.crossing_nodes].mean(axis=1)[:, :2]
-    zone = np.asarray(cKDTree(middle).query(grid.flat[:, :2])[1], dtype=np.int64)
     return Members(
         tuple(rods),
         connectors,
         len(shell.cable_ends),
         held,
-        zone,
-        len(middle),
+        zones_of(shell),
+        len(grid.crossing_nodes),
         shell.target.positions,
         beams.rest_length,  # edge beams come last, and are made without error
     )

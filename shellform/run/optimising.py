@@ -12,7 +12,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.case.build_gridshell import rounding_catalogue
 from shellform.case.build_problem import case_problem
-from shellform.case.build_safety import case_safety
+from shellform.case.build_safety import case_safety, case_tolerances
 from shellform.case.entries import OptimiseEntry
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
@@ -77,9 +77,15 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
     name, final = list(built.items())[-1]
     cable_count, symmetry = _wishes(workspace, final.design, groups)
     if workspace.case.robust is not None:
-        workspace.say("optimise", "what scatter does to the shape")
+        workspace.say("optimise", "what tolerances do to the shape")
+        built_shell = final.problem.shell
         scattered = robustness(
-            workspace.case.robust, final.problem.shell, final.design, final.states["design"], loads["design"]
+            workspace.case.robust,
+            built_shell,
+            final.design,
+            final.states["design"],
+            loads["design"],
+            case_tolerances(workspace.case, built_shell),
         )
         summary = replace(summary, robust=scattered.record(name))
         write_text(workspace.path("schedules/robust.csv"), table_text(scattered.table()))

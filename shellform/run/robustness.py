@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.case.build_problem import scatter_of
 from shellform.case.entries import RobustEntry
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
 from shellform.problem import robust
 from shellform.records.scattering import CauseRecord, RobustRecord, SampleRecord
 from shellform.structure.elements.state import State
@@ -49,9 +49,8 @@ class Robustness:
         drawn = len(self.sample.misfits) + self.sample.lost
         return [
             f"{self.sample.lost} of {drawn} structures drawn have no equilibrium on the stable branch: the "
-            "design is too near the end of its path for this scatter. Limit its critical factor, or the "
-            "robust "
-            "misfit."
+            "design is too near the end of its path for these tolerances. Ask for a larger "
+            "safety.critical_factor, or limit the robust misfit (robust.limit)."
         ]
 
     def _sampled(self) -> SampleRecord | None:
@@ -88,12 +87,13 @@ class Robustness:
         return Table("robust", heads, rows)
 
 
-def robustness(entry: RobustEntry, shell: Gridshell, design: Design, state: State, load: Reals) -> Robustness:
+def robustness(
+    entry: RobustEntry, shell: Gridshell, design: Design, state: State, load: Reals, tolerances: Tolerances
+) -> Robustness:
     """Of the design's stable `state` under the `load`. Raises NotConverged where it isn't stable."""
-    scatter = scatter_of(entry)
-    spread = robust.spread(shell, design, state, load, scatter)
+    spread = robust.spread(shell, design, state, load, tolerances)
     drawn = (
-        robust.sample(shell, design, state, load, scatter, count=entry.samples, seed=entry.seed)
+        robust.sample(shell, design, state, load, tolerances, count=entry.samples, seed=entry.seed)
         if entry.samples
         else None
     )

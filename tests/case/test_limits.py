@@ -13,6 +13,7 @@ from shellform.case.build_problem import case_problem, shown
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.reactions import reactions
+from shellform.gridshell.tolerances import default_tolerances
 from shellform.optimiser import rounding
 from shellform.problem.robust import RobustMisfit
 from shellform.run.folder import read_run
@@ -28,7 +29,7 @@ LIMITS = [
     "limits.connector_turn=0.4",
     "limits.uplift=7.0",
     "limits.slack_min=0.05",
-    "limits.critical_factor=1.25",
+    "safety.critical_further={ additional = 1.04 }",
 ]
 
 
@@ -43,21 +44,21 @@ def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loa
         CASE,
         [
             *LIMITS,
-            'limits.critical_loads=["design","additional"]',
             'limits.slack_loads=["none","additional"]',
-            "robust.supports=1e-4",
+            "tolerances.supports=1e-4",
             "robust.limit=0.003",
         ],
     )
     problem = case_problem(case, shell, loads, shell.design())
-    assert list(problem.loads) == ["design", "none", "additional", "critical additional", "critical design"]
-    np.testing.assert_allclose(problem.loads["critical design"], 1.25 * loads["design"])
+    assert list(problem.loads) == ["design", "none", "additional", "critical additional"]
+    np.testing.assert_allclose(problem.loads["critical additional"], 1.04 * loads["additional"])
+    assert problem.decisive == "critical additional"
     kinds = [(type(each.term).__name__, each.term.load) for each in problem.constraints]
     for kind in ("RodUtilisation", "ConnectorTurn", "Uplift"):
         assert [load for name, load in kinds if name == kind] == ["none", "design", "additional"]
     assert [load for name, load in kinds if name == "LeastTension"] == ["none", "additional"]
     assert ("LargestCableForce", "additional") in kinds
-    assert ("ModalStiffness", "critical design") in kinds
+    assert ("ModalStiffness", "critical additional") in kinds
     assert ("RobustMisfit", "design") in kinds
     plain = case_problem(load_case(CASE), shell, loads, shell.design())
     assert list(plain.loads) == ["design", "none", "additional"]
@@ -70,9 +71,8 @@ def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
         [
             *LIMITS,
             "limits.thrust=3.0",
-            'limits.critical_loads=["design","additional"]',
             'limits.slack_loads=["none"]',
-            "robust.supports=1e-4",
+            "tolerances.supports=1e-4",
             "robust.limit=0.003",
             "cable.force_max=18.0",
             "optimise.misfit_rms_additional=0.004",
@@ -103,12 +103,10 @@ def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
     )
     states = sf.follow(shell, shell.design(), {"design": loads["design"]})
     softest = modes(assemble(shell.network(shell.design())), states["design"].equilibrium.state, 1).stiffness
-    for load in ("critical design", "critical additional"):
-        kept = found["ModalStiffness", load]
-        assert kept.lower == pytest.approx((0.25 * softest[0]) ** 2, rel=1e-6)
-        assert kept.upper == np.inf
-        np.testing.assert_allclose(problem.loads[load], 1.25 * loads[load.removeprefix("critical ")])
-    assert problem.decisive == "critical design"
+    kept = found["ModalStiffness", "critical additional"]
+    assert kept.lower == pytest.approx((0.25 * softest[0]) ** 2, rel=1e-6)
+    assert kept.upper == np.inf
+    assert problem.decisive == "critical additional"
     assert problem.built_under == ("design", "additional")
 
 
@@ -122,10 +120,13 @@ def test_an_uplift_is_measured_against_what_a_support_bears_where_less_is_allowe
 
 
 def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
-    case = load_case(CASE, ["optimise.misfit=0.4", "optimise.robust=0.3", "robust.loads_all=0.1"])
+    case = load_case(
+        CASE, ["optimise.misfit=0.4", "optimise.robust=0.3", "robust.deviations=2.0", "tolerances.marks=1e-3"]
+    )
     shares = case_problem(case, shell, loads, shell.design()).minimise
     assert [each.share for each in shares] == [0.4, 0.3, 0.3]
-    assert isinstance(shares[2].term, RobustMisfit)
+    asked = dataclasses.replace(default_tolerances(shell), marks=1e-3)
+    assert shares[2].term == RobustMisfit("design", asked, 2.0)
     free = load_case(ROOT / "scripts/scale_model_radius.toml")
     fixed = case_problem(free, shell, loads, shell.design(), frees_radius=False)
     assert [each.share for each in fixed.minimise] == pytest.approx([0.75, 0.25])
@@ -139,9 +140,9 @@ def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
         (["limits.utilisaton=0.9"], "did you mean 'utilisation'"),
         (["limits.utilisation=0"], "limits.utilisation.*greater than 0"),
         (["limits.uplift=-1"], "limits.uplift"),
-        (["limits.critical_factor=0.9"], "limits.critical_factor.*greater than 1"),
-        (["robust.suports=0.1"], "did you mean 'supports'"),
-        (["robust.limit=0.1"], "nothing scatters"),
+        (["safety.critical_further={ half = 0.9 }"], "safety.critical_further.half.*greater than 1"),
+        (["robust.limits=0.1"], "did you mean 'limit'"),
+        (["tolerances.suports=0.1"], "did you mean 'supports'"),
         (["optimise.robust=0.3", "optimise.misfit=0.4"], "needs a table"),
         (["optimise.catalogue=gfrp_rods"], "catalogue is for a free radius"),
         (["optimise.catalogue=none", "optimise.misfit=0.5", "optimise.rod_radius=0.2"], "can't be read"),
@@ -157,12 +158,12 @@ def test_limits_that_can_t_be_are_refused_when_the_problem_is_made(shell, loads)
     case = load_case(CASE, ["limits.slack_min=0.1", 'limits.slack_loads=["storm"]'])
     with pytest.raises(InputError, match=r"limits\.slack_loads.*storm"):
         case_problem(case, shell, loads, shell.design())
-    case = load_case(CASE, ["limits.critical_factor=1.3", 'limits.critical_loads=["none"]'])
-    with pytest.raises(InputError, match=r"limits\.critical_loads.*none"):
+    case = load_case(CASE, ["safety.critical_further={ none = 1.3 }"])
+    with pytest.raises(InputError, match=r"safety\.critical_further.*none"):
         case_problem(case, shell, loads, shell.design())
     heavy = {name: 5.0 * load for name, load in loads.items()}
     with pytest.raises(NotConverged, match="no critical factor can be kept"):
-        case_problem(load_case(CASE, ["limits.critical_factor=1.3"]), shell, heavy, shell.design())
+        case_problem(load_case(CASE, LIMITS), shell, heavy, shell.design())
 
 
 def test_what_is_shown_of_a_design_without_load_is_its_prestress(shell, loads):
@@ -200,8 +201,10 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
             *LIMITS,
             "optimise.evaluations=5",
             "optimise.polish=0",
-            "robust.supports=5e-5",
-            "robust.loads_all=0.05",
+            "tolerances.cable_stiffness=0",
+            "tolerances.cable_length=0",
+            "tolerances.connectors=0",
+            "tolerances.load_each=0",
             "robust.samples=5",
             "safety.drawn=2",
             "safety.compared=1",
@@ -216,7 +219,7 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
         "connector_turn.additional",
         "uplift",
         "slackness.none",
-        "softness.critical design",
+        "softness.critical additional",
         "cable_force.additional",
     ]
     assert {f"constraint.{name}" for name in named} <= set(row)
@@ -231,7 +234,7 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
     assert summary.robust.sample.count == 5
     with (tmp_path / "schedules/robust.csv").open(encoding="utf-8", newline="") as file:
         causes = list(csv.DictReader(file))
-    assert {each["cause"] for each in causes} == {"supports", "loads_all"}
+    assert {each["cause"] for each in causes} == {"supports", "load_all", "load_uneven"}
     assert sum(float(each["share of the scatter of the shape"]) for each in causes) == pytest.approx(
         1.0, abs=1e-3
     )

@@ -7,7 +7,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
-from shellform.gridshell.scatter import Scatter, groups_of
+from shellform.gridshell.scatter import groups_of
 from shellform.problem import robust
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.robust import RobustMisfit, _Line, measure, sample, spread
@@ -16,16 +16,18 @@ from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
 
-ALL = Scatter(
-    cable_stiffness=0.1,
-    cable_stiffness_all=0.05,
-    rest_length=3e-4,
-    supports=3e-4,
-    joints=0.2,
-    joints_all=0.1,
-    loads=0.1,
-    loads_all=0.05,
-)
+CAUSES = {
+    "cable_stiffness": 0.1,
+    "cable_stiffness_all": 0.05,
+    "cable_length": 3e-4,
+    "supports": 3e-4,
+    "connectors": 0.2,
+    "connectors_all": 0.1,
+    "load_each": 0.1,
+    "load_all": 0.05,
+    "load_uneven": 0.05,
+}
+ALL = sf.Tolerances(**CAUSES)
 
 
 @pytest.fixture(scope="module")
@@ -49,22 +51,22 @@ def solved(shell, design, near, load):
     ).state
 
 
-def small(scatter, factor):
-    return Scatter(**{name: factor * getattr(scatter, name) for name in vars(scatter)})
+def small(tolerances, factor):
+    return sf.Tolerances(**{name: factor * value for name, value in vars(tolerances).items()})
 
 
-@pytest.mark.parametrize("cause", [*vars(ALL), "all"])
+@pytest.mark.parametrize("cause", [*CAUSES, "all"])
 def test_the_derivative_of_the_robust_value_is_that_of_re_solved_equilibria(shell, loaded, cause):
     design, state, load = loaded
-    scatter = ALL if cause == "all" else Scatter(**{cause: getattr(ALL, cause)})
+    tolerances = ALL if cause == "all" else ALL.only(cause)
     state = solved(shell, design, state, load)
-    found = measure(shell, design, state, load, scatter, deviations=2.0)
+    found = measure(shell, design, state, load, tolerances, deviations=2.0)
     direction = np.random.default_rng(3).normal(size=len(design.present))
     values = []
     for h in (2e-7, -2e-7):
         other = replace(design, rest_length=design.rest_length + h * direction)
         values.append(
-            measure(shell, other, solved(shell, other, state, load), load, scatter, deviations=2.0).value
+            measure(shell, other, solved(shell, other, state, load), load, tolerances, deviations=2.0).value
         )
     assert found.by_rest_length @ direction == pytest.approx((values[0] - values[1]) / 4e-7, rel=1e-5)
 
@@ -73,24 +75,24 @@ def misfit(shell, line, z):
     return float(((line.drawn(z, (1.0,)).positions - shell.target.positions) ** 2).sum())
 
 
-@pytest.mark.parametrize("cause", [*vars(ALL), "all"])
+@pytest.mark.parametrize("cause", [*CAUSES, "all"])
 def test_the_first_derivative_of_the_misfit_by_each_cause_is_that_of_re_solved_equilibria(
     shell, loaded, cause
 ):
     design, state, load = loaded
-    scatter = small(ALL if cause == "all" else Scatter(**{cause: getattr(ALL, cause)}), 0.02)
-    line = _Line(shell, design, solved(shell, design, state, load), load, scatter)
+    tolerances = small(ALL if cause == "all" else ALL.only(cause), 0.02)
+    line = _Line(shell, design, solved(shell, design, state, load), load, tolerances)
     z = np.random.default_rng(0).normal(size=line.motion.shape[1])
     slope = 2.0 * float((line.away * (line.motion @ z).reshape(-1, 6)[:, :3]).sum())
     assert 0.5 * (misfit(shell, line, z) - misfit(shell, line, -z)) == pytest.approx(slope, rel=5e-3)
 
 
 @pytest.mark.parametrize(
-    "cause", ["cable_stiffness_all", "joints_all", "loads_all", "rest_length", "supports"]
+    "cause", ["cable_stiffness_all", "connectors_all", "load_all", "load_uneven", "cable_length", "supports"]
 )
 def test_the_mean_s_second_order_terms_are_the_misfit_s_second_derivatives(shell, loaded, cause, monkeypatch):
     design, state, load = loaded
-    if cause == "rest_length":  # a few cables only
+    if cause == "cable_length":  # a few cables only
         design, load = replace(design, present=np.arange(len(design.present)) % 97 == 0), 0.3 * load
         state = sf.follow(shell, design, {"part": load})["part"].equilibrium.state
     if cause == "supports":  # two coordinates only
@@ -99,9 +101,9 @@ def test_the_mean_s_second_order_terms_are_the_misfit_s_second_derivatives(shell
             "groups_of",
             lambda *given: [replace(each, dofs=each.dofs[30:32]) for each in groups_of(*given)],
         )
-    scatter = Scatter(**{cause: 0.1 * getattr(ALL, cause)})
+    tolerances = small(ALL.only(cause), 0.1)
     state = solved(shell, design, state, load)
-    line, told = _Line(shell, design, state, load, scatter), spread(shell, design, state, load, scatter)
+    line, told = _Line(shell, design, state, load, tolerances), spread(shell, design, state, load, tolerances)
     total = 0.0
     for each in np.eye(line.motion.shape[1]):
         total += 0.5 * (misfit(shell, line, each) + misfit(shell, line, -each) - 2.0 * told.nominal)
@@ -111,9 +113,9 @@ def test_the_mean_s_second_order_terms_are_the_misfit_s_second_derivatives(shell
 
 def test_the_predicted_scatter_is_that_of_a_quick_sample(shell, loaded):
     design, state, load = loaded
-    scatter = small(ALL, 0.25)
-    told = spread(shell, design, state, load, scatter)
-    drawn = sample(shell, design, state, load, scatter, count=40, seed=1)
+    tolerances = small(ALL, 0.25)
+    told = spread(shell, design, state, load, tolerances)
+    drawn = sample(shell, design, state, load, tolerances, count=40, seed=1)
     assert drawn.lost == 0
     error = drawn.misfits.std() / np.sqrt(40)
     assert abs(drawn.misfits.mean() - told.mean) < 4.0 * error
@@ -124,7 +126,7 @@ def test_the_predicted_scatter_is_that_of_a_quick_sample(shell, loaded):
     assert sum(each[1] for each in told.causes.values()) == pytest.approx(1.0)
     assert (told.node_deviation**2).sum() == pytest.approx(told.linear)
     assert "comes from" in told.sentences()[1]
-    again = sample(shell, design, state, load, scatter, count=2, seed=1)
+    again = sample(shell, design, state, load, tolerances, count=2, seed=1)
     np.testing.assert_array_equal(again.misfits, drawn.misfits[:2])
 
 
@@ -140,12 +142,12 @@ def test_the_predicted_scatter_is_that_of_four_hundred_samples(shell, loaded):
 
 def test_what_can_t_scatter_is_refused(shell, loaded):
     design, state, load = loaded
-    with pytest.raises(InputError, match="not negative"):
-        Scatter(loads=-1.0)
-    with pytest.raises(InputError, match="nothing is uncertain"):
-        Scatter()
-    with pytest.raises(InputError, match="nothing of what is uncertain"):
-        spread(shell, design, state, np.zeros_like(load), Scatter(loads=0.1))
+    for tolerances, under in (
+        (sf.Tolerances(marks=1e-3), load),
+        (sf.Tolerances(load_each=0.1), np.zeros_like(load)),
+    ):
+        with pytest.raises(InputError, match="nothing is off"):
+            spread(shell, design, state, under, tolerances)
     with pytest.raises(InputError, match="not negative"):
         measure(shell, design, state, load, ALL, deviations=-1.0)
     with pytest.raises(InputError, match="at least 1"):
@@ -156,16 +158,18 @@ def test_what_can_t_scatter_is_refused(shell, loaded):
 
 def test_drawings_off_the_stable_branch_are_counted_and_have_no_misfit(shell, loaded):
     design, state, load = loaded
-    drawn = sample(shell, design, state, load, Scatter(loads_all=30.0), count=6, seed=0)
+    drawn = sample(shell, design, state, load, sf.Tolerances(supports=5e-3), count=6, seed=0)
     assert drawn.lost > 0
     assert len(drawn.misfits) + drawn.lost == 6
 
 
-@pytest.mark.parametrize("cause", ["supports", "joints_all", "rest_length", "cable_stiffness"])
+@pytest.mark.parametrize(
+    "cause", ["supports", "connectors_all", "cable_length", "cable_stiffness", "load_uneven"]
+)
 def test_the_gradient_of_the_robust_misfit_as_a_term_agrees_with_re_solved_equilibria(shell, loaded, cause):
     design, state, load = loaded
-    scatter = Scatter(**{cause: getattr(ALL, cause)})
-    term = RobustMisfit("wet", scatter, 2.0)
+    tolerances = ALL.only(cause)
+    term = RobustMisfit("wet", tolerances, 2.0)
     shares = [sf.Share(0.6, sf.Misfit("wet")), sf.Share(0.4, sf.RodRadius())]
     problem = sf.Problem(
         shell,
@@ -178,7 +182,7 @@ def test_the_gradient_of_the_robust_misfit_as_a_term_agrees_with_re_solved_equil
     point = evaluator.seed(design, {"wet": solved(shell, design, state, load)}, 1.0)
     assert (
         term.measure(LoadedDesign(shell, design, point.states["wet"], load)).value[0]
-        == measure(shell, design, point.states["wet"], load, scatter, deviations=2.0).value
+        == measure(shell, design, point.states["wet"], load, tolerances, deviations=2.0).value
     )
     for direction in (
         np.append(np.random.default_rng(3).normal(size=len(point.variables) - 1), 0.0),
@@ -194,4 +198,4 @@ def test_the_gradient_of_the_robust_misfit_as_a_term_agrees_with_re_solved_equil
             (4.0 * near - wide) / 3.0, rel=1e-5
         )
     with pytest.raises(InputError, match=r"robust\.deviations"):
-        RobustMisfit("wet", scatter, -1.0)
+        RobustMisfit("wet", tolerances, -1.0)

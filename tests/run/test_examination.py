@@ -126,17 +126,13 @@ def test_tolerances_of_the_case_take_the_place_of_the_defaults(file, whole):
     ("settings", "asked"),
     [
         ([], {"design": 1.25}),
-        (["limits.critical_factor=1.5"], {"design": 1.5}),
-        (["limits.critical_factor=1.1"], {"design": 1.25}),
-        (
-            ["limits.critical_factor=1.1", 'limits.critical_loads=["additional"]'],
-            {"design": 1.25, "additional": 1.1},
-        ),
-        (["safety.required=false"], {}),
-        (["safety.required=false", "limits.critical_factor=1.1"], {"design": 1.1}),
+        (["safety.critical_factor=1.5"], {"design": 1.5}),
+        (["safety.critical_further={ additional = 1.1 }"], {"design": 1.25, "additional": 1.1}),
+        (["safety.required=false", "safety.critical_further={ additional = 1.1 }"], {}),
+        (["optimise.method=paper"], {}),
     ],
 )
-def test_the_larger_of_both_critical_factors_is_asked_for(file, settings, asked):
+def test_critical_factors_are_asked_for_by_load_case(file, settings, asked):
     assert critical_factors_asked(load_case(file, settings)) == asked
 
 
