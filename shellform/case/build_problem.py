@@ -92,7 +92,6 @@ def case_problem(
         constraints,
         [LoadCase(name, used[name]) for name in order if name in used],
         variables,
-        decisive=_decisive(others, critical),
         built_under=tuple(name for name in loads if loads[name].any()),
     )
 
@@ -105,12 +104,6 @@ def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[V
     if frees_radius and entry.rod_radius > 0.0:
         blocks.append(FreeRadius(*bounds) if bounds else FreeRadius())
     return blocks
-
-
-def _decisive(others: Sequence[str], critical: Sequence[str]) -> str:
-    """Where thinning looks at what cables do against buckling: a critical case, else the last additional load,
-    which a case lists by rising severity."""
-    return critical[-1] if critical else (others[-1] if others else "design")
 
 
 def robust_misfit(case: Case, shell: Gridshell) -> RobustMisfit | None:

@@ -52,7 +52,7 @@ def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loa
     problem = case_problem(case, shell, loads, shell.design())
     assert list(problem.loads) == ["design", "none", "additional", "critical additional"]
     np.testing.assert_allclose(problem.loads["critical additional"], 1.04 * loads["additional"])
-    assert problem.decisive == "critical additional"
+    assert problem.decisive_load() == "critical additional"
     kinds = [(type(each.term).__name__, each.term.load) for each in problem.constraints]
     for kind in ("RodUtilisation", "ConnectorTurn", "Uplift"):
         assert [load for name, load in kinds if name == kind] == ["none", "design", "additional"]
@@ -106,7 +106,7 @@ def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
     kept = found["ModalStiffness", "critical additional"]
     assert kept.lower == pytest.approx((0.25 * softest[0]) ** 2, rel=1e-6)
     assert kept.upper == np.inf
-    assert problem.decisive == "critical additional"
+    assert problem.decisive_load() == "critical additional"
     assert problem.built_under == ("design", "additional")
 
 
