@@ -104,8 +104,8 @@ def tell_as_built(summary: Summary) -> None:
         for load, row in design.loads.items():
             parts = []
             if row.critical_factor is not None and row.critical_kind is not None:
-                off = "" if row.critical_factor_error is None else f" ± {abs(row.critical_factor_error):.3f}"
-                parts.append(f"critical factor {critical_words(row.critical_factor, row.critical_kind)}{off}")
+                end = critical_words(row.critical_factor, row.critical_kind, row.critical_factor_error)
+                parts.append(f"critical factor {end}")
             if row.stands is not None:
                 own = row.stands
                 parts.append(standing_words(own.drawn, own.standing, own.at_least, own.confidence))

@@ -83,6 +83,8 @@ def standing_words(drawn: int, standing: int, at_least: float, confidence: float
     )
 
 
-def critical_words(factor: float, kind: str) -> str:
-    """Where a path ends."""
-    return f"beyond {factor:.3g} ×" if kind == "none" else f"{factor:.3f} × ({kind})"
+def critical_words(factor: float, kind: str, error: float | None = None) -> str:
+    """Where a path ends, and how far that is off by the mesh where it is known."""
+    if kind == "none":
+        return f"beyond {factor:.3g} ×"
+    return f"{factor:.3f} × ({kind})" + ("" if error is None else f" ± {abs(error):.3f}")

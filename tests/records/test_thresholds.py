@@ -240,7 +240,8 @@ def test_words_of_loads_paths_and_structures_keep_their_numbers():
     assert load_title("additional") == "the additional load"
     assert load_title("design", 1.2) == "the design load"
     assert load_title("wind", 1.2) == "“wind”"
-    assert critical_words(3.0, "none") == "beyond 3 ×"
+    assert critical_words(3.0, "none", 0.0) == "beyond 3 ×"
+    assert critical_words(1.31, "limit point", -0.007) == "1.310 × (limit point) ± 0.007"
     assert critical_words(1.31, "bifurcation") == "1.310 × (bifurcation)"
     assert standing_words(200, 199, 0.9769, 0.95) == (
         "199 of 200 structures as built stand (at least 97 % with 95 % confidence)"
