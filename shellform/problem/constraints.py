@@ -32,9 +32,9 @@ class Constraint(Protocol):
 
 
 @dataclass(frozen=True)
-class AtMost:
-    """Every value of the term is at most `limit`, in the unit in which the term takes limits; its residuals
-    are shares of the limit, or of `of`, which a limit of 0 needs."""
+class _OneSided:
+    """A `limit` in the unit in which the term takes limits; residuals are shares of it, or of `of`, which a
+    limit of 0 needs."""
 
     limit: float
     term: Term
@@ -42,6 +42,22 @@ class AtMost:
 
     def __post_init__(self) -> None:
         _check(self.limit, self.of)
+
+    @property
+    def _at(self) -> float:
+        """The limit in the values' unit."""
+        return self.term.at_limit(self.limit)
+
+    @property
+    def scale(self) -> float:
+        """In the values' unit."""
+        return abs(self._at) if self.of is None else self.of
+
+
+@dataclass(frozen=True)
+class AtMost(_OneSided):
+    """Every value of the term is at most `limit`, in the unit in which the term takes limits; its residuals
+    are shares of the limit, or of `of`, which a limit of 0 needs."""
 
     @property
     def lower(self) -> float:
@@ -51,40 +67,23 @@ class AtMost:
     @property
     def upper(self) -> float:
         """In the values' unit."""
-        return self.term.at_limit(self.limit)
-
-    @property
-    def scale(self) -> float:
-        """In the values' unit."""
-        return abs(self.upper) if self.of is None else self.of
+        return self._at
 
 
 @dataclass(frozen=True)
-class AtLeast:
+class AtLeast(_OneSided):
     """Every value of the term is at least `limit`, in the unit in which the term takes limits; its residuals
     are shares of the limit, or of `of`, which a limit of 0 needs."""
-
-    limit: float
-    term: Term
-    of: float | None = None
-
-    def __post_init__(self) -> None:
-        _check(self.limit, self.of)
 
     @property
     def lower(self) -> float:
         """In the values' unit."""
-        return self.term.at_limit(self.limit)
+        return self._at
 
     @property
     def upper(self) -> float:
         """None."""
         return np.inf
-
-    @property
-    def scale(self) -> float:
-        """In the values' unit."""
-        return abs(self.lower) if self.of is None else self.of
 
 
 @dataclass(frozen=True)

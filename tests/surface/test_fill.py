@@ -10,10 +10,12 @@ from shellform.errors import InputError
 from shellform.surface import cad
 from shellform.surface.funicular import thrust_shell
 from shellform.surface.readers.draft import Draft
-from shellform.surface.readers.fills import filled, loops_of
+from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended
 from shellform.surface.readers.reading import surface_of
+from shellform.surface.readers.seams import open_edges
 from shellform.surface.shape.plate import bent_heights
+from shellform.surface.shape.target import closed_loops
 
 
 def disc(rings, radius=1.0):
@@ -62,7 +64,7 @@ def test_a_clamped_plate_between_two_rings_converges_with_the_mesh(rings, bound)
     number[used] = np.arange(len(used))
     plan, faces, radius = plan[used], number[faces], radius[used]
     exact = radius**2 * np.log(radius)
-    loops = loops_of(faces)
+    loops = closed_loops(open_edges(faces))
     known = np.full(len(plan), np.nan)
     edges, slopes = [], []
     for loop in loops:
@@ -156,9 +158,9 @@ def turns(edge):
 
 def test_the_footprint_turns_little_at_the_feet():
     draft = arched(0.25)
-    corners = turns(draft.points[loops_of(draft.triangles)[0], :2])
+    corners = turns(draft.points[closed_loops(open_edges(draft.triangles))[0], :2])
     closed = filled(draft, "shell", what="edges")
-    footprint = turns(closed.points[loops_of(closed.triangles)[0], :2])
+    footprint = turns(closed.points[closed_loops(open_edges(closed.triangles))[0], :2])
     assert np.abs(corners).max() > 60.0
     assert (
         np.abs(footprint).max() < 35.0
@@ -168,7 +170,7 @@ def test_the_footprint_turns_little_at_the_feet():
 def test_the_ground_may_lie_lower_than_the_edge():
     draft = arched(0.5)
     sunk = filled(draft, "shell", what="edges", ground=-0.001)
-    assert loops_of(sunk.triangles)
+    assert closed_loops(open_edges(sunk.triangles))
     with pytest.raises(InputError, match=r"fewer than two places.*ground"):
         filled(draft, "shell", what="edges", ground=-1.0)
 

@@ -20,7 +20,7 @@ from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.mend import noted
 from shellform.surface.readers.seams import open_edges
 from shellform.surface.shape.plate import bent_heights
-from shellform.surface.shape.target import make_surface
+from shellform.surface.shape.target import closed_loops, make_surface
 
 _ON_GROUND = 0.02  # of the rise: an edge lower than that stands on the ground
 _DESCENT = 1.0  # mean slope of a fill down to the ground
@@ -43,7 +43,7 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
         raise InputError("must be holes, edges or all", where="surface.fill", value=what)
     draft = _upwards(draft)
     normals = make_surface(draft.points, draft.triangles, normals=draft.normals, source=where).normals
-    loops = loops_of(draft.triangles)
+    loops = closed_loops(open_edges(draft.triangles))
     outline = [
         float(np.linalg.norm(draft.points[loop] - draft.points[np.roll(loop, 1)], axis=1).sum())
         for loop in loops
@@ -76,20 +76,6 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
         estimated = make_surface(closed.points, closed.triangles, source=where).normals
         closed = replace(closed, normals=np.vstack([estimated[:own], closed.normals[own:]]))
     return closed
-
-
-def loops_of(triangles: Indices) -> list[Indices]:
-    """The closed loops of vertices along the edge, with the surface on their left."""
-    following = {int(a): int(b) for a, b in open_edges(triangles)}
-    loops = []
-    while following:
-        start, here = following.popitem()
-        loop = [start]
-        while here != start:
-            loop.append(here)
-            here = following.pop(here)
-        loops.append(np.array(loop))
-    return loops
 
 
 def _upwards(draft: Draft) -> Draft:

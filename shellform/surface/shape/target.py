@@ -66,16 +66,7 @@ class Surface:
         across = across_edges(self.triangles, len(self.vertices))
         at = np.argwhere(across < 0)
         rim = np.column_stack([self.triangles[at[:, 0], (at[:, 1] + k) % 3] for k in (0, 1)])
-        following = dict(zip(rim[:, 0].tolist(), rim[:, 1].tolist(), strict=True))
-        loops = []
-        while following:
-            start, here = following.popitem()
-            loop = [start]
-            while here != start:
-                loop.append(here)
-                here = following.pop(here)
-            loops.append(np.array(loop))
-        return sorted(loops, key=lambda loop: -_length(self.vertices[loop]))
+        return sorted(closed_loops(rim), key=lambda loop: -_length(self.vertices[loop]))
 
     @property
     def holes(self) -> int:
@@ -293,6 +284,20 @@ def _directed_edges(faces: Indices) -> Indices:
 
 def _length(loop: Reals) -> float:
     return float(np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1).sum())
+
+
+def closed_loops(edges: Indices) -> list[Indices]:
+    """The closed loops of vertices along directed edges (e, 2), one of which leaves every vertex on them."""
+    following = dict(zip(edges[:, 0].tolist(), edges[:, 1].tolist(), strict=True))
+    loops = []
+    while following:
+        start, here = following.popitem()
+        loop = [start]
+        while here != start:
+            loop.append(here)
+            here = following.pop(here)
+        loops.append(np.array(loop))
+    return loops
 
 
 def across_edges(faces: Indices, count: int) -> Indices:
