@@ -17,7 +17,10 @@ def render(
         str | None, typer.Option(help="none, design, additional or another of the case's.")
     ] = None,
     design: Annotated[
-        str | None, typer.Option(help="unbraced, initial, unloaded, optimised, rounded or polished.")
+        str | None,
+        typer.Option(
+            help="best (the one to build), unbraced, initial, unloaded, optimised, rounded or polished."
+        ),
     ] = None,
     quantity: Annotated[
         str | None,
@@ -54,19 +57,21 @@ def render(
     from shellform.run.figures import draw_designs, wish
     from shellform.run.folder import read_run
 
+    found = read_run(run)
     asked = wish(
-        design=design, load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods,
+        design=found.best if design == "best" else design,
+        load=load, quantity=quantity, limit=limit, view=view, size=size, thickness=rods,
         transparent=transparent,
         kind=kind, film=film,
         force_limit=force_limit, width_mm=width_mm, dpi=dpi, font_size=font_size,
     )  # fmt: skip
     if film is None:
-        files = draw_designs(read_run(run), asked)
+        files = draw_designs(found, asked)
     else:
         from shellform.run.films import draw_film
 
         report = Spinner(quiet=quiet)
-        files = draw_film(read_run(run), film, asked, report=report)
+        files = draw_film(found, film, asked, report=report)
         report.close()
     for file in () if quiet else files:
         print(file)

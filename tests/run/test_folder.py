@@ -225,7 +225,7 @@ def test_without_opengl_one_line_names_the_packages_and_everything_else_is_made(
     assert refused.returncode == 2
     assert "apt-get install libegl1" in refused.stderr
     lines = shellform_process(
-        "render", copy, "--design", "initial", "--load", "design", "--format", "svg", env=WITHOUT
+        "render", copy, "--design", "best", "--load", "design", "--format", "svg", env=WITHOUT
     )
     assert lines.returncode == 0, lines.stderr
     assert (copy / "figures/initial-design.svg").is_file()
