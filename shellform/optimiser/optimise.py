@@ -4,8 +4,8 @@ Svanberg's method of moving asymptotes (1987, 2002) replaces a problem by a sequ
 solved exactly. Directly in the rest lengths (moving_asymptotes.py) it finds as good a fit with as few cables
 in tension, but knows nothing of what holds the shell up: without its slack cables the design collapses
 (README, "What was tried"). Here each convex problem is the model in tensions (step_model.py), exact in first
-order and with Gauss-Newton curvature; NLopt's MMA solves it within a window round the present design
-(proposal.py), and the trial is then evaluated by its true equilibria (trials.py, phases.py):
+order and with Gauss-Newton curvature; interior points and NLopt's MMA solve it within a window round the present
+design (proposal.py), and the trial is then evaluated by its true equilibria (trials.py, phases.py):
 
 - it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
 - a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
@@ -14,14 +14,15 @@ order and with Gauss-Newton curvature; NLopt's MMA solves it within a window rou
   their branch;
 - a start that doesn't bear the further loads climbs first: steps along the gradient of that stiffness carry its stable branch up to them;
 - where no better design is found cables are kept taut under the further loads (guards.py), and free again in turns;
-- then cables that the shell can do without are taken away in batches, the others kept taut.
+- then, with half of the evaluations at least, cables that the shell can do without are taken away in batches, the others kept
+  taut.
 
 Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures,
 the same for each (trial_structures.py): after the descent, and each time cables have been taken away, before
 the others are optimised again: that serves the objective with what makes a design stand. From then on the
 stiffness is no limit but a means. A design that falls is asked for more of it, and steps towards that follow,
-until it stands; where one with less than was asked for stands, thinning goes on from there. Where that
-leads to none after the descent, the structures that fall are kept in mind and lead it (minding.py). Where no
+until it stands; where one with less than was asked for stands, thinning goes on from there. After the descent an
+earlier design that stands is as good where that way costs more; where it leads to none, the structures that fall are kept in mind and lead it (minding.py). Where no
 design near one that falls stands, the search goes back to the last one that does, or takes fewer cables away. At the
 end a fresh sample judges, for the search has chosen its designs by their luck with the first one. The cables
 that are left keep a tension that errors don't use up.

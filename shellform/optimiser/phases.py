@@ -61,12 +61,9 @@ def run(search: Search, it: Iterate) -> Iterate:
     if it.phase == "climb":
         it = replace(_climb(search, it), phase="descend")
     if it.phase == "descend":
-        it = last_sound(search, _descend(search, it))
-        each_cable = search.evaluator.blocks.each_cable is not None
-        if it.accepted and search.solver.thin and each_cable:
-            it = _stiffened(search, it)
-        else:
-            it = last_standing(search, it)
+        thins = search.solver.thin and search.evaluator.blocks.each_cable is not None
+        it = last_sound(search, _descend(search, it, least=search.evaluations // 2 if thins else 0))
+        it = _stiffened(search, it) if it.accepted and thins else last_standing(search, it)
     if it.phase == "lead":
         it = _led(looking_closer(search), it)
     if it.phase == "thin":
@@ -102,11 +99,12 @@ def _climb(search: Search, it: Iterate) -> Iterate:
     return replace(it, window=search.first_window, guarded=search.always_guarded, climbing=False)
 
 
-def _descend(search: Search, it: Iterate) -> Iterate:
+def _descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
     """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none
-    may; and so in turns as long as a turn improves the objective."""
+    may; and so in turns as long as a turn improves the objective. A design that keeps every limit leaves the
+    `least` of the evaluations to what comes next."""
     solver = search.solver
-    while search.left() > 0:
+    while search.left() > (least if it.stage == 1.0 and violation(search, it.point) <= 0.0 else 0):
         tell(search, it)
         model = search.models.at(it.point)
         y, predicted = propose(task(search, it, model))
@@ -151,17 +149,23 @@ def _settled(search: Search, it: Iterate, predicted: float) -> str:
 
 
 def _stiffened(search: Search, it: Iterate) -> Iterate:
-    """Ready to thin at a design with as much stiffness as makes it stand as built: the objective alone leaves
-    no more than it has to. Where there is none near it, at the last one that stands, with what it has."""
+    """Ready to thin at a design with as much stiffness as makes it stand as built, since the objective alone
+    leaves no more than it has to; or at the last one that stands, with what it has, where that is better or there
+    is no other near it."""
     begun = _ready_to_thin(search, it)
     if search.asked is None:
         return begun
     tensioned = replace(begun, tensioned=_tensioned(search, it))
     found, other = _made_to_stand(search, tensioned, it.point, budget=np.inf)
-    if found is not None:
+    if found is not None and found.objective <= it.point.objective:
         return _ready_to_thin(search, accepted(search, other, found))
     fell = it.accepted[-1].built
     it = last_standing(search, replace(it, fallen=other.fallen))
+    if found is not None:  # the way to more stiffness, or the way back: which costs less
+        budget = search.solver.thrift * found.objective
+        if it.accepted and it.point.objective < budget and violation(search, it.point) <= 0.0:
+            return _ready_as_it_is(search, it)
+        return _ready_to_thin(search, accepted(search, other, found))
     leading = ready_to_lead(search, it, fell) if it.accepted else None
     return leading or _ready_as_it_is(search, it)
 

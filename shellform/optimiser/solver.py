@@ -2,8 +2,8 @@
 
 Each round replaces the problem by a convex model round the present design (step_model.py), exact in first
 order and with Gauss-Newton curvature, solves it within a window, and evaluates the trial by its true
-equilibria. Where no constraint asks for many rows NLopt's MMA solves the model, else CVXOPT's interior-point
-method (proposal.py).
+equilibria. CVXOPT's interior-point method solves the model, and where no constraint asks for many rows NLopt's
+MMA goes on from there (proposal.py).
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class SequentialConvex:
     The step's problem:
     - `many`: cables, beyond which its answers come by solves of their own instead of dense matrices: of 1,646
       those take seven times as long already.
-    - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA.
+    - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA to go on from the interior points' answer.
     """
 
     window: float = 0.2
@@ -106,7 +106,7 @@ class SequentialConvex:
     softer: float = 0.95
 
     many: int = 2000
-    model_evaluations: int = 2000
+    model_evaluations: int = 200
 
     def __post_init__(self) -> None:
         for each in fields(self):

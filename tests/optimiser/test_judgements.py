@@ -136,6 +136,36 @@ def test_the_window_grows_where_the_model_was_right_and_shrinks_where_it_was_wro
     assert not found.refused
 
 
+def test_a_descent_leaves_evaluations_to_what_comes_next_once_it_keeps_every_limit(bare):
+    bare.trials = [Point(0.9 - 0.01 * k) for k in range(10)]
+    found = phases._descend(searching(10), standing_at(Point(1.0)), least=4)
+    assert len(bare.taken) == 6
+    assert found.point.objective == pytest.approx(0.85)
+    broken = np.array([0.2])
+    bare.taken, bare.trials = [], [Point(0.9, constraints=broken), *(Point(0.8 - 0.01 * k) for k in range(9))]
+    phases._descend(searching(5), standing_at(Point(1.0, constraints=broken)), least=5)
+    assert len(bare.taken) == 2  # as long as a limit is broken it goes on
+
+
+@pytest.mark.parametrize(("earlier", "ready"), [(0.99, "as it is"), (1.15, "stiffened"), (None, "stiffened")])
+def test_the_way_back_to_a_design_that_stands_is_taken_where_it_costs_less_than_more_stiffness(
+    bare, monkeypatch, earlier, ready
+):
+    there, last = Point(1.0, "stiffer"), Point(0.5, "last")
+    it = standing_at(last, accepted=(SimpleNamespace(built=None),))
+    back = replace(it, point=Point(earlier or 0.0), accepted=it.accepted if earlier else ())
+    monkeypatch.setattr(phases, "_ready_to_thin", lambda search, it: (it.point, "stiffened"))
+    monkeypatch.setattr(phases, "_ready_as_it_is", lambda search, it: (it.point, "as it is"))
+    monkeypatch.setattr(phases, "_tensioned", lambda *_: it.tensioned)
+    monkeypatch.setattr(phases, "_made_to_stand", lambda *_, **__: (there, it))
+    monkeypatch.setattr(phases, "last_standing", lambda *_: back)
+    monkeypatch.setattr(
+        phases, "replace", lambda of, **changes: of if isinstance(of, tuple) else replace(of, **changes)
+    )
+    found = phases._stiffened(searching(asked=object()), it)
+    assert found == ((back if ready == "as it is" else replace(it, point=there)).point, ready)
+
+
 def test_a_search_has_settled_where_little_is_predicted_or_the_window_is_smallest():
     search = searching(solver=sf.SequentialConvex())
 

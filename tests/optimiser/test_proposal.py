@@ -1,0 +1,70 @@
+"""The convex problem of a step comes to its optimum, in windows however wide."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from shellform.optimiser import proposal
+from shellform.optimiser.optimise import begin
+from shellform.optimiser.proposal import propose
+from shellform.optimiser.solver import SequentialConvex
+from shellform.optimiser.trials import task
+from tests.problems import misfit_and_force
+
+WIDE = 5.0  # mean tensions
+
+
+@pytest.fixture(scope="module")
+def searching(dome):
+    problem = misfit_and_force(dome, 2.0, most=200.0, rms=None)
+    return begin(problem, dome.design(), SequentialConvex(window=WIDE), lambda softest: 0.0, 10)
+
+
+def asked(monkeypatch, searching):
+    """What a step's problem is, and the proposed step with the change of the objective that it predicts."""
+    told = []
+    from_there = proposal._from_there
+
+    def noted(evaluate, start, low, high, evaluations):
+        told.append((evaluate, start, low, high))
+        return from_there(evaluate, start, low, high, evaluations)
+
+    monkeypatch.setattr(proposal, "_from_there", noted)
+    search, it = searching
+    found = propose(task(search, it, search.models.at(it.point)))
+    return told[0], found
+
+
+def test_a_wide_window_s_problem_is_solved_to_its_optimum(monkeypatch, searching):
+    (evaluate, start, low, high), (_, predicted) = asked(monkeypatch, searching)
+    other = minimize(
+        lambda u: evaluate(u)[:2],
+        np.zeros(len(start)),
+        jac=True,
+        method="L-BFGS-B",
+        bounds=np.column_stack([low, high]),
+        options={"maxiter": 20_000, "maxfun": 40_000, "ftol": 1e-15, "gtol": 1e-12},
+    )
+    assert (evaluate(other.x)[2] <= 0.0).all()  # no constraint holds it back, as no bound on it says
+    assert predicted <= other.fun + 1e-6
+    count = len(evaluate(start)[2])
+    middle, _ = proposal.minimise(
+        evaluate, np.zeros(len(start)), low, high, constraints=count, evaluations=2000, tolerance=1e-9
+    )
+    assert evaluate(middle)[0] > 0.95 * predicted  # which MMA alone doesn't come to
+
+
+def test_mma_s_answer_counts_only_where_it_is_lower_and_keeps_the_constraints(monkeypatch, searching):
+    (evaluate, start, low, high), _ = asked(monkeypatch, searching)
+    worse = np.clip(start + 0.01, low, high)
+    assert evaluate(worse)[0] > evaluate(start)[0]
+    monkeypatch.setattr(proposal, "minimise", lambda *_, **__: (worse, "told"))
+    np.testing.assert_array_equal(proposal._from_there(evaluate, start, low, high, 10), start)
+
+    def one(u):
+        return float(u[0]), np.array([1.0]), np.array([0.5 - u[0]]), np.array([[-1.0]])
+
+    here, bounds = np.array([0.8]), (np.zeros(1), np.ones(1))
+    for there, kept in ((0.5, True), (0.4, False), (0.9, False)):
+        monkeypatch.setattr(proposal, "minimise", lambda *_, u=there, **__: (np.array([u]), "told"))
+        assert proposal._from_there(one, here, *bounds, 10)[0] == (there if kept else 0.8)
