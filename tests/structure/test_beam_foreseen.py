@@ -35,8 +35,10 @@ def test_foreseen_deformations_are_right_to_first_order(shell):
         assert half / one == pytest.approx(np.full(7, 0.25), rel=0.1)
 
 
-def test_the_tangent_of_the_state_s_own_deformations_is_the_state_s_tangent(shell):
-    assembly, state = assemble(shell.network(shell.design(rest_ratio=0.95))), bent(shell, 0)
+@pytest.mark.parametrize("braced", [True, False])
+def test_the_tangent_of_the_state_s_own_deformations_is_the_state_s_tangent(shell, braced):
+    design = shell.design(rest_ratio=0.95) if braced else shell.unbraced()
+    assembly, state = assemble(shell.network(design)), bent(shell, 0)
     still = assembly.foreseen(state, np.zeros((shell.node_count, 6)))
     expected = assembly.evaluate(state).tangent
     assert assembly.tangent_of(state, still) == pytest.approx(expected, rel=1e-9, abs=1e-9 * expected.max())

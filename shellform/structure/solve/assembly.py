@@ -135,10 +135,13 @@ class Assembly:
         began = time.perf_counter()
         given = iter(deformations)
         for part, dofs, (first, last) in zip(self.parts, self._dofs, self._shares, strict=True):
+            own = next(given) if isinstance(part, Beams) else None
+            if not len(dofs):
+                continue
             block = self._entries[first:last].reshape(len(dofs), -1)
-            if isinstance(part, Beams):
-                part.tangent_of(state, next(given), block)
-            elif len(dofs):
+            if isinstance(part, Beams) and own is not None:
+                part.tangent_of(state, own, block)
+            else:
                 part.evaluate(state, tangent=True, into=block)
         values = self._gathered()
         self.clock["assembly"] += time.perf_counter() - began
