@@ -38,8 +38,8 @@ FAR = 0.05  # of the span from the perfect structure
 STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps
 MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
-_RELAXING = 15  # of the unloaded state, before it is sought from the target instead
-_RELAXATIONS = 150  # factorisations of a relaxation from the target: what takes more has none
+_RELAXING = 15  # of the unloaded state, before it is relaxed instead
+_RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none
 
 
 @dataclass(frozen=True)
@@ -165,13 +165,16 @@ class Loading(Branch):
         found = self.newton(begin, none, limit=_RELAXING, tolerance=ON_THE_WAY, foreseen=foreseen)
         if found is not None:
             return found
-        try:
-            relaxed = find_equilibrium(self.assembly, moved(nominal.start, offset), none, limit=_RELAXATIONS)
-        except NotConverged as error:
-            self.spent += error.iterations
-            return None
-        self.spent += relaxed.factorisations
-        return self.newton(relaxed.state, none, limit=2, tolerance=ON_THE_WAY)
+        # By small steps then, from where the errors took the perfect structure, or if that fails from the target.
+        for near in (begin, moved(nominal.start, offset)):
+            try:
+                relaxed = find_equilibrium(self.assembly, near, none, limit=_RELAXATIONS)
+            except NotConverged as error:
+                self.spent += error.iterations
+                continue
+            self.spent += relaxed.factorisations
+            return self.newton(relaxed.state, none, limit=2, tolerance=ON_THE_WAY)
+        return None
 
     def _as_perfect(self, start: State, turned: float, change: Reals) -> Foreseen:
         """The deformations that a step by the perfect structure's tangent leads to: elements take on the forces

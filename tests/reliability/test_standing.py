@@ -177,3 +177,19 @@ def test_an_iteration_with_foreseen_deformations_ends_where_one_with_the_state_s
         assert one.factorisations <= other.factorisations
         if one.stands:
             assert one.state.positions == pytest.approx(other.state.positions, abs=1e-8)
+
+
+def test_a_structure_whose_first_tangent_is_indefinite_is_relaxed_to_the_same_state(nominal, monkeypatch):
+    errors = drawn(nominal, LARGE, 3)
+    workshop = Workshop(nominal)
+    expected = workshop.load(errors)
+    real = Branch.newton
+    monkeypatch.setattr(
+        Branch,
+        "newton",
+        lambda self, *given, **named: real(self, *given, **named) if named["limit"] < 15 else None,
+    )
+    found = workshop.load(errors)
+    assert found.factorisations > expected.factorisations
+    assert found.stands == expected.stands
+    assert found.state.positions == pytest.approx(expected.state.positions, abs=1e-8)
