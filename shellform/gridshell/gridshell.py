@@ -24,6 +24,7 @@ from shellform.structure.network import Network
 from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.target import Surface
 
+_RADII = 8  # whose beams are kept
 _SAMPLES = (0.25, 0.5, 0.75)  # where along a cable its height over the surface is taken
 
 
@@ -162,6 +163,7 @@ class Gridshell:
     cable_lengths: Reals = field(init=False)
     _edges: Beams | None = field(init=False, repr=False, compare=False)
     _locks: Beams | None = field(init=False, repr=False, compare=False)
+    _made: dict[float, Beams] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         place = self.net.target.positions[self.cable_ends]
@@ -171,6 +173,7 @@ class Gridshell:
         )
         object.__setattr__(self, "_edges", edge_beams(self.net, self.edge))
         object.__setattr__(self, "_locks", locks(self.net, self.rod.section, self.target))
+        object.__setattr__(self, "_made", {})
 
     def __repr__(self) -> str:
         return (
@@ -213,8 +216,17 @@ class Gridshell:
 
     def beams(self, radius: float) -> Beams:
         """Rods of the radius, m, and connectors; what locks rods in two layers; then edge beams and their
-        clamps, whatever the radius.
+        clamps, whatever the radius. The same for the same radius, made once: one evaluation asks a dozen times.
         """
+        made = self._made.get(radius)
+        if made is None:
+            made = self._beams(radius)
+            if len(self._made) >= _RADII:
+                self._made.clear()
+            self._made[radius] = made
+        return made
+
+    def _beams(self, radius: float) -> Beams:
         own = grid_beams(self.net.grid, self.rod.resized(radius).stiffness, self.joint.stiffness)
         if self._locks is not None:
             larger = (radius / self.rod.radius) ** 4

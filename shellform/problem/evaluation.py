@@ -222,6 +222,7 @@ class Evaluator:
                 design,
                 states[name or self.base],
                 self.load(name or self.base, stage),
+                assembly,
             )
             measurements = [measured(terms[k], at) for k in own]
             total = _chained(measurements, at, assembly if name else None, blocks.moves_radius)

@@ -19,17 +19,24 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.elements.state import State
+from shellform.structure.network import assemble
+from shellform.structure.solve.assembly import Assembly
 
 
 @dataclass(frozen=True)
 class LoadedDesign:
     """What a term is taken of: a `design` of the `shell` in its equilibrium `state` under the dead `load`
-    (n, 6), N and Nm."""
+    (n, 6), N and Nm; `assembly` of the design's network where whoever measures has it."""
 
     shell: Gridshell
     design: Design
     state: State
     load: Reals
+    assembly: Assembly | None = None
+
+    def assembled(self) -> Assembly:
+        """The assembly of the design's network."""
+        return self.assembly or assemble(self.shell.network(self.design))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ _PATIENCE = 10  # factorisations of one step
 _FAR_OFF = 5.0  # rad, a step that leads nowhere
 
 Report = Callable[[float, State], None]
+Foreseen = tuple[Reals, ...] | None  # deformations of each part of beams
 
 
 @dataclass(frozen=True)
@@ -75,52 +76,80 @@ class Branch:
     def step(self, here: Here, goal: float, *, last: bool) -> Here | None:
         """From a state on the branch to the load factor `goal`."""
         load = goal * self.load
-        change = self._solved(here, load)
+        change = self._solved(here.factor, here.balance, load)
         if change is None:
             return None
         begin = moved(here.state, self.assembly.chords.corrected(here.state, change))
         tolerance = TOLERANCE if last else ON_THE_WAY
-        found = self.newton(begin, load, limit=_PATIENCE, tolerance=tolerance)
+        foreseen = self.foreseen(here.state, here.balance.turned, change)
+        found = self.newton(begin, load, limit=_PATIENCE, tolerance=tolerance, foreseen=foreseen)
         if found is None:
             return None
         stray = float(np.abs(found.state.positions - begin.positions).max())
         return found if stray <= STRAY * self.span else None
 
-    def newton(self, begin: State, load: Reals, *, limit: int, tolerance: float) -> Here | None:
-        """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent positive
-        definite, the last one included; None where one isn't. Where rounding leaves more than the tolerance,
-        what it leaves counts as none as far as it would on the way."""
-        own, state, before = self.assembly, begin, np.inf
+    def newton(
+        self, begin: State, load: Reals, *, limit: int, tolerance: float, foreseen: Foreseen = None
+    ) -> Here | None:
+        """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent that is made
+        positive definite, that of the equilibrium included; None where one isn't. Where rounding leaves more than
+        the tolerance, what it leaves counts as none as far as it would on the way. Tangents on the way are those of
+        the deformations that were `foreseen`, by the step that led to `begin` and then by each one
+        (Assembly.tangent_of); the equilibrium's is its own."""
+        own, state, before, factor = self.assembly, begin, np.inf, None
         for _ in range(limit):
-            here = self.at(state)
-            if here is None:
-                return None
-            residual = self.measure.residual(here.balance, load)
-            noise = self.measure.rounding(here.balance, state, load) if residual > STAGNANT * before else 0.0
-            if residual <= max(tolerance, min(noise, ON_THE_WAY)):
-                return here
+            balance = own.evaluate(state, tangent=False)
+            residual = self.measure.residual(balance, load)
+            if residual <= tolerance:
+                return self.at(state)
+            # A step that has brought so much brings as much again with the tangent that it was made with.
+            if factor is None or residual * (residual / before) > tolerance:
+                balance = replace(balance, tangent=self._tangent(state, balance, foreseen))
+                noise = self.measure.rounding(balance, state, load) if residual > STAGNANT * before else 0.0
+                if residual <= min(noise, ON_THE_WAY):
+                    return self.at(state)
+                factor = self._factor(balance)
             before = residual
-            change = self._solved(here, load)
+            change = None if factor is None else self._solved(factor, balance, load)
             if change is None:
                 return None
-            state = moved(state, own.chords.corrected(state, change))
+            foreseen = self.foreseen(state, balance.turned, change)
+            state = moved(state, change)
         return None
+
+    def foreseen(self, state: State, turned: float, change: Reals) -> Foreseen:
+        """The deformations to which a step (n, 6) leads by its linear system; None where they aren't known: where
+        a beam is turned far, or coordinates have twice the digits."""
+        if turned > 0.0 or state.tail is not None:
+            return None
+        return self.assembly.foreseen(state, change)
+
+    def _tangent(self, state: State, balance: Balance, foreseen: Foreseen) -> Reals:
+        if foreseen is None or balance.turned > 0.0:
+            values = self.assembly.evaluate(state).tangent
+            assert values is not None
+            return values
+        return self.assembly.tangent_of(state, foreseen)
 
     def at(self, state: State) -> Here | None:
         """The state with its tangent's factor; None where that isn't positive definite."""
         balance = self.assembly.evaluate(state)
+        factor = self._factor(balance)
+        return None if factor is None else Here(state, balance, factor)
+
+    def _factor(self, balance: Balance) -> Factor | None:
+        """Of the balance's tangent; None where it isn't positive definite."""
         self.spent += 1
         try:
-            factor = self.assembly.matrix.factor(held(self.assembly, balance))
+            return self.assembly.matrix.factor(held(self.assembly, balance))
         except NotPositiveDefinite:
             return None
-        return Here(state, balance, factor)
 
-    def _solved(self, here: Here, load: Reals) -> Reals | None:
+    def _solved(self, factor: Factor, balance: Balance, load: Reals) -> Reals | None:
         """Newton's step (n, 6), no spin beyond TURN; None where it leads nowhere."""
         step = np.zeros(6 * self.assembly.count)
         free = self.assembly.free
-        step[free] = here.factor.solve((load - here.balance.force).ravel()[free])
+        step[free] = factor.solve((load - balance.force).ravel()[free])
         change = step.reshape(-1, 6)
         spin = float(np.abs(change[:, 3:]).max())
         if not spin <= _FAR_OFF:

@@ -125,10 +125,8 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
         own = t.marks * z["marks"][first : first + len(rod.marks)]
         first += len(rod.marks)
         nominal = members.beam_length[rod.elements]
-        for i, (begin, end) in enumerate(zip(rod.marks[:-1], rod.marks[1:], strict=True)):
-            segment = nominal[begin:end]
-            longer = (own[i + 1] - own[i]) / segment.sum()
-            length[rod.elements[begin:end]] = max(longer, _LEAST - 1.0) * segment
+        longer = np.diff(own) / np.add.reduceat(nominal, rod.marks[:-1])
+        length[rod.elements] = np.repeat(np.maximum(longer, _LEAST - 1.0), np.diff(rod.marks)) * nominal
         stiffness[rod.elements] = stiffness[rod.locks] = np.exp(t.rod_stiffness * z["rod_stiffness"][k])
         bow = 8.0 * t.rod_bow / float(nominal.sum()) * z["rod_bow"][2 * k : 2 * k + 2]
         # An element that runs against the rod has its local y axis turned round and goes the other way.

@@ -8,6 +8,7 @@ straight in the stress-free state, marked where something else touches them.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -48,7 +49,7 @@ class Members:
     places: Reals
     beam_length: Reals
 
-    @property
+    @cached_property
     def span(self) -> float:
         """The longest side, m, of the box round the target."""
         return float(np.ptp(self.places, axis=0).max())

@@ -11,8 +11,9 @@ from typing import cast
 
 import numpy as np
 
+from shellform.arrays import Reals
 from shellform.errors import NotConverged
-from shellform.reliability.branch import ON_THE_WAY, Branch, Here
+from shellform.reliability.branch import ON_THE_WAY, Branch, Foreseen, Here
 from shellform.reliability.drawing import (
     Errors,
     built_beams,
@@ -37,9 +38,8 @@ FAR = 0.05  # of the span from the perfect structure
 STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps
 MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
-_RELAXING = 15  # of the unloaded state, before it is sought from the target instead
-_RELAXATIONS = 150  # factorisations of a relaxation from the target: what takes more has none
-_PASSES = 2  # of bringing beams to their length
+_RELAXING = 15  # of the unloaded state, before it is relaxed instead
+_RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none
 
 
 @dataclass(frozen=True)
@@ -151,44 +151,39 @@ class Loading(Branch):
         moved."""
         nominal, none = self.nominal, np.zeros_like(self.load)
         start, offset = nominal.unloaded, self.errors.supports
-        pull = -self.assembly.evaluate(start, tangent=False).force
+        balance = self.assembly.evaluate(start, tangent=False)
+        pull = -balance.force
         if offset.any():
             pull -= self.bench.assembly.force_along(start, offset)
         step = offset.ravel().copy()
         free = self.assembly.free
         if self.bench.unloaded is not None:
             step[free] = self.bench.unloaded.solve(pull.ravel()[free])
-        begin = moved(start, self.assembly.chords.corrected(start, step.reshape(-1, 6)))
-        begin = self._to_length(begin)
-        found = self.newton(begin, none, limit=_RELAXING, tolerance=ON_THE_WAY)
+        change = step.reshape(-1, 6)
+        begin = moved(start, self.assembly.chords.corrected(start, change))
+        foreseen = self._as_perfect(start, balance.turned, change)
+        found = self.newton(begin, none, limit=_RELAXING, tolerance=ON_THE_WAY, foreseen=foreseen)
         if found is not None:
             return found
-        try:
-            relaxed = find_equilibrium(self.assembly, moved(nominal.start, offset), none, limit=_RELAXATIONS)
-        except NotConverged as error:
-            self.spent += error.iterations
-            return None
-        self.spent += relaxed.factorisations
-        return self.newton(relaxed.state, none, limit=2, tolerance=ON_THE_WAY)
+        # By small steps then, from where the errors took the perfect structure, or if that fails from the target.
+        for near in (begin, moved(nominal.start, offset)):
+            try:
+                relaxed = find_equilibrium(self.assembly, near, none, limit=_RELAXATIONS)
+            except NotConverged as error:
+                self.spent += error.iterations
+                continue
+            self.spent += relaxed.factorisations
+            return self.newton(relaxed.state, none, limit=2, tolerance=ON_THE_WAY)
+        return None
 
-    def _to_length(self, state: State) -> State:
-        """The state with its nodes moved so that the beams have the perfect structure's axial strains: rods
-        are so stiff along their axis that what a linear motion leaves would buckle them. The nearest motion
-        in the sense of least squares weighted by EA / l0, as in chords.py."""
-        beams = self.nominal.network.beams
-        rest = cast(Beams, self.assembly.parts[0]).rest_length
-        a, b = beams.ends.T
-        before = self.nominal.unloaded.positions
-        goal = rest / beams.rest_length * np.linalg.norm(before[b] - before[a], axis=1)
-        positions = state.positions.copy()
-        chords = self.assembly.chords
-        for _ in range(_PASSES):
-            along = positions[b] - positions[a]
-            length = np.linalg.norm(along, axis=1)
-            pull = (chords.weight * (goal - length) / length)[:, None] * along
-            right = np.zeros_like(positions)
-            np.add.at(right, b, pull)
-            np.add.at(right, a, -pull)
-            for nodes, group, factor in chords.axes:
-                positions[np.ix_(nodes, group)] += factor.solve(right[np.ix_(nodes, group)])
-        return State(positions, state.quaternions)
+    def _as_perfect(self, start: State, turned: float, change: Reals) -> Foreseen:
+        """The deformations that a step by the perfect structure's tangent leads to: elements take on the forces
+        that its own would."""
+        still = self.foreseen(start, turned, np.zeros_like(change))
+        moved_on = self.foreseen(start, turned, change)
+        if still is None or moved_on is None:
+            return None
+        (before,), (after,), beams = still, moved_on, self.nominal.network.beams
+        own = cast(Beams, self.assembly.parts[0])
+        softer = own.rest_length / beams.rest_length / self.errors.beam_stiffness
+        return (before + softer[:, None] * (after - before),)

@@ -23,7 +23,8 @@ from shellform.structure.network import Network, assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.loading import SMALLEST
 
-_NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structure's path to the next
+NOMINAL_STEP = 0.125  # of the load, from one kept state of the perfect structure's path to the next
+TO_ITS_END = 0.5  # the same where only the last one is asked for
 
 
 @dataclass(frozen=True)
@@ -52,15 +53,24 @@ class Perfect:
 
 
 def perfect(
-    shell: Gridshell, design: Design, load: Reals, *, shapes: int = SHAPES, followed: bool = True
+    shell: Gridshell,
+    design: Design,
+    load: Reals,
+    *,
+    shapes: int = SHAPES,
+    followed: bool = True,
+    step: float = NOMINAL_STEP,
 ) -> Perfect:
-    """The perfect structure of a design and its path under the dead `load` (n, 6), unless that isn't to be
-    `followed`: drawn structures begin at its unloaded state. Raises NotConverged where there is none."""
+    """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it,
+    unless that isn't to be `followed`: drawn structures begin at its unloaded state. Raises NotConverged where
+    there is none."""
     network, present = shell.network(design), np.asarray(design.present)
-    return _perfect(network, members_of(shell), present, load, shell.target, shapes, followed)
+    return _perfect(
+        network, members_of(shell), present, load, shell.target, shapes, step if followed else 0.0
+    )
 
 
-def perfect_of(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
+def perfect_of(model: Model, load: str, *, shapes: int = SHAPES, step: float = NOMINAL_STEP) -> Perfect:
     """The same of a model file and one of its load cases. Raises InputError for an unknown one."""
     if load not in model.loads:
         raise InputError(
@@ -81,7 +91,7 @@ def perfect_of(model: Model, load: str, *, shapes: int = SHAPES) -> Perfect:
     positions[fixed] = (network.nodes + network.imposed[:, :3])[fixed]
     every = np.ones(len(network.cables.ends), dtype=bool)
     start = State(positions, model.start.quaternions)
-    return _perfect(network, members, every, model.loads[load], start, shapes, followed=True)
+    return _perfect(network, members, every, model.loads[load], start, shapes, step)
 
 
 def _perfect(
@@ -91,18 +101,18 @@ def _perfect(
     load: Reals,
     target: State,
     shapes: int,
-    followed: bool,
+    step: float,
 ) -> Perfect:
     assembly = assemble(network)
     none = np.zeros_like(load)
     unloaded = find_equilibrium(assembly, target, none)
     kept: list[tuple[float, State]] = [(0.0, unloaded.state)]
     branch = Branch(assembly, load, members.span)
-    here = branch.at(unloaded.state) if followed else None
+    here = branch.at(unloaded.state) if step > 0.0 else None
     reached = 0.0
     if here is not None:
         _, reached = branch.along(
-            here, 0.0, 1.0, _NOMINAL_STEP, SMALLEST, lambda factor, state: kept.append((factor, state))
+            here, 0.0, 1.0, step, SMALLEST, lambda factor, state: kept.append((factor, state))
         )
     soft = modes(assembly, kept[-1][1], shapes).shapes if shapes else np.zeros((0, *load.shape))
     return Perfect(

@@ -29,7 +29,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.model import Model
 from shellform.structure.network import Network
 
-_STEP = 0.125  # of the load, towards the critical factor
+_STEP = 0.25  # of the load, towards the critical factor
 _RESOLUTION = 1e-4  # of the load factor
 
 
@@ -130,7 +130,7 @@ def _chosen(beams: Beams, chosen: Indices) -> Beams:
 
 
 def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
-    nominal = perfect_of(model, load, shapes=0)
+    nominal = perfect_of(model, load, shapes=0, step=_STEP)
     workshop = Workshop(nominal)
     members = members_of_model(model)
     none = drawn(members, Tolerances(), 0, PERFECT)

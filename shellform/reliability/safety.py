@@ -20,7 +20,7 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import Limit
-from shellform.reliability.perfect import perfect, perfect_of
+from shellform.reliability.perfect import TO_ITS_END, perfect, perfect_of
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
 from shellform.reliability.refinement import rods_halved
 from shellform.reliability.standing import Workshop
@@ -136,7 +136,7 @@ def judge(
     found: dict[str, UnderLoad] = {}
     failed = []
     for largest, shares in paths(loads).items():
-        workshop = Workshop(perfect(shell, design, loads[largest]))
+        workshop = Workshop(perfect(shell, design, loads[largest], step=TO_ITS_END))
         outcomes = workshop.drawn(
             safety.tolerances,
             seed=safety.seed,
@@ -179,10 +179,11 @@ def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: fl
     `sought`; 0 where the finer mesh has no unloaded equilibrium."""
     supports = tuple(int(node) for node in shell.net.supports)
     model = rods_halved(Model(shell.network(design), {"load": load}, shell.target, supports))
-    nominal = perfect_of(model, "load", shapes=0)
+    nominal = perfect_of(model, "load", shapes=0, step=_STEP)
     members = members_of_model(model)
     none = drawn(members, Tolerances(), 0, PERFECT)
-    return Workshop(nominal).limit(none, most=sought, step=_STEP, resolution=_RESOLUTION)
+    begin = min(float(nominal.factors[-1]), sought), nominal.states[-1]
+    return Workshop(nominal).limit(none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=begin)
 
 
 def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:

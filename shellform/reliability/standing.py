@@ -2,9 +2,10 @@
 
 A structure is relaxed without load from where the perfect one rests, and then loaded (path_of_one.py), with the
 whole load at first. A step (branch.py) begins along the tangent of the path, whose factor is at hand, and goes
-on by whole steps of Newton's. It counts only where every tangent on the way is positive definite and no node
-lands farther than `STRAY` of the span from where the path's tangent led; else it is halved, as on any path. So
-the large steps lead along the same branch as small ones do.
+on by whole steps of Newton's, in a mixed form: stresses are unknowns of their own, which halves the number of
+steps of slender rods. It counts only where every tangent that is made on the way is positive definite, the one at
+its end among them, and no node lands farther than `STRAY` of the span from where the path's tangent led; else it is
+halved, as on any path. So the large steps lead along the same branch as small ones do.
 
 A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther
 than `FAR` of the span from the perfect structure's; one that loses stability on the way has fallen, whatever

@@ -23,9 +23,8 @@ from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import PERFECT, drawn
-from shellform.reliability.members import Members
 from shellform.reliability.path_of_one import STEP
-from shellform.reliability.perfect import perfect
+from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import Safety, allowed, critical_on_halved, paths
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.threads import side_by_side
@@ -161,27 +160,29 @@ def tried(
     larger = enlarged(safety.tolerances, safety.enlarged)
     kept = True
     for largest, shares in paths(asked.loads).items():
-        nominal = perfect(shell, design, asked.loads[largest])
+        nominal = perfect(shell, design, asked.loads[largest], step=TO_ITS_END)
         workshop = Workshop(nominal)
-        members = nominal.members
         wanted = _critical(asked, shares) if critical else 0.0
 
         def one(
             number: int,
-            members: Members = members,
+            nominal: Perfect = nominal,
             workshop: Workshop = workshop,
             wanted: float = wanted,
             shares: Mapping[str, float] = shares,
         ) -> tuple[float, int]:
             """The share of the largest load that a structure bears."""
-            most = wanted if number == PERFECT else 1.0
-            errors = drawn(members, larger, safety.seed + SEED, number)
+            most, begin = 1.0, None
+            if number == PERFECT:  # whose path is known so far
+                most, begin = wanted, (min(float(nominal.factors[-1]), wanted), nominal.states[-1])
+            errors = drawn(nominal.members, larger, safety.seed + SEED, number)
             found = workshop.limit(
                 errors,
                 most=most,
                 step=STEP,
                 resolution=_RESOLUTION,
                 tell=False,
+                begin=begin,
                 marks=tuple(shares.values()),
             )
             return found.factor, found.factorisations

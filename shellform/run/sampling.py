@@ -15,7 +15,7 @@ from shellform.compiled import clock_without_compiling
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.records.drawn import DrawnPath, read_drawn, write_drawn
-from shellform.reliability.perfect import perfect
+from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
 
@@ -70,7 +70,7 @@ def drawn_of(
     while len(path.factors) < count:
         began = clock_without_compiling()
         if workshop is None:
-            workshop = Workshop(perfect(shell, design, loads[load]))
+            workshop = Workshop(perfect(shell, design, loads[load], step=TO_ITS_END))
         first = len(path.factors)
         some = workshop.drawn(
             tolerances,

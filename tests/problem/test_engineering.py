@@ -95,6 +95,27 @@ def test_supports_that_would_lift_are_told_with_their_force(shell, wet):
     assert -reaction.min() <= told <= -reaction.min() + 2.0 * np.log(len(reaction)) / SHARPNESS
 
 
+def test_a_term_is_the_same_on_an_assembly_at_hand_as_on_one_of_its_own(shell, wet):
+    evaluator = Evaluator(limited(shell, wet, ModalStiffness("wet", 1.0)), shell.design())
+    state, design = evaluator.begin()["wet"].equilibrium.state, shell.design()
+    for term in (ModalStiffness("wet", 1.0), Uplift("wet", 2.0)):
+        alone = term.measure(LoadedDesign(shell, design, state, wet))
+        there = term.measure(LoadedDesign(shell, design, state, wet, evaluator.assembly(design)))
+        assert there.value.tobytes() == alone.value.tobytes()
+        assert there.by_dof.toarray().tobytes() == alone.by_dof.toarray().tobytes()
+
+
+def test_beams_are_made_once_for_a_radius_and_anew_for_another(shell):
+    radius = shell.rod.radius
+    made = shell.beams(radius)
+    assert shell.beams(radius) is made
+    thicker = shell.beams(1.1 * radius)
+    assert (thicker.axial > made.axial).any()
+    for k in range(20):
+        shell.beams((1.2 + 0.01 * k) * radius)
+    assert shell.beams(radius).axial.tobytes() == made.axial.tobytes()
+
+
 def test_limits_that_make_no_sense_are_refused(shell, wet):
     with pytest.raises(InputError, match=r"least_tension\.scale"):
         LeastTension("wet", 0.0)

@@ -4,9 +4,11 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.drawing import PERFECT, drawn
+from shellform.reliability.perfect import perfect
 from shellform.reliability.refinement import critical_factor, mesh_error
 from shellform.reliability.safety import Safety, allowed, judge, paths
-from shellform.reliability.standing import sample
+from shellform.reliability.standing import Workshop, sample
 
 HARD = Tolerances(load_each=0.2, load_all=0.2)
 
@@ -83,3 +85,22 @@ def test_what_cannot_be_asked_for_is_refused(entries, where):
 def test_judging_asks_for_a_design_load(dome, loads):
     with pytest.raises(InputError, match="design load"):
         judge(dome, dome.design(), {"none": loads["none"]}, Safety(Tolerances()))
+
+
+@pytest.mark.parametrize("step", [0.5, 0.125])
+def test_a_path_gone_on_with_ends_where_one_from_nothing_does(dome, loads, step):
+    nominal = perfect(dome, dome.design(), loads["additional"], step=step)
+    none = drawn(nominal.members, Tolerances(), 0, PERFECT)
+    workshop = Workshop(nominal)
+    begin = float(nominal.factors[-1]), nominal.states[-1]
+    going_on = workshop.limit(none, most=3.0, resolution=1e-4, begin=begin)
+    anew = workshop.limit(none, most=3.0, step=1 / 16, resolution=1e-4)
+    assert 1.0 < anew.factor < 3.0
+    assert going_on.factor == pytest.approx(anew.factor, abs=2e-4)
+    assert going_on.kind == anew.kind
+
+
+def test_a_path_followed_to_its_end_alone_ends_in_the_same_state(dome, loads):
+    short, whole = (perfect(dome, dome.design(), loads["design"], step=step) for step in (0.5, 0.125))
+    assert (short.bears, len(short.states), len(whole.states)) == (True, 3, 9)
+    assert short.states[-1].positions == pytest.approx(whole.states[-1].positions, abs=1e-8)

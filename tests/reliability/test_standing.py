@@ -7,6 +7,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances, default_tolerances
+from shellform.reliability.branch import Branch
 from shellform.reliability.drawing import CAUSES, built_beams, built_cables, built_load, errors_of, variables
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.standing import Workshop, sample
@@ -162,3 +163,33 @@ def test_next_to_a_load_it_is_known_surely_whether_a_structure_stands_under_it(n
     assert marked[0].factor >= just[0]
     assert marked[1].factor < just[1]
     assert workshop.load(none, marks=[end - 0.01]).factor >= min(end - 0.01, 1.0)
+
+
+def test_an_iteration_with_foreseen_deformations_ends_where_one_with_the_state_s_own_does(
+    nominal, monkeypatch
+):
+    workshop = Workshop(nominal)
+    mixed = [workshop.load(drawn(nominal, LARGE, number)) for number in range(6)]
+    monkeypatch.setattr(Branch, "foreseen", lambda *_: None)
+    plain = [workshop.load(drawn(nominal, LARGE, number)) for number in range(6)]
+    for one, other in zip(mixed, plain, strict=True):
+        assert one.stands == other.stands
+        assert one.factorisations <= other.factorisations
+        if one.stands:
+            assert one.state.positions == pytest.approx(other.state.positions, abs=1e-8)
+
+
+def test_a_structure_whose_first_tangent_is_indefinite_is_relaxed_to_the_same_state(nominal, monkeypatch):
+    errors = drawn(nominal, LARGE, 3)
+    workshop = Workshop(nominal)
+    expected = workshop.load(errors)
+    real = Branch.newton
+    monkeypatch.setattr(
+        Branch,
+        "newton",
+        lambda self, *given, **named: real(self, *given, **named) if named["limit"] < 15 else None,
+    )
+    found = workshop.load(errors)
+    assert found.factorisations > expected.factorisations
+    assert found.stands == expected.stands
+    assert found.state.positions == pytest.approx(expected.state.positions, abs=1e-8)

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from shellform.output.pictures.images import web_picture
+from shellform.structure.elements.threads import side_by_side
 
 _WIDEST = 1600  # pixels
 _QUALITY = 82
@@ -34,15 +35,14 @@ class Picture:
 
 def embed(files: Sequence[Path], *, budget: int) -> tuple[list[Picture], list[str]]:
     """The pictures that fit into `budget` bytes, in order, and a sentence for each that is left out: too
-    large, or damaged.
+    large, or damaged. They are made smaller side by side.
     """
     found, left = [], []
-    for file in files:
-        try:
-            kind, data, (width, height) = _read(file)
-        except (OSError, ValueError) as error:
-            left.append(f"The picture {file.name} can't be read: {error}")
+    for file, content in zip(files, side_by_side(_content, files), strict=True):
+        if isinstance(content, Exception):
+            left.append(f"The picture {file.name} can't be read: {content}")
             continue
+        kind, data, (width, height) = content
         if len(data) > budget:
             left.append(f"The picture {file.name} is left out: the page would grow too large.")
             continue
@@ -50,6 +50,14 @@ def embed(files: Sequence[Path], *, budget: int) -> tuple[list[Picture], list[st
         source = f"data:{kind};base64,{base64.b64encode(data).decode()}"
         found.append(Picture(file.stem, source, width, height, kind.startswith("video/")))
     return found, left
+
+
+def _content(file: Path) -> tuple[str, bytes, tuple[int, int]] | Exception:
+    """As `_read`, or why it can't be read."""
+    try:
+        return _read(file)
+    except (OSError, ValueError) as error:
+        return error
 
 
 def _read(file: Path) -> tuple[str, bytes, tuple[int, int]]:

@@ -42,6 +42,7 @@ from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, indices, reals
 from shellform.errors import InputError
+from shellform.structure.elements.beam_foreseen import foreseen
 from shellform.structure.elements.beam_kernels import evaluate, local_by_dof
 from shellform.structure.elements.beam_thirds import contracted
 from shellform.structure.elements.double_double import beam_deformations, beam_tangents
@@ -116,6 +117,23 @@ class Beams:
         inputs = self._kernel_input(state)
         share(evaluate, count, *inputs, given, 1.0, energy, force, blocks, _NOTHING, _NOTHING, turn)
         return Evaluation(energy, force, blocks if tangent else None, float(turn.max(initial=0.0)))
+
+    def foreseen(self, state: State, motion: Reals) -> Reals:
+        """Deformations (m, 7) to which a `motion` (n, 6) leads to first order: stretch, m, and the sines of the six
+        local rotations. No end may be turned farther than 45 degrees at the state (`Evaluation.turned` is 0).
+        """
+        result = np.empty((len(self.ends), 7))
+        inputs = self._kernel_input(state)[:5]
+        share(foreseen, len(result), *inputs, np.ascontiguousarray(motion), result)
+        return result
+
+    def tangent_of(self, state: State, deformations: Reals, into: Reals) -> None:
+        """Fills packed lower tangents (m, 78) at the state of elements that have other `deformations`, as of
+        `foreseen`, and the forces that belong to those."""
+        count = len(self.ends)
+        energy, force, turn = np.empty(count), np.empty((count, 12)), np.empty(count)
+        inputs = self._kernel_input(state)
+        share(evaluate, count, *inputs, deformations, 1.0, energy, force, into, _NOTHING, _NOTHING, turn)
 
     def evaluate_extended(self, state: State, *, tangent: bool) -> Evaluation:
         """As `evaluate` at a state with a tail, tangents (m, 78, 2) with all their digits."""

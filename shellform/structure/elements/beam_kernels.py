@@ -78,10 +78,10 @@ def evaluate(  # type: ignore[no-untyped-def]
         a, b = ends[e, 0], ends[e, 1]
         l0 = rest_length[e]
         EA, GJ, EIy, EIz = stiffness[e, 0], stiffness[e, 1], stiffness[e, 2], stiffness[e, 3]
-        l = _triads(positions, quaternions, frames[e], a, b, E, A, B, Q)
+        l = triads(positions, quaternions, frames[e], a, b, E, A, B, Q)
         by_z = _rolled_by_z(A, B)
         if by_z:  # the same element by the other pair of axes, its y axis along z
-            l = _triads(positions, quaternions, _by_z(frames[e]), a, b, E, A, B, Q)
+            l = triads(positions, quaternions, _by_z(frames[e]), a, b, E, A, B, Q)
             EIy, EIz = EIz, EIy
 
         # Local rotations (12) and moments (15, 18); order xa, ya, za, xb, yb, zb.
@@ -414,10 +414,10 @@ def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length,
     h, curvature = np.empty((6, 3), dtype), np.empty((3, 3), dtype)
     for e in range(start, stop):
         a, b = ends[e, 0], ends[e, 1]
-        l = _triads(positions, quaternions, frames[e], a, b, E, A, B, Q)
+        l = triads(positions, quaternions, frames[e], a, b, E, A, B, Q)
         by_z = _rolled_by_z(A, B)
         if by_z:
-            l = _triads(positions, quaternions, _by_z(frames[e]), a, b, E, A, B, Q)
+            l = triads(positions, quaternions, _by_z(frames[e]), a, b, E, A, B, Q)
         v0, v1 = A[0, 1] + B[0, 1], A[1, 1] + B[1, 1]
         eta = v0 / v1
         rate[:] = 0.0
@@ -478,7 +478,7 @@ def local_by_dof(start, stop, positions, quaternions, ends, frames, rest_length,
 
 
 @njit(cache=True, error_model="numpy", inline="always", fastmath={"contract"})
-def _triads(positions, quaternions, frame, a, b, E, A, B, Q):  # type: ignore[no-untyped-def]
+def triads(positions, quaternions, frame, a, b, E, A, B, Q):  # type: ignore[no-untyped-def]
     """Fills the element triad E in global axes and the ends' triads A and B in element axes; returns the
     length.
     """

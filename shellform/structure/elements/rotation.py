@@ -71,8 +71,7 @@ def turned(vectors, quaternions):  # type: ignore[no-untyped-def]
 def matrices(quaternions: Reals) -> Reals:
     """Rotation matrices (k, 3, 3) of unit quaternions (k, 4)."""
     result = np.empty((len(quaternions), 3, 3))
-    for k, quaternion in enumerate(quaternions):
-        matrix(quaternion, result[k])
+    _matrices(np.ascontiguousarray(quaternions), result)
     return result
 
 
@@ -112,3 +111,9 @@ def matrix(q, out):  # type: ignore[no-untyped-def]
     out[2, 0] = 2.0 * (x * z - w * y)
     out[2, 1] = 2.0 * (y * z + w * x)
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@njit(cache=True)
+def _matrices(quaternions, result):  # type: ignore[no-untyped-def]
+    for k in range(len(quaternions)):
+        matrix(quaternions[k], result[k])

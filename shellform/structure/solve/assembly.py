@@ -117,12 +117,41 @@ class Assembly:
             energy += float(result.energy.sum())
             turned = max(turned, result.turned)
             largest = max(largest, add_forces(dofs, self.reach, result.force, force))
-        values = None
-        if tangent:
-            values = np.empty(len(self.matrix.indices))
-            share(_gather, len(values), *self._sources, self._entries, values)
+        values = self._gathered() if tangent else None
         self.clock["assembly"] += time.perf_counter() - began
         return Balance(energy, force.reshape(-1, 6), values, largest, turned)
+
+    def foreseen(self, state: State, motion: Reals) -> tuple[Reals, ...]:
+        """The deformations (m, 7) of each part of beams to which the `motion` (n, 6) leads to first order."""
+        return tuple(part.foreseen(state, motion) for part in self.beams)
+
+    @told(Work.LOOPS)
+    def tangent_of(self, state: State, deformations: Sequence[Reals]) -> Reals:
+        """The tangent's lower values (nnz,) at the state, of beams that have other `deformations` than follow from
+        it, part after part. Those of the last step's linear system make Newton's iteration a mixed one, in which
+        stresses are unknowns of their own (Magisano, Leonetti and Garcea 2017): a slender rod that a finite step
+        has stretched by second-order terms isn't told to be stiffer, or softer, by a force that the next step
+        takes away again."""
+        began = time.perf_counter()
+        given = iter(deformations)
+        for part, dofs, (first, last) in zip(self.parts, self._dofs, self._shares, strict=True):
+            own = next(given) if isinstance(part, Beams) else None
+            if not len(dofs):
+                continue
+            block = self._entries[first:last].reshape(len(dofs), -1)
+            if isinstance(part, Beams) and own is not None:
+                part.tangent_of(state, own, block)
+            else:
+                part.evaluate(state, tangent=True, into=block)
+        values = self._gathered()
+        self.clock["assembly"] += time.perf_counter() - began
+        return values
+
+    def _gathered(self) -> Reals:
+        """The tangent's values (nnz,) from the elements' entries."""
+        values = np.empty(len(self.matrix.indices))
+        share(_gather, len(values), *self._sources, self._entries, values)
+        return values
 
     def force_along(self, state: State, motion: Reals) -> Reals:
         """How the internal forces (n, 6) begin to change, N and N·m, as the nodes move by `motion` (n, 6),
