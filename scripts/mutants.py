@@ -74,7 +74,7 @@ _CALLED = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum
 @dataclass(frozen=True)
 class Fault:
     """A fault: the `file`, from the root; the place of the expression that it changes; what stood there,
-    `before`, and what stands there `after`."""
+    `before`, and what stands there `after`; and the `text` of the line that it begins in."""
 
     file: str
     line: int
@@ -83,6 +83,7 @@ class Fault:
     end_column: int
     before: str
     after: str
+    text: str
 
     @property
     def room(self) -> str:
@@ -91,18 +92,20 @@ class Fault:
 
     @property
     def name(self) -> str:
-        """As it is called in mutants.toml, whatever lines come and go."""
-        return f"{self.file}: {self.before} -> {self.after}"
+        """As it is called in mutants.toml, whatever other lines come and go."""
+        return f"{self.file}: {self.text}: {self.before} -> {self.after}"
 
 
 def faults(file: Path) -> Iterator[Fault]:
     """Every fault that could be planted in a file."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    whole = file.read_text(encoding="utf-8")
+    tree, lines = ast.parse(whole), whole.splitlines()
     for node in _code(tree):
         for changed in _changes(node):
             after = ast.unparse(ast.fix_missing_locations(changed))
             place = node.lineno, node.col_offset, node.end_lineno or 0, node.end_col_offset or 0
-            yield Fault(file.relative_to(ROOT).as_posix(), *place, ast.unparse(node), after)
+            text = lines[node.lineno - 1].partition("  # ")[0].strip()
+            yield Fault(file.relative_to(ROOT).as_posix(), *place, ast.unparse(node), after, text)
 
 
 def _code(node: ast.AST) -> Iterator[ast.expr]:
@@ -149,8 +152,12 @@ def _is_text(node: ast.BinOp) -> bool:
 
 
 def sample(count: int, seed: int, rooms: Sequence[str]) -> list[Fault]:
-    """So many faults, as evenly over the rooms as they come."""
+    """So many faults, as evenly over the rooms as they come. Raises ValueError where a reason stands in mutants.toml
+    for a line that isn't there any more."""
     known = set(tomllib.loads(KNOWN.read_text(encoding="utf-8"))) if KNOWN.is_file() else set()
+    gone = known - {fault.name for file in (ROOT / "shellform").rglob("*.py") for fault in faults(file)}
+    if gone:
+        raise ValueError("no such lines any more: " + "; ".join(sorted(gone)))
     found: dict[str, list[Fault]] = {}
     for file in sorted((ROOT / "shellform").rglob("*.py")):
         if not any(part in _LEFT_OUT for part in file.parts):
@@ -256,7 +263,7 @@ class Planter:
         self.rows: dict[Fault, str] = {}
         self.rest: list[Fault] = []
         self.failed = ""
-        self._now: set[tuple[str, int]] = set()
+        self._now: dict[int, CodeType] = {}
         self._shared: set[tuple[str, int]] = set()
         self._fixtures: dict[str, set[tuple[str, int]]] = {}
         self._itself: dict[str, set[tuple[str, int]]] = {}
@@ -264,27 +271,32 @@ class Planter:
         self._kept: list[pytest.FixtureDef[object]] = []
 
     def _trace(self, frame: FrameType, event: str, value: object) -> None:
-        code = frame.f_code
-        if code.co_filename.startswith(str(ROOT / "shellform")):
-            self._now.add((code.co_filename, code.co_firstlineno))
+        """At every call of any function: no more than it must."""
+        self._now[id(frame.f_code)] = frame.f_code
+
+    def _called(self) -> set[tuple[str, int]]:
+        """The package's functions that were called in a test's part so far."""
+        codes, package = list(self._now.values()), str(ROOT / "shellform")  # what follows is traced too
+        places = ((code.co_filename, code.co_firstlineno) for code in codes)
+        return {place for place in places if place[0].startswith(package)}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """After a test's fixtures, after it, and after what clears them away."""
         if report.failed:
             self.failed = report.nodeid
-        file = report.nodeid.split("::")[0]
+        file, called = report.nodeid.split("::")[0], self._called()
         if report.when == "setup":
-            self._fixtures.setdefault(file, set()).update(self._now)
+            self._fixtures.setdefault(file, set()).update(called)
         if report.when == "call":
-            self._itself[report.nodeid] = self._now
-        self._now = set()
+            self._itself[report.nodeid] = called
+        self._now = {}
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef[object]) -> Iterator[None]:
         """Those of the whole session are kept for all faults that they don't meet."""
         found = yield
         if fixturedef.scope == "session":
-            self._shared |= self._now
+            self._shared |= self._called()
             self._kept.append(fixturedef)
         return found
 
@@ -401,7 +413,9 @@ def in_one_process(faults: Sequence[Fault], tests: Sequence[str], told: TextIO) 
     files = tests or sorted({file for fault in faults for file in likeliest(fault)})
     os.chdir(ROOT)
     words = ["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist"]
-    pytest.main([*words, *files], plugins=[planter])
+    status = pytest.main([*words, *files], plugins=[planter])
+    if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+        raise RuntimeError(f"the tests can't be run: {pytest.ExitCode(status).name}")
     return planter
 
 
