@@ -66,6 +66,18 @@ def test_the_cable_plan_names_every_cable_between_its_crossings(folder, built):
     assert names == [f"C{k}" for k in range(built.design.present.sum())]
     lengths = [line.dxf.start.distance(line.dxf.end) for line in on(space, "CABLES", "LINE")]
     assert lengths == pytest.approx([55.0 * 2.0**0.5 - 2 * 0.13 * 55.0] * len(names), abs=1e-6)
+    joints = 1e3 * built.grid.flat[built.grid.crossing_nodes[:, 0], :2]
+    ends = joints[schedules.cable_crossings(built.shell, built.design)]
+    lines = [(tuple(line.dxf.start)[:2], tuple(line.dxf.end)[:2]) for line in on(space, "CABLES", "LINE")]
+    assert np.mean(lines, axis=1) == pytest.approx(ends.mean(axis=1), abs=1e-6)
+    rising = np.prod(np.subtract(*np.swapaxes(lines, 0, 1)), axis=1) > 0.0
+    place = np.array([tuple(text.get_placement()[1].vec2) for text in on(space, "CABLE_NAMES", "TEXT")])
+    beside = np.column_stack([np.zeros(len(names)), np.where(rising, 0.27, -0.27) * 55.0])
+    assert place == pytest.approx(ends.mean(axis=1) + beside, abs=1e-6)
+    turns = [text.dxf.text.partition("·")[2] for text in on(space, "CABLE_NAMES", "TEXT")]
+    assert turns == [str(turn) for turn in schedules.rounds(built.shell, built.design)]
+    for text in on(space, "CROSSING_NUMBERS", "TEXT"):
+        assert tuple(text.get_placement()[1].vec2) == pytest.approx(joints[int(text.dxf.text)], abs=1e-6)
 
 
 def test_supports_stand_on_the_plan_where_the_net_has_them(folder, built):
@@ -141,6 +153,42 @@ def test_letters_are_legible_on_paper_and_the_drawing_stays_beside_the_column(bu
     drawn = [x for line in page.lines if line.colour in pens for x, _ in line.points]
     assert drawn
     assert max(drawn) < frame
+
+
+def test_words_of_the_title_block_stay_in_their_fields_however_long(built, sheets):
+    block = TitleBlock("2026-05-31", "R" * 20, "A" * 60)
+    long = replace(built, title="T" * 70, name="N" * 40, block=block)
+    page = drawings.paper_page(sheets[0], long, "1 / 1")
+    found = {label.text: label for label in page.labels}
+    left, right = page.width - 10.0 - 110.0, page.width - 10.0
+    for text, x, end in (
+        (long.title, left, right),
+        (long.name, left + 55.0, right),
+        (f"2026-05-31 / {block.revision}", left, left + 55.0),
+        (block.author, left + 55.0, right),
+    ):
+        label = found[text]
+        width = 0.8 * label.height * len(text)
+        assert label.place[0] == pytest.approx(x + 2.0)
+        assert x + 2.0 + width == pytest.approx(end - 2.0), "as large as the field allows"
+    short = {label.text: label.height for label in drawings.paper_page(sheets[0], built, "1 / 1").labels}
+    assert (short["The vault"], short["test"]) == (3.5, 3.0)
+
+
+def test_letters_are_as_large_as_the_largest_usual_scale_on_the_smallest_paper_lets_them(built, sheets):
+    assert drawings.SMALLEST == 1.6
+    assert drawings.SCALES[:5] == (1.0, 2.0, 2.5, 5.0, 10.0)
+    for sheet in sheets:
+        paper, scale = drawings.fitted(sheet)
+        x0, y0, x1, y1 = sheet.extent
+        # What the frame, the bound edge and the column of notes leave of the paper, with a little air.
+        names = list(drawings.PAPERS)
+        for name in names[: names.index(paper) + 1]:
+            width, height = drawings.PAPERS[name]
+            room = max((x1 - x0) / (width - 156.0), (y1 - y0) / (height - 32.0))
+            best = next(each for each in drawings.SCALES if each >= room)
+            assert (best == scale) if name == paper else (sheet.lettering / best < 1.6)
+        assert sheet.lettering / scale >= 1.6
 
 
 def test_the_gaps_between_lines_on_paper_are_to_scale(built):
