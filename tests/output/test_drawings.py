@@ -13,7 +13,7 @@ from pypdf import PdfReader
 from shellform.errors import InputError
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import drawings, layout, nesting, schedules, setting_out
-from shellform.output.workshop.marks import PENS, Span, Words, overlap
+from shellform.output.workshop.marks import PENS, Span, Stroke, Words, overlap
 from shellform.output.workshop.schedules import TitleBlock
 
 
@@ -246,6 +246,44 @@ def test_elevations_tell_the_levels_of_crown_and_supports(built):
     assert f"lowest support {feet.min():+.1f}" in words
     spans = [mark.text for mark in sheet.marks if isinstance(mark, Span)]
     assert spans[::2] == [f"{np.ptp(place[:, axis]):.1f}" for axis in (0, 1)]
+    strokes = {
+        layer: [mark for mark in sheet.marks if isinstance(mark, Stroke) and mark.layer == layer]
+        for layer in ("GROUND", "LEVELS")
+    }
+    told = [mark for mark in sheet.marks if isinstance(mark, Words) and mark.layer == "LEVELS"]
+    assert len(told) == len(strokes["LEVELS"]) == 6
+    for k, (stroke, mark) in enumerate(zip(strokes["LEVELS"], told, strict=True)):
+        ground, level = strokes["GROUND"][k // 3].points[0][1], float(mark.text.split()[-1])
+        for point in stroke.points[:2]:
+            assert point[1] - ground == pytest.approx(level - place[:, 2].min(), abs=0.051)
+        assert stroke.points[2][1] == mark.place[1] >= stroke.points[1][1]
+
+
+def test_a_support_s_number_stands_outside_of_it_seen_from_the_middle(built):
+    sheet, net = setting_out.support_plan(built), built.shell.net
+    feet = 1e3 * net.target.positions[net.supports, :2]
+    numbers = [mark for mark in sheet.marks if isinstance(mark, Words) and mark.layer == "SUPPORT_NUMBERS"]
+    assert [mark.text for mark in numbers] == [f"S{k}" for k in range(len(feet))]
+    for mark, foot in zip(numbers, feet, strict=True):
+        away, out = np.array(mark.place) - foot, foot - feet.mean(axis=0)
+        assert np.linalg.norm(away) >= mark.height * (1.0 - 1e-9)
+        out /= np.linalg.norm(out)
+        assert away / np.linalg.norm(away) == pytest.approx(out)
+        # Letters go on from there, away from the support.
+        assert mark.side == ("left" if out[0] > 0.3 else "right" if out[0] < -0.3 else "middle")
+        assert mark.foot == ("bottom" if out[1] > 0.3 else "top" if out[1] < -0.3 else "middle")
+
+
+def test_the_plan_of_supports_tells_how_long_and_wide_the_shell_is(built):
+    sheet, place = setting_out.support_plan(built), 1e3 * built.shell.target.positions[:, :2]
+    low, high = place.min(axis=0), place.max(axis=0)
+    along, across = (mark for mark in sheet.marks if isinstance(mark, Span))
+    assert (along.text, across.text) == tuple(f"{each:.1f}" for each in high - low)
+    for axis, span in enumerate((along, across)):
+        ends = np.array([span.a, span.b])
+        assert ends[:, axis] == pytest.approx([low[axis], high[axis]])
+        assert (ends[:, 1 - axis] == span.base[1 - axis]).all()
+        assert span.base[1 - axis] < low[1 - axis]
 
 
 def test_supports_that_stand_too_near_for_their_shoes_are_named(built):
@@ -260,6 +298,8 @@ def test_supports_that_stand_too_near_for_their_shoes_are_named(built):
     for a, b, _ in found:
         assert f"S{a} and S{b}" in note
         assert f"S{b}" in table.column("clashes with")[a].split(", ")
+        assert f"S{a} and S{b}, {1e3 * apart[a, b]:.1f} mm" in " ".join(table.notes)
     thin = replace(built, design=replace(built.design, radius=1e-6))
     assert not schedules.clashing_supports(thin)
     assert "Nearer" not in " ".join(setting_out.support_plan(thin).notes)
+    assert "clash: none." in " ".join(schedules.supports(thin).notes)

@@ -54,7 +54,9 @@ def test_each_crossing_is_marked_once_on_both_rods_that_cross_there(read, net):
     pairs = {(row["rod"], row["crosses rod"]) for row in rows}
     assert all((b, a) in pairs for a, b in pairs)
     for row in rows:
-        rod = net.grid.rods[int(row["rod"][1:])]
+        rod, other = (net.grid.rods[int(row[each][1:])] for each in ("rod", "crosses rod"))
+        assert {rod.direction, other.direction} == {"u", "v"}
+        assert int(row["crossing"]) in other.crossings
         place = rod.nodes[rod.at[int(row["mark"]) - 1]]
         along = np.linalg.norm(net.grid.flat[place] - net.grid.flat[rod.nodes[0]])
         assert float(row["from the first end [m]"]) == pytest.approx(along, abs=1e-6)
