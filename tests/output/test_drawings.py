@@ -237,6 +237,75 @@ def test_the_title_block_says_who_drew_it_and_when_as_the_case_does(built, tmp_p
     assert (properties["Date"], properties["Revision"]) == ("2026-05-31", "B")
 
 
+def words_on(sheet, layer):
+    return [mark for mark in sheet.marks if isinstance(mark, Words) and mark.layer == layer]
+
+
+def test_what_is_written_on_the_flat_grid_stands_at_what_it_speaks_of(built):
+    sheet, grid, s = layout.flat_grid(built), built.grid, 55.0
+    flat, supports = 1e3 * grid.flat[:, :2], built.shell.net.supports.tolist()
+    joints = flat[grid.crossing_nodes[:, 0]]
+    numbers = words_on(sheet, "CROSSING_NUMBERS")
+    beside = np.array([0.05 * s, 0.04 * s])
+    assert np.array([mark.place for mark in numbers]) == pytest.approx(joints + beside)
+    names, lengths = words_on(sheet, "ROD_NAMES"), iter(words_on(sheet, "CUT_LENGTHS"))
+    firsts, feet = iter(words_on(sheet, "FIRST_MARKS")), iter(words_on(sheet, "SUPPORT_NUMBERS"))
+    for k, (rod, name) in enumerate(zip(grid.rods, names, strict=True)):
+        axis = "uv".index(rod.direction)
+        tips, marks = flat[rod.nodes[[0, -1]]], 1e3 * rod.marks
+        middles = 0.5 * (marks[:-1] + marks[1:])
+        near = tips[0, axis] + middles[np.argmin(np.abs(middles - 500.0 * rod.length))]
+        assert name.text == f"{rod.direction.upper()}{k}"
+        assert name.place[axis] == pytest.approx(near)
+        assert abs(name.place[1 - axis] - tips[0, 1 - axis]) < 0.1 * s
+        for tip, sign, first in ((tips[0], -1.0, marks[0]), (tips[1], 1.0, 1e3 * rod.length - marks[-1])):
+            mark, length = next(firsts), next(lengths)
+            assert mark.text == f"{first:.1f}"
+            assert abs(mark.place[1 - axis] - tip[1 - axis]) < 0.1 * s
+            assert name.text in length.text
+            assert length.place[1 - axis] == pytest.approx(tip[1 - axis])
+            assert sign * (length.place[axis] - tip[axis]) >= 0.75 * s
+            node = int(rod.nodes[0 if sign < 0.0 else -1])
+            if node in supports:
+                foot = next(feet)
+                assert foot.text == f"S{supports.index(node)}"
+                assert abs(foot.place[1 - axis] - tip[1 - axis]) < 0.1 * s
+                assert 0.0 < sign * (foot.place[axis] - tip[axis]) < s
+    assert next(feet, None) is next(firsts, None) is next(lengths, None) is None
+
+
+def test_marks_and_splices_stand_on_the_rod_strips_where_they_are_on_the_rods(built):
+    cutting = nesting.cut(built.grid, stock=0.6)
+    starts = {}
+    for piece in (piece for bar in cutting.bars for piece in bar.pieces):
+        starts.setdefault(piece.rod, set()).add(round(1e3 * piece.start, 6))
+    sheet = layout.rod_strips(built, cutting, 3, 9)
+    strokes = [mark for mark in sheet.marks if isinstance(mark, Stroke)]
+    for row, number in enumerate(range(3, 9)):
+        rod, y = built.grid.rods[number], -0.75 * 55.0 * row
+        at = {
+            layer: [
+                mark.points[0][0]
+                for mark in strokes
+                if mark.layer == layer and abs(np.mean(mark.points, axis=0)[1] - y) < 1e-9
+            ]
+            for layer in ("CROSSINGS", "SUPPORTS")
+        }
+        assert at["CROSSINGS"] == pytest.approx((1e3 * rod.marks).tolist())
+        cuts = sorted(starts[number] - {0.0})
+        assert sorted(at["SUPPORTS"]) == pytest.approx([cut - 0.08 * 55.0 for cut in cuts])
+        for layer, told in (
+            ("FIRST_MARKS", [f"{mark:.1f}" for mark in 1e3 * rod.marks]),
+            ("CROSSING_NUMBERS", [str(k) for k in rod.crossings]),
+        ):
+            own = [mark for mark in words_on(sheet, layer) if abs(mark.place[1] - y) < 0.3 * 55.0]
+            assert [mark.text for mark in own] == told
+            assert [mark.place[0] for mark in own] == pytest.approx((1e3 * rod.marks).tolist())
+        own = [mark for mark in words_on(sheet, "SUPPORT_NUMBERS") if y - 0.5 * 55.0 < mark.place[1] < y]
+        assert sorted(mark.text for mark in own) == sorted(f"splice {cut:.1f}" for cut in cuts)
+    assert len(words_on(sheet, "ROD_NAMES")) == 6
+
+
 def test_elevations_tell_the_levels_of_crown_and_supports(built):
     sheet = setting_out.elevations(built)
     place = 1e3 * built.shell.target.positions
@@ -250,7 +319,7 @@ def test_elevations_tell_the_levels_of_crown_and_supports(built):
         layer: [mark for mark in sheet.marks if isinstance(mark, Stroke) and mark.layer == layer]
         for layer in ("GROUND", "LEVELS")
     }
-    told = [mark for mark in sheet.marks if isinstance(mark, Words) and mark.layer == "LEVELS"]
+    told = words_on(sheet, "LEVELS")
     assert len(told) == len(strokes["LEVELS"]) == 6
     for k, (stroke, mark) in enumerate(zip(strokes["LEVELS"], told, strict=True)):
         ground, level = strokes["GROUND"][k // 3].points[0][1], float(mark.text.split()[-1])
@@ -262,7 +331,7 @@ def test_elevations_tell_the_levels_of_crown_and_supports(built):
 def test_a_support_s_number_stands_outside_of_it_seen_from_the_middle(built):
     sheet, net = setting_out.support_plan(built), built.shell.net
     feet = 1e3 * net.target.positions[net.supports, :2]
-    numbers = [mark for mark in sheet.marks if isinstance(mark, Words) and mark.layer == "SUPPORT_NUMBERS"]
+    numbers = words_on(sheet, "SUPPORT_NUMBERS")
     assert [mark.text for mark in numbers] == [f"S{k}" for k in range(len(feet))]
     for mark, foot in zip(numbers, feet, strict=True):
         away, out = np.array(mark.place) - foot, foot - feet.mean(axis=0)
