@@ -3,7 +3,7 @@ top of each other.
 """
 
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import ezdxf
 import numpy as np
@@ -80,6 +80,17 @@ def test_the_cable_plan_names_every_cable_between_its_crossings(folder, built):
         assert tuple(text.get_placement()[1].vec2) == pytest.approx(joints[int(text.dxf.text)], abs=1e-6)
 
 
+def test_the_cable_plan_s_rods_run_from_ring_to_ring(built):
+    sheet, grid = layout.cable_plan(built), built.grid
+    joints = 1e3 * grid.flat[grid.crossing_nodes[:, 0], :2]
+    lines = [mark.points for mark in sheet.marks if isinstance(mark, Stroke) and mark.layer == "BACKGROUND"]
+    between = sum(len(rod.crossings) - 1 for rod in grid.rods)
+    lengths = np.linalg.norm(np.subtract(*np.swapaxes(lines, 0, 1)), axis=1)
+    assert np.isclose(lengths, 55.0 - 2 * 0.13 * 55.0).sum() >= between
+    apart = np.linalg.norm(np.array(lines).reshape(-1, 1, 2) - joints[None], axis=2)
+    assert apart.min() >= 0.13 * 55.0 - 1e-6
+
+
 def test_supports_stand_on_the_plan_where_the_net_has_them(folder, built):
     space = ezdxf.readfile(folder / "supports.dxf").modelspace()
     middles = [np.mean(square.get_points("xy")[:4], axis=0) for square in on(space, "SUPPORTS", "LWPOLYLINE")]
@@ -153,6 +164,27 @@ def test_letters_are_legible_on_paper_and_the_drawing_stays_beside_the_column(bu
     drawn = [x for line in page.lines if line.colour in pens for x, _ in line.points]
     assert drawn
     assert max(drawn) < frame
+    assert min(drawn) > 20.0
+    up = [y for line in page.lines if line.colour in pens for _, y in line.points]
+    assert 10.0 < min(up) < max(up) < page.height - 10.0
+    assert min(label.place[1] for label in page.labels) > 10.0
+    assert max(label.place[1] for label in page.labels) < page.height - 10.0
+
+
+def test_notes_are_broken_into_lines_as_long_as_the_column_is_wide_and_no_word_is_lost():
+    column = drawings._Column(5.0, 100.0, 50.0)
+    text = (
+        "Rods are drawn by their axes. Their first end is the left one of U rods and the lower one of V rods."
+    )
+    column.words(text, 2.5)
+    assert " ".join(label.text for label in column.labels) == text
+    widths = [0.8 * 2.5 * len(label.text) for label in column.labels]
+    assert max(widths) <= 50.0
+    for label, following in pairwise(column.labels):  # none could have taken the next one's first word
+        assert 0.8 * 2.5 * len(f"{label.text} {following.text.split()[0]}") > 50.0
+    assert [label.place for label in column.labels] == [
+        (5.0, pytest.approx(97.5 - 4.0 * k)) for k in range(len(widths))
+    ]
 
 
 def test_words_of_the_title_block_stay_in_their_fields_however_long(built, sheets):
@@ -189,6 +221,28 @@ def test_letters_are_as_large_as_the_largest_usual_scale_on_the_smallest_paper_l
             best = next(each for each in drawings.SCALES if each >= room)
             assert (best == scale) if name == paper else (sheet.lettering / best < 1.6)
         assert sheet.lettering / scale >= 1.6
+
+
+@pytest.mark.parametrize("upright", [False, True])
+def test_a_dimension_on_paper_has_its_ticks_at_its_ends_and_its_text_in_the_middle(upright):
+    ends, base = [(2.0, 0.0), (12.0, 0.0)], (2.0, -5.0)
+    line = [(2.0, -5.0), (12.0, -5.0)]
+    turned = (lambda point: point[::-1]) if upright else (lambda point: point)
+    span = Span("DIMENSIONS", *map(turned, ends), turned(base), 2.0, "10.0")
+    (found, *marks), words = drawings._dimension(span)
+    assert found == [turned(point) for point in line]
+    for mark, end in zip(marks, line * 2, strict=True):
+        middle = np.mean(mark, axis=0)
+        if mark in marks[:2]:
+            assert tuple(middle) == turned(end)
+            assert np.subtract(mark[1], mark[0]).tolist() == [2.0, 2.0]
+        else:  # from a little beyond the line towards what is measured
+            along, across = (1, 0) if upright else (0, 1)
+            assert {point[along] for point in mark} == {end[0]}
+            assert [point[across] for point in mark] == [-6.0, -3.0]
+    at, beside = (words.place[::-1]) if upright else words.place
+    assert (at, words.text, words.height, words.angle) == (7.0, "10.0", 2.0, 90.0 if upright else 0.0)
+    assert beside == pytest.approx(-5.8 if upright else -4.2)
 
 
 def test_the_gaps_between_lines_on_paper_are_to_scale(built):
@@ -262,6 +316,10 @@ def test_what_is_written_on_the_flat_grid_stands_at_what_it_speaks_of(built):
             mark, length = next(firsts), next(lengths)
             assert mark.text == f"{first:.1f}"
             assert abs(mark.place[1 - axis] - tip[1 - axis]) < 0.1 * s
+            # between the rod's end and its first crossing, further out in steps where something lies there
+            steps = (sign * (mark.place[axis] - tip[axis]) + first - 0.07 * s) / (0.08 * s)
+            assert steps == pytest.approx(np.rint(steps), abs=1e-6)
+            assert -1e-6 < steps < 11.5
             assert name.text in length.text
             assert length.place[1 - axis] == pytest.approx(tip[1 - axis])
             assert sign * (length.place[axis] - tip[axis]) >= 0.75 * s
@@ -301,6 +359,7 @@ def test_marks_and_splices_stand_on_the_rod_strips_where_they_are_on_the_rods(bu
             own = [mark for mark in words_on(sheet, layer) if abs(mark.place[1] - y) < 0.3 * 55.0]
             assert [mark.text for mark in own] == told
             assert [mark.place[0] for mark in own] == pytest.approx((1e3 * rod.marks).tolist())
+            assert all((mark.place[1] > y) == (layer == "FIRST_MARKS") for mark in own)
         own = [mark for mark in words_on(sheet, "SUPPORT_NUMBERS") if y - 0.5 * 55.0 < mark.place[1] < y]
         assert sorted(mark.text for mark in own) == sorted(f"splice {cut:.1f}" for cut in cuts)
     assert len(words_on(sheet, "ROD_NAMES")) == 6
@@ -326,6 +385,8 @@ def test_elevations_tell_the_levels_of_crown_and_supports(built):
         for point in stroke.points[:2]:
             assert point[1] - ground == pytest.approx(level - place[:, 2].min(), abs=0.051)
         assert stroke.points[2][1] == mark.place[1] >= stroke.points[1][1]
+        aside = [x for x, _ in (*stroke.points, mark.place)]
+        assert aside == sorted(aside)
 
 
 def test_a_support_s_number_stands_outside_of_it_seen_from_the_middle(built):
