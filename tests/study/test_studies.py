@@ -428,6 +428,7 @@ def test_summaries_become_columns():
         "f": [[1]],
         "g": True,
         "h": list(range(9)),
+        "i": [1.0, "x"],
     }
     assert flat(tree) == {"a.b": 1, "a.c.0": 1.0, "a.c.1": 2.0, "d": "x; y", "g": True}
 
