@@ -396,7 +396,9 @@ def test_a_support_s_number_stands_outside_of_it_seen_from_the_middle(built):
     assert [mark.text for mark in numbers] == [f"S{k}" for k in range(len(feet))]
     for mark, foot in zip(numbers, feet, strict=True):
         away, out = np.array(mark.place) - foot, foot - feet.mean(axis=0)
-        assert np.linalg.norm(away) >= mark.height * (1.0 - 1e-9)
+        steps = 2.0 * (np.linalg.norm(away) / mark.height - 1.0)  # outwards until it lies on no other
+        assert steps == pytest.approx(np.rint(steps), abs=1e-6)
+        assert -0.5 < steps < 39.5
         out /= np.linalg.norm(out)
         assert away / np.linalg.norm(away) == pytest.approx(out)
         # Letters go on from there, away from the support.
