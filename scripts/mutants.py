@@ -68,13 +68,14 @@ _COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
 }  # fmt: skip
 _NEXT = "\n"  # between what a child tells
+_DEATH = "status"  # the first word of how a child ended that told nothing
 _CALLED = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "any": "all", "all": "any"}
 
 
 @dataclass(frozen=True)
 class Fault:
     """A fault: the `file`, from the root; the place of the expression that it changes; what stood there,
-    `before`, and what stands there `after`."""
+    `before`, and what stands there `after`; and the `text` of the line that it begins in."""
 
     file: str
     line: int
@@ -83,6 +84,7 @@ class Fault:
     end_column: int
     before: str
     after: str
+    text: str
 
     @property
     def room(self) -> str:
@@ -91,18 +93,20 @@ class Fault:
 
     @property
     def name(self) -> str:
-        """As it is called in mutants.toml, whatever lines come and go."""
-        return f"{self.file}: {self.before} -> {self.after}"
+        """As it is called in mutants.toml, whatever other lines come and go."""
+        return f"{self.file}: {self.text}: {self.before} -> {self.after}"
 
 
 def faults(file: Path) -> Iterator[Fault]:
     """Every fault that could be planted in a file."""
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+    whole = file.read_text(encoding="utf-8")
+    tree, lines = ast.parse(whole), whole.splitlines()
     for node in _code(tree):
         for changed in _changes(node):
             after = ast.unparse(ast.fix_missing_locations(changed))
             place = node.lineno, node.col_offset, node.end_lineno or 0, node.end_col_offset or 0
-            yield Fault(file.relative_to(ROOT).as_posix(), *place, ast.unparse(node), after)
+            text = lines[node.lineno - 1].partition("  # ")[0].strip()
+            yield Fault(file.relative_to(ROOT).as_posix(), *place, ast.unparse(node), after, text)
 
 
 def _code(node: ast.AST) -> Iterator[ast.expr]:
@@ -149,8 +153,12 @@ def _is_text(node: ast.BinOp) -> bool:
 
 
 def sample(count: int, seed: int, rooms: Sequence[str]) -> list[Fault]:
-    """So many faults, as evenly over the rooms as they come."""
+    """So many faults, as evenly over the rooms as they come. Raises ValueError where a reason stands in mutants.toml
+    for a line that isn't there any more."""
     known = set(tomllib.loads(KNOWN.read_text(encoding="utf-8"))) if KNOWN.is_file() else set()
+    gone = known - {fault.name for file in (ROOT / "shellform").rglob("*.py") for fault in faults(file)}
+    if gone:
+        raise ValueError("no such lines any more: " + "; ".join(sorted(gone)))
     found: dict[str, list[Fault]] = {}
     for file in sorted((ROOT / "shellform").rglob("*.py")):
         if not any(part in _LEFT_OUT for part in file.parts):
@@ -256,7 +264,7 @@ class Planter:
         self.rows: dict[Fault, str] = {}
         self.rest: list[Fault] = []
         self.failed = ""
-        self._now: set[tuple[str, int]] = set()
+        self._now: dict[int, CodeType] = {}
         self._shared: set[tuple[str, int]] = set()
         self._fixtures: dict[str, set[tuple[str, int]]] = {}
         self._itself: dict[str, set[tuple[str, int]]] = {}
@@ -264,27 +272,32 @@ class Planter:
         self._kept: list[pytest.FixtureDef[object]] = []
 
     def _trace(self, frame: FrameType, event: str, value: object) -> None:
-        code = frame.f_code
-        if code.co_filename.startswith(str(ROOT / "shellform")):
-            self._now.add((code.co_filename, code.co_firstlineno))
+        """At every call of any function: no more than it must."""
+        self._now[id(frame.f_code)] = frame.f_code
+
+    def _called(self) -> set[tuple[str, int]]:
+        """The package's functions that were called in a test's part so far."""
+        codes, package = list(self._now.values()), str(ROOT / "shellform")  # what follows is traced too
+        places = ((code.co_filename, code.co_firstlineno) for code in codes)
+        return {place for place in places if place[0].startswith(package)}
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """After a test's fixtures, after it, and after what clears them away."""
         if report.failed:
             self.failed = report.nodeid
-        file = report.nodeid.split("::")[0]
+        file, called = report.nodeid.split("::")[0], self._called()
         if report.when == "setup":
-            self._fixtures.setdefault(file, set()).update(self._now)
+            self._fixtures.setdefault(file, set()).update(called)
         if report.when == "call":
-            self._itself[report.nodeid] = self._now
-        self._now = set()
+            self._itself[report.nodeid] = called
+        self._now = {}
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(self, fixturedef: pytest.FixtureDef[object]) -> Iterator[None]:
         """Those of the whole session are kept for all faults that they don't meet."""
         found = yield
         if fixturedef.scope == "session":
-            self._shared |= self._now
+            self._shared |= self._called()
             self._kept.append(fixturedef)
         return found
 
@@ -304,7 +317,15 @@ class Planter:
         print(f"{len(items)} tests, {spent:.0f} s of processor time", file=self.told, flush=True)
         by_name = {item.nodeid: item for item in items}
         for fault in self.faults:
-            told = self._forked(fault, [by_name[name] for name in self._calling(fault)], items[0])
+            chosen = [by_name[name] for name in self._calling(fault)]
+            told = self._forked(fault, chosen, items[0])
+            if (
+                told is not None
+                and told.startswith(_DEATH)
+                and self._forked(fault, chosen, items[0], planted=False)
+            ):
+                print(f"left out: {told} without any fault", file=self.told, flush=True)
+                told = None
             if told is None:
                 self.rest.append(fault)
                 continue
@@ -331,8 +352,11 @@ class Planter:
                 names.append(name)
         return names
 
-    def _forked(self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item) -> str | None:
-        """The test that notices a fault, "" where none does; None where it can't be planted."""
+    def _forked(
+        self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item, *, planted: bool = True
+    ) -> str | None:
+        """The test that notices a fault, "" where none does; None where it can't be planted. With nothing `planted`,
+        the test that fails there anyhow."""
         if not items:
             return None
         reading, writing = os.pipe()
@@ -341,7 +365,7 @@ class Planter:
             os.close(reading)
             told = "a crash"
             try:
-                told = self._child(fault, items, last, writing)
+                told = self._child(fault, items, last, writing, planted)
             finally:
                 os.write(writing, f"{_NEXT}{told}".encode())
                 os._exit(0)
@@ -350,15 +374,17 @@ class Planter:
             found = pipe.read().decode()
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
         if status:
-            return f"status {status} in {found.split(_NEXT)[-1]}"
+            return f"{_DEATH} {status} in {found.split(_NEXT)[-1]}"
         found = found.split(_NEXT)[-1]
         return None if found == "not planted" else found
 
-    def _child(self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item, told: int) -> str:
+    def _child(
+        self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item, told: int, planted: bool
+    ) -> str:
         longest = int(time.process_time() + 10.0 * sum(self._seconds[item.nodeid] for item in items)) + 60
         resource.setrlimit(resource.RLIMIT_CPU, (longest, longest))
         try:
-            if not plant(fault):
+            if planted and not plant(fault):
                 return "not planted"
         except Exception as error:  # where a module stops with it before any test
             return f"{type(error).__name__} when it is planted"
@@ -397,11 +423,14 @@ def is_compiled(fault: Fault) -> bool:
 
 def in_one_process(faults: Sequence[Fault], tests: Sequence[str], told: TextIO) -> Planter:
     """What the tests notice of faults in functions."""
+    os.environ["NUMBA_THREADING_LAYER"] = "workqueue"  # GNU's OpenMP ends a forked process at its first loop
     planter = Planter(faults, told)
     files = tests or sorted({file for fault in faults for file in likeliest(fault)})
     os.chdir(ROOT)
     words = ["-q", "--no-header", "--tb=no", "-p", "no:cacheprovider", "-p", "no:xdist"]
-    pytest.main([*words, *files], plugins=[planter])
+    status = pytest.main([*words, *files], plugins=[planter])
+    if status not in (pytest.ExitCode.OK, pytest.ExitCode.TESTS_FAILED):
+        raise RuntimeError(f"the tests can't be run: {pytest.ExitCode(status).name}")
     return planter
 
 

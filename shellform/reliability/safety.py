@@ -194,7 +194,8 @@ def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:
     for name in sorted((name for name in loads if size[name] > 0.0), key=lambda name: -size[name]):
         for largest, shares in found.items():
             share = float(np.vdot(loads[name], loads[largest])) / size[largest] ** 2
-            if np.linalg.norm(loads[name] - share * loads[largest]) <= _SAME * size[name]:
+            off = np.linalg.norm(loads[name] - share * loads[largest])
+            if share > 0.0 and off <= _SAME * size[name]:  # what pulls upwards has a path of its own
                 shares[name] = share
                 break
         else:

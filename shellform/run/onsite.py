@@ -256,7 +256,7 @@ def erect(
         shell,
         run.designs[name],
         way=[] if way is None else measurements.read_way(way, shell),
-        groups=None if groups is None else measurements.read_groups(groups, shell),
+        groups=None if groups is None else measurements.read_groups(groups, run.designs[name]),
         load=carried[0],
         weight=carried[1],
         lift=carried[2],

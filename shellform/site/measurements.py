@@ -13,7 +13,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
-from shellform.gridshell.gridshell import Gridshell
+from shellform.gridshell.gridshell import Design, Gridshell
 
 
 @dataclass(frozen=True)
@@ -150,14 +150,15 @@ def read_places(path: str | Path, shell: Gridshell) -> tuple[Indices, Reals]:
     return nodes_of(path, rows, shell), np.array([[row.values[axis] for axis in "xyz"] for row in rows])
 
 
-def read_groups(path: str | Path, shell: Gridshell) -> list[Indices]:
-    """Groups of candidate cables by rising number from a CSV file: `cable`, `group`."""
+def read_groups(path: str | Path, design: Design) -> list[Indices]:
+    """Groups of candidate cables by rising number from a CSV file: `cable`, its number among the design's own cables,
+    as in drawings and model files, and `group`."""
+    present = np.flatnonzero(design.present)
     teams: dict[float, list[int]] = {}
     for row in read_table(path, ("cable", "group")):
         where = f"{path}, line {row.line}: cable"
-        teams.setdefault(row.values["group"], []).append(
-            _index(row.values["cable"], where, len(shell.cable_ends))
-        )
+        cable = int(present[_index(row.values["cable"], where, len(present))])
+        teams.setdefault(row.values["group"], []).append(cable)
     return [np.array(teams[group], dtype=np.int64) for group in sorted(teams)]
 
 

@@ -95,17 +95,18 @@ class Adjustment:
     halved: int
 
     def schedule(self, shell: Gridshell) -> str:
-        """What the crew does, cable after cable, as CSV: number, both nodes, turns (negative: tighten),
-        change in mm, tension afterwards in N.
+        """What the crew does, cable after cable, as CSV: number among the design's own cables, as in drawings
+        and model files, both nodes, turns (negative: tighten), change in mm, tension afterwards in N.
         """
         design = self.belief.design
+        number = np.cumsum(design.present) - 1
         tension = np.zeros(len(self.turns))
         tension[design.present] = shell.cables(design).tension(self.belief.state)
         rows = []
         for cable in np.flatnonzero(self.turns):
             a, b = shell.cable_ends[cable].tolist()
             turn, change = f"{self.turns[cable]:+d}", f"{1e3 * self.change[cable]:+.2f}"
-            rows.append((int(cable), a, b, turn, change, f"{tension[cable]:.2f}"))
+            rows.append((int(number[cable]), a, b, turn, change, f"{tension[cable]:.2f}"))
         heads = ("cable", "node a", "node b", "turns", "change [mm]", "tension after [N]")
         return table_text(Table("turns", heads, tuple(rows)))
 

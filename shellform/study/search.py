@@ -55,8 +55,8 @@ def generations(
 
 
 def _beyond(value: Value | None, most: float) -> float:
-    """How far a value is beyond its limit; one that isn't known is."""
-    return float(value) - most if value is not None else 1.0
+    """How far a value is beyond its limit; one that isn't known, or is a word, is."""
+    return 1.0 if value is None or isinstance(value, str) else float(value) - most
 
 
 def _excess(trial: Any) -> list[float]:

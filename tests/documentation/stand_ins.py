@@ -101,7 +101,7 @@ def measured_run(here):
     for name in ("survey1", "survey2"):
         seen = state.positions[nodes] + 1e-4 * rng.normal(size=(len(nodes), 3))
         _table(here / f"{name}.csv", "crossing,x,y,z", [(k, *place) for k, place in enumerate(seen)])
-    cables = np.flatnonzero(run.designs["optimised"].present)
+    cables = range(int(run.designs["optimised"].present.sum()))
     _table(here / "groups.csv", "cable,group", [(k, 1 + k % 2) for k in cables])
 
 

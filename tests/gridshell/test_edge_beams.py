@@ -71,6 +71,16 @@ def test_reactions_add_up_to_the_load(arches, solved):
         assert each.pressure * each.uplift == 0.0
 
 
+def test_what_acts_on_a_support_itself_goes_into_the_ground_there(arches, solved):
+    shell, load = arches
+    own = np.zeros_like(load)
+    own[shell.net.supports[1], :3] = (0.5, -0.25, -2.0)
+    before, after = (reactions(shell, shell.design(), solved["design"], each) for each in (load, load + own))
+    for k, (one, other) in enumerate(zip(before.supports, after.supports, strict=True)):
+        more = (-0.5, 0.25, 2.0) if k == 1 else (0.0, 0.0, 0.0)
+        assert np.subtract(other.force, one.force) == pytest.approx(more, abs=1e-9)
+
+
 def test_a_support_is_pressed_lifted_and_pushed_by_its_own_force():
     down, up, side = (
         Support(k, 0, "ground", "", (0.0, 0.0, 0.0), force)

@@ -166,6 +166,37 @@ def test_utilisation_adds_what_erection_left_and_what_blocks_bear(shells, solved
     assert max(row[4] for row in table.rows) > 0.0
 
 
+def test_blocks_carry_what_the_laths_forces_change_by_between_two_crossings_and_all_of_it_at_rods_ends(
+    shells, solved
+):
+    shell = shells[0]["locked"]
+    states = solved["locked"]
+    rods = shell.net.grid.rods
+    table = block_table(shell, shell.design(), states, [f"R{k}" for k in range(len(rods))])
+    assert table.columns[2:] == ("from [m]", "to [m]", "none: carried [N]", "design: carried [N]")
+    beams = shell.beams(shell.rod.radius)
+    locked, rows = beams.of_kind("lock"), iter(table.rows)
+    ends = list(map(tuple, beams.ends[locked].tolist()))
+    found = [dict(zip(ends, beams.local_forces(each)[locked], strict=True)) for each in states.values()]
+    for k, rod in enumerate(rods):
+        stops = np.concatenate([[0.0], rod.marks, [rod.length]])
+        nodes = [int(rod.nodes[0]), *(int(rod.nodes[at]) for at in rod.at), int(rod.nodes[-1])]
+        along = rod.nodes.tolist()
+        for stretch in range(len(nodes) - 1):
+            if nodes[stretch] == nodes[stretch + 1]:
+                continue
+            name, number, begin, end, *carried = next(rows)
+            assert (name, number) == (f"R{k}", stretch)
+            assert (begin, end) == pytest.approx(tuple(stops[stretch : stretch + 2]))
+            a, b = along.index(nodes[stretch]), along.index(nodes[stretch + 1])
+            for told, forces in zip(carried, found, strict=True):
+                # the laths' axes lie 12 mm apart, and a moment turns an element's second end the other way
+                first = 0.0 if a == 0 else forces[along[a], along[a + 1]][2] / 0.012
+                last = 0.0 if b == len(along) - 1 else -forces[along[b - 1], along[b]][5] / 0.012
+                assert told == pytest.approx(abs(last - first))
+    assert next(rows, None) is None
+
+
 def test_gradients_hold_with_two_layers(shells):
     found, load = shells
     problem = sf.Problem(

@@ -1,13 +1,15 @@
 """An optimisation that is broken off goes on from where it stood, to the same design."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 import shellform as sf
 from shellform.optimiser.optimise import begin
-from shellform.optimiser.resuming import resumed, tell
+from shellform.optimiser.optimum import Step
+from shellform.optimiser.resuming import _COUNTS, resumed, tell
+from shellform.optimiser.search_state import Accepted
 from shellform.structure.elements.state import extended, moved
 from tests.problems import misfit_and_force
 
@@ -95,3 +97,38 @@ def test_a_search_resumed_with_states_of_twice_the_digits_has_all_of_them(shell,
     for name, state in states.items():
         assert state.tail.any()
         np.testing.assert_array_equal(again[name].tail, state.tail)
+
+
+def test_a_checkpoint_holds_every_field_of_where_a_search_stands(shell, problem):
+    kept = []
+    search, it = begin(
+        problem, shell.design(), sf.SequentialConvex(), lambda softest: softest, 1, keep=kept.append
+    )
+    count = len(shell.cable_ends)
+    first, second = np.arange(count) % 2 == 0, np.arange(count) % 3 == 0
+    thick = replace(it.point.design, radius=1.25 * it.point.design.radius, present=first)
+    step = Step(7, 0.9, {"misfit": 0.8}, {"cable_force": -0.1}, 60, 0.75, True, 3.5, "descend")
+    stood = replace(
+        it,
+        accepted=(Accepted(it.point.design, second, 0.125), Accepted(thick, first, 0.25)),
+        history=(step,), stiffness=0.5 * search.softest, stage=0.75, window=0.375, margin=0.06, guarded=not it.guarded,
+        tensioned=second, excess=it.excess + 2.0, climbing=not it.climbing, status="said", phase="thin", refused=True,
+        before=0.7, thrifty=0.3, batch=5, failures=2, needed=first, fallen=(3, 1), fell=True, stood=2, led_to=0.6, until=9,
+    )  # fmt: skip
+    fresh = {each.name: getattr(it, each.name) for each in fields(it)}
+    for k, name in enumerate(_COUNTS):
+        setattr(search.evaluator, name, 10 + k)
+    tell(search, stood)
+    for name in _COUNTS:
+        setattr(search.evaluator, name, 0)
+    again = resumed(search, kept[-1])[1]
+    assert [getattr(search.evaluator, name) for name in _COUNTS] == [10, 11, 12, 13, 14]
+    for name in fresh.keys() - {"point", "accepted", "mind", "remembered"}:
+        found, wanted = getattr(again, name), getattr(stood, name)
+        assert not np.array_equal(wanted, fresh[name]), f"{name} would be right by chance"
+        assert np.array_equal(found, wanted), name
+    for found, wanted in zip(again.accepted, stood.accepted, strict=True):
+        np.testing.assert_array_equal(found.design.rest_length, wanted.design.rest_length)
+        np.testing.assert_array_equal(found.design.present, wanted.design.present)
+        np.testing.assert_array_equal(found.taut, wanted.taut)
+        assert (found.design.radius, found.violation) == (wanted.design.radius, wanted.violation)

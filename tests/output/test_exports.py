@@ -14,7 +14,8 @@ import trimesh
 import shellform.surface
 from shellform.errors import InputError
 from shellform.output.exchange import exports
-from shellform.output.workshop.schedules import rod_names
+from shellform.output.workshop.schedules import cable_crossings, rod_names, rounds
+from shellform.structure.network import assemble
 from shellform.surface.occ import session
 
 
@@ -78,6 +79,51 @@ def test_the_3dm_file_has_rods_cables_and_supports_on_layers_in_metres(folder, b
     assert len(found["supports"]) == len(built.shell.net.supports)
     assert len(found["crossings"]) == len(grid.lattice)
     assert len(found["target"]["target"].Geometry.Vertices) == len(vault.vertices)
+
+
+def test_what_the_3dm_file_s_objects_say_of_themselves_is_true_under_each_load(folder, built):
+    model = rhino3dm.File3dm.Read(str(folder / "gridshell.3dm"))
+    layers = {layer.Index: layer.Name for layer in model.Layers}
+    said, shell = {}, built.shell
+    for each in model.Objects:
+        own = {name: each.split() for name, each in each.Attributes.GetUserStrings()}
+        said[layers[each.Attributes.LayerIndex], each.Attributes.Name] = own
+    ties, network = shell.cables(built.design), shell.network(built.design)
+
+    def numbers(layer, name, word):
+        return np.array(said[layer, name][word], dtype=float)
+
+    for load, state in built.states.items():
+        push = -assemble(network).evaluate(state, tangent=False).force[:, :3]
+        for k, node in enumerate(shell.net.supports):
+            told = numbers("supports", f"S{k}", f"on the support under {load} [N]")
+            np.testing.assert_allclose(told, push[node], atol=1e-6)
+        for k in range(len(ties.ends)):
+            told = [
+                numbers("cables", f"C{k}", f"{word} under {load} {unit}")[0]
+                for word, unit in (("length", "[m]"), ("force", "[N]"))
+            ]
+            np.testing.assert_allclose(told, [ties.lengths(state)[k], ties.tension(state)[k]], atol=1e-6)
+        away = np.linalg.norm(state.positions - shell.target.positions, axis=1)
+        for k, rod in enumerate(built.grid.rods):
+            told = numbers(
+                f"rods {rod.direction}", rod_names(built.grid)[k], f"off the target at most under {load} [m]"
+            )
+            assert told == pytest.approx(away[rod.nodes].max(), abs=1e-6)
+        for k, pair in enumerate(built.grid.crossing_nodes):
+            told = numbers("crossings", str(k), f"under {load} [m]")
+            np.testing.assert_allclose(told, state.positions[pair].mean(axis=0), atol=1e-6)
+    for k, pair in enumerate(built.grid.crossing_nodes):
+        told = numbers("crossings", str(k), "target [m]")
+        np.testing.assert_allclose(told, shell.target.positions[pair].mean(axis=0), atol=1e-6)
+    for k, rod in enumerate(built.grid.rods):
+        name = f"rods {rod.direction}", rod_names(built.grid)[k]
+        np.testing.assert_allclose(numbers(*name, "marks from the first end [m]"), rod.marks, atol=1e-6)
+        assert numbers(*name, "length [m]") == pytest.approx(rod.length, abs=1e-6)
+    turns = rounds(shell, built.design)
+    for k, pair in enumerate(cable_crossings(shell, built.design).tolist()):
+        assert said["cables", f"C{k}"]["crossings"] == list(map(str, pair))
+        assert said["cables", f"C{k}"]["tensioning round"] == [str(turns[k])]
 
 
 def test_the_glb_file_has_closed_tubes_of_the_rods_volume(folder, built):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import shellform as sf
 from shellform.errors import InputError
@@ -52,6 +53,9 @@ def test_the_script_begins_without_load_and_compares_with_what_the_load_moves(bu
     load = shell.point_load(6.9, every=2)
     told = lists(opensees_script(network, [before, after], load, title="", name="", case="additional"))
     np.testing.assert_allclose(np.array(told["START"])[:, :3], before.positions - network.nodes)
+    turned = Rotation.from_quat(before.quaternions[:, [1, 2, 3, 0]]).as_rotvec()
+    assert np.abs(turned).max() > 0.5
+    np.testing.assert_allclose(np.array(told["START"])[:, 3:], turned, atol=1e-12)
     np.testing.assert_allclose(np.array(told["MOVED"]), after.positions - before.positions)
     cable = network.cables.ends[-1].tolist()
     assert list(told["CABLES"][-1][:3]) == [*cable, 187.0]

@@ -54,7 +54,9 @@ def test_each_crossing_is_marked_once_on_both_rods_that_cross_there(read, net):
     pairs = {(row["rod"], row["crosses rod"]) for row in rows}
     assert all((b, a) in pairs for a, b in pairs)
     for row in rows:
-        rod = net.grid.rods[int(row["rod"][1:])]
+        rod, other = (net.grid.rods[int(row[each][1:])] for each in ("rod", "crosses rod"))
+        assert {rod.direction, other.direction} == {"u", "v"}
+        assert int(row["crossing"]) in other.crossings
         place = rod.nodes[rod.at[int(row["mark"]) - 1]]
         along = np.linalg.norm(net.grid.flat[place] - net.grid.flat[rod.nodes[0]])
         assert float(row["from the first end [m]"]) == pytest.approx(along, abs=1e-6)
@@ -232,6 +234,19 @@ def test_a_cable_s_round_is_how_many_crossings_it_lies_from_the_nearest_end_of_a
     assert [ranks[step] for step in own] == [int(each) for each in table.column("tensioning round")]
 
 
+def test_within_a_round_cables_stand_as_they_go_round_the_middle_of_the_plan_wherever_it_lies(built):
+    shell, order = built.shell, schedules.tension_order(built.shell, built.design)
+    turns = schedules.rounds(shell, built.design)[order]
+    away = shell.target.positions[shell.cable_ends[built.design.present]].mean(axis=1)
+    away = (away - shell.net.crossings.mean(axis=0))[order]
+    for turn in range(1, turns.max() + 1):
+        angles = np.arctan2(away[turns == turn, 1], away[turns == turn, 0])
+        assert (np.diff(angles) >= 0.0).all()
+    far = replace(shell.target, positions=shell.target.positions + np.array([30.0, -20.0, 0.0]))
+    moved = replace(shell, net=replace(shell.net, target=far))
+    np.testing.assert_array_equal(schedules.tension_order(moved, built.design), order)
+
+
 def test_supports_and_survey_targets_stand_where_the_net_has_them(read, built):
     net = built.shell.net
     for number, row in enumerate(read["supports"]):
@@ -355,6 +370,14 @@ def test_each_piece_begins_a_saw_cut_after_the_one_before_it(built):
     for (*_, length, at, _, _), following in beside:
         assert following[5] == pytest.approx(at + length + 0.004, abs=1e-9)
     assert all(row[5] == 0.0 for row in rows if row[1] == 1)
+    pieces = [piece for bar in cutting.bars for piece in bar.pieces]
+    assert {piece.parts for piece in pieces} == {1}
+    assert all(row[3] == "" for row in rows)
+    spliced = nesting.cut(built.grid, stock=0.5)
+    told = [str(row[3]) for row in schedules.bars(built, spliced).rows]
+    pieces = [piece for bar in spliced.bars for piece in bar.pieces]
+    assert told == [f"{each.part} of {each.parts}" if each.parts > 1 else "" for each in pieces]
+    assert len(set(told)) > 2
     last = [row for row in rows if row[7] is not None]
     assert len(last) == len(cutting.bars)
     for *_, length, at, _, offcut in last:

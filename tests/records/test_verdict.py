@@ -215,6 +215,7 @@ def test_what_is_only_told_fails_no_design(shell, designs):
     check = as_built(shell, designs, None, standing(200, 1), told)
     assert check.limit == "told only"
     assert verdict([check], "polished").holds
+    assert asked([check], "polished") == 0
 
 
 def test_the_remedy_says_which_rods_would_do_or_that_the_grid_must_be_closer(shell, designs):
@@ -244,6 +245,8 @@ def test_the_verdict_gives_reason_and_remedy_and_names_what_is_not_examined(shel
     unknown = verdict(checks(every(shell, designs), designs, summary(designs), bounds), "polished")
     assert not unknown.holds, "what isn't examined doesn't hold"
     assert headline(unknown) == "The polished design is not examined: 1 check is still open."
+    every_one = checks(every(shell, designs), designs, summary(designs), bounds)
+    assert asked(every_one, "polished") == len(every_one) - 2, "neither the optimiser's nor the open one"
     sound = verdict(checks(every(shell, designs), designs, summary(designs), BOUNDS), "polished")
     assert sound.holds
     assert sound.failed == sound.not_examined == ()

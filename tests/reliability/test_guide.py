@@ -123,6 +123,21 @@ def test_the_derivative_of_a_modes_stiffness_by_the_rest_length_is_exact(cables)
     assert found == pytest.approx(2.0, abs=0.15)
 
 
+def test_both_derivatives_of_a_modes_stiffness_are_exact_for_cables_that_are_stretched_to_twice_their_length(
+    cables,
+):
+    """Where the tension across a cable counts as much as its own stiffness."""
+    way, mode = directions()
+    state, rate = at_rest(PLACES), np.array([1.0, -0.5, 0.3, 2.0])
+    taut = replace(cables, rest_length=0.5 * cables.lengths(state))
+    by_place = expected(taut).stiffness_by_dof(state, mode) * way[np.array(ENDS)].reshape(4, 6)
+    found = orders(lambda h: quadratic(expected(taut), shifted(h, way), mode), by_place.sum(axis=1))
+    assert found == pytest.approx(2.0, abs=0.15)
+    by_rest = expected(taut).stiffness_by_rest_length(state, mode) * rate
+    found = orders(lambda h: quadratic(expected(longer(taut, h, rate)), state, mode), by_rest)
+    assert found == pytest.approx(2.0, abs=0.15)
+
+
 def test_a_shell_whose_cables_are_taut_by_a_hair_is_told_to_be_softer_than_the_sharp_law_says(nominal):
     state, assembly = nominal.states[-1], assemble(nominal.network)
     cables = nominal.network.cables

@@ -39,6 +39,15 @@ def test_loads_that_are_shares_of_another_lie_on_its_path(loads):
     assert "none" not in found
 
 
+def test_a_load_against_another_has_a_path_of_its_own(loads):
+    design = loads["design"]
+    found = paths({"design": design, "uplift": -0.3 * design, "more": -0.6 * design})
+    assert found == {
+        "design": {"design": 1.0},
+        "more": {"more": 1.0, "uplift": pytest.approx(0.5)},
+    }
+
+
 def test_the_initial_designs_share_is_required_under_the_additional_load_where_none_is_named(dome, loads):
     safety = Safety(HARD, critical_factor=None, drawn=12, seed=3)
     initial = judge(dome, dome.design(), loads, safety)

@@ -52,11 +52,15 @@ def test_a_common_failure_is_counted_at_once():
     found = subset_simulation(plane(0.5, 4), 4, count=200, seed=0)
     assert found.levels == ()
     assert found.evaluations == 200
+    share = found.probability  # of independent samples
+    assert found.variation == pytest.approx(np.sqrt((1.0 - share) / (200 * share)))
+    assert len(found.failed) == round(200 * share)
 
 
 def test_what_never_fails_has_no_likeliest_failure():
     found = subset_simulation(lambda z: np.full(len(z), 1.0), 3, count=50, seed=0)
     assert found.probability == 0.0
+    assert found.variation == np.inf
     assert found.likeliest is None
 
 

@@ -1,6 +1,8 @@
 """The stage that writes drawings, schedules and models of a run's best design."""
 
 import csv
+import itertools
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +10,11 @@ import pytest
 
 from shellform.case.case import load_case
 from shellform.errors import InputError
+from shellform.output.workshop.schedules import TitleBlock
 from shellform.records.progress import Kind
 from shellform.records.stages import STAGES
 from shellform.records.summary import Summary
-from shellform.run.documents import stock_length, write_documents
+from shellform.run.documents import built_design, stock_length, write_documents
 from shellform.run.folder import Run
 from shellform.run.keys import stage_keys
 
@@ -55,6 +58,30 @@ def test_all_documents_of_the_best_design_are_written_and_splices_are_said(run):
     assert found.spliced == tuple(long)
     assert (found.design, found.stock_length) == ("polished", 0.8)
     assert [each for each in said if "SPLICED" in each.text and each.kind is Kind.NOTE]
+    with (run.folder / "schedules/bars.csv").open(encoding="utf-8", newline="") as file:
+        bars = list(csv.DictReader(file))
+    assert found.bars == len({row["bar"] for row in bars}) >= found.bars_least
+    used = sum(rod.length for rod in run.net.grid.rods)
+    assert found.waste == pytest.approx(1.0 - used / (0.8 * found.bars))
+    for first, then in itertools.pairwise(bars):
+        if first["bar"] == then["bar"]:
+            end = float(first["begins on the bar at [mm]"]) + float(first["length [mm]"])
+            assert float(then["begins on the bar at [mm]"]) == pytest.approx(end + 2.0, abs=2e-3)
+
+
+def test_what_is_built_is_the_best_design_with_its_cables_hung_into_the_grid_before_bracing(run):
+    words = ["cable.adjustment=0.01", "title_block.date=2026-05-31", "title_block.revision=B"]
+    case = load_case(CASE, [*words, "title_block.author=A. Author", "surface.origin=[1.0, 2.0, 3.0]"])
+    states = {**run.states, "unbraced": {**run.states["initial"], "none": run.states["unbraced"]["design"]}}
+    built = built_design(replace(run, case=case, states=states))
+    assert (built.name, built.design, built.states) == (
+        "polished", run.designs["polished"], run.states["polished"],
+    )  # fmt: skip
+    assert built.hung is states["unbraced"]["none"]
+    assert (built.adjustment, built.origin, built.title) == (0.01, (1.0, 2.0, 3.0), case.title)
+    assert built.block == TitleBlock("2026-05-31", "B", "A. Author")
+    alone = {name: own for name, own in states.items() if name != "unbraced"}
+    assert built_design(replace(run, states=alone)).hung is None
 
 
 def test_a_folder_in_which_nothing_can_be_written_is_named(run, tmp_path):

@@ -9,11 +9,14 @@ from shellform.case.build_safety import case_safety, case_tolerances, critical_f
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.tolerances import SOURCES, default_tolerances
+from shellform.records.drawn import DrawnPath
 from shellform.records.progress import Kind
 from shellform.records.summary import read_summary
+from shellform.reliability.probability import counted
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import sample
 from shellform.run import examination
+from shellform.run.examination import _standing
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
 from tests.stubs import CASE
@@ -52,6 +55,15 @@ def test_every_design_tells_its_critical_factor_on_both_meshes_and_how_many_stru
                 assert row.stands.drawn == (12 if name == summary.verdict.design else 4)
                 assert row.stands.standing <= row.stands.drawn
                 assert (row.stands.confidence, row.stands.seed) == (0.95, 0)
+        main, more = design.loads["design"], design.loads["additional"]
+        for each in (
+            "factor",
+            "factor_halved",
+            "factor_error",
+            "sought",
+        ):  # one path, by the load that it counts
+            found = [getattr(row, f"critical_{each}") * row.factor for row in (main, more)]
+            assert found[1] == pytest.approx(found[0], rel=1e-9)
         ratio = design.loads["design"].critical_factor / design.loads["additional"].critical_factor
         assert ratio == pytest.approx(1.2)
 
@@ -64,6 +76,19 @@ def test_what_is_told_is_what_a_sample_of_the_same_seed_finds(whole):
     found = sample(shell, design, run.loads[largest], tolerances, count=12, seed=0).standing
     told = run.summary.designs["optimised"].loads[largest].stands
     assert (told.drawn, told.standing, told.at_least) == (found.drawn, found.standing, found.at_least)
+
+
+def test_under_a_share_of_a_load_those_stand_that_bear_it_and_the_lowest_factor_is_of_that_share(file):
+    case = load_case(file, ["safety.confidence=0.9", "safety.seed=5"])
+    # of the last two, which bear the whole load, one ends far from where the perfect structure does
+    path = DrawnPath((0.4, 0.5, 0.8, 0.9, 1.0, 1.0), (False, False, False, False, False, True))
+    share, whole = (_standing(path, each, case) for each in (0.8, 1.0))
+    assert (share.standing, share.drawn, share.lowest) == (4, 6, pytest.approx(0.5))
+    assert (whole.standing, whole.lowest) == (1, 0.4)
+    for told in (share, whole):
+        assert told.at_least == counted(6, told.standing, seed=5, confidence=0.9).at_least
+        assert (told.confidence, told.seed) == (0.9, 5)
+    assert _standing(DrawnPath((1.0,), (True,)), 0.8, case).lowest == 1.0
 
 
 def test_sampling_tells_how_far_it_is_and_how_long_it_takes_at_most(whole):

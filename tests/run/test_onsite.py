@@ -144,6 +144,16 @@ def test_erection_is_told_step_by_step(folder, run, tmp_path):
         )
 
 
+def test_groups_count_cables_as_drawings_do(shell, tmp_path):
+    design = replace(shell.design(), present=np.arange(len(shell.cable_ends)) % 3 == 1)
+    last = int(design.present.sum()) - 1
+    file = written(tmp_path / "groups.csv", "cable,group", [(last, 1), (0, 2), (1, 1)])
+    first, second = measurements.read_groups(file, design)
+    assert (first.tolist(), second.tolist()) == ([3 * last + 1, 4], [1])
+    with pytest.raises(InputError, match=f"from 0 to {last}"):
+        measurements.read_groups(written(file, "cable,group", [(last + 1, 1)]), design)
+
+
 def test_erection_by_way_points_and_under_weight(folder, run, tmp_path):
     from shellform.site.erection import laid_out
 
@@ -235,7 +245,7 @@ def test_bad_tables_of_loads_groups_and_ways_are_refused(folder, run, tmp_path):
     with pytest.raises(InputError, match="is empty"):
         measurements.read_table(written(tmp_path / "a.csv", "# nothing", []), ("x",))
     with pytest.raises(InputError, match="line 2: cable"):
-        measurements.read_groups(written(tmp_path / "a.csv", "cable,group", [(-1, 1)]), shell)
+        measurements.read_groups(written(tmp_path / "a.csv", "cable,group", [(-1, 1)]), shell.design())
     with pytest.raises(InputError, match="is no support"):
         measurements.read_way(
             written(

@@ -7,6 +7,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.reactions import reactions
 from shellform.site.erection import erect, laid_out
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -66,6 +67,7 @@ def test_groups_lift_way_points_weight_and_a_load_are_stages_of_their_own(shell)
     supports = shell.net.supports
     half = 0.5 * (laid_out(shell).positions[supports] + shell.target.positions[supports])
     lift, weight = 0.1 * shell.point_load(-0.1), shell.point_load(0.01)
+    weight[supports, 2] -= 0.3  # which goes into the ground there, and counts in what supports bear
     done = erect(
         shell,
         design,
@@ -87,6 +89,24 @@ def test_groups_lift_way_points_weight_and_a_load_are_stages_of_their_own(shell)
     ]
     expected = sf.follow(shell, design, {"all": weight + shell.point_load(0.1)})["all"].equilibrium.state
     np.testing.assert_allclose(done.steps[-1].state.positions, expected.positions, atol=1e-6)
+    unbraced = replace(design, present=np.zeros(len(design.present), dtype=bool))
+    carried = {"lifting": (0.0, 1.0), "moving supports": (1.0, 0.0), "lowering": (1.0, -1.0)}
+    for each in done.steps:
+        # What supports bear is in equilibrium with the weight, and with the share of the lift that acts then.
+        if each.stage in carried:
+            own, before = unbraced, carried[each.stage]
+            acting = weight + (before[0] + each.share * before[1]) * lift
+        elif each.stage == "loading":
+            own, acting = design, weight + each.share * shell.point_load(0.1)
+        else:
+            continue
+        found = reactions(shell, own, each.state, acting)
+        off = assemble(shell.network(own)).evaluate(each.state, tangent=False).force - acting
+        off[supports] = 0.0
+        assert np.abs(off).max() < 1e-4
+        assert each.reaction == pytest.approx(max(np.linalg.norm(one.force) for one in found.supports))
+        place = each.state.positions
+        assert each.height == pytest.approx(place[:, 2].max() - place[supports, 2].min())
     for stage in stages:
         shares = [each.share for each in done.steps if each.stage == stage]
         assert shares == sorted(shares)

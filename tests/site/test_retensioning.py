@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError, NotConverged
-from shellform.site.retensioning import Crew, adjust, drawn, learn, replay, whole_turns
+from shellform.site.retensioning import Adjustment, Crew, adjust, drawn, learn, replay, whole_turns
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -109,6 +109,22 @@ def test_whole_turns_come_near_the_best_of_all_combinations():
     assert min(ratios) > 1.0 - 1e-12
     assert np.mean(ratios) < 1.05
     assert np.mean(np.array(ratios) < 1.0 + 1e-9) > 0.7
+
+
+def test_turns_are_listed_under_the_numbers_of_drawings_with_the_force_that_each_cable_ends_with(shell):
+    present = np.arange(len(shell.cable_ends)) % 2 == 1
+    design, none = replace(shell.design(), present=present), np.zeros((shell.node_count, 6))
+    state = find_equilibrium(assemble(shell.network(design)), shell.target, none).state
+    turns = np.zeros(len(present), dtype=np.int64)
+    turns[[5, 101]] = [-3, 2]
+    belief = drawn(shell, design, state, none, length_error=ERROR)
+    step = Adjustment(turns, 0.25e-3 * turns, state.positions, belief, 0.0, 0.0, 0.0, 0)
+    rows = [line.split(",") for line in step.schedule(shell).splitlines()]
+    assert rows[0] == ["cable", "node a", "node b", "turns", "change [mm]", "tension after [N]"]
+    cables = shell.cables(design)
+    pull = cables.tension(state)
+    for row, number, told in zip(rows[1:], (2, 50), (("-3", "-0.75"), ("+2", "+0.50")), strict=True):
+        assert row == [*map(str, (number, *cables.ends[number])), *told, f"{pull[number]:.2f}"]
 
 
 def test_nothing_is_turned_where_cables_are_as_good_as_exact(shell, belief, upper):

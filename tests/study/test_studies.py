@@ -25,6 +25,7 @@ from shellform.study.engine import engine, sweep
 from shellform.study.front import Front
 from shellform.study.jobs import Job, work
 from shellform.study.outcome import Outcome, Row, Status, flat
+from shellform.study.search import _beyond
 from shellform.study.store import Log, read_table
 from shellform.study.studies import run_study
 from tests.stubs import ROOT, deadly, quick, stuck, study_file
@@ -398,13 +399,25 @@ def test_the_front_holds_what_nothing_beats_and_keeps_limits():
         ("other", 2, 2, []),
         ("best", 1, 3, ["one", "other"]),
         ("same", 1, 3, []),
-        ("beyond", 6, 9, ["beyond"]),
+        ("at its limit", 5, 4, []),
+        ("beyond", 5.0001, 9, ["beyond"]),
+        ("word", "5", 9, ["word"]),
         ("none", None, 9, ["none"]),
         ("nan", float("nan"), 9, ["nan"]),
     ]:
         assert front.add(Row(key, Status.DONE, "", {"a": a, "b": b})) == off
     assert front.add(Row("failed", Status.NO_RESULT, "", {"a": 0, "b": 9})) == ["failed"]
-    assert set(front.found) == {"best", "same"}
+    assert set(front.found) == {"best", "same", "at its limit"}
+
+
+def test_a_search_counts_what_is_beyond_a_limit_or_not_known():
+    assert [_beyond(value, 2.0) for value in (2.0, 1.5, 3.0, None, "limit point")] == [
+        0.0,
+        -0.5,
+        1.0,
+        1.0,
+        1.0,
+    ]
 
 
 def test_summaries_become_columns():
@@ -415,6 +428,7 @@ def test_summaries_become_columns():
         "f": [[1]],
         "g": True,
         "h": list(range(9)),
+        "i": [1.0, "x"],
     }
     assert flat(tree) == {"a.b": 1, "a.c.0": 1.0, "a.c.1": 2.0, "d": "x; y", "g": True}
 

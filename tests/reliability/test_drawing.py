@@ -1,0 +1,101 @@
+"""What drawn structures are off by: every cause by its own deviation, once, and as its own words say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.drawing import built_beams, built_cables, built_load, errors_of, variables
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.state import from_vectors
+
+
+@pytest.fixture(scope="module")
+def z(nominal):
+    """The variables of one structure."""
+    return variables(nominal.members, 3, 8)
+
+
+def off(nominal, z, **deviations):
+    return errors_of(nominal.members, Tolerances(**deviations), z)
+
+
+def test_lengths_places_and_stiffnesses_are_off_by_their_deviations_times_their_variables(nominal, z):
+    members = nominal.members
+    found = off(
+        nominal, z, cable_length=1e-3, cable_stiffness=0.05, supports=2e-3, connectors=0.1, shape=5e-4
+    )
+    np.testing.assert_allclose(found.cable_length, 1e-3 * z["cable_length"])
+    np.testing.assert_allclose(found.cable_stiffness, np.exp(0.05 * z["cable_stiffness"]))
+    np.testing.assert_allclose(found.supports.ravel()[members.held], 2e-3 * z["supports"])
+    assert np.count_nonzero(found.supports) == len(members.held)
+    np.testing.assert_allclose(found.beam_stiffness[members.connectors], np.exp(0.1 * z["connectors"]))
+    np.testing.assert_allclose(found.shape, 5e-4 * np.ptp(members.places, axis=0).max() * z["shape"])
+    rods = off(nominal, z, rod_stiffness=0.03)
+    for k, rod in enumerate(members.rods):
+        np.testing.assert_allclose(rods.beam_stiffness[rod.elements], np.exp(0.03 * z["rod_stiffness"][k]))
+    assert (rods.beam_stiffness[members.connectors] == 1.0).all()
+
+
+def test_a_rod_s_own_arc_rises_by_its_share_of_the_rod_s_length_about_either_axis(nominal, z):
+    members = nominal.members
+    found = off(nominal, z, rod_bow=1e-3)
+    for k, rod in enumerate(members.rods):
+        length = members.beam_length[rod.elements].sum()
+        rise = np.abs(found.beam_curvature[rod.elements]) * length**2 / 8.0
+        wanted = 1e-3 * length * np.abs(z["rod_bow"][2 * k : 2 * k + 2])
+        np.testing.assert_allclose(rise, np.tile(wanted, (len(rod.elements), 1)))
+
+
+def test_loads_are_off_crossing_by_crossing_as_a_whole_and_from_one_half_to_the_other(nominal, z):
+    members = nominal.members
+    each = off(nominal, z, load_each=0.1).load
+    np.testing.assert_allclose(each, 1.0 + 0.1 * z["load_each"][members.zone])
+    np.testing.assert_allclose(off(nominal, z, load_all=0.05).load, 1.0 + 0.05 * z["load_all"][0])
+    for axis in range(2):
+        alone = z | {"load_uneven": np.eye(2)[axis]}
+        uneven = off(nominal, alone, load_uneven=0.05).load - 1.0
+        along = members.places[:, axis] - members.places[:, axis].mean()
+        assert np.abs(uneven).mean() == pytest.approx(0.05)
+        np.testing.assert_allclose(uneven / along, uneven[0] / along[0])
+        assert uneven[0] / along[0] > 0.0
+    every = off(nominal, z, load_each=0.1, load_all=0.05)
+    np.testing.assert_allclose(built_load(nominal.load, every)[:, 2], nominal.load[:, 2] * every.load)
+
+
+def test_a_built_structure_has_each_error_once_and_those_of_its_own_cables(dome, nominal, z):
+    present = np.arange(len(dome.cable_ends)) % 3 == 1
+    cables = dome.cables(replace(dome.design(), present=present))
+    found = off(nominal, z, cable_length=1e-3, cable_stiffness=0.05, connectors=0.1, marks=1e-4)
+    built = built_cables(cables, present, found)
+    np.testing.assert_allclose(built.rest_length, cables.rest_length + 1e-3 * z["cable_length"][present])
+    np.testing.assert_allclose(
+        built.stiffness, cables.stiffness * np.exp(0.05 * z["cable_stiffness"][present])
+    )
+    beams = nominal.network.beams
+    made = built_beams(beams, found)
+    np.testing.assert_allclose(made.rest_length, beams.rest_length + found.beam_length)
+    for name in ("axial", "torsion", "bending_y", "bending_z"):
+        np.testing.assert_allclose(getattr(made, name), getattr(beams, name) * found.beam_stiffness)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_a_bowed_rod_is_free_of_stress_on_its_arc(nominal, z, axis):
+    along = np.array([0.0, 0.2, 0.5, 0.6, 1.0])
+    flat = np.column_stack([along, np.zeros(5), np.zeros(5)])
+    ends = np.column_stack([np.arange(4), np.arange(1, 5)])
+    rod = make_beams(flat, ends, axial=1e5, torsion=1.0, bending_y=1.0, bending_z=2.0)
+    curvature = np.zeros((4, 2))
+    curvature[:, axis] = 0.8
+    none = off(nominal, z)
+    straight = replace(none, beam_length=np.zeros(4), beam_stiffness=np.ones(4))
+    bowed = built_beams(rod, replace(straight, beam_curvature=curvature))
+    # Chords between nodes of which each is turned by curvature times length against the one before.
+    turned, about = 0.8 * along, rod.frames[0, 0, :, 1 + axis]
+    middle, step = 0.5 * (turned[:-1] + turned[1:]), np.diff(along)
+    side = np.cross(about, [1.0, 0.0, 0.0])
+    chords = step[:, None] * (np.cos(middle)[:, None] * [1.0, 0.0, 0.0] + np.sin(middle)[:, None] * side)
+    arc = from_vectors(np.vstack([np.zeros(3), np.cumsum(chords, axis=0)]), turned[:, None] * about)
+    np.testing.assert_allclose(bowed.local_forces(arc), 0.0, atol=1e-9)
+    assert np.abs(bowed.local_forces(from_vectors(flat, np.zeros((5, 3))))).max() > 0.5

@@ -1,0 +1,37 @@
+"""The judge within a search: which structures it draws, and how many may fall."""
+
+import pytest
+
+from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability import trial_structures
+from shellform.reliability.safety import Safety
+from shellform.reliability.trial_structures import SEED, Required, enlarged, tried
+
+ROUGH = Tolerances(supports=1e-4, load_each=0.1, load_all=0.4)
+
+
+def test_a_search_draws_other_structures_than_those_by_which_its_result_is_judged_and_with_larger_errors(
+    dome, nominal, monkeypatch
+):
+    asked_for, own = [], trial_structures.drawn
+
+    def perfect(members, tolerances, seed, number):
+        asked_for.append((tolerances, seed, number))
+        return own(members, Tolerances(), seed, number)
+
+    monkeypatch.setattr(trial_structures, "drawn", perfect)
+    safety = Safety(ROUGH, critical_factor=None, drawn=10, tried=3, seed=5, enlarged=1.5)
+    asked = Required(safety, {"design": nominal.load}, "design", {"design": 0})
+    found = tried(dome, dome.design(), asked, first=(2,))
+    assert found.stands
+    assert [number for *_, number in asked_for] == [2, 0, 1], "those that fell before come first"
+    assert {seed for _, seed, _ in asked_for} == {5 + SEED} != {safety.seed}
+    assert {each for each, *_ in asked_for} == {
+        Tolerances(supports=1.5 * 1e-4, load_each=1.5 * 0.1, load_all=0.5)
+    }
+
+
+def test_enlarged_errors_are_larger_by_the_factor_as_far_as_shares_go():
+    found = enlarged(Tolerances(cable_length=1e-3, supports=2e-3, marks=0.4, rod_bow=1e-3, load_all=0.4), 1.5)
+    assert (found.cable_length, found.supports, found.marks) == pytest.approx((1.5e-3, 3e-3, 0.6))
+    assert (found.rod_bow, found.load_all, found.shape) == (pytest.approx(1.5e-3), 0.5, 0.0)
