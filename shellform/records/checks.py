@@ -29,15 +29,16 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) `stress`
-    over strength, connectors' `turn`, rad, `uplift`, N, of supports under any load, least pull `slack`, N, of
-    cables under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as
-    built (`safety`); and how the case gives its `rods`' size."""
+    over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
+    `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
+    structures as built (`safety`); and how the case gives its `rods`' size."""
 
     force: float
     misfit: float
     stress: float | None = None
     turn: float | None = None
     uplift: float | None = None
+    thrust: float | None = None
     slack: float | None = None
     slack_loads: tuple[str, ...] = ()
     critical: Mapping[str, float] = field(default_factory=dict)
@@ -201,6 +202,17 @@ def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: B
                 bounds.uplift,
                 lambda row: _largest(each.uplift_max for each in row.loads.values()),
                 "limits.uplift",
+                1.0,
+            )
+        )
+    if bounds.thrust is not None:
+        found.append(
+            worst(
+                "Thrust on a support under any load",
+                "N",
+                bounds.thrust,
+                lambda row: _largest(each.thrust_max for each in row.loads.values()),
+                "limits.thrust",
                 1.0,
             )
         )
