@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
 from shellform.records.as_built import AsBuilt, critical_checks, standing_checks
 from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, share_of
-from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count
+from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
 from shellform.records.summary import DesignRecord, LoadRecord, OptimisationRecord, Summary
 from shellform.records.words import constraint_title, load_title, number
 
@@ -265,7 +265,9 @@ def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, l
     for name in designs:
         row = rows[name].loads.get(load) if name in rows else None
         pull = None if row is None else row.cable_force_min
-        remedy = allow("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
+        remedy = (
+            allow_less("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
+        )
         cells[name] = (
             UNKNOWN
             if pull is None
