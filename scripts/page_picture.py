@@ -1,4 +1,4 @@
-"""Draws the README's pictures of pages: `python scripts/page_picture.py DIR`, where DIR is a run with a
+"""Draws the documentation's pictures of pages: `python scripts/page_picture.py DIR`, where DIR is a run with a
 report.html, or a study with a study.html whose picture is named as the folder; needs playwright and a
 Chromium."""
 

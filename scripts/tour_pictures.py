@@ -1,4 +1,4 @@
-"""Makes the README's pictures from a finished run of scripts/scale_model_radius.toml, small enough to be kept beside
+"""Makes the documentation's pictures from a finished run of scripts/scale_model_radius.toml, small enough to be kept beside
 the code.
 
 scripts/shellform design scripts/scale_model_radius.toml --output runs/scale_model

@@ -58,6 +58,7 @@ from shellform.problem.engineering import LargestCableForce as LargestCableForce
 from shellform.problem.engineering import LeastTension as LeastTension
 from shellform.problem.engineering import ModalStiffness as ModalStiffness
 from shellform.problem.engineering import RodUtilisation as RodUtilisation
+from shellform.problem.engineering import Thrust as Thrust
 from shellform.problem.engineering import Uplift as Uplift
 from shellform.problem.evaluation import Linearisation as Linearisation
 from shellform.problem.paths import deviations as deviations

@@ -1,4 +1,4 @@
-"""What the peers read of a model file (contracts/model-file.md): plain NumPy, for Pythons that don't have
+"""What the peers read of a model file (documentation/reference/model.md): plain NumPy, for Pythons that don't have
 shellform.
 """
 

@@ -1,4 +1,4 @@
-"""The program: one module a command, and the status with which it ends (contracts/run-folder.md).
+"""The program: one module a command, and the status with which it ends (documentation/how-to/failed.md).
 
 Large libraries are loaded by the command that needs them.
 """

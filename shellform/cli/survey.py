@@ -51,7 +51,11 @@ def survey(
     from shellform.run import onsite
 
     if (measured is None) == (replay is None):
-        raise InputError("needs either a survey or --replay", where="survey")
+        raise InputError(
+            "needs either a survey or --replay",
+            where="survey",
+            remedy="Name a CSV file of the survey, or give --replay 4, say, without one.",
+        )
     options = onsite.Survey(design, load, unit, noise, length_error, step, largest, cables, after)
     if replay is not None:
         tell_lines(

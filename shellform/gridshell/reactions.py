@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from shellform.net.edges import HELD
 from shellform.net.net import Net
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
-from shellform.written import write_text
 
 
 @dataclass(frozen=True)
@@ -102,23 +100,6 @@ def edge_of(net: Net, nodes: Indices) -> list[tuple[str, str]]:
     place = net.target.positions[nodes]
     away = np.array([_distance(place, each.points) for each in held])
     return [(held[k].kind, held[k].name) for k in np.argmin(away, axis=0)]
-
-
-def write_reactions(path: Path, found: dict[str, Reactions]) -> None:
-    """One line a support and load case as CSV."""
-    lines = [
-        "support,node,kind,name,x [m],y [m],z [m],load,Fx [N],Fy [N],Fz [N],pressure [N],uplift [N],thrust "
-        "[N]"
-    ]
-    for load, each in found.items():
-        for one in each.supports:
-            place = ",".join(f"{value:.4f}" for value in one.place)
-            forces = (*one.force, one.pressure, one.uplift, one.thrust)
-            lines.append(
-                f"S{one.number},{one.node},{one.kind},{one.name.replace(',', ' ')},{place},{load},"
-                + ",".join(f"{value:.3f}" for value in forces)
-            )
-    write_text(path, "\n".join(lines) + "\n")
 
 
 def _three(values: Reals) -> tuple[float, float, float]:

@@ -3,7 +3,7 @@
 Where a cable goes slack the tangent loses its stiffness at once. Far from collapse that is a kink like
 others; but a cable that helps to hold the softest mode under an additional load may leave the shell without
 equilibrium, and no derivative tells of it beforehand: that of the mode's stiffness may even promise a rise
-(README, "What was tried").
+(documentation/decisions.md).
 
 A guard is the linear model of those tensions under one load: t + (∂t/∂s) Δs, one adjoint solve for each, kept
 from falling below a floor.

@@ -3,7 +3,7 @@
 Svanberg's method of moving asymptotes (1987, 2002) replaces a problem by a sequence of convex ones that are
 solved exactly. Directly in the rest lengths (moving_asymptotes.py) it finds as good a fit with as few cables
 in tension, but knows nothing of what holds the shell up: without its slack cables the design collapses
-(README, "What was tried"). Here each convex problem is the model in tensions (step_model.py), exact in first
+(documentation/decisions.md). Here each convex problem is the model in tensions (step_model.py), exact in first
 order and with Gauss-Newton curvature; interior points and NLopt's MMA solve it within a window round the present
 design (proposal.py), and the trial is then evaluated by its true equilibria (trials.py, phases.py):
 

@@ -9,8 +9,6 @@ problem, its weights those of the initial design.
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -51,26 +49,6 @@ class CandidateSection:
     mass: float
     why: str
     rounded_up: bool
-
-    def row(self) -> dict[str, object]:
-        """As a line of sections.csv and of the summary; what isn't known is None."""
-        known = self.optimum is not None
-        values = {
-            "objective": self.objective,
-            "deviation_max": self.deviation_max,
-            "deviation_mean": self.deviation_mean,
-            "cables": self.cables,
-            "stress_utilisation_max": self.utilisation,
-        }
-        return {
-            "section": self.section,
-            "rod_radius": self.shell.rod.radius,
-            "rod_mass": self.mass,
-            "rounded_up": self.rounded_up,
-            **{name: value if known else None for name, value in values.items()},
-            "feasible": not self.why,
-            "why_not": self.why,
-        }
 
 
 def tried(
@@ -124,16 +102,6 @@ def chosen(trials: Sequence[CandidateSection]) -> CandidateSection | None:
     if not up.why or not feasible:
         return up if up.optimum is not None else None
     return min(feasible, key=lambda each: each.objective)
-
-
-def table(trials: Sequence[CandidateSection]) -> str:
-    """The content of sections.csv."""
-    text = io.StringIO()
-    rows = [each.row() for each in trials]
-    writer = csv.DictWriter(text, list(rows[0]))
-    writer.writeheader()
-    writer.writerows({name: "" if value is None else value for name, value in row.items()} for row in rows)
-    return text.getvalue()
 
 
 def rods_mass(shell: Gridshell) -> float:

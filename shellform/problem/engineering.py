@@ -127,7 +127,7 @@ class LeastTension(Term):
     such as the limit that it is to keep.
 
     It is told up to ln(number) / 10 of `scale` too low. Cables longer than `let_out` times their length
-    in the target don't count: those which the optimiser has done without (tensions.py).
+    in the target don't count: those which the optimiser has done without (step_model.py).
     """
 
     name = "slackness"

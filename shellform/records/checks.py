@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
 from shellform.records.as_built import AsBuilt, critical_checks, standing_checks
 from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, share_of
-from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count
+from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
 from shellform.records.summary import DesignRecord, LoadRecord, OptimisationRecord, Summary
 from shellform.records.words import constraint_title, load_title, number
 
@@ -29,15 +29,16 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) `stress`
-    over strength, connectors' `turn`, rad, `uplift`, N, of supports under any load, least pull `slack`, N, of
-    cables under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as
-    built (`safety`); and how the case gives its `rods`' size."""
+    over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
+    `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
+    structures as built (`safety`); and how the case gives its `rods`' size."""
 
     force: float
     misfit: float
     stress: float | None = None
     turn: float | None = None
     uplift: float | None = None
+    thrust: float | None = None
     slack: float | None = None
     slack_loads: tuple[str, ...] = ()
     critical: Mapping[str, float] = field(default_factory=dict)
@@ -204,6 +205,17 @@ def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: B
                 1.0,
             )
         )
+    if bounds.thrust is not None:
+        found.append(
+            worst(
+                "Thrust on a support under any load",
+                "N",
+                bounds.thrust,
+                lambda row: _largest(each.thrust_max for each in row.loads.values()),
+                "limits.thrust",
+                1.0,
+            )
+        )
     if bounds.slack is not None:
         for load in bounds.slack_loads:
             found.append(_taut(rows, designs, load, bounds.slack))
@@ -253,7 +265,9 @@ def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, l
     for name in designs:
         row = rows[name].loads.get(load) if name in rows else None
         pull = None if row is None else row.cable_force_min
-        remedy = allow("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
+        remedy = (
+            allow_less("limits.slack_min", pull) if pull else "Leave limits.slack_min out, or let it be 0.01."
+        )
         cells[name] = (
             UNKNOWN
             if pull is None

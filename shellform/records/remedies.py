@@ -106,6 +106,11 @@ def allow(entry: str, value: float, *, or_else: str = "") -> str:
     return f"Allow {entry} = {_up(value)}{tail}."
 
 
+def allow_less(entry: str, value: float) -> str:
+    """To let a limit from below be what was found."""
+    return f"Allow {entry} = {_down(value)}."
+
+
 def allow_count(cables: int) -> str:
     """To let so many cables be."""
     return f"Allow optimise.cables_max = {cables}."

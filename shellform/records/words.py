@@ -22,6 +22,7 @@ _CONSTRAINTS = {
     "connector_turn": "connectors' turning",
     "slackness": "least pull of a cable",
     "uplift": "uplift of supports",
+    "thrust": "thrust on supports",
 }
 
 _CAUSES = {

@@ -19,7 +19,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import CAUSES, built_cables, errors_of, variables
-from shellform.reliability.path_of_one import DrawnOutcome, Limit
+from shellform.reliability.path_of_one import Limit
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.state import State
@@ -48,12 +48,6 @@ class Failure:
     def driver(self) -> str:
         """The cause without which it would bear most."""
         return next(iter(self.without))
-
-
-def most_likely(outcomes: tuple[DrawnOutcome, ...]) -> DrawnOutcome | None:
-    """Of the fallen structures the one whose load factor is in the middle; None where all stand."""
-    fallen = sorted((each for each in outcomes if not each.stands), key=lambda each: each.factor)
-    return fallen[len(fallen) // 2] if fallen else None
 
 
 def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: int) -> Failure:

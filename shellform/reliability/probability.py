@@ -41,13 +41,3 @@ def counted(drawn: int, standing: int, *, seed: int, confidence: float = CONFIDE
     least = 0.0 if standing == 0 else float(beta.ppf(1.0 - confidence, standing, drawn - standing + 1))
     most = 1.0 if standing == drawn else float(beta.ppf(confidence, standing + 1, drawn - standing))
     return Standing(drawn, standing, least, most, confidence, seed)
-
-
-def enough(probability: float, *, confidence: float = CONFIDENCE, fallen: int = 0) -> int:
-    """How many structures must be drawn so that the probability is shown with this many fallen."""
-    if not 0.0 < probability < 1.0:
-        raise InputError("must lie between 0 and 1", where="probability", value=probability)
-    count = fallen + 1
-    while counted(count, count - fallen, seed=0, confidence=confidence).at_least < probability:
-        count += 1
-    return count

@@ -30,6 +30,7 @@ _LOADS = {"none": "no load", "design": "design load", "additional": "additional 
 
 QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode", "history")
 FILMS = ("pour", "erection")
+_STILL = ("spring", "mode", "history")  # of one state, or of none
 
 
 _USUAL = (1600, 1000)  # pixels
@@ -94,9 +95,13 @@ def wish(
         raise InputError("must be positive", where="--force-limit", value=force_limit)
     if film is not None and film not in FILMS:
         raise InputError("is no film", where="--film", value=film, remedy=f"Known: {', '.join(FILMS)}.")
-    if film is not None and (transparent or quantity in ("spring", "mode", "history")):
+    if film is not None and (transparent or quantity in _STILL):
+        filmed = ", ".join(each for each in QUANTITIES if each not in _STILL)
         raise InputError(
-            "can't be filmed", where="--film", value="--transparent" if transparent else quantity
+            "can't be filmed",
+            where="--film",
+            value="--transparent" if transparent else quantity,
+            remedy="Leave --transparent out." if transparent else f"Films show {filmed}.",
         )
     if quantity is not None and quantity not in QUANTITIES:
         raise InputError(

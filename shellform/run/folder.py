@@ -1,4 +1,4 @@
-"""The run folder (contracts/run-folder.md): what the stages leave in it, and how it is read back.
+"""The run folder (documentation/reference/run.md): what the stages leave in it, and how it is read back.
 
 Every file is written whole or not at all. `read_run` gives the nouns that pictures, drawings and the page are
 made from. Whoever makes a run is `alone` in its folder, and no symbolic link in a folder is followed: it may

@@ -28,6 +28,7 @@ def run_checks(run: Run) -> list[Check]:
         stress=limits.utilisation,
         turn=limits.connector_turn,
         uplift=limits.uplift,
+        thrust=limits.thrust,
         slack=limits.slack_min,
         slack_loads=tuple(limits.slack_loads),
         critical=critical_factors_asked(run.case),

@@ -313,11 +313,17 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     } - data.keys()
     if lacking:
         raise InputError(
-            "was not left by shellform survey", where=str(options.after), value=", ".join(sorted(lacking))
+            "was not left by shellform survey: it lacks what a belief has",
+            where=str(options.after),
+            value=", ".join(sorted(lacking)),
+            remedy="Name the schedules/belief.npz of the round before.",
         )
     if str(data["origin"]) != f"{name}/{options.load}" or not np.array_equal(data["present"], design.present):
         raise InputError(
-            "belongs to another design or load case", where=str(options.after), value=str(data["origin"])
+            "belongs to another design or load case",
+            where=str(options.after),
+            value=str(data["origin"]),
+            remedy="Give the --design and --load of that round.",
         )
     known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
     there = State(data["positions"], data["quaternions"])

@@ -1,4 +1,4 @@
-"""The whole job of one case, stage by stage, in a run folder (contracts/run-folder.md).
+"""The whole job of one case, stage by stage, in a run folder (documentation/reference/run.md).
 
 surface -> net -> initial -> optimise -> safety -> figures -> documents -> report. Each stage leaves its
 result in the folder and a key in `stages.json`: a hash of the entries it depends on, the surface file's

@@ -1,4 +1,4 @@
-"""The model file: one structural model as a JSON document (contracts/model-file.md).
+"""The model file: one structural model as a JSON document (documentation/reference/model.md).
 
 msgspec reads and checks the document against the structures below in compiled code (a million nodes in about
 two seconds); what a type can't say, ranges, signs and references, is checked on whole arrays afterwards.

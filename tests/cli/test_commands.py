@@ -337,7 +337,7 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
     assert max(summary["optimisation"]["constraints"].values()) <= 1e-3
     optimised = designs["optimised"]["loads"]
     assert all(optimised[load]["stable"] and optimised[load]["on_branch"] for load in optimised)
-    # The orderings of verification.md F.
+    # As section 4.1 of the paper orders its designs.
     assert not designs["unbraced"]["loads"]["design"]["on_branch"]
     braced = ["initial", "unloaded", "optimised"]
     mean = {

@@ -8,7 +8,7 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, lengths, mass, weight
-from shellform.gridshell.reactions import Reactions, Support, reactions, write_reactions
+from shellform.gridshell.reactions import Reactions, Support, reactions
 from shellform.net.edges import stand
 from shellform.output.exchange.opensees import opensees_script
 from shellform.output.workshop.edge_schedule import edge_table
@@ -129,15 +129,6 @@ def test_the_schedule_of_edge_beams_is_in_equilibrium_and_names_the_rods_that_ar
         at, element = at + len(line.nodes), element + last
     assert table.columns[8:] == ("design: axial force [N]", "design: bending moment [N m]")
     assert f"{mass(shell.net, BUNDLE) / 2.0:.3g} kg" in " ".join(table.notes)
-
-
-def test_reactions_are_written_a_line_a_support_and_load(arches, solved, tmp_path):
-    shell, load = arches
-    found = reactions(shell, shell.design(), solved["design"], load)
-    write_reactions(tmp_path / "reactions.csv", {"design": found, "again": found})
-    lines = (tmp_path / "reactions.csv").read_text().splitlines()
-    assert len(lines) == 1 + 2 * len(found.supports)
-    assert all(len(line.split(",")) == len(lines[0].split(",")) for line in lines)
 
 
 def test_a_model_file_gives_the_design_with_edge_beams_again(arches, solved, tmp_path):

@@ -114,6 +114,7 @@ def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, de
         ({"stress": 0.9}, "none", {"stress_utilisation_max": 0.95}, "95 % of the strength"),
         ({"turn": 0.1}, "design", {"connector_turn_max": 0.2}, "11.5 °"),
         ({"uplift": 1.0}, "additional", {"uplift_max": 1.5}, "1.5 N"),
+        ({"thrust": 2.0}, "none", {"thrust_max": 2.5}, "2.5 N"),
         ({"slack": 0.5}, "none", {"cable_force_min": 0.2}, "0.2 N"),
         ({"force": 20.0}, "additional", {"cable_force_max": 21.0}, "21 N"),
     ],

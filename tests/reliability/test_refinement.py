@@ -8,7 +8,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.failure import explained, most_likely
+from shellform.reliability.failure import explained
 from shellform.reliability.path_of_one import BIFURCATION, BORNE, LIMIT_POINT
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.refinement import critical_factor, critical_of, mesh_error, rods_halved
@@ -133,8 +133,9 @@ def test_mesh_errors_are_told_of_all_four_numbers(dome, nominal):
 
 def test_a_fallen_structure_is_explained_by_what_it_would_bear_without_each_cause(dome, nominal):
     workshop = Workshop(perfect(dome, dome.design(), 1.2 * nominal.load))
-    outcomes = tuple(workshop.drawn(LARGE, seed=7, numbers=range(12)))
-    fallen = most_likely(outcomes)
+    outcomes = workshop.drawn(LARGE, seed=7, numbers=range(12))
+    lost = sorted((each for each in outcomes if not each.stands), key=lambda each: each.factor)
+    fallen = lost[len(lost) // 2]
     found = explained(workshop, LARGE, seed=7, number=fallen.number)
     assert set(found.without) == {name for name, value in vars(LARGE).items() if value}
     assert found.without[found.driver] == max(found.without.values()) > found.factor

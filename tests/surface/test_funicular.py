@@ -1,4 +1,4 @@
-"""Force densities against closed forms (verification.md, E), and shells that bear a uniform weight by thrust
+"""Force densities against closed forms, and shells that bear a uniform weight by thrust
 alone.
 """
 
@@ -46,7 +46,7 @@ def disc(rings, radius=1.0):
 
 
 def test_a_line_of_equal_branches_is_a_parabola():
-    # verification.md E: z_i = p i (n - i) / (2 q), exact at the nodes.
+    # z_i = p i (n - i) / (2 q), exact at the nodes.
     count, density, load = 10, 3.0, 2.0
     nodes, edges, loads, fixed = line(count, load)
     i = np.arange(count + 1)

@@ -1,5 +1,5 @@
 """The analysis of a model: how it comes to its load, and what there is to tell of it then
-(contracts/model-file.md).
+(documentation/reference/model.md).
 
 Four ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the
 stable branch and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole

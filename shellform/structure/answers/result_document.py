@@ -1,4 +1,4 @@
-"""What an analysis found, as the document that is written (contracts/model-file.md)."""
+"""What an analysis found, as the document that is written (documentation/reference/model.md)."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ from shellform.structure.elements.threads import share
 
 _NOTHING = np.empty((0, 78))
 _NO_MODES = np.empty((0, 6, 9, 2))
-_PARALLEL_TO_Z = 1e-6  # rad; nearer to global z than this, the default z axis is global x (model-file.md)
+_PARALLEL_TO_Z = 1e-6  # rad; nearer to global z than this, the default z axis is global x (model file)
 
 
 @dataclass(frozen=True)

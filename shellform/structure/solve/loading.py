@@ -170,14 +170,6 @@ def advance(
     return Loaded(replace(found, factorisations=spent), share, spent)
 
 
-def limit_factor(assembly: Assembly, start: State, load: Reals, *, most: float = 2.0) -> float:
-    """The share of `load`, up to `most`, that is borne on the stable branch from the unloaded equilibrium
-    `start`.
-    """
-    none = np.zeros_like(load)
-    return most * apply_load(assembly, start, none, most * load, step=0.0625, stay=True).share
-
-
 def _moved_on(
     assembly: Assembly, state: State, drive: Drive, share: float, begin: float, end: float
 ) -> tuple[State, float]:

@@ -29,7 +29,6 @@ _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
     "vtk": "VTK", "vtu": "VTK", "vtp": "VTK", "gltf": "the glTF reader", "script": "the builder script",
 }  # fmt: skip
-KINDS = tuple(_LIBRARIES)
 
 
 def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest: float = _LONGEST) -> Draft:

@@ -1,0 +1,26 @@
+"""What a case asks for is checked on every design of its run."""
+
+from pathlib import Path
+
+from shellform.case.entries import LimitsEntry
+from shellform.run.folder import read_run
+from shellform.run.judged import run_checks
+from tests.run.small_run import begin
+
+ROOT = Path(__file__).parent.parent.parent
+LIMITS = {
+    "utilisation": "Rods' stress with axial force under any load",
+    "connector_turn": "Connectors' turning under any load",
+    "uplift": "Uplift of a support under any load",
+    "thrust": "Thrust on a support under any load",
+    "slack_min": "Least pull of a cable under no load",
+}
+
+
+def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
+    assert set(LIMITS) == set(LimitsEntry.model_fields) - {"slack_loads"}
+    tight = [f"limits.{name}={1e3 if name == 'slack_min' else 1e-6}" for name in LIMITS]
+    run = read_run(begin(ROOT, tmp_path / "run", "net.elements=2", *tight))
+    found = {check.name: check.cells["initial"] for check in run_checks(run)}
+    assert found[LIMITS["uplift"]].holds is not None  # all supports may press
+    assert [name for name in LIMITS if name != "uplift" and found[LIMITS[name]].holds is not False] == []
