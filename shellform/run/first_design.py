@@ -160,7 +160,8 @@ class _Search:
         if self.best is None:
             raise refused(self.surface, None, self.wish)
         crossings = self.surface.area / finer**2
-        if self.allowance.left <= 0 or self.best.spacing > spacing:  # a coarser net came nearer
+        ended = self.allowance.over or not self.allowance.thorough
+        if ended or self.best.spacing > spacing:  # a coarser net came nearer
             return True
         if crossings > (CURVED if self.best.why is Why.NET else MOST_CROSSINGS):
             return True
@@ -200,7 +201,7 @@ class _Search:
         at = first_choice(placed.net, self.surface, spacing, possible, NEEDED * pressure(thickness, 2500.0))
         tried_before: set[int] = set()
         while at not in tried_before and len(tried_before) < _STEPS:
-            if tried_before and self.allowance.left <= 0:
+            if tried_before and self.allowance.over:
                 break
             tried_before.add(at)
             result = self._stands(placed, possible[at], spacing, thickness)
@@ -221,8 +222,8 @@ class _Search:
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
         seen = {choice}
-        for _ in range(_THINNER):
-            if failure.factor == 0.0 or self.allowance.left <= 0:  # without any concrete it doesn't stand
+        for _ in range(_THINNER if self.allowance.thorough else 0):
+            if failure.factor == 0.0 or self.allowance.over:  # without any concrete it doesn't stand
                 break
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
