@@ -100,7 +100,6 @@ def climbed_net(
             continue
         turned = angle + rung.turn
         shifted = (offset[0] + rung.shift[0], offset[1] + rung.shift[1])
-        taken = 0
         try:
             if failed is not None and not attempts:
                 raise failed
@@ -112,7 +111,6 @@ def climbed_net(
                 tuning=rung.tuning,
                 progress=watch,
             )
-            taken = net.quality.factorisations
             if not near:
                 refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
@@ -120,7 +118,7 @@ def climbed_net(
             progress(attempts[-1].sentence())
             reasons.add(error.reason)
             first = first or error
-            spent += error.iterations if isinstance(error, Stalled) else max(taken, error.factorisations)
+            spent += error.iterations if isinstance(error, Stalled) else error.factorisations
             if spent > most:
                 break
             continue

@@ -103,14 +103,15 @@ def least_bent_net(
         ((k, each) for k, each in enumerate(pulled) if not isinstance(each, Placed)),
         key=lambda each: (isinstance(each[1], Stalled), each[0]),  # whose next attempts take longest
     )
-    if allowance.over or not allowance.thorough:
+    left = _worth(surface, spacing) - sum(_taken(each) for each in pulled if not isinstance(each, Placed))
+    if allowance.over or not allowance.thorough or left <= 0:
         raise failed
     allowance.spend(_STALLED * surface.area / spacing**2)
     net, given = climbed_net(
         surface,
         settings,
         angle=math.radians(angles[first]),
-        most=_worth(surface, spacing),
+        most=left + _taken(failed),
         failed=failed,
         near=False,
         progress=tell,
@@ -140,6 +141,11 @@ def bends_to(net: Net) -> float:
 def _worth(surface: Surface, spacing: float) -> int:
     """How many factorisations of pulls that fail a net is worth."""
     return round(_PULLS * min(1.0, _USUAL_CROSSINGS * spacing**2 / surface.area))
+
+
+def _taken(error: NoNet | Stalled) -> int:
+    """Factorisations of a pull that failed."""
+    return error.iterations if isinstance(error, Stalled) else error.factorisations
 
 
 def _least_bent(nets: Sequence[Placed]) -> Placed:

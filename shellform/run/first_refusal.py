@@ -63,7 +63,7 @@ def shares(refusal: Unbuildable) -> list[float]:
     for share in _SHARES[1:]:
         if share > _APART * found[-1]:
             found.append(share)
-    return [*found, _FURTHER * found[-1]]
+    return [*found, _FURTHER * found[-1], _FURTHER**2 * found[-1]]
 
 
 class _Rounded:
