@@ -67,8 +67,8 @@ def shares(refusal: Unbuildable) -> list[float]:
 
 
 class _Rounded:
-    """All of the search on a rounded surface, within the work of all such trials; on walls too where that surface
-    gives way on edge beams."""
+    """All of the search on a rounded surface, within the work of all such trials; on walls too where a net covers it
+    that falls on edge beams."""
 
     def __init__(self, wish: DesignWish, until: float, say: Say) -> None:
         self._wish, self._say = wish, say
@@ -86,7 +86,8 @@ class _Rounded:
         try:
             self._found(surface)
         except (InputError, NotConverged) as error:
-            if not _walls_may_help(error, surface, self._wish):
+            covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
+            if not (covered and _on_edge_beams(surface, self._wish)):
                 raise
             self._say(f"rounded: {error}")
             self._on_walls(surface)
@@ -107,9 +108,14 @@ def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callab
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:
     """Whether walls all round may: where something but its curvature is the reason, and its outer edge doesn't stand
     on the ground."""
-    if wish.edges != "auto" or (isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH):
+    if isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH:
         return False
-    if not isinstance(refusal, (Unbuildable, Tips, NotConverged)):
+    return isinstance(refusal, (Unbuildable, Tips, NotConverged)) and _on_edge_beams(surface, wish)
+
+
+def _on_edge_beams(surface: Surface, wish: DesignWish) -> bool:
+    """Whether edge beams carry a part of the outer edge that walls might."""
+    if wish.edges != "auto":
         return False
     return any(each.kind == "beam" and not each.opening for each in stretches_of(surface))
 

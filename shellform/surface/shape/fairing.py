@@ -20,7 +20,7 @@ fixed frames; frames follow in a few rounds. ρ = R⁴ makes both terms of one s
 happens.
 
 D are normals smoothed over R, so that neighbours on both sides of a crease don't cross. Vertices on the
-ground stay on their level, and move in plan only where a crease runs into it.
+ground stay on their level, move in plan only where a crease runs into it, and aren't capped: rods end there.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ class _Fit:
         near.setdiag(0.0)
         near.eliminate_zeros()
         size = np.diff(near.indptr)
-        self.fitted: Indices = np.flatnonzero(size >= 6)
+        self.fitted: Indices = np.flatnonzero((size >= 6) & ~_on_ground(surface))
         self.count = count
         # Vertices with equally many neighbours are fitted together.
         self._groups = [
