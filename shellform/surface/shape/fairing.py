@@ -20,7 +20,8 @@ fixed frames; frames follow in a few rounds. ρ = R⁴ makes both terms of one s
 happens.
 
 D are normals smoothed over R, so that neighbours on both sides of a crease don't cross. Vertices on the
-ground stay on their level, move in plan only where a crease runs into it, and aren't capped: rods end there.
+ground stay on their level, and move in plan only where a crease runs into it; where that leaves none that keeps the cap, the
+ground is left uncapped: rods end there.
 """
 
 from __future__ import annotations
@@ -73,7 +74,14 @@ def faired(surface: Surface, radius: float) -> Faired:
             remedy="Give a smaller radius, or draw the surface anew.",
         )
     start = _refined(surface, _MESH * radius)
-    fit = _Fit(start)
+    try:
+        return _rounded(start, _Fit(start, np.ones(len(start.vertices), dtype=bool)), radius)
+    except NotConverged:
+        return _rounded(start, _Fit(start, ~_on_ground(start)), radius)
+
+
+def _rounded(start: Surface, fit: _Fit, radius: float) -> Faired:
+    """The nearest surface that keeps the cap where it is fitted. Raises NotConverged."""
     cap, at, place = 1.0 / radius, start.vertices, np.zeros(len(start.vertices))
     toward, weight = _directions(start, radius), _weights(start)
     if fit.most(at, rough_normals(at, start.triangles)) <= cap:
@@ -86,7 +94,7 @@ def faired(surface: Surface, radius: float) -> Faired:
         most = fit.most(at, rough_normals(at, start.triangles))
         if most <= cap:
             _refuse_folds(start, at, radius)
-            result = make_surface(at, start.triangles, source=surface.source)
+            result = make_surface(at, start.triangles, source=start.source)
             return Faired(result, start, np.abs(place) * np.linalg.norm(toward, axis=1))
         vain = 0 if most < _BETTER * best else vain + 1
         best = min(best, most)
@@ -130,10 +138,10 @@ def _round(
 
 
 class _Fit:
-    """Quadratics through the neighbours of the vertices `fitted` (i,): how their second derivatives follow from
-    places."""
+    """Quadratics through the neighbours of the vertices `fitted` (i,), those of `which` (v,) that have enough of them: how
+    their second derivatives follow from places."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: Surface, which: Flags) -> None:
         count, faces = len(surface.vertices), surface.triangles
         pairs = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         ones = np.ones(len(pairs))
@@ -143,7 +151,7 @@ class _Fit:
         near.setdiag(0.0)
         near.eliminate_zeros()
         size = np.diff(near.indptr)
-        self.fitted: Indices = np.flatnonzero((size >= 6) & ~_on_ground(surface))
+        self.fitted: Indices = np.flatnonzero((size >= 6) & which)
         self.count = count
         # Vertices with equally many neighbours are fitted together.
         self._groups = [
