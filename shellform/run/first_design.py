@@ -222,7 +222,7 @@ class _Search:
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
         seen = {choice}
-        for _ in range(_THINNER if self.allowance.thorough else 0):
+        for _ in range(_THINNER if self.allowance.thins else 0):
             if failure.factor == 0.0 or self.allowance.over:  # without any concrete it doesn't stand
                 break
             other = choice

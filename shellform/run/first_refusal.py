@@ -72,7 +72,8 @@ class _Rounded:
 
     def __init__(self, wish: DesignWish, until: float, say: Say) -> None:
         self._wish, self._say = wish, say
-        self._found = _trial("rounded", wish, Allowance(_WORK, until, thorough=False), say)
+        brief = Allowance(_WORK, until, thorough=False, thins=False)
+        self._found = _trial("rounded", wish, brief, say)
         on_walls = replace(wish, edges="wall")
         self._on_walls = _trial("rounded, on walls", on_walls, Allowance(_WORK, until, thorough=False), say)
         self._options = ""
