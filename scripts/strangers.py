@@ -631,9 +631,10 @@ def report(files: Sequence[Path]) -> str:
     another case than the last that `new` wrote."""
     proposals: dict[str, dict[str, Any]] = {}
     designs: dict[str, dict[str, Any]] = {}
+    latest = ""
     for line in (line for file in files for line in file.read_text(encoding="utf-8").splitlines()):
         row = json.loads(line)
-        name = row["name"]
+        name, latest = row["name"], row.get("build", latest)
         if "new" in row:
             before = proposals.get(name, {})
             if any(before.get(key) != row.get(key) for key in ("new", "section", "proposed", "crossings")):
@@ -641,8 +642,6 @@ def report(files: Sequence[Path]) -> str:
             proposals[name] = row
         if "design" in row:
             designs[name] = row
-    builds = [str(row["build"]) for row in proposals.values() if "build" in row]
-    latest = max(set(builds), key=builds.count) if builds else ""
     rows = [reported(row, designs.get(name, {}), latest) for name, row in proposals.items()]
     lines = [f"| {' | '.join(rows[0])} |", "| --- " * len(rows[0]) + "|"]
     lines += [f"| {' | '.join(each.values())} |" for each in rows]

@@ -264,7 +264,7 @@ class _Search:
             shifted=angles is ANGLES,
             tell=self._say,
         )
-        self.angles = near or self.angles
+        self.angles, self.allowance.angle = near or self.angles, best.angle
         self.say(
             f"net at {best.angle:g}° and {spacing:g} m: {len(best.net.grid.lattice)} crossings, "
             f"rods bend to a radius of {bends_to(best.net):.3g} m"

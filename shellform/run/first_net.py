@@ -39,12 +39,13 @@ class Allowance:
     solved, so that the same surface is given up at the same place on any machine; and, for machines on which
     that would take too long, `until` when of this process's processor time, s, it may begin anything new.
     Whether it is `thorough`: climbs the ladder where no angle gives a net, and tries finer spacings where no section
-    stands; whether it `thins` concrete then."""
+    stands; whether it `thins` concrete then. The `angle`, degrees, of the net found last."""
 
     left: int = 25_000  # about a minute of one processor
     until: float = math.inf
     thorough: bool = True
     thins: bool = True
+    angle: float | None = None
 
     @property
     def over(self) -> bool:

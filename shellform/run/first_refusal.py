@@ -72,10 +72,8 @@ class _Rounded:
 
     def __init__(self, wish: DesignWish, until: float, say: Say) -> None:
         self._wish, self._say = wish, say
-        brief = Allowance(_WORK, until, thorough=False, thins=False)
-        self._found = _trial("rounded", wish, brief, say)
-        on_walls = replace(wish, edges="wall")
-        self._on_walls = _trial("rounded, on walls", on_walls, Allowance(_WORK, until, thorough=False), say)
+        self._brief = Allowance(_WORK, until, thorough=False, thins=False)
+        self._walled = Allowance(_WORK, until, thorough=False)
         self._options = ""
 
     def options(self) -> str:
@@ -85,13 +83,14 @@ class _Rounded:
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""
         try:
-            self._found(surface)
+            _trial("rounded", self._wish, self._brief, self._say)(surface)
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
             if not (covered and _on_edge_beams(surface, self._wish)):
                 raise
             self._say(f"rounded: {error}")
-            self._on_walls(surface)
+            walls = replace(self._wish, edges="wall", angle=self._brief.angle)
+            _trial("rounded, on walls", walls, self._walled, self._say)(surface)
             self._options = _WALLS
 
 
