@@ -50,6 +50,7 @@ from shellform.run.sizes import (
     least_spacing,
     load_borne,
     next_choice,
+    next_thinner,
     practical,
     rest_ratio_for,
     rope_for,
@@ -199,15 +200,17 @@ class _Search:
             )
             return None
         at = first_choice(placed.net, self.surface, spacing, possible, NEEDED * pressure(thickness, 2500.0))
-        tried_before: set[int] = set()
-        while at not in tried_before and len(tried_before) < _STEPS:
-            if tried_before and self.allowance.over:
+        tried: dict[int, Obstacle] = {}
+        while at not in tried and len(tried) < _STEPS:
+            if tried and self.allowance.over:
                 break
-            tried_before.add(at)
             result = self._stands(placed, possible[at], spacing, thickness)
             if isinstance(result, FirstDesign):
                 return result
+            tried[at] = result
             at = _next(placed.net, possible, at, result)
+            if at in tried and result.why is Why.STRENGTH:  # stiffer ones only bend harder
+                at = next_thinner(possible, min(tried, key=lambda each: tried[each].stress))
         return None
 
     def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
