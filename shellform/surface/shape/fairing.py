@@ -138,10 +138,10 @@ def _round(
 
 
 class _Fit:
-    """Quadratics through the neighbours of the vertices `fitted` (i,), those of `which` (v,) that have enough of them: how
+    """Quadratics through the neighbours of the vertices `fitted` (i,), those `chosen` (v,) that have enough of them: how
     their second derivatives follow from places."""
 
-    def __init__(self, surface: Surface, which: Flags) -> None:
+    def __init__(self, surface: Surface, chosen: Flags) -> None:
         count, faces = len(surface.vertices), surface.triangles
         pairs = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         ones = np.ones(len(pairs))
@@ -151,7 +151,7 @@ class _Fit:
         near.setdiag(0.0)
         near.eliminate_zeros()
         size = np.diff(near.indptr)
-        self.fitted: Indices = np.flatnonzero((size >= 6) & which)
+        self.fitted: Indices = np.flatnonzero((size >= 6) & chosen)
         self.count = count
         # Vertices with equally many neighbours are fitted together.
         self._groups = [
