@@ -210,7 +210,8 @@ class _Search:
             tried[at] = result
             at = _next(placed.net, possible, at, result)
             if at in tried and result.why is Why.STRENGTH:  # stiffer ones only bend harder
-                at = next_thinner(possible, min(tried, key=lambda each: tried[each].stress))
+                least = min(tried, key=lambda each: tried[each].stress)
+                at = next_thinner(possible, least, _AIMED * STRESSED / tried[least].stress)
         return None
 
     def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
