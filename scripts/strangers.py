@@ -647,7 +647,13 @@ def report(files: Sequence[Path]) -> str:
     lines += [f"| {' | '.join(each.values())} |" for each in rows]
     ends = [each["ends with"].strip("*") for each in rows]
     told = ", ".join(f"{ends.count(end)} {end}" for end in sorted(set(ends)))
-    return "\n".join([*lines, "", f"{len(rows)} shells: {told}. ¹: of an earlier build than {latest}."])
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"{len(rows)} shells: {told}. ¹: of an earlier build than {latest}; ²: of one that wasn't recorded.",
+        ]
+    )
 
 
 def reported(new: dict[str, Any], design: dict[str, Any], latest: str) -> dict[str, str]:
@@ -656,7 +662,7 @@ def reported(new: dict[str, Any], design: dict[str, Any], latest: str) -> dict[s
     double = section.startswith("2 layers of ")
 
     def used(row: dict[str, Any], step: str) -> str:
-        mark = "" if row.get("build") == latest else " ¹"
+        mark = "" if row.get("build") == latest else " ¹" if "build" in row else " ²"
         return f"{row[f'{step}_processor']:.0f}{mark}" if f"{step}_processor" in row else ""
 
     if new["new"] != 0:
