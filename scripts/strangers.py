@@ -8,11 +8,15 @@ Files of others can be added by `--files`.
 Run: PYTHONPATH=. python scripts/strangers.py FOLDER [--files OTHER ...] [--only NAME ...] [--limit 120]
      [--processor 150] [--rows FILE]
      [--do make check net new design] [--until safety] [--quick]
+ or: PYTHONPATH=. python scripts/strangers.py --report FILE ...
+prints the documentation's table of the rows in files that `--rows` wrote, the last one of each shell and step.
+Each row says of which build it is: a digest of the package's modules.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import math
 import os
@@ -524,7 +528,7 @@ def measured(
     processor: float | None = None,
 ) -> dict[str, Any]:
     """One row: what each of the steps in `do` came to; `design` with the further options `quick`."""
-    row: dict[str, Any] = {"name": file.name}
+    row: dict[str, Any] = {"name": file.name, "build": build()}
     logs = folder / "logs"
     logs.mkdir(exist_ok=True)
 
@@ -614,6 +618,97 @@ def designed(printed: str) -> dict[str, Any]:
     }
 
 
+def build() -> str:
+    """Eight letters that tell the package's modules from others."""
+    digest = hashlib.sha256()
+    for file in sorted((ROOT / "shellform").rglob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:8]
+
+
+def report(files: Sequence[Path]) -> str:
+    """The documentation's table of the rows in the files: the last one of each shell and step; none of designs of
+    another case than the last that `new` wrote."""
+    proposals: dict[str, dict[str, Any]] = {}
+    designs: dict[str, dict[str, Any]] = {}
+    latest = ""
+    for line in (line for file in files for line in file.read_text(encoding="utf-8").splitlines()):
+        row = json.loads(line)
+        name, latest = row["name"], row.get("build", latest)
+        if "new" in row:
+            before = proposals.get(name, {})
+            if any(before.get(key) != row.get(key) for key in ("new", "section", "proposed", "crossings")):
+                designs.pop(name, None)
+            proposals[name] = row
+        if "design" in row:
+            designs[name] = row
+    rows = [reported(row, designs.get(name, {}), latest) for name, row in proposals.items()]
+    lines = [f"| {' | '.join(rows[0])} |", "| --- " * len(rows[0]) + "|"]
+    lines += [f"| {' | '.join(each.values())} |" for each in rows]
+    ends = [each["ends with"].strip("*") for each in rows]
+    told = ", ".join(f"{ends.count(end)} {end}" for end in sorted(set(ends)))
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"{len(rows)} shells: {told}. ¹: of an earlier build than {latest}; ²: of one that wasn't recorded.",
+        ]
+    )
+
+
+def reported(new: dict[str, Any], design: dict[str, Any], latest: str) -> dict[str, str]:
+    """The cells of a shell in the documentation's table."""
+    section = str(new.get("section", ""))
+    double = section.startswith("2 layers of ")
+
+    def used(row: dict[str, Any], step: str) -> str:
+        mark = "" if row.get("build") == latest else " ¹" if "build" in row else " ²"
+        return f"{row[f'{step}_processor']:.0f}{mark}" if f"{step}_processor" in row else ""
+
+    if new["new"] != 0:
+        ends = "broken off" if new["new"] is None else "refused"
+    elif not design:
+        ends = "case, not designed"
+    else:
+        ends = {True: "**holds**", False: "does not hold"}.get(design.get("holds"), "design broken off")  # type: ignore[call-overload]
+    factor = design.get("factor")
+    fails = f"fails: {design['fails']}" if design.get("fails") else ""
+    return {
+        "file": new["name"],
+        "net": f"{new['crossings']} at {new['proposed']}" if "proposed" in new else "",
+        "section": section.removeprefix("2 layers of "),
+        "layers": ("2" if double else "1") if section else "",
+        "concrete": str(new.get("concrete", "")),
+        "cables": str(design.get("cables", "")),
+        "deviation, mm": f"{1e3 * design['deviation']:.1f}" if "deviation" in design else "",
+        "factor": ("3 or more" if factor >= 3.0 else f"{factor:.2f}") if factor else "",
+        "stand at 1 and 1.2": str(design.get("stands", "")),
+        "`new`, s": used(new, "new"),
+        "`design`, s": used(design, "design"),
+        "ends with": ends,
+        "said": (fails or shortened(str(new.get("reason", "")))) if ends != "**holds**" else "",
+    }
+
+
+def shortened(reason: str) -> str:
+    """What was said in a line: the reason's first sentence, and the way out."""
+    text = re.sub(r"^shellform: (refused: |stopped: )?", "", reason)
+    parts = re.split(r"(?<=[a-z0-9%)])[.;] (?=[A-Z]|it is|no surface|\d+ attempts)", text)
+    first = re.sub(r"^[^ ]*: (reason: )?", "", parts[0])
+    way = ""
+    rounded = re.search(r"creases rounded to ([\d.]+ m), ([\d.]+ m) off at most", text)
+    if rounded:
+        walls = ", on walls" if "with --edges wall)" in text else ""
+        way = f"rounded to {rounded[1]} ({rounded[2]} off at most){walls}"
+    elif (option := re.search(r"With (--[a-z]+ [a-z0-9.]+) this goes on", text)) is not None:
+        way = f"`{option[1]}`"
+    elif "no surface near it" in text:
+        way = "none found"
+    elif len(parts) > 1:
+        way = parts[-1].rstrip(".")
+    return first[:230] + (f" → {way}" if way else "")
+
+
 def table(rows: Sequence[dict[str, Any]]) -> str:
     """The rows in Markdown, without columns in which nothing stands."""
     steps = [step for step in ("check", "net", "new", "design") if any(step in row for row in rows)]
@@ -661,7 +756,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("folder", type=Path)
+    parser.add_argument("folder", type=Path, nargs="?")
+    parser.add_argument("--report", type=Path, nargs="+", default=[], help="print the table of such rows")
     parser.add_argument("--files", type=Path, nargs="*", default=[], help="files or folders of others")
     parser.add_argument("--only", nargs="*", default=[], help="names (their beginnings)")
     parser.add_argument("--limit", type=float, default=120.0, help="s for one command")
@@ -673,6 +769,11 @@ def main() -> None:
         "--quick", action="store_true", help="design: in ten evaluations, eighty structures drawn"
     )
     given = parser.parse_args()
+    if given.report:
+        print(report(given.report))
+        return
+    if given.folder is None:
+        parser.error("a folder is needed")
     quick = QUICK if given.quick else []
     made = given.folder / "files"
     made.mkdir(parents=True, exist_ok=True)

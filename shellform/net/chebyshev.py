@@ -279,6 +279,14 @@ def _halves(along_u: Reals, along_v: Reals) -> tuple[Reals, list[Reals]]:
 
 
 def _net(surface: Surface, finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Net:
+    try:
+        return _measured(surface, finder, oversized, pulled, trimmed)
+    except NoNet as error:
+        error.factorisations = pulled.factorisations
+        raise
+
+
+def _measured(surface: Surface, finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Net:
     grid, state = trimmed.grid, trimmed.state
     refuse_folds(finder, grid, state)
     own = trimmed.origin >= 0

@@ -24,7 +24,7 @@ from shellform.surface.shape.target import Surface, largest_curvature
 
 TOLERANCE = math.radians(10.0)  # of the angle asked for
 _SETTLED = 1e-5  # residual that will do: distances and lengths are measured, whatever is left of it
-_MOST = 600  # factorisations of pulls that failed, all rungs together
+_MOST = 800  # factorisations of pulls that failed, all rungs together
 _SMALL = 1e-3  # residual of a stall that a looser tolerance may end
 _ANY = frozenset(Reason)
 _PULL = frozenset({Reason.STALLED, Reason.FOLDED, Reason.OVERLAPPING, Reason.OFF})
@@ -100,7 +100,6 @@ def climbed_net(
             continue
         turned = angle + rung.turn
         shifted = (offset[0] + rung.shift[0], offset[1] + rung.shift[1])
-        taken = 0
         try:
             if failed is not None and not attempts:
                 raise failed
@@ -112,7 +111,6 @@ def climbed_net(
                 tuning=rung.tuning,
                 progress=watch,
             )
-            taken = net.quality.factorisations
             if not near:
                 refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
@@ -120,7 +118,7 @@ def climbed_net(
             progress(attempts[-1].sentence())
             reasons.add(error.reason)
             first = first or error
-            spent += error.iterations if isinstance(error, Stalled) else taken
+            spent += error.iterations if isinstance(error, Stalled) else error.factorisations
             if spent > most:
                 break
             continue

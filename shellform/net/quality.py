@@ -212,10 +212,12 @@ def refuse_nearness(quality: Quality, grid: Grid, state: State) -> None:
     """Raises NoNet for a net whose neighbouring crossings lie nearer than its spacing or farther (nearness)."""
     told = nearness(quality, grid, state)
     if told:
-        raise NoNet(
+        refusal = NoNet(
             Reason.NEAR,
             told,
             where="net.spacing",
             value=float(grid.spacing),
             remedy="Choose a smaller spacing, or a surface without creases.",
         )
+        refusal.factorisations = quality.factorisations
+        raise refusal

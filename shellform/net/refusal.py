@@ -27,12 +27,13 @@ class Reason(Enum):
 
 
 class NoNet(InputError):
-    """A surface that takes no net with the settings at hand, and the `reason`."""
+    """A surface that takes no net with the settings at hand, and the `reason`; how many `factorisations` a pull had
+    taken that gave a net which then was refused."""
 
     def __init__(
         self, reason: Reason, what: str, *, where: str = "", value: object = None, remedy: str = ""
     ) -> None:
-        self.reason = reason
+        self.reason, self.factorisations = reason, 0
         super().__init__(what, where=where, value=value, remedy=remedy)
 
 

@@ -50,6 +50,7 @@ from shellform.run.sizes import (
     least_spacing,
     load_borne,
     next_choice,
+    next_thinner,
     practical,
     rest_ratio_for,
     rope_for,
@@ -160,7 +161,8 @@ class _Search:
         if self.best is None:
             raise refused(self.surface, None, self.wish)
         crossings = self.surface.area / finer**2
-        if self.allowance.left <= 0 or self.best.spacing > spacing:  # a coarser net came nearer
+        ended = self.allowance.over or not self.allowance.thorough
+        if ended or self.best.spacing > spacing:  # a coarser net came nearer
             return True
         if crossings > (CURVED if self.best.why is Why.NET else MOST_CROSSINGS):
             return True
@@ -198,15 +200,18 @@ class _Search:
             )
             return None
         at = first_choice(placed.net, self.surface, spacing, possible, NEEDED * pressure(thickness, 2500.0))
-        tried_before: set[int] = set()
-        while at not in tried_before and len(tried_before) < _STEPS:
-            if tried_before and self.allowance.left <= 0:
+        tried: dict[int, Obstacle] = {}
+        while at not in tried and len(tried) < _STEPS:
+            if tried and self.allowance.over:
                 break
-            tried_before.add(at)
             result = self._stands(placed, possible[at], spacing, thickness)
             if isinstance(result, FirstDesign):
                 return result
+            tried[at] = result
             at = _next(placed.net, possible, at, result)
+            if at in tried and result.why is Why.STRENGTH:  # stiffer ones only bend harder
+                least = min(tried, key=lambda each: tried[each].stress)
+                at = next_thinner(possible, least, _AIMED * STRESSED / tried[least].stress)
         return None
 
     def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
@@ -221,8 +226,8 @@ class _Search:
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
         seen = {choice}
-        for _ in range(_THINNER):
-            if failure.factor == 0.0 or self.allowance.left <= 0:  # without any concrete it doesn't stand
+        for _ in range(_THINNER if self.allowance.thins else 0):
+            if failure.factor == 0.0 or self.allowance.over:  # without any concrete it doesn't stand
                 break
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
@@ -263,7 +268,7 @@ class _Search:
             shifted=angles is ANGLES,
             tell=self._say,
         )
-        self.angles = near or self.angles
+        self.angles, self.allowance.angle = near or self.angles, best.angle
         self.say(
             f"net at {best.angle:g}° and {spacing:g} m: {len(best.net.grid.lattice)} crossings, "
             f"rods bend to a radius of {bends_to(best.net):.3g} m"

@@ -2,12 +2,14 @@
 
 Pulls that fail end earlier here than in a design: nets that are found take up to a hundred factorisations. Where
 no angle gives a net, the ladder (net/ladder.py) is climbed from the one whose failure costs least to mend, with
-fewer factorisations for larger nets.
+fewer factorisations for larger nets; not on surfaces that are tried as a way out, of which the next rounder one is
+more likely to take a net than another attempt on this one.
 """
 
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,8 +27,8 @@ from shellform.surface.shape.target import Surface
 
 ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
-_PULL = 110  # factorisations of one pull
-_PULLS, _USUAL_CROSSINGS = 600, 300  # factorisations of failed pulls, for so many crossings
+_PULL, _BRIEF = 110, 70  # factorisations of one pull
+_PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
 _STALLED = 4  # times the work of a pull that ends, one that stalls
 Say = Callable[[str], None]
 
@@ -34,9 +36,21 @@ Say = Callable[[str], None]
 @dataclass
 class Allowance:
     """How much work a search may still do: crossings of the nets that were pulled and of the designs that were
-    solved, so that the same surface is given up at the same place on any machine."""
+    solved, so that the same surface is given up at the same place on any machine; and, for machines on which
+    that would take too long, `until` when of this process's processor time, s, it may begin anything new.
+    Whether it is `thorough`: climbs the ladder where no angle gives a net, and tries finer spacings where no section
+    stands; whether it `thins` concrete then. The `angle`, degrees, of the net found last."""
 
-    left: int = 25_000  # about a minute and a half of one processor
+    left: int = 25_000  # about a minute of one processor
+    until: float = math.inf
+    thorough: bool = True
+    thins: bool = True
+    angle: float | None = None
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing new may begin."""
+        return self.left <= 0 or time.process_time() > self.until
 
     def spend(self, crossings: float, times: int = 1) -> None:
         """Takes what a pull or a trial on a net of so many `crossings` costs."""
@@ -61,9 +75,11 @@ def least_bent_net(
 
     def at(angle: float, offset: tuple[float, float]) -> Placed | NoNet | Stalled:
         crossings = surface.area / spacing**2
-        where, tuning = f"net at {angle:g}°, {spacing:g} m", NetTuning(limit=_PULL)
+        where, limit = f"net at {angle:g}°, {spacing:g} m", _PULL if allowance.thorough else _BRIEF
         try:
-            net = pull_net(surface, **settings, angle=math.radians(angle), offset=offset, tuning=tuning)
+            net = pull_net(
+                surface, **settings, angle=math.radians(angle), offset=offset, tuning=NetTuning(limit=limit)
+            )
             refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
             say(f"{where}: {error.reason.value}")
@@ -73,7 +89,11 @@ def least_bent_net(
         tell(f"{where}: rods bend to a radius of {bends_to(net):.3g} m")
         return Placed(net, angle, offset)
 
-    pulled = [at(angle, (0.0, 0.0)) for angle in angles]
+    pulled: list[Placed | NoNet | Stalled] = []
+    for angle in angles:
+        if pulled and allowance.over:
+            break
+        pulled.append(at(angle, (0.0, 0.0)))
     nets = [each for each in pulled if isinstance(each, Placed)]
     if nets:
         best = _least_bent(nets)
@@ -85,12 +105,15 @@ def least_bent_net(
         ((k, each) for k, each in enumerate(pulled) if not isinstance(each, Placed)),
         key=lambda each: (isinstance(each[1], Stalled), each[0]),  # whose next attempts take longest
     )
+    left = _worth(surface, spacing) - sum(_taken(each) for each in pulled if not isinstance(each, Placed))
+    if allowance.over or not allowance.thorough or left <= 0:
+        raise failed
     allowance.spend(_STALLED * surface.area / spacing**2)
     net, given = climbed_net(
         surface,
         settings,
         angle=math.radians(angles[first]),
-        most=_worth(surface, spacing),
+        most=left + _taken(failed),
         failed=failed,
         near=False,
         progress=tell,
@@ -120,6 +143,11 @@ def bends_to(net: Net) -> float:
 def _worth(surface: Surface, spacing: float) -> int:
     """How many factorisations of pulls that fail a net is worth."""
     return round(_PULLS * min(1.0, _USUAL_CROSSINGS * spacing**2 / surface.area))
+
+
+def _taken(error: NoNet | Stalled) -> int:
+    """Factorisations of a pull that failed."""
+    return error.iterations if isinstance(error, Stalled) else error.factorisations
 
 
 def _least_bent(nets: Sequence[Placed]) -> Placed:

@@ -2,11 +2,14 @@
 
 Three are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
 round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a rounded surface,
-where its rods are bent too much (way_out.py); and as much concrete as these bear, where no rounded surface helps.
+where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as much concrete as these
+bear, where no rounded surface helps. None is begun later than so many seconds of a processor after the surface was
+read.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -22,40 +25,81 @@ from shellform.surface.shape.target import Surface
 
 _SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
 _FLAT_SHARES = (1.0, 1.8)  # of a radius that makes a vault of flat pieces
-_WORK = 10_000  # crossings pulled and solved on rounded surfaces
+_WELL_COVERED = 1.4 * COVERED  # spacings: of COVERED itself half the nets are bent a little too much
+_APART = 1.3  # from one to the next, at the least
+_FURTHER = 1.7  # times the largest radius, where it helps nothing
+_WORK = 10_000  # crossings pulled and solved on rounded surfaces, and on these again on walls
 _WALLED = 15_000  # on walls, with which large nets are tried once
+_WALLS = "--edges wall"
 Refusal = InputError | NotConverged
 Say = Callable[[str], None]
 
 
-def with_ways_out(refusal: Refusal, surface: Surface, wish: DesignWish, output: Path, say: Say) -> Refusal:
+def with_ways_out(
+    refusal: Refusal, surface: Surface, wish: DesignWish, output: Path, say: Say, until: float = math.inf
+) -> Refusal:
     """The refusal with the first way out that leads to a design as its remedy; else saying which were tried. What is
-    offered as a surface is written into a folder beside `output`. `say` hears what is tried."""
+    offered as a surface is written into a folder beside `output`. `say` hears what is tried; `until` when, of this
+    process's processor time, s, trials may begin."""
     folder = output.with_name(f"{output.stem}-{BUILDABLE}")
     if _walls_may_help(refusal, surface, wish):
-        told = _on_walls(refusal, surface, wish, say)
+        told = _on_walls(refusal, surface, wish, say, until)
         if told is not refusal or not isinstance(refusal, Unbuildable):
             return told
     if not isinstance(refusal, Unbuildable) or wish.rod:
         return refusal
-    again = _trial("rounded", wish, Allowance(_WORK), say)
+    again = _Rounded(wish, until, say)
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
-    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, tried)
-    return _poured_first(refusal.in_vain(), surface, wish, say) if told is refusal else told
+    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, tried, again.options)
+    if told is not refusal:
+        return told
+    return _poured_first(refusal.in_vain(), surface, wish, say, until)
 
 
 def shares(refusal: Unbuildable) -> list[float]:
     """What of its radius to round to, one after the other: the least first that nets cover."""
-    least = min(COVERED * refusal.spacing / refusal.radius, 1.0)
-    return sorted({max(least, share) for share in _SHARES})
+    least = _WELL_COVERED * refusal.spacing / refusal.radius
+    found = [max(least, _SHARES[0])]
+    for share in _SHARES[1:]:
+        if share > _APART * found[-1]:
+            found.append(share)
+    return [*found, _FURTHER * found[-1], _FURTHER**2 * found[-1]]
+
+
+class _Rounded:
+    """All of the search on a rounded surface, within the work of all such trials; on walls too where a net covers it
+    that falls on edge beams."""
+
+    def __init__(self, wish: DesignWish, until: float, say: Say) -> None:
+        self._wish, self._say = wish, say
+        self._brief = Allowance(_WORK, until, thorough=False, thins=False)
+        self._walled = Allowance(_WORK, until, thorough=False)
+        self._options = ""
+
+    def options(self) -> str:
+        """Of the command, with which the last surface went on."""
+        return self._options
+
+    def __call__(self, surface: Surface) -> None:
+        """Raises InputError or NotConverged where no design stands."""
+        try:
+            _trial("rounded", self._wish, self._brief, self._say)(surface)
+        except (InputError, NotConverged) as error:
+            covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
+            if not (covered and _on_edge_beams(surface, self._wish)):
+                raise
+            self._say(f"rounded: {error}")
+            walls = replace(self._wish, edges="wall", angle=self._brief.angle)
+            _trial("rounded, on walls", walls, self._walled, self._say)(surface)
+            self._options = _WALLS
 
 
 def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callable[[Surface], None]:
     """All of the search on another surface, within the allowance of all such trials."""
 
     def again(surface: Surface) -> None:
-        if allowance.left <= 0:
-            raise InputError("left untried, since the one before took all the work that is allowed")
+        if allowance.over:
+            raise InputError("left untried, since what was tried before took all the work that is allowed")
         first_design(surface, wish, lambda text: say(f"{how}, {text}"), allowance)
 
     return again
@@ -64,35 +108,42 @@ def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callab
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:
     """Whether walls all round may: where something but its curvature is the reason, and its outer edge doesn't stand
     on the ground."""
-    if wish.edges != "auto" or (isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH):
+    if isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH:
         return False
-    if not isinstance(refusal, (Unbuildable, Tips, NotConverged)):
+    return isinstance(refusal, (Unbuildable, Tips, NotConverged)) and _on_edge_beams(surface, wish)
+
+
+def _on_edge_beams(surface: Surface, wish: DesignWish) -> bool:
+    """Whether edge beams carry a part of the outer edge that walls might."""
+    if wish.edges != "auto":
         return False
     return any(each.kind == "beam" and not each.opening for each in stretches_of(surface))
 
 
-def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say) -> Refusal:
+def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say, until: float) -> Refusal:
     """The refusal with walls as its remedy; as it was, where no design stands on them either."""
     try:
-        _trial("on walls", replace(wish, edges="wall"), Allowance(_WALLED), say)(surface)
+        _trial("on walls", replace(wish, edges="wall"), Allowance(_WALLED, until), say)(surface)
     except (InputError, NotConverged) as error:
         say(f"on walls: {error}")
         return refusal
     outer = surface.vertices[surface.boundary[0], 2]
     return renewed(
         refusal,
-        f"With --edges wall this goes on: walls all round, up to {outer.max() - outer.min():.3g} m above the lowest of its "
+        f"With {_WALLS} this goes on: walls all round, up to {outer.max() - outer.min():.3g} m above the lowest of its "
         "edge",
     )
 
 
-def _poured_first(refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say) -> Refusal:
+def _poured_first(
+    refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say, until: float
+) -> Refusal:
     """The refusal with a first layer of concrete as its remedy; as it was, where none is known to be borne."""
     if refusal.bears is None or wish.thickness is not None:
         return refusal
     how = f"with {1e3 * refusal.bears:g} mm"
     try:
-        _trial(how, replace(wish, thickness=refusal.bears), Allowance(_WORK), say)(surface)
+        _trial(how, replace(wish, thickness=refusal.bears), Allowance(_WORK, until), say)(surface)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
         return refusal

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import THICKNESS, FirstDesign, first_design, usual_thickness
 from shellform.run.first_look import surface_entry
+from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import with_ways_out
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
 from shellform.run.plinths import plinths_for
@@ -31,6 +33,7 @@ from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
+_SEARCH, _WAYS_OUT = 60.0, 90.0  # s of a processor after which no design, and no way out, is begun any more
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
@@ -66,10 +69,11 @@ def propose_case(
         surface, options = plinths.surface, {**options, "above": plinths.above}
         say(plinths.told)
 
+    began = time.process_time()
     try:
-        design = first_design(surface, wanted, say)
+        design = first_design(surface, wanted, say, Allowance(until=began + _SEARCH))
     except (InputError, NotConverged) as error:
-        raise with_ways_out(error, surface, wanted, output, say) from error
+        raise with_ways_out(error, surface, wanted, output, say, began + _WAYS_OUT) from error
     edges = _edges_told(stretches_of(surface, Edges(outer=wanted.edges)))
     entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
     if plinths is not None:

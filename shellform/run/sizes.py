@@ -239,6 +239,14 @@ def next_choice(
     return next((k for k in fit if possible[k].bending >= times * own.bending), fit[-1] if fit else at)
 
 
+def next_thinner(possible: Sequence[RodChoice], at: int, share: float) -> int:
+    """The stiffest of the sections less stiff than that `at` that is at most a `share` as deep, for where what is added
+    to the stress of bending into the net is more bending, at supports and ends of rods, and grows with the depth; `at`
+    where there is none."""
+    deep = share * max(possible[at].section.fibres)
+    return next((k for k in range(at - 1, -1, -1) if max(possible[k].section.fibres) <= deep), at)
+
+
 def load_borne(net: Net, choice: RodChoice, stress: float, most: float) -> float:
     """What share of the load a section bears with a stress of `most` over its strength, whose `stress` under all of
     it is told."""

@@ -35,13 +35,14 @@ def with_way_out(
     again: Callable[[Surface], object],
     say: Callable[[str], None] = lambda text: None,
     shares: Sequence[float] = MORE,
+    options: Callable[[], str] = lambda: "",
 ) -> InputError | NotConverged:
     """The refusal of a surface with the nearest buildable one as its remedy, written into `folder` as
     surface.obj, surface.step, change.vtu and change.png; as it was, where none is found.
 
     `radius`, m, to which the surface must be rounded at least; `again` does with a surface what was refused
     and raises InputError or NotConverged where it is refused again; `say` hears what is tried;
-    `shares` of the radius are, one after the other.
+    `shares` of the radius are, one after the other; `options` are those of the command with which `again` went on.
     """
     from shellform.surface.readers.meshes import write_mesh
 
@@ -58,7 +59,7 @@ def with_way_out(
                     trial = Path(place) / SURFACE
                     write_mesh(trial, found.surface)
                     again(read_surface(trial))  # the very file that is offered
-                return renewed(refusal, _offer(found, wanted, folder))
+                return renewed(refusal, _offer(found, wanted, folder, options()))
         except (InputError, NotConverged) as error:
             say(f"rounded to {wanted:.3g} m: {error}")
         else:
@@ -66,7 +67,7 @@ def with_way_out(
     return refusal
 
 
-def _offer(found: Faired, radius: float, folder: Path) -> str:
+def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
     """Writes the surface and the map of its change; what to say of them."""
     from shellform.output.pictures.plots import plan_map
     from shellform.surface.readers.meshes import write_mesh, write_values
@@ -87,7 +88,8 @@ def _offer(found: Faired, radius: float, folder: Path) -> str:
         label="change, m",
     )
     return (
-        f"The nearest surface with which this goes on is {folder / SURFACE}{cad} (in metres): creases rounded to "
+        f"The nearest surface with which this goes on is {folder / SURFACE}{cad} (in metres"
+        f"{f', with {options}' if options else ''}): creases rounded to "
         f"{radius:.3g} m, {off} (change.png)"
     )
 

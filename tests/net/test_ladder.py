@@ -120,10 +120,31 @@ def test_the_ladder_is_left_where_pulls_that_failed_have_cost_too_much(monkeypat
         raise Stalled("stalled", residual=0.9, iterations=250)
 
     monkeypatch.setattr("shellform.net.ladder.pull_net", stalls)
-    with pytest.raises(Stalled, match="3 attempts") as caught:
+    with pytest.raises(Stalled, match="4 attempts") as caught:
+        climbed_net(bowl(), {}, angle=0.0)
+    assert len(calls) == 4
+    assert caught.value.residual == 0.9
+
+
+def test_pulls_whose_net_is_refused_cost_as_much_as_those_that_stall(monkeypatch):
+    calls = []
+
+    def leaves(surface, *, progress, **settings):
+        calls.append(settings)
+        error = NoNet(Reason.OFF, "stays off")
+        error.factorisations = 300
+        raise error
+
+    monkeypatch.setattr("shellform.net.ladder.pull_net", leaves)
+    with pytest.raises(NoNet, match="3 attempts"):
         climbed_net(bowl(), {}, angle=0.0)
     assert len(calls) == 3
-    assert caught.value.residual == 0.9
+
+
+def test_a_net_that_is_refused_tells_what_its_pull_took(umbrella):
+    with pytest.raises(NoNet) as caught:
+        sf.pull_net(umbrella, **SETTINGS, angle=math.pi / 4)
+    assert caught.value.factorisations > 0
 
 
 def test_rungs_keep_to_what_was_stated():

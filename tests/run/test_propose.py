@@ -33,6 +33,7 @@ from shellform.run.sizes import (
     hopeless,
     load_borne,
     next_choice,
+    next_thinner,
     practical,
     radius_for,
     rest_ratio_for,
@@ -212,6 +213,14 @@ def test_after_a_section_that_falls_a_stiffer_one_comes_and_after_one_that_break
     assert next_choice(net, found, at, 50.0, 0.0, 0.01) == at, "none would do"
     half = 0.5 * (share[at] + 0.95)
     assert load_borne(net, found[at], half, 0.95) == pytest.approx(2.0)
+
+
+def test_where_stiffer_sections_are_stressed_more_one_less_deep_comes(net):
+    found = choices(net, 0.1, None)
+    thinner = next_thinner(found, len(found) - 1, 0.8)
+    assert max(found[thinner].section.fibres) <= 0.8 * max(found[-1].section.fibres)
+    assert found[thinner].bending < found[-1].bending
+    assert next_thinner(found, 0, 0.8) == 0, "there is none"
 
 
 def test_two_layers_are_stiffer_across_the_surface_and_bent_like_one(net):

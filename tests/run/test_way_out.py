@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.errors import InputError
+from shellform.errors import InputError, NotConverged
 from shellform.net.refusal import NoNet, Stalled
 from shellform.records.progress import unheard
 from shellform.run import first_refusal
@@ -76,9 +76,9 @@ def test_surfaces_are_rounded_to_what_nets_cover_before_what_is_sure_to_bear_the
     def refusal(spacing, radius):
         return Unbuildable("no", why=Why.NET, where="rod", remedy="Round it.", spacing=spacing, radius=radius)
 
-    assert shares(refusal(0.75, 13.5)) == [0.2, 0.5, 1.0]
-    assert shares(refusal(1.0, 4.0)) == [0.75, 1.0]
-    assert shares(refusal(1.0, 2.0)) == [1.0]
+    assert shares(refusal(0.75, 20.0)) == pytest.approx([0.2, 0.5, 1.0, 1.7, 2.89])
+    assert shares(refusal(1.0, 6.0)) == pytest.approx([0.7, 1.0, 1.7, 2.89])
+    assert shares(refusal(1.0, 3.0)) == pytest.approx([1.4, 1.7 * 1.4, 2.89 * 1.4])
 
 
 @pytest.mark.slow
@@ -118,6 +118,38 @@ def test_where_no_rounded_surface_helps_a_first_layer_of_concrete_is_offered_if_
         refusal, sheet(gable), DesignWish(thickness=0.05), tmp_path / "case.toml", lambda text: None
     )
     assert "--thickness" not in other.remedy, "another was asked for"
+
+
+def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path, monkeypatch):
+    tried = []
+
+    def search(surface, wish, say, allowance):
+        tried.append(wish.edges)
+        if wish.edges != "wall":
+            raise NotConverged("falls", residual=0.0, iterations=0)
+
+    monkeypatch.setattr(first_refusal, "first_design", search)
+    refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
+    told = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
+    )
+    assert tried == ["auto", "wall"]
+    assert "(in metres, with --edges wall)" in told.remedy
+    assert named(told).is_file()
+
+
+def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
+    def search(surface, wish, say, allowance):
+        raise AssertionError("too late")
+
+    monkeypatch.setattr(first_refusal, "first_design", search)
+    refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
+    heard = []
+    told = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, until=0.0
+    )
+    assert "no surface near it" in told.what
+    assert any("left untried" in each for each in heard)
 
 
 @pytest.mark.slow

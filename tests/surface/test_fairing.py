@@ -49,6 +49,14 @@ def test_creases_are_rounded_to_the_radius_as_the_package_measures_it(height, ra
     assert found.change.max() < 0.6 * radius
 
 
+def test_a_crease_that_runs_out_at_the_edge_is_rounded_there_too():
+    found = faired(sheet(gable), 1.5)
+    points = found.surface.vertices[found.before.vertices[:, 1] == 4.0]
+    x, _, z = points[np.argsort(points[:, 0])].T
+    bent = np.abs(np.gradient(np.gradient(z, x), x))[2:-2] / (1.0 + np.gradient(z, x)[2:-2] ** 2) ** 1.5
+    assert bent.max() < 1.1 / 1.5
+
+
 def test_a_crease_changes_less_than_an_arc_that_touches_both_sides_would():
     """Of a fold by 30° on each side the arc of radius R leaves it by R (1 / cos 30° - sqrt(1 - s²) - s tan 30°)
     at R s from the ridge, upright; one of all surfaces that keep the cap, so that the least change is less."""

@@ -3,14 +3,14 @@ change.
 
 A surface x = v + d D is sought, v the vertices as given, D directions across it, that solves
 
-    minimise ½ ∫ d² dA   subject to   |κ₁|, |κ₂| ≤ 1/R   everywhere inside,
+    minimise ½ ∫ d² dA   subject to   |κ₁|, |κ₂| ≤ 1/R   everywhere,
 
 since no rod on it, whichever way it runs, is then bent across the surface to less than R. In a vertex' frame
 (u, v, n) the second fundamental form is that of the quadratic that fits its two rings of neighbours best,
 
     II_i = Σ_j C_ij n_i · (x_j - x_i) = II_i(v) + (L d)_i,   L_ij = C_ij n_i · D_j,
 
-linear in d while the frames stay. With Z = II(v) + L d, whose eigenvalues are to be capped, this is a
+of one side at the edge (a crease that runs out there bends rods as well), linear in d while the frames stay. With Z = II(v) + L d, whose eigenvalues are to be capped, this is a
 projection, solved by the alternating direction method of multipliers (Boyd et al. 2011, section 5.2):
 
     (M + ρ Lᵀ W L) d = ρ Lᵀ W (Z - U - II(v)),   Z = capped(II + U),   U += II - Z
@@ -20,7 +20,8 @@ fixed frames; frames follow in a few rounds. ρ = R⁴ makes both terms of one s
 happens.
 
 D are normals smoothed over R, so that neighbours on both sides of a crease don't cross. Vertices on the
-ground stay on their level, and move in plan only where a crease runs into it.
+ground stay on their level, and move in plan only where a crease runs into it; where that leaves none that keeps the cap, the
+ground is left uncapped: rods end there.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class Faired:
 
 
 def faired(surface: Surface, radius: float) -> Faired:
-    """The surface nearest to the given one that is curved nowhere inside to less than `radius`, m; coarse
+    """The surface nearest to the given one that is curved nowhere to less than `radius`, m; coarse
     meshes are refined to show it.
 
     Raises InputError for a radius that isn't positive, larger than the surface or too small for a mesh of
@@ -73,12 +74,19 @@ def faired(surface: Surface, radius: float) -> Faired:
             remedy="Give a smaller radius, or draw the surface anew.",
         )
     start = _refined(surface, _MESH * radius)
-    fit = _Fit(start)
+    try:
+        return _rounded(start, _Fit(start, np.ones(len(start.vertices), dtype=bool)), radius)
+    except NotConverged:
+        return _rounded(start, _Fit(start, ~_on_ground(start)), radius)
+
+
+def _rounded(start: Surface, fit: _Fit, radius: float) -> Faired:
+    """The nearest surface that keeps the cap where it is fitted. Raises NotConverged."""
     cap, at, place = 1.0 / radius, start.vertices, np.zeros(len(start.vertices))
     toward, weight = _directions(start, radius), _weights(start)
     if fit.most(at, rough_normals(at, start.triangles)) <= cap:
         return Faired(start, start, place)
-    multiplier = np.zeros((len(fit.inner), 3))
+    multiplier = np.zeros((len(fit.fitted), 3))
     best, vain = np.inf, 0
     for _ in range(_ROUNDS):
         place, multiplier = _round(fit, start, toward, weight, place, multiplier, radius)
@@ -86,7 +94,7 @@ def faired(surface: Surface, radius: float) -> Faired:
         most = fit.most(at, rough_normals(at, start.triangles))
         if most <= cap:
             _refuse_folds(start, at, radius)
-            result = make_surface(at, start.triangles, source=surface.source)
+            result = make_surface(at, start.triangles, source=start.source)
             return Faired(result, start, np.abs(place) * np.linalg.norm(toward, axis=1))
         vain = 0 if most < _BETTER * best else vain + 1
         best = min(best, most)
@@ -115,7 +123,7 @@ def _round(
     frames = fit.frames(rough_normals(at, start.triangles))
     own, rate = fit.forms(at, frames), fit.by_distance(at, frames, toward)
     given = own - (rate @ place).reshape(-1, 3)
-    scale = radius**4 * np.repeat(weight[fit.inner], 3) * np.tile([1.0, 2.0, 1.0], len(fit.inner))
+    scale = radius**4 * np.repeat(weight[fit.fitted], 3) * np.tile([1.0, 2.0, 1.0], len(fit.fitted))
     weighted = sp.diags_array(scale) @ rate
     factor = _factored(sp.diags_array(weight) + rate.T @ weighted)
     most = _MARGIN / radius
@@ -130,10 +138,10 @@ def _round(
 
 
 class _Fit:
-    """Quadratics through the neighbours of the vertices `inner` (i,): how their second derivatives follow from
-    places."""
+    """Quadratics through the neighbours of the vertices `fitted` (i,), those `chosen` (v,) that have enough of them: how
+    their second derivatives follow from places."""
 
-    def __init__(self, surface: Surface) -> None:
+    def __init__(self, surface: Surface, chosen: Flags) -> None:
         count, faces = len(surface.vertices), surface.triangles
         pairs = np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
         ones = np.ones(len(pairs))
@@ -142,21 +150,19 @@ class _Fit:
         near = sp.csr_array(next_to @ next_to + next_to)
         near.setdiag(0.0)
         near.eliminate_zeros()
-        inside = np.ones(count, dtype=bool)
-        inside[np.concatenate(surface.boundary)] = False
         size = np.diff(near.indptr)
-        self.inner: Indices = np.flatnonzero(inside & (size >= 6))
+        self.fitted: Indices = np.flatnonzero((size >= 6) & chosen)
         self.count = count
         # Vertices with equally many neighbours are fitted together.
         self._groups = [
-            (which, near.indices[near.indptr[self.inner[which]][:, None] + np.arange(k)])
-            for k in np.unique(size[self.inner])
-            if len(which := np.flatnonzero(size[self.inner] == k))
+            (which, near.indices[near.indptr[self.fitted[which]][:, None] + np.arange(k)])
+            for k in np.unique(size[self.fitted])
+            if len(which := np.flatnonzero(size[self.fitted] == k))
         ]
 
     def frames(self, normals: Reals) -> Reals:
-        """Axes (i, 3, 3) u, v, n as rows at the inner vertices, from the normals (v, 3) of all."""
-        n = normals[self.inner]
+        """Axes (i, 3, 3) u, v, n as rows at the fitted vertices, from the normals (v, 3) of all."""
+        n = normals[self.fitted]
         least = np.eye(3)[np.argmin(np.abs(n), axis=1)]
         u = np.cross(least, n)
         u /= np.linalg.norm(u, axis=1)[:, None]
@@ -164,9 +170,9 @@ class _Fit:
 
     def forms(self, at: Reals, frames: Reals) -> Reals:
         """II_uu, II_uv, II_vv (i, 3), 1/m, of places (v, 3)."""
-        result = np.empty((len(self.inner), 3))
+        result = np.empty((len(self.fitted), 3))
         for which, near in self._groups:
-            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[self.inner[which], None])
+            own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[self.fitted[which], None])
             result[which] = np.einsum("ick,ik->ic", _second(own), own[..., 2])
         return result
 
@@ -174,7 +180,7 @@ class _Fit:
         """Their derivatives (3 i, v) by distances that vertices move along `toward` (v, 3), at fixed frames."""
         rows, columns, values = [], [], []
         for which, near in self._groups:
-            here = self.inner[which]
+            here = self.fitted[which]
             own = np.einsum("iab,ikb->ika", frames[which], at[near] - at[here, None])
             fit = _second(own)
             risen = np.einsum("ib,ikb->ik", frames[which, 2], toward[near])
@@ -184,7 +190,7 @@ class _Fit:
             columns += [np.broadcast_to(near[:, None, :], fit.shape).ravel(), np.repeat(here, 3)]
             values += [(fit * risen[:, None, :]).ravel(), (-fit.sum(axis=2) * self_risen[:, None]).ravel()]
         entries = np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))
-        return sp.csr_array(entries, shape=(3 * len(self.inner), self.count))
+        return sp.csr_array(entries, shape=(3 * len(self.fitted), self.count))
 
     def most(self, at: Reals, normals: Reals) -> float:
         """The largest principal curvature, 1/m."""
