@@ -30,7 +30,7 @@ from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch, not_carried
 from shellform.problem.paths import follow, without_slack
-from shellform.problem.problem import FEASIBLE, Problem
+from shellform.problem.problem import Problem
 from shellform.structure.solve.loading import Loaded
 
 METHODS = ("trust-constr", "SLSQP")
@@ -57,7 +57,7 @@ class Plain:
         self.start = point.variables
         self.points = [point]
         self.best = point
-        self.history = [(0, point.objective, violation(point))]
+        self.history = [(0, point.objective, point.violation)]
         self._at = (point.variables.tobytes(), point, True)
 
     def bounds(self) -> tuple[Reals, Reals]:
@@ -97,8 +97,8 @@ class Plain:
         return self._at[1], self._at[2]
 
     def _remember(self, point: Linearisation) -> None:
-        self.history.append((self.evaluator.evaluations, point.objective, violation(point)))
-        if _rank(point) < _rank(self.best):
+        self.history.append((self.evaluator.evaluations, point.objective, point.violation))
+        if point.rank < self.best.rank:
             self.best = point
         self.points = [*(each for each in self.points[1 - _KEPT :] if each is not self.best), self.best]
         if point is not self.best:
@@ -170,24 +170,13 @@ def compare(
         design,
         follow(shell, design, {"none": none, **problem.loads}),
         best.objective,
-        violation(best),
+        best.violation,
         tuple(plain.history),
         evaluator.evaluations,
         evaluator.rejected,
         evaluator.factorisations,
         status,
     )
-
-
-def violation(point: Linearisation) -> float:
-    """By how much the worst constraint is violated, over its limit; 0 where all are met."""
-    return max(float(point.constraints.max(initial=0.0)), 0.0)
-
-
-def _rank(point: Linearisation) -> tuple[float, float]:
-    """Feasible designs by their objective, before the others by their violation."""
-    beyond = violation(point)
-    return (0.0, point.objective) if beyond <= FEASIBLE else (beyond, point.objective)
 
 
 def _minimised(plain: Plain, counted: Any, method: str, evaluations: int, tolerance: float) -> str:

@@ -40,14 +40,12 @@ from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
 from shellform.optimiser.optimum import Checkpoint, Optimum, Step
 from shellform.optimiser.trials import reach, staged
-from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch
+from shellform.problem.evaluation import COUNTS, Evaluator, Linearisation, OffBranch
 from shellform.problem.paths import follow, without_slack
-from shellform.problem.problem import FEASIBLE, Problem
-from shellform.problem.terms import Term
+from shellform.problem.problem import Problem
 from shellform.structure.elements.state import State
 from shellform.work_clock import Work, told
 
-_COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 _NUMBERS = ("stage", "margin", "until", "caution")
 _TOLD = ("variables", "objective", "slope", "rows", "row_slopes")
 
@@ -236,7 +234,7 @@ def _tried(search: _Search, x: Reals) -> _Told:
     except OffBranch:
         _note(search, near, False)
         return _as_told(search, x, near, np.inf)
-    better = _rank(point) < _rank(search.best)
+    better = point.rank < search.best.rank
     if better:
         search.accepted.append(search.taut(point))
     # the last ones, and behind them the best
@@ -278,12 +276,6 @@ def _rows(search: _Search, values: Reals) -> Indices:
     return np.concatenate([np.zeros(0, dtype=np.int64), *chosen])
 
 
-def _rank(point: Linearisation) -> tuple[float, float]:
-    """Feasible designs by their objective, before the others by their violation."""
-    beyond = float(point.constraints.max(initial=0.0))
-    return (0.0, point.objective) if beyond <= FEASIBLE else (beyond, point.objective)
-
-
 def _note(search: _Search, point: Linearisation, accepted: bool) -> None:
     """A trial in the history, told to who watches."""
     step = _step(search, point, accepted)
@@ -299,11 +291,11 @@ def _step(search: _Search, point: Linearisation, accepted: bool) -> Step:
         search.evaluator.evaluations,
         point.objective,
         {
-            _column(search, part.term): float(value)
+            problem.column(part.term): float(value)
             for part, value in zip(problem.minimise, point.terms, strict=True)
         },
         {
-            _column(search, part.term): float(point.constraints[own].max(initial=-np.inf))
+            problem.column(part.term): float(point.constraints[own].max(initial=-np.inf))
             for part, own in zip(problem.constraints, problem.places(), strict=True)
         },
         int((pull > 0.0).sum()),
@@ -313,15 +305,11 @@ def _step(search: _Search, point: Linearisation, accepted: bool) -> Step:
     )
 
 
-def _column(search: _Search, term: Term) -> str:
-    return term.name if term.load in ("", search.base) else f"{term.name}.{term.load}"
-
-
 def _tell(search: _Search) -> None:
     """Hands out where the search stands before a trial."""
     if search.keep is None:
         return
-    numbers = {name: getattr(search.evaluator, name) for name in _COUNTS}
+    numbers = {name: getattr(search.evaluator, name) for name in COUNTS}
     numbers |= {name: getattr(search, name) for name in _NUMBERS}
     numbers |= {"radii": [each.design.radius for each in search.near]}
     numbers |= {"accepted radii": [each.radius for each in search.accepted]}
@@ -360,7 +348,7 @@ def _resume(search: _Search, checkpoint: Checkpoint) -> None:
     search.told = [_Told(x, float(value), *rest) for x, value, *rest in told]
     search.history = list(checkpoint.history)
     search.began -= checkpoint.history[-1].seconds
-    for name in _COUNTS:
+    for name in COUNTS:
         setattr(evaluator, name, numbers[name])
 
 

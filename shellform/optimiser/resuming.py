@@ -11,9 +11,9 @@ import numpy as np
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.optimum import Checkpoint
 from shellform.optimiser.search_state import Accepted, Iterate, Search, aimed, kept_in_mind
+from shellform.problem.evaluation import COUNTS
 from shellform.structure.elements.state import State
 
-_COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 _ARRAYS = ("tensioned", "excess", "needed")
 _NUMBERS = tuple(
     each.name
@@ -27,7 +27,7 @@ def tell(search: Search, it: Iterate) -> None:
     if search.keep is None:
         return
     numbers = {name: getattr(it, name) for name in _NUMBERS}
-    numbers |= {name: getattr(search.evaluator, name) for name in _COUNTS}
+    numbers |= {name: getattr(search.evaluator, name) for name in COUNTS}
     design = it.point.design
     arrays = {"rest_length": design.rest_length, "present": design.present}
     arrays |= {name: getattr(it, name) for name in _ARRAYS}
@@ -70,7 +70,7 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
         for name in search.evaluator.problem.used()
     }
     point = search.evaluator.seed(design, states, numbers["stage"])
-    for name in _COUNTS:
+    for name in COUNTS:
         setattr(search.evaluator, name, numbers[name])
     kept = {name: numbers[name] for name in _NUMBERS} | {name: np.array(arrays[name]) for name in _ARRAYS}
     kept["fallen"] = tuple(kept["fallen"])

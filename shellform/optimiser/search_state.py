@@ -22,7 +22,6 @@ from shellform.problem.engineering import ModalStiffness
 from shellform.problem.evaluation import Evaluator, Linearisation
 from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
-from shellform.problem.terms import Term
 from shellform.reliability.scenarios import FactorsAsBuilt, scenarios
 from shellform.reliability.scenarios import remembered as remembered_in
 from shellform.reliability.trial_structures import SEED, Demand, enlarged, largest_on_path
@@ -302,13 +301,13 @@ def record(search: Search, point: Linearisation, stage: float, accepted: bool, p
     """A trial as a step of the history, told to who watches."""
     problem, pull = search.evaluator.problem, tensions(search, point)
     terms = {
-        _column(search, part.term): float(value)
+        problem.column(part.term): float(value)
         for part, value in zip(problem.minimise, point.terms, strict=True)
     }
     largest = np.array([pull.max(initial=0.0)])
-    constraints = {_column(search, part.term): float(residuals(part, largest)[0]) for part in search.bounded}
+    constraints = {problem.column(part.term): float(residuals(part, largest)[0]) for part in search.bounded}
     constraints |= {
-        _column(search, part.term): float(point.constraints[own].max(initial=-np.inf))
+        problem.column(part.term): float(point.constraints[own].max(initial=-np.inf))
         for part, own in zip(problem.constraints, problem.places(), strict=True)
         if own.stop <= len(point.constraints) - _in_mind(search)
     }
@@ -326,10 +325,6 @@ def record(search: Search, point: Linearisation, stage: float, accepted: bool, p
     if search.progress is not None:
         search.progress(step)
     return step
-
-
-def _column(search: Search, term: Term) -> str:
-    return term.name if term.load in ("", search.base) else f"{term.name}.{term.load}"
 
 
 def finish(search: Search, it: Iterate) -> Optimum:

@@ -111,7 +111,7 @@ class SequentialConvex:
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
-            least = 0.0 if each.name in _MAY_BE_NONE else np.nextafter(0.0, 1.0)
+            least = 0.0 if each.name in _MAY_BE_ZERO else np.nextafter(0.0, 1.0)
             if value is not None and not (np.isfinite(value) and value >= least):
                 raise InputError(
                     "must be finite and positive" if least else "must be finite and not negative",
@@ -126,7 +126,7 @@ class SequentialConvex:
             )
 
 
-_MAY_BE_NONE = (
+_MAY_BE_ZERO = (
     "thin",
     "stiffness",
     "most_cables",

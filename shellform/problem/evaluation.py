@@ -20,7 +20,7 @@ from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.problem.constraints import residual_rows, residuals
 from shellform.problem.paths import follow
-from shellform.problem.problem import Problem
+from shellform.problem.problem import FEASIBLE, Problem
 from shellform.problem.terms import LoadedDesign, Measurement, Squares, measured
 from shellform.problem.variables import Blocks
 from shellform.structure.answers.sensitivity import (
@@ -41,6 +41,9 @@ _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five
 _LED = 0.5  # of a further load, the steps by which it is led
 _FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed …
 _NEAR = 0.02  # … but for one whose root mean square distance is below this share of the target's size
+
+
+COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")  # of an Evaluator's work
 
 
 class OffBranch(Exception):
@@ -64,6 +67,18 @@ class Linearisation:
     constraints_by_variables: Reals
     measurements: tuple[Measurement, ...]
     stage: float
+
+    @property
+    def violation(self) -> float:
+        """By how much the worst constraint is violated, as a share of its scale; 0 where all are met."""
+        return max(float(self.constraints.max(initial=0.0)), 0.0)
+
+    @property
+    def rank(self) -> tuple[float, float]:
+        """By which designs are put in order: feasible ones by their objective, before the others by their
+        violation."""
+        beyond = self.violation
+        return (0.0, self.objective) if beyond <= FEASIBLE else (beyond, self.objective)
 
 
 class Evaluator:

@@ -86,6 +86,10 @@ class Problem:
         """The terms of the objective, then those of the constraints."""
         return [part.term for part in self.minimise] + [part.term for part in self.constraints]
 
+    def column(self, term: Term) -> str:
+        """A term's name in histories: its own, and its load case's where that isn't the design load."""
+        return term.name if term.load in ("", self.design_load.name) else f"{term.name}.{term.load}"
+
     def used(self) -> list[str]:
         """The load cases that are needed: the design load and those of the terms."""
         needed = {term.load for term in self.terms} | {self.design_load.name}

@@ -5,7 +5,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
-from shellform.optimiser.comparison import METHODS, Plain, compare, violation
+from shellform.optimiser.comparison import METHODS, Plain, compare
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +112,7 @@ def test_a_trial_off_the_branch_is_infinite_and_has_the_derivatives_of_the_neare
     assert len(plain.history) == 1
     # What was lost is no start: the next trial begins where the branch was.
     assert np.isfinite(plain.value(plain.start - 1e-4))
-    assert violation(plain.best) == 0.0
+    assert plain.best.violation == 0.0
 
 
 def test_what_can_t_be_compared_is_refused(coarse):
