@@ -8,8 +8,9 @@ import pytest
 import shellform as sf
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.optimum import Step
-from shellform.optimiser.resuming import _COUNTS, resumed, tell
+from shellform.optimiser.resuming import resumed, tell
 from shellform.optimiser.search_state import Accepted
+from shellform.problem.evaluation import COUNTS
 from shellform.structure.elements.state import extended, moved
 from tests.problems import misfit_and_force
 
@@ -116,13 +117,13 @@ def test_a_checkpoint_holds_every_field_of_where_a_search_stands(shell, problem)
         before=0.7, thrifty=0.3, batch=5, failures=2, needed=first, fallen=(3, 1), fell=True, stood=2, led_to=0.6, until=9,
     )  # fmt: skip
     fresh = {each.name: getattr(it, each.name) for each in fields(it)}
-    for k, name in enumerate(_COUNTS):
+    for k, name in enumerate(COUNTS):
         setattr(search.evaluator, name, 10 + k)
     tell(search, stood)
-    for name in _COUNTS:
+    for name in COUNTS:
         setattr(search.evaluator, name, 0)
     again = resumed(search, kept[-1])[1]
-    assert [getattr(search.evaluator, name) for name in _COUNTS] == [10, 11, 12, 13, 14]
+    assert [getattr(search.evaluator, name) for name in COUNTS] == [10, 11, 12, 13, 14]
     for name in fresh.keys() - {"point", "accepted", "mind", "remembered"}:
         found, wanted = getattr(again, name), getattr(stood, name)
         assert not np.array_equal(wanted, fresh[name]), f"{name} would be right by chance"
