@@ -44,6 +44,7 @@ SETTINGS = [
     "optimise.evaluations=24",
     "optimise.polish=3",
 ]
+NAME = "run"  # of each run's folder
 _UNLIKE = ("log.txt", "lock")  # times of day, and how often it was begun
 _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
 _LOOK = 0.02  # s between two looks
@@ -62,7 +63,8 @@ def main() -> int:
     place = asked.folder or Path(tempfile.mkdtemp(prefix="design_faults"))
     place.mkdir(parents=True, exist_ok=True)
     settings, chance = [*SETTINGS, *asked.set], random.Random(asked.seed)
-    whole, times = place / "whole", Counter[str]()
+    # The page tells its folder's name, which is the same for all.
+    whole, times = place / "whole" / NAME, Counter[str]()
     end = run(whole, settings, times=times)
     print(
         "undisturbed, s of processor time: " + ", ".join(f"{k} {v:.1f}" for k, v in times.items()), flush=True
@@ -70,7 +72,7 @@ def main() -> int:
     kills, runs, failed = Counter[str](), 0, 0
     while kills.total() < asked.kills:
         runs += 1
-        out, places = place / f"out{runs}", list(times)
+        out, places = place / f"out{runs}" / NAME, list(times)
         at, ended = 0, None
         while ended is None:
             at += chance.randrange(2)
@@ -138,6 +140,7 @@ def begin(folder: Path, settings: list[str]) -> int:
     import shellform.run.optimising
 
     sys.stdout.flush()
+    folder.parent.mkdir(parents=True, exist_ok=True)
     job = os.fork()
     if job:
         return job
@@ -213,6 +216,7 @@ def timeless(file: Path) -> bytes:
     if file.name == "history.csv":
         return b"\n".join(line.rsplit(b",", 1)[0] for line in data.splitlines())
     if file.name == "report.html":
+        data = re.sub(rb"<h3>Time</h3>.*?</table>", b"", data, flags=re.DOTALL)
         return re.sub(rb'"seconds": ?(\{[^}]*\}|\[[^]]*\]|[-+.\de]+)', b"", data)
     return data
 

@@ -1,6 +1,7 @@
 """Which rods stand where the given ones don't."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.records.as_built import AsBuilt
 from shellform.records.remedies import RodsOf, rounded_up
 from shellform.reliability.standing import sample
+from shellform.run import thicker
 from shellform.run.thicker import DRAWN, rods_that_stand
 from shellform.structure.elements.sections import Round
 
@@ -96,3 +98,14 @@ def test_remedies_name_the_entries_that_the_case_has():
     tube = OwnRodEntry(young=10e9, strength=30e6, radius=0.02, wall=0.002)
     sizes = rod_sizes(tube, Rod(given_section(tube)))
     assert "rod.radius = 0.018, rod.wall = 0.0018" in RodsOf(0.02, 0.05, 1.0, sizes=sizes).thinner(0.9)
+
+
+def test_rods_stand_as_often_as_under_the_load_under_which_the_fewest_do(monkeypatch):
+    stood = {1.0: 30, 2.0: 20, 3.0: 25}
+
+    def counted(shell, design, load, *arguments, **settings):
+        return SimpleNamespace(standing=SimpleNamespace(standing=stood[load[0, 0]]))
+
+    monkeypatch.setattr(thicker, "sample", counted)
+    loads = {name: np.array([row]) for name, row in (("a", [1.0, 9.0]), ("b", [2.0, 0.0]), ("c", [3.0, 1.0]))}
+    assert thicker._standing(None, None, loads, None, 0) == 20

@@ -33,6 +33,8 @@ def test_what_moves_no_marker_is_not_told_and_does_not_blur_the_others():
         assert found.tellable == ("a", "b")
         assert found.deviation[2] > 0.5
         assert found.deviation[:2] == pytest.approx(told(1.0).deviation[:2])
+    assert told(1.0, 1.0 / 60.0).tellable == ("a", "b")  # to 60 %, where half is the most
+    assert told(1.0, 1.0 / 40.0).tellable == ("a", "b", "c")
     known = told(1.0, 0.1)
     assert known.tellable == ("a", "b", "c")
     assert known.deviation[2] == pytest.approx(0.1)
