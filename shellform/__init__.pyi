@@ -106,7 +106,9 @@ from shellform.structure.elements.sections import Tube as Tube
 from shellform.structure.elements.state import State as State
 from shellform.structure.network import Network as Network
 from shellform.structure.solve.assembly import Assembly as Assembly
+from shellform.structure.solve.assembly import Balance as Balance
 from shellform.structure.solve.equilibrium import Equilibrium as Equilibrium
+from shellform.structure.solve.factorisation import Factor as Factor
 from shellform.structure.solve.loading import Loaded as Loaded
 from shellform.surface import cad as cad
 from shellform.surface import funicular as funicular
