@@ -37,6 +37,7 @@ def tell(search: Search, it: Iterate) -> None:
         "accepted radius": np.array([each.design.radius for each in it.accepted]),
         "accepted taut": np.array([each.taut for each in it.accepted]),
         "accepted violation": np.array([each.violation for each in it.accepted]),
+        "accepted objective": np.array([each.objective for each in it.accepted]),
     }
     for name, state in it.point.states.items():
         arrays |= {f"{name} positions": state.positions, f"{name} quaternions": state.quaternions}
@@ -75,11 +76,13 @@ def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
     kept = {name: numbers[name] for name in _NUMBERS} | {name: np.array(arrays[name]) for name in _ARRAYS}
     kept["fallen"] = tuple(kept["fallen"])
     before = tuple(
-        Accepted(Design(rest, np.array(present), float(radius)), np.array(taut), float(share))
-        for rest, present, radius, taut, share in zip(
+        Accepted(
+            Design(rest, np.array(present), float(radius)), np.array(taut), float(share), float(objective)
+        )
+        for rest, present, radius, taut, share, objective in zip(
             *(
                 arrays[f"accepted {name}"]
-                for name in ("rest_length", "present", "radius", "taut", "violation")
+                for name in ("rest_length", "present", "radius", "taut", "violation", "objective")
             ),
             strict=True,
         )

@@ -82,12 +82,13 @@ class Search:
 
 @dataclass(frozen=True)
 class Accepted:
-    """An accepted `design`, the candidates (c,) that are `taut` in it under the design load, and by what
-    share it breaks its constraints, its `violation`."""
+    """An accepted `design`, the candidates (c,) that are `taut` in it under the design load, by what share it
+    breaks its constraints, its `violation`, and its `objective`."""
 
     design: Design
     taut: Flags
     violation: float
+    objective: float = np.inf
 
     @property
     def built(self) -> Design:
@@ -188,7 +189,7 @@ class Models:
 def accepted_design(search: Search, point: Linearisation) -> Accepted:
     """The point's design, to go back to."""
     taut = in_tension(search.problem.shell, point.design, point.states[search.base])
-    return Accepted(point.design, taut, violation(search, point))
+    return Accepted(point.design, taut, violation(search, point), point.objective)
 
 
 def stiff(problem: Problem, least: float) -> Problem:

@@ -20,6 +20,7 @@ from shellform.reliability.trial_structures import confirm, stands
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 
+_ELSEWHERE = 1.1  # times the objective: a design that is worse has come to another equilibrium
 _COARSE = 0.5  # the first load step of a search for the end of a branch
 
 
@@ -75,8 +76,8 @@ def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indi
 
 def sound(search: Search, before: Accepted) -> Linearisation | None:
     """The same design in the states to which the documented path leads, without its slack cables; None where
-    it doesn't bear all loads there or breaks a constraint: of two equilibria side by side, a search from
-    design to design may have come to the other one."""
+    it doesn't bear all loads there, breaks a constraint, or is worse than it was: of two equilibria side by side,
+    a search from design to design may have come to the other one."""
     evaluator, problem = search.evaluator, search.problem
     loaded = follow(problem.shell, before.built, problem.loads, stay=True)
     evaluator.factorisations += sum(each.factorisations for each in loaded.values())
@@ -87,7 +88,8 @@ def sound(search: Search, before: Accepted) -> Linearisation | None:
         found = evaluator.seed(before.design, states, 1.0)
     except OffBranch:
         return None
-    return found if violation(search, found) <= max(before.violation, 0.0) else None
+    kept = violation(search, found) <= max(before.violation, 0.0)
+    return found if kept and found.objective <= _ELSEWHERE * before.objective else None
 
 
 def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]:

@@ -394,6 +394,10 @@ def test_a_design_is_sound_only_where_its_documented_path_bears_every_load_and_b
     own = Accepted(sf_design(), np.ones(2, dtype=bool), before)
     assert (trials.sound(search, own) is end) is is_sound
     assert search.evaluator.factorisations == 6
+    better = Accepted(sf_design(), np.ones(2, dtype=bool), before, 0.9)
+    assert trials.sound(search, better) is None, "its path leads to another equilibrium, which is worse"
+    as_good = Accepted(sf_design(), np.ones(2, dtype=bool), before, 0.92)
+    assert (trials.sound(search, as_good) is end) is is_sound
 
     def off(*_):
         raise OffBranch
