@@ -21,11 +21,9 @@ from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.net.grid import CONNECTOR
-from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.beam import STIFFNESSES, Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
-
-_STIFFNESSES = ("axial", "torsion", "bending_y", "bending_z")
 
 
 @dataclass(frozen=True)
@@ -73,15 +71,13 @@ class Group(Protocol):
 @dataclass(frozen=True)
 class Stiffness:
     """Stiffness of `part`'s elements, each on its own or all `together`; the part has the derivative for a
-    stiffness. `chosen` are the elements' numbers among the beams, and `properties` what of them varies;
-    cables vary in one way only."""
+    stiffness. `chosen` are the elements' numbers among all beams or cables; of beams all four constants vary."""
 
     name: str
     part: Beams | Cables
     deviation: float
     together: bool
     chosen: Indices
-    properties: tuple[str, ...]
 
     @property
     def count(self) -> int:
@@ -132,7 +128,7 @@ class Stiffness:
         if isinstance(self.part, Cables):
             return replace(built, cables=replace(built.cables, stiffness=built.cables.stiffness * factor))
         values = {}
-        for name in self.properties:
+        for name in STIFFNESSES:
             values[name] = getattr(built.beams, name).copy()
             values[name][self.chosen] *= factor
         return replace(built, beams=replace(built.beams, **values))
@@ -304,7 +300,7 @@ def _of_cables(cables: Cables, tolerances: Tolerances) -> list[Group]:
     for name, together in (("cable_stiffness", False), ("cable_stiffness_all", True)):
         deviation = getattr(tolerances, name)
         if deviation and len(every):
-            result.append(Stiffness(name, cables, deviation, together, every, ()))
+            result.append(Stiffness(name, cables, deviation, together, every))
     if tolerances.cable_length and len(every):
         result.append(Lengths("cable_length", cables, tolerances.cable_length))
     return result
@@ -317,9 +313,9 @@ def _of_supports(shell: Gridshell, tolerances: Tolerances) -> list[Group]:
 
 def _of_connectors(beams: Beams, tolerances: Tolerances) -> list[Group]:
     chosen = np.flatnonzero(beams.of_kind(CONNECTOR))
-    part = _rows(beams, chosen)
+    part = beams.chosen(chosen)
     return [
-        Stiffness(name, part, getattr(tolerances, name), together, chosen, _STIFFNESSES)
+        Stiffness(name, part, getattr(tolerances, name), together, chosen)
         for name, together in (("connectors", False), ("connectors_all", True))
         if getattr(tolerances, name)
     ]
@@ -367,15 +363,6 @@ def unpacked(packed: Reals, size: int) -> Reals:
     result[:, rows, columns] = packed
     result[:, columns, rows] = packed
     return result
-
-
-def _rows(beams: Beams, chosen: Indices) -> Beams:
-    """Some of the beams."""
-    each = {
-        name: getattr(beams, name)[chosen]
-        for name in (*_STIFFNESSES, "ends", "rest_length", "frames", "kind")
-    }
-    return replace(beams, **each)
 
 
 def _spread(values: Reals, dofs: Indices, state: State, columns: Indices) -> sp.csc_array:

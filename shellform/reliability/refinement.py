@@ -116,17 +116,12 @@ def _with_locks_cut(finer: Beams, start: State, beams: Beams, rods: Indices, mid
     )
     y_axes = np.tile(beams.frames[rods[along], 0, :, 1], (2, 1))
     kept = np.setdiff1d(np.arange(len(finer.ends)), cut)
-    return joined(_chosen(finer, kept), locks_along(start, halves, y_axes, bending))
+    return joined(finer.chosen(kept), locks_along(start, halves, y_axes, bending))
 
 
 def _repeated(beams: Beams, rods: np.ndarray) -> Beams:
     """The beams, then those of the rods once more."""
-    return _chosen(beams, np.concatenate([np.arange(len(beams.ends)), rods]))
-
-
-def _chosen(beams: Beams, chosen: Indices) -> Beams:
-    names = ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length", "frames", "kind")
-    return replace(beams, **{name: getattr(beams, name)[chosen] for name in names})
+    return beams.chosen(np.concatenate([np.arange(len(beams.ends)), rods]))
 
 
 def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
@@ -134,9 +129,9 @@ def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
     workshop = Workshop(nominal)
     members = members_of_model(model)
     none = drawn(members, Tolerances(), 0, PERFECT)
-    known = nominal.factors <= sought
-    begin = float(nominal.factors[known][-1]), nominal.states[int(known.sum()) - 1]
-    return workshop, workshop.limit(none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=begin)
+    return workshop, workshop.limit(
+        none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=nominal.known_to(sought)
+    )
 
 
 def _numbers(

@@ -20,7 +20,7 @@ from shellform.structure.answers.sensitivity import (
     tension_rows,
 )
 from shellform.structure.elements import rotation
-from shellform.structure.elements.beam import Beams, make_beams
+from shellform.structure.elements.beam import STIFFNESSES, Beams, make_beams
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import State, at_rest, from_vectors, moved
 from shellform.structure.network import Network, assemble
@@ -300,10 +300,7 @@ def sensitivities() -> Iterator[Comparison]:
 
     def varied(change: Reals) -> tuple[Network, Reals]:
         cables = replace(network.cables, rest_length=network.cables.rest_length + change[:3])
-        stiffness = {
-            name: getattr(network.beams, name) * (1.0 + change[3])
-            for name in ("axial", "torsion", "bending_y", "bending_z")
-        }
+        stiffness = {name: getattr(network.beams, name) * (1.0 + change[3]) for name in STIFFNESSES}
         return replace(network, cables=cables, beams=replace(network.beams, **stiffness)), load * (
             1.0 + change[4]
         )

@@ -21,7 +21,7 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import NotConverged
 from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements import rotation
-from shellform.structure.elements.beam import Beams
+from shellform.structure.elements.beam import STIFFNESSES, Beams
 from shellform.structure.elements.state import State, at_rest
 from shellform.structure.model import Model
 from shellform.structure.network import Network, assemble
@@ -93,9 +93,7 @@ def halved(model: Model) -> Model:
     before = np.linalg.norm(network.nodes[b] - network.nodes[a], axis=1)
     rest[halves] *= length / np.tile(before, 2)
     frames[halves] = _turned_to(frames[halves], chord / length[:, None])
-    others = {
-        name: getattr(beams, name)[whole] for name in ("axial", "torsion", "bending_y", "bending_z", "kind")
-    }
+    others = {name: getattr(beams, name)[whole] for name in (*STIFFNESSES, "kind")}
     none = np.zeros((len(cut), 6))
     held = np.broadcast_to(network.fixed.all(axis=0) & ~network.imposed.any(axis=0), none.shape)
     finer = replace(beams, ends=ends, rest_length=rest, frames=frames, **others)

@@ -35,7 +35,8 @@ Sign: theta_y and M_y follow the paper's (12), which counts turns about the loca
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,6 +52,7 @@ from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
 
+STIFFNESSES: Final = ("axial", "torsion", "bending_y", "bending_z")
 _NOTHING = np.empty((0, 78))
 _NO_MODES = np.empty((0, 6, 9, 2))
 _PARALLEL_TO_Z = 1e-6  # rad; nearer to global z than this, the default z axis is global x (model file)
@@ -79,7 +81,7 @@ class Beams:
         count = len(self.ends)
         put = object.__setattr__
         put(self, "ends", indices("beams.ends", self.ends, (count, 2), below=np.iinfo(np.int64).max))
-        for name in ("axial", "torsion", "bending_y", "bending_z"):
+        for name in STIFFNESSES:
             put(self, name, reals(f"beams.{name}", getattr(self, name), (count,)))
         put(self, "rest_length", reals("beams.rest_length", self.rest_length, (count,), positive=True))
         put(self, "frames", reals("beams.frames", self.frames, (count, 2, 3, 3)))
@@ -105,6 +107,11 @@ class Beams:
         if kind not in self.kinds:
             return np.zeros(len(self.ends), dtype=bool)
         return np.asarray(self.kind == self.kinds.index(kind))
+
+    def chosen(self, numbers: Indices) -> Beams:
+        """The beams with these numbers, in their order, of the same kinds."""
+        names = ("ends", *STIFFNESSES, "rest_length", "frames", "kind")
+        return replace(self, **{name: getattr(self, name)[numbers] for name in names})
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy (m,) J, end forces (m, 12) N and N·m, packed lower tangents (m, 78) if asked for (19, 21),
@@ -290,7 +297,7 @@ def joined(first: Beams, second: Beams) -> Beams:
     """The beams of both, the `first` before the `second`, kinds of one name being one."""
     kinds = (*first.kinds, *(each for each in second.kinds if each not in first.kinds))
     number = np.array([kinds.index(each) for each in second.kinds], dtype=np.int64)
-    names = ("ends", "axial", "torsion", "bending_y", "bending_z", "rest_length", "frames")
+    names = ("ends", *STIFFNESSES, "rest_length", "frames")
     ends, ea, gj, eiy, eiz, rest, frames = (
         np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
     )
