@@ -51,6 +51,11 @@ class Perfect:
         """The state without load."""
         return self.states[0]
 
+    def known_to(self, most: float) -> tuple[float, State]:
+        """The largest factor of the load, up to `most`, to which the path is known, and the state there."""
+        last = int(np.count_nonzero(self.factors <= most)) - 1
+        return float(self.factors[last]), self.states[last]
+
 
 def perfect(
     shell: Gridshell,
@@ -58,16 +63,13 @@ def perfect(
     load: Reals,
     *,
     shapes: int = SHAPES,
-    followed: bool = True,
     step: float = NOMINAL_STEP,
 ) -> Perfect:
-    """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it,
-    unless that isn't to be `followed`: drawn structures begin at its unloaded state. Raises NotConverged where
-    there is none."""
+    """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it; 0:
+    it isn't followed, since drawn structures begin at its unloaded state. Raises NotConverged where there is
+    none."""
     network, present = shell.network(design), np.asarray(design.present)
-    return _perfect(
-        network, members_of(shell), present, load, shell.target, shapes, step if followed else 0.0
-    )
+    return _perfect(network, members_of(shell), present, load, shell.target, shapes, step)
 
 
 def perfect_of(model: Model, load: str, *, shapes: int = SHAPES, step: float = NOMINAL_STEP) -> Perfect:

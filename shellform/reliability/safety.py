@@ -182,8 +182,9 @@ def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: fl
     nominal = perfect_of(model, "load", shapes=0, step=_STEP)
     members = members_of_model(model)
     none = drawn(members, Tolerances(), 0, PERFECT)
-    begin = min(float(nominal.factors[-1]), sought), nominal.states[-1]
-    return Workshop(nominal).limit(none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=begin)
+    return Workshop(nominal).limit(
+        none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=nominal.known_to(sought)
+    )
 
 
 def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:

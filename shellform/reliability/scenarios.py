@@ -154,5 +154,5 @@ def _end(
 
 
 def _workshop(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> Workshop:
-    nominal = perfect(shell, design, asked.case.force, shapes=0, followed=False)
+    nominal = perfect(shell, design, asked.case.force, shapes=0, step=0.0)
     return Workshop(replace(nominal, imperfections=asked.imperfections))

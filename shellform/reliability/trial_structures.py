@@ -174,7 +174,7 @@ def tried(
             """The share of the largest load that a structure bears."""
             most, begin = 1.0, None
             if number == PERFECT:  # whose path is known so far
-                most, begin = wanted, (min(float(nominal.factors[-1]), wanted), nominal.states[-1])
+                most, begin = wanted, nominal.known_to(wanted)
             errors = drawn(nominal.members, larger, safety.seed + SEED, number)
             found = workshop.limit(
                 errors,
