@@ -21,11 +21,12 @@ Designs that are to stand as built keep more of that stiffness at first, and are
 the same for each (trial_structures.py): after the descent, and each time cables have been taken away, before
 the others are optimised again: that serves the objective with what makes a design stand. From then on the
 stiffness is no limit but a means. A design that falls is asked for more of it, and steps towards that follow,
-until it stands; where one with less than was asked for stands, thinning goes on from there. After the descent an
-earlier design that stands is as good where that way costs more; where it leads to none, the structures that fall are kept in mind and lead it (minding.py). Where no
-design near one that falls stands, the search goes back to the last one that does, or takes fewer cables away. At the
-end a fresh sample judges, for the search has chosen its designs by their luck with the first one. The cables
-that are left keep a tension that errors don't use up.
+until it stands; where one with less than was asked for stands, thinning goes on from there. After the descent the
+last design that stood is taken instead where that costs less; where the way to more stiffness leads to none, the
+structures that fall are kept in mind and lead it (minding.py). Where no design near one that falls stands, the
+search goes back to the last one that does, or takes fewer cables away. At the end a fresh sample judges, for the
+search has chosen its designs by their luck with the first one. The cables that are left keep a tension that errors
+don't use up.
 
 A limit that the start breaks stops neither: no batch may break it more.
 

@@ -10,8 +10,9 @@ since no rod on it, whichever way it runs, is then bent across the surface to le
 
     II_i = Σ_j C_ij n_i · (x_j - x_i) = II_i(v) + (L d)_i,   L_ij = C_ij n_i · D_j,
 
-of one side at the edge (a crease that runs out there bends rods as well), linear in d while the frames stay. With Z = II(v) + L d, whose eigenvalues are to be capped, this is a
-projection, solved by the alternating direction method of multipliers (Boyd et al. 2011, section 5.2):
+of one side at the edge (a crease that runs out there bends rods as well), linear in d while the frames stay.
+With Z = II(v) + L d, whose eigenvalues are to be capped, this is a projection, solved by the alternating direction
+method of multipliers (Boyd et al. 2011, section 5.2):
 
     (M + ρ Lᵀ W L) d = ρ Lᵀ W (Z - U - II(v)),   Z = capped(II + U),   U += II - Z
 
@@ -20,8 +21,8 @@ fixed frames; frames follow in a few rounds. ρ = R⁴ makes both terms of one s
 happens.
 
 D are normals smoothed over R, so that neighbours on both sides of a crease don't cross. Vertices on the
-ground stay on their level, and move in plan only where a crease runs into it; where that leaves none that keeps the cap, the
-ground is left uncapped: rods end there.
+ground stay on their level, and move in plan only where a crease runs into it; where that leaves none that keeps
+the cap, the ground is left uncapped: rods end there.
 """
 
 from __future__ import annotations
