@@ -77,6 +77,12 @@ class SafetyEntry(Entry):
     )
     drawn: PositiveInt = Field(200, description="structures of the design to build")
     compared: PositiveInt = Field(20, description="structures of the designs to compare with")
+    rare: NonNegativeInt = Field(
+        0,
+        multiple_of=10,
+        description="structures a level of the subset simulation that tells how rarely the design to build falls: "
+        "with 200, one in a thousand takes some 600 structures; 0: not asked",
+    )
     confidence: float = Field(0.95, gt=0.0, lt=1.0, description="of the probability that is told")
     seed: NonNegativeInt = Field(0, description="of the drawing; the search draws others")
 
@@ -84,4 +90,6 @@ class SafetyEntry(Entry):
     def _enough(self) -> SafetyEntry:
         if self.compared > self.drawn:
             raise ValueError("compared must not exceed drawn")
+        if 0 < self.rare < 20:
+            raise ValueError("rare must be 0 or at least 20")
         return self

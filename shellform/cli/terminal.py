@@ -98,7 +98,7 @@ def tell_verdict(verdict: VerdictRecord) -> None:
 def tell_as_built(summary: Summary) -> None:
     """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one
     to build fails first."""
-    from shellform.records.words import cause_title, critical_words, standing_words
+    from shellform.records.words import cause_title, critical_words, rare_words, standing_words
 
     for name, design in summary.designs.items():
         for load, row in design.loads.items():
@@ -118,6 +118,8 @@ def tell_as_built(summary: Summary) -> None:
             f"fails first: structure {found.number} at {found.factor:.2f} of the load “{found.load}” ({found.kind}), "
             f"driven by {cause_title(found.driver)}, without which it bears {found.without[found.driver]:.2f}{cables}"
         )
+    for rare in summary.rare or ():
+        print(f"how rarely, {rare.design} under the load “{rare.load}”: {rare_words(rare)}")
 
 
 def tell_labelled(lines: Mapping[str, Any]) -> None:

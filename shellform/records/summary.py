@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import Damaged, InputError
+from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.files import ANEW, plain, read_record, text_of
 from shellform.records.scattering import RobustRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
@@ -251,23 +252,6 @@ class DocumentsRecord:
 
 
 @dataclass(frozen=True)
-class FailureRecord:
-    """How the `design` most likely fails under the `load`: structure `number`, of middle load factor among
-    the fallen ones, falls at the load `factor` by what `kind` tells; the `driver` is the cause of error
-    without which it bears most, `without` the factors that it reaches with one cause left out; `cables` go
-    slack on the way."""
-
-    design: str
-    load: str
-    number: int
-    factor: float
-    kind: str
-    driver: str
-    without: Mapping[str, float]
-    cables: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class VerdictRecord:
     """Whether the `design` to build `holds`: what `failed`, a sentence with reason and remedy each, and the
     checks that were asked for and `not_examined`. It holds where neither is (verdict.py)."""
@@ -295,6 +279,7 @@ class Summary:
     sections: tuple[SectionRecord, ...] | None = None
     robust: RobustRecord | None = None
     failure: FailureRecord | None = None
+    rare: tuple[RareRecord, ...] | None = None
     thicker: ThickerRodsRecord | None = None
     documents: DocumentsRecord | None = None
     verdict: VerdictRecord | None = None
@@ -309,7 +294,14 @@ class Summary:
         """Without these designs, and without what is told of designs made from the optimised one."""
         kept = {name: design for name, design in self.designs.items() if name not in names}
         return replace(
-            self, designs=kept, sections=None, robust=None, failure=None, thicker=None, verdict=None
+            self,
+            designs=kept,
+            sections=None,
+            robust=None,
+            failure=None,
+            rare=None,
+            thicker=None,
+            verdict=None,
         )
 
     def unexamined(self) -> Summary:
@@ -322,7 +314,7 @@ class Summary:
             )
             for name, design in self.designs.items()
         }
-        return replace(self, designs=designs, failure=None, thicker=None)
+        return replace(self, designs=designs, failure=None, rare=None, thicker=None)
 
     def with_seconds(self, stage: str, spent: float) -> Summary:
         """With the time of a stage, s."""

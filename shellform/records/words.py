@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from shellform.records.failures import RareRecord
+
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
 TITLES = {
     "unbraced": "Unbraced",
@@ -81,6 +83,19 @@ def standing_words(drawn: int, standing: int, at_least: float, confidence: float
     return (
         f"{standing} of {drawn} structures as built stand (at least {math.floor(100.0 * at_least):.0f} % "
         f"with {number(100.0 * confidence)} % confidence)"
+    )
+
+
+def rare_words(found: RareRecord) -> str:
+    """How rarely structures as built fall under a load."""
+    if found.variation is None:
+        rarer = "" if found.probability == 1.0 else f": less than one in {1.0 / found.probability:,.0f}"
+        return f"none of {found.structures} structures falls that subset simulation led towards it{rarer}"
+    causes = sorted(found.shares.items(), key=lambda each: -each[1])[:2]
+    by = " and ".join(f"{cause_title(name)} ({100.0 * share:.0f} %)" for name, share in causes if share > 0.0)
+    return (
+        f"about one structure in {1.0 / found.probability:,.0f} falls (coefficient of variation "
+        f"{found.variation:.2g}, from {found.structures} structures){f', driven by {by}' if by else ''}"
     )
 
 

@@ -38,7 +38,7 @@ _ADAPTED = 5  # times a level at which the step is adapted
 @dataclass(frozen=True)
 class Rare:
     """The `probability` of failure, its coefficient of `variation`, `evaluations` of the limit state, the
-    `levels` passed, and the failed points (k, d) of the last one with the one of smallest norm first: the
+    `levels` passed and the share that they `reached`, and the failed points (k, d) of the last one with the one of smallest norm first: the
     `likeliest`."""
 
     probability: float
@@ -46,6 +46,11 @@ class Rare:
     evaluations: int
     levels: tuple[float, ...]
     failed: Reals
+
+    @property
+    def reached(self) -> float:
+        """The share of all points beyond the last level."""
+        return float(_SHARE ** len(self.levels))
 
     @property
     def likeliest(self) -> Reals | None:
@@ -71,6 +76,8 @@ def subset_simulation(limit_state: LimitState, size: int, *, count: int, seed: i
         bound = 0.5 * float(g[order[seeds - 1]] + g[order[seeds]])
         failing = g < 0.0
         if bound <= 0.0 or failing.mean() >= _SHARE:
+            break
+        if g.min() == g.max():  # nothing that leads towards a failure
             break
         probability *= _SHARE
         squares += _square(g <= bound, chains, _SHARE)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,10 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.records.as_built import EQUAL, falls
 from shellform.records.checks import BUILT
 from shellform.records.drawn import DrawnPath
+from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.progress import Event, Kind
 from shellform.records.summary import (
     DesignRecord,
-    FailureRecord,
     StandingRecord,
     Summary,
     write_summary,
@@ -47,6 +48,7 @@ from shellform.run.figures import FAILURE
 from shellform.run.folder import Run, read_run
 from shellform.run.judged import asked_as_built, judged, run_checks
 from shellform.run.pace import time_words
+from shellform.run.rare_failures import rare_of
 from shellform.run.sampling import Clock, drawn_of
 from shellform.run.thicker import rods_that_stand
 from shellform.run.workspace import Workspace
@@ -102,6 +104,8 @@ def examine(workspace: Workspace) -> Summary:
     if best != "unbraced":
         summary = _stand(workspace, chosen, entry.drawn, summary, clock)
         summary = replace(summary, failure=_failure(workspace, chosen, entry.drawn))
+        if entry.rare:
+            summary = replace(summary, rare=_rare(workspace, chosen))
         if falls(summary.designs, best, asked_as_built(workspace.case)):
             summary = replace(summary, thicker=_thicker(workspace, run))
     return replace(summary, verdict=judged(replace(run, summary=summary)))
@@ -236,6 +240,34 @@ def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
     found = counted(drawn, drawn - len(fallen), seed=entry.seed, confidence=entry.confidence)
     lowest = min(fallen, default=share) / share
     return StandingRecord(drawn, found.standing, found.at_least, entry.confidence, entry.seed, lowest)
+
+
+def _rare(workspace: Workspace, each: _Examined) -> tuple[RareRecord, ...] | None:
+    """How rarely a design's structures fall under each load; None, and a note, where the perfect one has no
+    unloaded equilibrium."""
+    entry = workspace.case.safety
+
+    def tell(load: str, done: int) -> None:
+        text = f"how rarely the {each.name} design falls under the load “{load}”: structure {done}"
+        workspace.report(Event("safety", text))
+
+    try:
+        return tuple(
+            rare_of(
+                workspace.folder,
+                each.name,
+                (each.shell, each.design, each.tolerances),
+                (load, each.loads),
+                count=entry.rare,
+                seed=entry.seed,
+                tell=partial(tell, load),
+            )
+            for load, force in each.loads.items()
+            if force.any()
+        )
+    except NotConverged as error:
+        workspace.say("safety", f"how rarely it falls was not found: {error.what}", Kind.NOTE)
+        return None
 
 
 def _failure(workspace: Workspace, each: _Examined, count: int) -> FailureRecord | None:

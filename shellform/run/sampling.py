@@ -62,7 +62,7 @@ def drawn_of(
     has no unloaded equilibrium."""
     shell, design, tolerances = made
     load, loads = under
-    key = _key(shell, design, tolerances, loads, seed)
+    key = key_of(shell, design, tolerances, loads, seed)
     kept = read_drawn(folder, name, key)
     path = kept.paths.get(load, DrawnPath())
     clock.kept(min(len(path.factors), count))
@@ -88,7 +88,7 @@ def drawn_of(
     return DrawnPath(path.factors[:count], path.stand[:count])
 
 
-def _key(
+def key_of(
     shell: Gridshell, design: Design, tolerances: Tolerances, loads: Mapping[str, Reals], seed: int
 ) -> str:
     """Of all that a design's structures depend on."""

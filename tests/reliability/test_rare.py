@@ -21,6 +21,28 @@ def test_subset_simulation_agrees_with_counting_fallen_structures(dome, nominal)
     assert found.probability == pytest.approx(share, abs=3.0 * doubt)
 
 
+def test_broken_off_it_goes_on_with_the_factors_that_are_known(dome, nominal):
+    workshop, heard = Workshop(perfect(dome, dome.design(), 1.1 * nominal.load)), []
+    whole = rare_failure(
+        workshop, ERRORS, seed=3, count=20, most=1.5, tell=lambda found: heard.append(list(found))
+    )
+    known = heard[len(heard) // 2]
+    again = []
+    resumed = rare_failure(
+        workshop,
+        ERRORS,
+        seed=3,
+        count=20,
+        most=1.5,
+        known=known,
+        tell=lambda found: again.append(list(found)),
+    )
+    assert 0 < len(known) < len(heard[-1]) == whole.found.evaluations
+    assert all(len(found) > len(known) for found in again), "none is loaded again"
+    assert again[-1] == heard[-1]
+    assert (resumed.found.probability, resumed.shares) == (whole.found.probability, whole.shares)
+
+
 def test_the_cause_that_alone_matters_has_the_largest_share(dome, nominal):
     workshop = Workshop(perfect(dome, dome.design(), 1.1 * nominal.load))
     errors = Tolerances(load_all=0.1, connectors=1e-6)

@@ -62,6 +62,13 @@ def test_what_never_fails_has_no_likeliest_failure():
     assert found.probability == 0.0
     assert found.variation == np.inf
     assert found.likeliest is None
+    assert (found.evaluations, found.reached) == (50, 1.0), "nothing leads towards a failure"
+
+
+def test_a_failure_too_rare_to_be_met_is_known_to_be_rarer_than_the_last_level():
+    found = subset_simulation(plane(9.0, 3), 3, count=100, seed=0)
+    assert found.probability == 0.0
+    assert found.reached == pytest.approx(1e-8)
 
 
 def test_the_likeliest_failure_is_the_failed_point_nearest_to_the_origin():

@@ -118,6 +118,45 @@ def test_killed_inside_sampling_it_goes_on_and_ends_with_the_same_bytes(file, wh
         ).read_bytes()
 
 
+def test_how_rarely_it_falls_is_told_where_asked_for_and_goes_on_where_it_was_broken_off(
+    file, whole, tmp_path
+):
+    asked = [
+        *FEW,
+        "safety.rare=20",
+        "tolerances.load_each=0.3",
+        "tolerances.load_uneven=0.2",
+        "safety.required=false",
+    ]
+    seen = []
+
+    def stop(event):
+        seen.append(event.text)
+        if "how rarely" in event.text and "structure 20" in event.text:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_case(load_case(file, asked), tmp_path / "stopped", until="safety", report=stop)
+    resumed, undisturbed = (
+        run_case(load_case(file, asked), tmp_path / name, until="safety") for name in ("stopped", "other")
+    )
+    assert read_summary(whole[0]).rare is None, "not asked for"
+    assert resumed.rare == undisturbed.rare
+    assert [each.load for each in resumed.rare] == ["design", "additional"]
+    design, additional = resumed.rare
+    assert 0.0 < design.probability <= additional.probability <= 1.0
+    for each in resumed.rare:
+        assert each.design == resumed.verdict.design
+        assert each.structures >= 20
+        assert (each.variation is None) == (each.shares == {})
+
+
+def test_a_number_of_structures_that_subset_simulation_cannot_share_out_is_refused(file):
+    for count in (10, 25):
+        with pytest.raises(InputError, match="rare"):
+            load_case(file, [f"safety.rare={count}"])
+
+
 def test_other_tolerances_draw_other_structures_and_a_fallen_one_is_explained(file, whole, tmp_path):
     loose = [*FEW, "tolerances.load_each=0.4", "tolerances.load_uneven=0.3", "tolerances.load_all=0.3"]
     summary = run_case(load_case(file, [*loose, "safety.required=false"]), tmp_path, until="safety")

@@ -1,0 +1,59 @@
+"""How rarely structures of a design fall: subset simulation (reliability/rare.py), each few structures kept in
+the run folder, so that it goes on where it stopped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+
+from shellform.arrays import Reals
+from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.tolerances import Tolerances
+from shellform.records.drawn import DrawnPath, read_drawn, write_drawn
+from shellform.records.failures import RareRecord
+from shellform.reliability.perfect import TO_ITS_END, perfect
+from shellform.reliability.rare import rare_failure
+from shellform.reliability.standing import Workshop
+from shellform.run.sampling import key_of
+
+
+def rare_of(
+    folder: Path,
+    name: str,
+    made: tuple[Gridshell, Design, Tolerances],
+    under: tuple[str, Mapping[str, Reals]],
+    *,
+    count: int,
+    seed: int,
+    tell: Callable[[int], None],
+) -> RareRecord:
+    """The share of structures of the design `name`, `made` of a shell with tolerances, that fall `under` the
+    load of a name among all, with `count` structures a level; `tell` hears how many there were so far. Raises
+    NotConverged where the perfect structure has no unloaded equilibrium."""
+    shell, design, tolerances = made
+    load, loads = under
+    file = f"{name}-rare"
+    kept = read_drawn(folder, file, f"{key_of(shell, design, tolerances, loads, seed)} {count}")
+
+    def keep(values: Sequence[float]) -> None:
+        factors = tuple(1.0 + value for value in values)
+        write_drawn(folder, file, kept.also(load, DrawnPath(factors, tuple(f >= 1.0 for f in factors))))
+        tell(len(values))
+
+    found = rare_failure(
+        Workshop(perfect(shell, design, loads[load], step=TO_ITS_END)),
+        tolerances,
+        seed=seed,
+        count=count,
+        known=[factor - 1.0 for factor in kept.paths.get(load, DrawnPath()).factors],
+        tell=keep,
+    )
+    fell = len(found.found.failed) > 0
+    return RareRecord(
+        name,
+        load,
+        found.found.probability if fell else found.found.reached,
+        found.found.variation if fell else None,
+        found.found.evaluations,
+        found.shares,
+    )
