@@ -109,6 +109,8 @@ def tell_as_built(summary: Summary) -> None:
             if row.stands is not None:
                 own = row.stands
                 parts.append(standing_words(own.drawn, own.standing, own.at_least, own.confidence))
+            if row.expected_stiffness is not None:
+                parts.append(f"softest mode as built {row.expected_stiffness:.3g} N/m")
             if parts:
                 print(f"{name:>10}  {load}: {', '.join(parts)}")
     found = summary.failure

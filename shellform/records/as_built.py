@@ -10,11 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 from shellform.records.check import UNASKED, UNKNOWN, Cell, Check
 from shellform.records.remedies import RodsOf
-from shellform.records.summary import DesignRecord
-from shellform.records.words import critical_words, load_title, standing_words
+from shellform.records.summary import DesignRecord, LoadRecord
+from shellform.records.words import critical_words, load_title, number, standing_words
 from shellform.reliability.safety import allowed
 
 EQUAL = 1e-3  # relative: critical factors that count as equal
@@ -52,6 +53,48 @@ def standing_checks(
         limit = f"at least {safety.drawn - fallen} of {safety.drawn}" if safety.required else "told only"
         found.append(Check(f"As built under {load_title(load, factors[load])}", limit, cells))
     return found
+
+
+def guide_checks(
+    rows: Mapping[str, DesignRecord],
+    names: Sequence[str],
+    loads: Sequence[str],
+    factors: Mapping[str, float],
+) -> list[Check]:
+    """The guide beside the drawn structures, and how well both agree: it judges nothing."""
+    found = []
+    for load in loads:
+        known = {name: rows[name].loads[load] for name in names if name in rows and load in rows[name].loads}
+        stiffness = {
+            name: row.expected_stiffness for name, row in known.items() if row.expected_stiffness is not None
+        }
+        if stiffness:
+            cells = {
+                name: Cell(f"{number(stiffness[name])} N/m", None, False) if name in stiffness else UNASKED
+                for name in names
+            }
+            found.append(
+                Check(
+                    f"Softest mode as built under {load_title(load, factors[load])}", _agreement(known), cells
+                )
+            )
+    return found
+
+
+def _agreement(rows: Mapping[str, LoadRecord]) -> str:
+    """Of how many pairs of designs the guide tells as the drawn structures do which one stands more often."""
+    both = [
+        (row.expected_stiffness, row.stands.standing / row.stands.drawn)
+        for row in rows.values()
+        if row.expected_stiffness is not None and row.stands is not None
+    ]
+    pairs = [(a, b) for a, b in combinations(both, 2) if a[1] != b[1]]
+    if not pairs:
+        return "a guide; the drawn structures decide"
+    alike = sum((a[0] > b[0]) == (a[1] > b[1]) for a, b in pairs)
+    return (
+        f"a guide: orders {alike} of {len(pairs)} pairs of designs as the drawn structures do, which decide"
+    )
 
 
 def falls(rows: Mapping[str, DesignRecord], name: str, safety: AsBuilt) -> bool:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
-from shellform.records.as_built import AsBuilt, critical_checks, standing_checks
+from shellform.records.as_built import AsBuilt, critical_checks, guide_checks, standing_checks
 from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, share_of
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
 from shellform.records.summary import DesignRecord, LoadRecord, OptimisationRecord, Summary
@@ -103,6 +103,7 @@ def checks(
     return [
         *under("Stands", "stable, without snapping through", _stands, loads),
         *standing_checks(rows, rods, [load for load in loads if load != "none"], factors, bounds.safety),
+        *guide_checks(rows, list(rods), [load for load in loads if load != "none"], factors),
         *critical_checks(rows, rods, bounds.critical),
         *under(
             "Rods",

@@ -114,7 +114,8 @@ class LoadRecord:
     doesn't up to that factor, the most that was tried), `critical_factor_halved` the same with rod elements
     halved, and `critical_factor_error` what the coarser mesh is off by, as are `deviation_max_error`,
     `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without tension, by name;
-    `stands`: as built.
+    `stands`: as built; `expected_stiffness`, N/m: the least of the softest mode on the path to this load, cables
+    counted for what they are worth under their errors.
     """
 
     factor: float
@@ -143,6 +144,7 @@ class LoadRecord:
     rod_utilisation_error: float | None = None
     slack: tuple[str, ...] | None = None
     stands: StandingRecord | None = None
+    expected_stiffness: float | None = None
 
 
 _UNEXAMINED: dict[str, Any] = dict.fromkeys(
@@ -156,6 +158,7 @@ _UNEXAMINED: dict[str, Any] = dict.fromkeys(
         "deviation_mean_error",
         "rod_utilisation_error",
         "stands",
+        "expected_stiffness",
     ]
 )
 

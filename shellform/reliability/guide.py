@@ -50,6 +50,11 @@ class PathStiffness:
         """The smallest along the path, N/m."""
         return float(self.stiffness.min())
 
+    def least_to(self, factor: float) -> float:
+        """The smallest up to a factor of the load, N/m, between two states on the straight line."""
+        here = float(np.interp(factor, self.factors, self.stiffness))
+        return min(here, float(self.stiffness[self.factors <= factor].min()))
+
 
 def guide(perfect: Perfect, tolerances: Tolerances, *, seed: int = 0, drawn: int = DRAWN) -> PathStiffness:
     """The guide of a perfect structure's path as far as it goes, at each of its kept states."""

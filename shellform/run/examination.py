@@ -38,6 +38,7 @@ from shellform.records.summary import (
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, open_checks, to_build
 from shellform.reliability.failure import explained
+from shellform.reliability.guide import guide
 from shellform.reliability.path_of_one import SOUGHT
 from shellform.reliability.perfect import perfect
 from shellform.reliability.probability import counted
@@ -57,6 +58,7 @@ from shellform.written import write_arrays
 
 _BEYOND = 1.5  # times the factor asked for, up to which a path is followed at least
 _SAME = 1e-9  # relative
+_GUIDED = 0.25  # of the largest load, the steps in which the guide looks along the path
 
 
 @dataclass(frozen=True)
@@ -191,8 +193,10 @@ def _stand(workspace: Workspace, each: _Examined, count: int, summary: Summary, 
         path = _drawn(workspace, each, largest, count, clock)
         if path is None:
             continue
+        guided = {} if before is not None else _guided(each, largest, shares, entry.seed)
         for name, share in shares.items():
-            rows[name] = replace(rows[name], stands=_standing(path, share, workspace.case))
+            own = replace(rows[name], stands=_standing(path, share, workspace.case))
+            rows[name] = replace(own, expected_stiffness=guided.get(name, own.expected_stiffness))
     record = replace(summary.designs[each.name], loads=rows)
     summary = summary.with_design(each.name, record)
     write_summary(workspace.folder, summary)
@@ -228,6 +232,18 @@ def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: 
     except NotConverged as error:
         workspace.say("safety", f"the {each.name} design was not drawn: {error.what}", Kind.NOTE)
         return None
+
+
+def _guided(each: _Examined, largest: str, shares: Mapping[str, float], seed: int) -> dict[str, float]:
+    """The guide (reliability/guide.py) for the loads, whose `shares` of the largest are given; a load to which
+    the perfect path doesn't lead has none."""
+    nominal = perfect(each.shell, each.design, each.loads[largest], shapes=0, step=_GUIDED)
+    found = guide(nominal, each.tolerances, seed=seed)
+    return {
+        name: found.least_to(share)
+        for name, share in shares.items()
+        if found.factors[-1] >= share * (1.0 - _SAME)
+    }
 
 
 def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:

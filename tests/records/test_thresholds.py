@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from shellform.records.as_built import AsBuilt, critical_checks, falls, standing_checks
+from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
 from shellform.records.check import SLACK, below, share_of
 from shellform.records.checks import Bounds, checks
 from shellform.records.remedies import RodSizes, RodsOf, allow
@@ -140,6 +140,23 @@ def test_no_more_has_to_stand_under_another_load_than_under_the_design_load():
     )
     assert made[0].limit == "at least 100 of 200"
     assert standing_checks(rows, {"initial": RODS}, ["additional"], {"additional": 1.2}, None) == []
+
+
+def test_the_guide_judges_nothing_and_tells_of_how_many_pairs_of_designs_it_orders_as_the_drawn_ones_do():
+    rows = {
+        name: design("design", stands=standing(20, number), expected_stiffness=stiffness)
+        for name, number, stiffness in (("a", 20, 9.0), ("b", 12, 4.0), ("c", 12, 5.0), ("d", 3, 6.0))
+    }
+    (check,) = guide_checks(rows, list(rows), ["design"], {"design": 1.0})
+    # of six pairs b and c stand equally often; d is told stiffer than both and falls more often
+    assert "orders 3 of 5 pairs" in check.limit
+    assert [cell.holds for cell in check.cells.values()] == [None] * 4
+    assert not any(cell.asked for cell in check.cells.values())
+    assert check.cells["b"].found == "4 N/m"
+    (alike,) = guide_checks({"a": rows["a"]}, ["a", "unbraced"], ["design"], {"design": 1.0})
+    assert alike.limit == "a guide; the drawn structures decide"
+    assert alike.cells["unbraced"].found == "–"
+    assert guide_checks({"a": design()}, ["a"], ["design"], {"design": 1.0}) == []
 
 
 def test_a_remedy_gives_the_entry_in_the_entry_s_own_unit(shell, designs):

@@ -7,7 +7,7 @@ import pytest
 
 from shellform.gridshell.tolerances import default_tolerances
 from shellform.reliability.expected_cables import ExpectedCables
-from shellform.reliability.guide import expected_stiffness, guide
+from shellform.reliability.guide import PathStiffness, expected_stiffness, guide
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
@@ -153,3 +153,11 @@ def test_the_guide_looks_at_the_whole_path(nominal, dome):
     assert len(found.stiffness) == len(found.factors) == len(nominal.states)
     assert found.least == found.stiffness.min()
     assert (found.factors[0], found.factors[-1]) == (0.0, 1.0)
+
+
+def test_up_to_a_share_of_the_load_the_guide_takes_the_least_on_the_way_and_at_its_end():
+    falling = PathStiffness(np.array([0.0, 0.5, 1.0]), np.array([4.0, 3.0, 1.0]))
+    assert falling.least_to(0.75) == pytest.approx(2.0)
+    dipping = PathStiffness(np.array([0.0, 0.5, 1.0]), np.array([4.0, 1.0, 3.0]))
+    assert dipping.least_to(0.75) == 1.0
+    assert dipping.least_to(1.0) == dipping.least == 1.0

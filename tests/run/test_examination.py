@@ -54,6 +54,7 @@ def test_every_design_tells_its_critical_factor_on_both_meshes_and_how_many_stru
             if name != "unbraced":
                 assert row.stands.drawn == (12 if name == summary.verdict.design else 4)
                 assert row.stands.standing <= row.stands.drawn
+                assert row.expected_stiffness > 0.0
                 assert (row.stands.confidence, row.stands.seed) == (0.95, 0)
         main, more = design.loads["design"], design.loads["additional"]
         for each in (
