@@ -94,7 +94,7 @@ def falling(search: Search, design: Design) -> dict[int, float]:
     load that are aimed for; none where the design has no unloaded equilibrium."""
     assert search.asked is not None
     try:
-        least = to_bear(search.problem.shell, design, search.asked.trial)
+        least = to_bear(search.problem.shell, design, search.asked.trial, judging=search.judging)
     except NotConverged:
         return {}
     return {number: _OVER * factor for number, factor in least.items()}

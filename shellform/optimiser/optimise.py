@@ -72,7 +72,7 @@ from shellform.problem.terms import Misfit, Share
 from shellform.reliability.guide import stretch_deviation
 from shellform.reliability.perfect import perfect
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import Demand, demand
+from shellform.reliability.trial_structures import Demand, Judging, demand
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.threads import dense_on_one
 from shellform.structure.network import assemble
@@ -88,14 +88,15 @@ def optimise(
     initial: Design | None = None,
     progress: Watch | None = None,
     keep: Keep | None = None,
+    judging: Judging | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`; with `safety` one that
     stands as built under the problem's loads, no less likely than `initial` (None: the start); with
     MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever stands.
 
-    `progress(step)` is called at each trial, `keep(checkpoint)` before each: with `resume` the same call goes
-    on from there to the same result.
+    `progress(step)` is called at each trial, `judging(done, most)` while structures of a design are drawn, and
+    `keep(checkpoint)` before each trial: with `resume` the same call goes on from there to the same result.
 
     Raises NotConverged where the start doesn't carry the design load, with the paper's advice.
     """
@@ -115,11 +116,18 @@ def optimise(
         if safety is not None:
             share = max(share, safety.stiffness)
             built = {name: problem.loads[name] for name in problem.built_under or problem.loads}
-            asked = demand(
-                problem.shell, initial or start, built, safety, design_load=problem.design_load.name
-            )
+            base = problem.design_load.name
+            asked = demand(problem.shell, initial or start, built, safety, design_load=base, judging=judging)
         search, it = begin(
-            problem, start, solver, lambda softest: share * softest, evaluations, progress, keep, asked
+            problem,
+            start,
+            solver,
+            lambda softest: share * softest,
+            evaluations,
+            progress,
+            keep,
+            asked,
+            judging,
         )
         if resume is not None:
             search, it = resumed(search, resume)
@@ -133,6 +141,7 @@ def polish(
     evaluations: int = 20,
     groups: Indices | None = None,
     progress: Watch | None = None,
+    judging: Judging | None = None,
 ) -> Optimum:
     """The design of `best` with the cables that it has and the least misfit under the design load, its
     constraints kept; the solver's `stiffness` is a share of what `best` had to keep.
@@ -165,6 +174,7 @@ def polish(
             evaluations,
             progress,
             asked=best.asked,
+            judging=judging,
         )
         models = Models(search.evaluator, solver, search.models.reach, whole=alike is not None)
         search = replace(search, always_guarded=True, groups=alike, models=models)
@@ -189,6 +199,7 @@ def begin(
     progress: Watch | None = None,
     keep: Keep | None = None,
     asked: Demand | None = None,
+    judging: Judging | None = None,
 ) -> tuple[Search, Iterate]:
     """A search of the problem and its first iterate. `kept` gives the stiffness, N/m, that no mode may fall
     below under the further loads, from that of the start's softest mode under the design load; what is
@@ -230,6 +241,7 @@ def begin(
         False,
         progress,
         keep,
+        judging,
         began,
         Models(evaluator, solver, mean),
     )

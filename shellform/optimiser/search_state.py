@@ -24,7 +24,7 @@ from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.reliability.scenarios import FactorsAsBuilt, scenarios
 from shellform.reliability.scenarios import remembered as remembered_in
-from shellform.reliability.trial_structures import SEED, Demand, enlarged, largest_on_path
+from shellform.reliability.trial_structures import SEED, Demand, Judging, enlarged, largest_on_path
 from shellform.structure.solve.loading import Loaded
 
 Watch = Callable[[Step], None]
@@ -62,6 +62,7 @@ class Search:
     always_guarded: bool
     progress: Watch | None
     keep: Keep | None
+    judging: Judging | None
     began: float
     models: Models
 

@@ -96,7 +96,7 @@ def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]
     """Whether the design stands as built, and the iterate that knows which structures fell."""
     if search.asked is None:
         return True, it
-    found = stands(search.problem.shell, built, search.asked.trial, first=it.fallen)
+    found = stands(search.problem.shell, built, search.asked.trial, first=it.fallen, judging=search.judging)
     search.evaluator.factorisations += found.factorisations
     fallen = [number for own in found.fallen.values() for number in own]
     fallen = list(dict.fromkeys([*fallen, *it.fallen]))
@@ -106,7 +106,7 @@ def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]
 def confirmed(search: Search, built: Design) -> bool:
     """Whether a fresh sample agrees that the design stands as built."""
     assert search.asked is not None
-    found = confirm(search.problem.shell, built, search.asked.confirmed)
+    found = confirm(search.problem.shell, built, search.asked.confirmed, judging=search.judging)
     search.evaluator.factorisations += found.factorisations
     return found.stands
 

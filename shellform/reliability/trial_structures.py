@@ -12,7 +12,7 @@ The perfect structure's critical factor is asked for beside them, with an allowa
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -34,6 +34,9 @@ SEED, _CONFIRMED = (
     100,
 )  # added to the safety's: a search doesn't see the structures that a finished design is judged by
 MOST = 40  # structures by which a search confirms its result, or tries designs without enlarged errors
+Judging = Callable[[int, int], None]
+"""Called while a design is judged, with how many structures were loaded and how many there are at the most."""
+
 _AT_ONCE = 4  # structures between two looks at how many have fallen
 _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a structure falls
 _MESH = 1.01  # over the critical factor asked for: what elements of usual length tell too much, twice over
@@ -77,6 +80,7 @@ def demand(
     safety: Safety,
     *,
     design_load: str = "design",
+    judging: Judging | None = None,
 ) -> Demand:
     """What is asked of designs that come after `start`, in trials and of a fresh sample under another seed.
     Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
@@ -89,16 +93,18 @@ def demand(
         most = {name: own.tried for name, load in loads.items() if load.any()}
         most[design_load] = _known(own, design_load, design_load)
         asked = Required(own, {name: loads[name] for name in most}, design_load, most)
-        shown = tried(shell, start, asked, critical=False)
+        shown = tried(shell, start, asked, critical=False, judging=judging)
         if shown.stands:
             trial = _shown(asked, shown)
             break
     if trial is None:
         many = replace(safety, enlarged=1.0, tried=max(MOST, safety.tried))
-        trial, confirming = required(shell, start, loads, many, design_load=design_load), safety.drawn
+        trial = required(shell, start, loads, many, design_load=design_load, judging=judging)
+        confirming = safety.drawn
     fresh = replace(safety, enlarged=1.0, tried=min(safety.drawn, confirming), seed=safety.seed + _CONFIRMED)
     if any(trial.fallen[name] > _known(fresh, name, design_load) for name in trial.fallen):
-        return Demand(trial, required(shell, start, loads, fresh, design_load=design_load))
+        confirmed = required(shell, start, loads, fresh, design_load=design_load, judging=judging)
+        return Demand(trial, confirmed)
     known = {name: _known(fresh, name, design_load) for name in trial.fallen}
     return Demand(trial, Required(fresh, trial.loads, design_load, known))
 
@@ -122,6 +128,7 @@ def required(
     safety: Safety,
     *,
     design_load: str = "design",
+    judging: Judging | None = None,
 ) -> Required:
     """What is asked of designs that come after `start`: under the design load what the probability says for
     enlarged errors, or what `start` shows where that is less, for the search would have nowhere to begin;
@@ -129,7 +136,7 @@ def required(
     equilibrium."""
     own = {name: load for name, load in loads.items() if load.any()}
     every = Required(safety, own, design_load, {name: safety.tried for name in own})
-    return _shown(every, tried(shell, start, every, critical=False))
+    return _shown(every, tried(shell, start, every, critical=False, judging=judging))
 
 
 def _shown(asked: Required, shown: JudgedTrial) -> Required:
@@ -150,6 +157,7 @@ def tried(
     first: Sequence[int] = (),
     critical: bool = True,
     whole: bool = False,
+    judging: Judging | None = None,
 ) -> JudgedTrial:
     """The design judged by the search's structures, the numbers `first` before the others, and no more of
     them than it takes to refuse it but where the `whole` sample is asked for. Raises NotConverged where it
@@ -198,6 +206,8 @@ def tried(
                 for name, share in shares.items():
                     if factor < share * (1.0 - _SAME):
                         fallen[name].append(number)
+            if judging is not None:
+                judging(begin + len(numbers), len(queue))
             refused = not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares)
             if refused and not whole:
                 return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, False, spent)
@@ -213,11 +223,13 @@ def largest_on_path(asked: Required) -> tuple[str, dict[str, float]]:
     )
 
 
-def to_bear(shell: Gridshell, design: Design, asked: Required) -> dict[int, float]:
+def to_bear(
+    shell: Gridshell, design: Design, asked: Required, *, judging: Judging | None = None
+) -> dict[int, float]:
     """The numbers of structures that fall under loads on the design load's path more often than is allowed,
     and the factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its
     critical factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
-    found = tried(shell, design, asked, whole=True)
+    found = tried(shell, design, asked, whole=True, judging=judging)
     _, shares = largest_on_path(asked)
     least: dict[int, float] = {}
     if not found.critical:
@@ -236,17 +248,26 @@ def _critical(asked: Required, shares: Mapping[str, float]) -> float:
     return _MESH * asked.safety.critical_factor * shares[asked.design_load]
 
 
-def stands(shell: Gridshell, design: Design, asked: Required, *, first: Sequence[int] = ()) -> JudgedTrial:
+def stands(
+    shell: Gridshell,
+    design: Design,
+    asked: Required,
+    *,
+    first: Sequence[int] = (),
+    judging: Judging | None = None,
+) -> JudgedTrial:
     """As `tried`; a design without unloaded equilibrium doesn't stand."""
     try:
-        return tried(shell, design, asked, first=first)
+        return tried(shell, design, asked, first=first, judging=judging)
     except NotConverged as error:
         return JudgedTrial({name: () for name in asked.loads}, False, False, error.iterations)
 
 
-def confirm(shell: Gridshell, design: Design, asked: Required) -> JudgedTrial:
+def confirm(
+    shell: Gridshell, design: Design, asked: Required, *, judging: Judging | None = None
+) -> JudgedTrial:
     """As `stands`, and with the critical factor kept on the mesh with rod elements halved."""
-    found, factor = stands(shell, design, asked), asked.safety.critical_factor
+    found, factor = stands(shell, design, asked, judging=judging), asked.safety.critical_factor
     if not found.stands or factor is None:
         return found
     end = critical_on_halved(shell, design, asked.loads[asked.design_load], factor)

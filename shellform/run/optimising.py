@@ -14,6 +14,7 @@ from shellform.case.build_gridshell import rounding_catalogue
 from shellform.case.build_problem import case_problem
 from shellform.case.build_safety import case_safety, case_tolerances
 from shellform.case.entries import OptimiseEntry
+from shellform.compiled import clock_without_compiling
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import symmetric_groups
@@ -34,6 +35,7 @@ from shellform.records.summary import (
     Summary,
     SymmetryRecord,
 )
+from shellform.reliability.trial_structures import Judging
 from shellform.run.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
 from shellform.run.designs import followed, forget, keep
 from shellform.run.pace import POLISHING, WITHOUT_LOADS, Pace, time_words
@@ -42,6 +44,7 @@ from shellform.run.workspace import Workspace
 from shellform.tables import Table, table_text
 from shellform.written import write_text
 
+_QUIET = 10.0  # s between two notes on the judgement of a design
 _UNLOADED = 15  # evaluations at most, of the design without regard to the loads
 
 
@@ -135,6 +138,7 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
         safety=case_safety(workspace.case, shell),
         progress=watch,
         keep=lambda checkpoint: save_checkpoint(workspace.folder, key, checkpoint),
+        judging=_judging(workspace),
         resume=checkpoint,
     )
 
@@ -177,7 +181,11 @@ def _polished(
     try:
         most = workspace.case.optimise.polish
         polished = optimiser.polish(
-            last, evaluations=most, groups=groups, progress=_telling(workspace, "polishing", most)
+            last,
+            evaluations=most,
+            groups=groups,
+            progress=_telling(workspace, "polishing", most),
+            judging=_judging(workspace),
         )
     except NotConverged as error:  # averaged lengths may not bear the loads; the design before them stands
         workspace.say("optimise", f"not polished: {error.what}", Kind.NOTE)
@@ -227,6 +235,20 @@ def _without_loads(workspace: Workspace, shell: Gridshell, start: Design, none: 
         evaluations=_UNLOADED,
         progress=_telling(workspace, "without the loads", _UNLOADED),
     ).design
+
+
+def _judging(workspace: Workspace) -> Judging:
+    """Tells now and then how far the judgement of a design is: of a large shell one takes minutes."""
+    told = clock_without_compiling()
+
+    def tell(done: int, most: int) -> None:
+        nonlocal told
+        if clock_without_compiling() - told >= _QUIET:
+            told = clock_without_compiling()
+            text = f"a design as it would be built: {done} structures loaded, {most} at the most"
+            workspace.report(Event("optimise", text))
+
+    return tell
 
 
 def _telling(workspace: Workspace, what: str, most: int) -> Callable[[Step], None]:

@@ -58,7 +58,7 @@ def test_structures_that_fall_too_often_are_to_bear_their_loads_and_the_perfect_
 def test_what_structures_in_mind_bear_is_an_aim_and_no_limit(searching, monkeypatch):
     search, it, _ = searching
     monkeypatch.setattr(
-        minding, "to_bear", lambda *_: {0: 1.0, 1: 9.0}
+        minding, "to_bear", lambda *_, **__: {0: 1.0, 1: 9.0}
     )  # no structure bears nine times the load
     led = ready_to_lead(search, it, it.point.design)
     assert led is not None
@@ -68,19 +68,19 @@ def test_what_structures_in_mind_bear_is_an_aim_and_no_limit(searching, monkeypa
     assert missed(search, led.point) > 0.5
     assert merit(search, led.point) > led.point.objective + 1.5
     # those that fall later come first
-    monkeypatch.setattr(minding, "to_bear", lambda *_: {2: 1.0})
+    monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {2: 1.0})
     assert [each.number for each in joined(search, led, led.accepted[-1].built).mind.scenarios] == [2, 0, 1]
 
 
 def test_without_a_structure_that_falls_there_is_nothing_to_be_led_by(searching, monkeypatch):
     search, it, _ = searching
-    monkeypatch.setattr(minding, "to_bear", lambda *_: {})
+    monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {})
     assert ready_to_lead(search, it, it.point.design) is None
 
 
 def test_a_search_resumed_while_it_is_led_knows_the_same_structures_and_point(searching, monkeypatch):
     search, it, kept = searching
-    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 2.0, 2: 2.5})
+    monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 2.0, 2: 2.5})
     led = ready_to_lead(search, it, it.point.design)
     tell(search, led)
     numbers = json.loads(json.dumps(kept[-1].numbers))  # as a run folder keeps them
@@ -94,7 +94,7 @@ def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_
     searching, monkeypatch
 ):
     search, it, _ = searching
-    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 1.0})
+    monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 1.0})
     led = ready_to_lead(search, it, it.point.design)
     monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": (0,)}, True, False, 0))
     after = phases._led(search, led)
@@ -107,7 +107,7 @@ def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_
 
 def test_where_structures_lead_to_a_better_design_that_stands_thinning_begins_there(searching, monkeypatch):
     search, it, _ = searching
-    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 1.0})
+    monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 1.0})
     led = ready_to_lead(search, it, it.point.design)
     monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": ()}, True, True, 0))
     after = phases._led(search, led)
@@ -121,7 +121,7 @@ def test_where_structures_lead_to_a_better_design_that_stands_thinning_begins_th
 
 def test_a_cable_counts_for_what_structures_in_mind_would_lose_without_it(searching, monkeypatch):
     search, it, _ = searching
-    monkeypatch.setattr(minding, "to_bear", lambda *_: {0: 2.0, 2: 2.5})
+    monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 2.0, 2: 2.5})
     monkeypatch.setattr(search_state, "_NEARLY", 1e-8)
     led = ready_to_lead(search, it, it.point.design)
     model = search.models.at(led.point)

@@ -31,6 +31,14 @@ def test_a_search_draws_other_structures_than_those_by_which_its_result_is_judge
     }
 
 
+def test_a_judgement_tells_how_many_structures_were_loaded_and_how_many_there_are_at_the_most(dome, nominal):
+    safety = Safety(ROUGH, critical_factor=None, drawn=10, tried=6)
+    heard = []
+    asked = Required(safety, {"design": nominal.load}, "design", {"design": 6})
+    tried(dome, dome.design(), asked, judging=lambda done, most: heard.append((done, most)))
+    assert heard == [(4, 6), (6, 6)]
+
+
 def test_enlarged_errors_are_larger_by_the_factor_as_far_as_shares_go():
     found = enlarged(Tolerances(cable_length=1e-3, supports=2e-3, marks=0.4, rod_bow=1e-3, load_all=0.4), 1.5)
     assert (found.cable_length, found.supports, found.marks) == pytest.approx((1.5e-3, 3e-3, 0.6))

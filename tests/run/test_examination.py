@@ -15,7 +15,7 @@ from shellform.records.summary import read_summary
 from shellform.reliability.probability import counted
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import sample
-from shellform.run import examination
+from shellform.run import examination, optimising
 from shellform.run.examination import _standing
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
@@ -98,6 +98,15 @@ def test_sampling_tells_how_far_it_is_and_how_long_it_takes_at_most(whole):
     assert parts
     assert all(0.0 < each.fraction <= 1.0 and each.seconds_left >= 0.0 for each in parts)
     assert parts[-1].seconds_left == pytest.approx(0.0, abs=1e-6)
+
+
+def test_the_judgement_of_a_design_in_a_search_tells_how_far_it_is(file, tmp_path, monkeypatch):
+    monkeypatch.setattr(optimising, "_QUIET", 0.0)
+    told = []
+    run_case(load_case(file, FEW), tmp_path, until="optimise", report=lambda event: told.append(event.text))
+    found = [text for text in told if text.startswith("a design as it would be built")]
+    assert found
+    assert all("structures loaded" in text for text in found)
 
 
 def test_killed_inside_sampling_it_goes_on_and_ends_with_the_same_bytes(file, whole, tmp_path):
