@@ -16,7 +16,8 @@ from shellform.gridshell.gridshell import Joint, Rod
 _PAPER = Joint(axial=7.15e4, torsion=7.38e-4, bending=7.85e-4, gap=0.002)
 _RODS = Rod.round(young=40e9, radius=0.001)
 _OFF = 4.0  # times what fits: as much as a rod's EI changes where its radius is √2 times as large
-_GAP = 1.5  # the same of the gap
+_WIDE = 1.5  # the same of the gap
+_NARROW = 0.95  # of what fits, below which rods would be pressed into each other
 _SPACING = 0.055  # m, of the paper's rods
 
 
@@ -57,10 +58,12 @@ class JointDoubt:
 
 
 def doubts(joint: Joint, rod: Rod) -> tuple[JointDoubt, ...]:
-    """What of the joint doesn't fit its rods: stiffness more than four times off, a gap more than half."""
-    fitting = following(rod)
+    """What of the joint doesn't fit its rods: stiffness more than four times off, a gap half as wide again, or
+    less than the rods are deep."""
+    fitting, stiffness = following(rod), (1.0 / _OFF, _OFF)
+    usual = {"axial": stiffness, "torsion": stiffness, "bending": stiffness, "gap": (_NARROW, _WIDE)}
     return tuple(
         JointDoubt(name, getattr(joint, name), getattr(fitting, name))
-        for name, most in (("axial", _OFF), ("torsion", _OFF), ("bending", _OFF), ("gap", _GAP))
-        if not 1.0 / most <= getattr(joint, name) / getattr(fitting, name) <= most
+        for name, (least, most) in usual.items()
+        if not least <= getattr(joint, name) / getattr(fitting, name) <= most
     )

@@ -18,6 +18,7 @@ from shellform.compiled import clock_without_compiling
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import symmetric_groups
+from shellform.gridshell.joints import doubts
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.optimum import Optimum, Step
 from shellform.optimiser.rounding import CandidateSection
@@ -78,6 +79,9 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
             section = summary.designs["rounded"].section if "rounded" in summary.designs else None
             summary = summary.with_design("polished", replace(summary.designs["polished"], section=section))
     name, final = list(built.items())[-1]
+    if entry.rod_radius > 0.0:
+        for doubt in doubts(shell.joint, final.problem.shell.rod.resized(final.design.radius)):
+            workspace.say("optimise", f"the rods that were found: {doubt.told()}", Kind.NOTE)
     cable_count, symmetry = _wishes(workspace, final.design, groups)
     if workspace.case.robust is not None:
         workspace.say("optimise", "what tolerances do to the shape")

@@ -316,7 +316,7 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
     net = with_rods(_there(summary.net), rod_limits(case.rod, shell.net))
     summary = replace(summary, net=net)
     for doubt in joint_doubts(shell.joint, shell.rod):
-        workspace.say("initial", doubt.told())
+        workspace.say("initial", doubt.told(), Kind.NOTE)
     if keep:
         return _Ended(parts, summary)
     start = shell.design(rest_ratio=case.cable.rest_ratio)

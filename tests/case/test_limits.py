@@ -16,6 +16,7 @@ from shellform.gridshell.reactions import reactions
 from shellform.gridshell.tolerances import default_tolerances
 from shellform.optimiser import rounding
 from shellform.problem.robust import RobustMisfit
+from shellform.records.progress import Kind
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
 from shellform.structure.answers.stability import modes
@@ -241,10 +242,12 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
 
 
 def test_a_free_radius_is_rounded_up_and_the_neighbouring_sections_are_tried(tmp_path):
-    settings = ["optimise.evaluations=5", "optimise.rounded=2", "optimise.polish=0"]
-    summary = run_case(
-        load_case(ROOT / "scripts/scale_model_rounded.toml", settings), tmp_path, until="optimise"
-    )
+    settings = ["optimise.evaluations=5", "optimise.rounded=2", "optimise.polish=0", "joint.gap=0.0045"]
+    case, heard = load_case(ROOT / "scripts/scale_model_rounded.toml", settings), []
+    summary = run_case(case, tmp_path, until="optimise", report=heard.append)
+    (doubt,) = [each for each in heard if "the rods that were found" in each.text]
+    assert doubt.kind is Kind.NOTE
+    assert f"{2.0 * summary.designs['rounded'].rod_radius:.3g} would fit" in doubt.text
     designs, sections = summary.designs, summary.sections
     free = designs["optimised"].rod_radius
     up = next(each for each in sections if each.rounded_up)
