@@ -53,7 +53,7 @@ class Plain:
             if not reached[name].on_branch:
                 raise not_carried(name, reached[name], "Lead it there by stages: optimise.")
         states = {name: reached[name].equilibrium.state for name in problem.used()}
-        point = self.evaluator.seed(start, states, 1.0)
+        point = self.evaluator.linearised(self.evaluator.seed(start, states, 1.0))
         self.start = point.variables
         self.points = [point]
         self.best = point
@@ -88,7 +88,8 @@ class Plain:
             near = min(self.points, key=lambda point: float(np.linalg.norm(point.variables - variables)))
             try:
                 design = self.evaluator.blocks.design(np.array(variables), near.design.present)
-                point, there = self.evaluator.evaluate(design, near.states, 1.0, lead=True), True
+                found = self.evaluator.evaluate(design, near.states, 1.0, lead=True)
+                point, there = self.evaluator.linearised(found), True
             except OffBranch:
                 point, there = near, False
             if there:

@@ -11,7 +11,7 @@ import numpy as np
 
 from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted_design
 from shellform.optimiser.trials import confirmed, sound, standing
-from shellform.problem.evaluation import Linearisation
+from shellform.problem.evaluation import Evaluated
 
 
 def last_confirmed(search: Search, it: Iterate) -> Iterate:
@@ -74,7 +74,7 @@ def last_sound(search: Search, it: Iterate) -> Iterate:
     return it
 
 
-def _at(search: Search, it: Iterate, point: Linearisation) -> Iterate:
+def _at(search: Search, it: Iterate, point: Evaluated) -> Iterate:
     """At the point, whose design may have other cables than the present one."""
     if np.array_equal(point.design.present, it.point.design.present):
         return replace(it, point=point)

@@ -128,7 +128,7 @@ def missed_without(search: Search, it: Iterate, model: StepModel) -> Reals:
     assert it.mind is not None
     blocks, present = search.evaluator.blocks, np.flatnonzero(it.point.design.present)
     assert blocks.each_cable is not None  # else nothing is thinned
-    rows = it.point.constraints_by_variables[-len(it.mind.scenarios) :, blocks.each_cable][:, present]
+    rows = model.point.constraints_by_variables[-len(it.mind.scenarios) :, blocks.each_cable][:, present]
     longer = (model.length - it.point.design.rest_length[present]) / blocks.unit[blocks.each_cable][present]
     misses = np.maximum(rows * longer, 0.0).max(axis=0)
     return np.asarray(misses / max(float(misses.sum()), 1e-300))

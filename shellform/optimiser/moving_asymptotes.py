@@ -40,7 +40,7 @@ from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
 from shellform.optimiser.optimum import Checkpoint, Optimum, Step
 from shellform.optimiser.trials import reach, staged
-from shellform.problem.evaluation import COUNTS, Evaluator, Linearisation, OffBranch
+from shellform.problem.evaluation import COUNTS, Evaluated, Evaluator, Linearisation, OffBranch
 from shellform.problem.paths import follow, without_slack
 from shellform.problem.problem import Problem
 from shellform.structure.elements.state import State
@@ -126,12 +126,13 @@ class _Search:
         """The best point of this stage."""
         return self.near[-1]
 
-    def begin(self, point: Linearisation) -> None:
+    def begin(self, point: Evaluated) -> None:
         """Goes on from a point at the present stage, MMA from the beginning."""
-        self.near, self.accepted = [point], [self.taut(point)]
-        self.told = [_as_told(self, point.variables, point, point.objective)]
+        first = self.evaluator.linearised(point)
+        self.near, self.accepted = [first], [self.taut(first)]
+        self.told = [_as_told(self, first.variables, first, first.objective)]
         self.until = 1 + self.solver.stage
-        _note(self, point, True)
+        _note(self, first, True)
 
     def taut(self, point: Linearisation) -> Design:
         """The point's design without the cables that are slack under the design load."""
@@ -230,7 +231,7 @@ def _tried(search: _Search, x: Reals) -> _Told:
     near = min(search.near, key=lambda point: float(np.linalg.norm(point.variables - x)))
     try:
         design = evaluator.blocks.design(np.array(x), near.design.present)
-        point = evaluator.evaluate(design, near.states, search.stage, lead=True)
+        point = evaluator.linearised(evaluator.evaluate(design, near.states, search.stage, lead=True))
     except OffBranch:
         _note(search, near, False)
         return _as_told(search, x, near, np.inf)
@@ -276,7 +277,7 @@ def _rows(search: _Search, values: Reals) -> Indices:
     return np.concatenate([np.zeros(0, dtype=np.int64), *chosen])
 
 
-def _note(search: _Search, point: Linearisation, accepted: bool) -> None:
+def _note(search: _Search, point: Evaluated, accepted: bool) -> None:
     """A trial in the history, told to who watches."""
     step = _step(search, point, accepted)
     search.history.append(step)
@@ -284,7 +285,7 @@ def _note(search: _Search, point: Linearisation, accepted: bool) -> None:
         search.progress(step)
 
 
-def _step(search: _Search, point: Linearisation, accepted: bool) -> Step:
+def _step(search: _Search, point: Evaluated, accepted: bool) -> Step:
     problem = search.problem
     pull = problem.shell.cables(point.design).tension(point.states[search.base])
     return Step(
@@ -337,7 +338,7 @@ def _resume(search: _Search, checkpoint: Checkpoint) -> None:
             name: State(arrays[f"{k} {name} positions"], arrays[f"{k} {name} quaternions"]) for name in used
         }
         design = Design(arrays[f"{k} rest_length"], present, radius)
-        search.near.append(evaluator.seed(design, states, search.stage))
+        search.near.append(evaluator.linearised(evaluator.seed(design, states, search.stage)))
     search.accepted = [
         Design(lengths, np.array(there), radius)
         for lengths, there, radius in zip(

@@ -47,7 +47,7 @@ from shellform.optimiser.trials import (
     standing,
     task,
 )
-from shellform.problem.evaluation import Linearisation
+from shellform.problem.evaluation import Evaluated
 
 _TINY = -1e-300  # a predicted change that isn't one
 # of the objective, gained by a turn, for which another is made where thinning is to end with what stands
@@ -183,8 +183,8 @@ def _ready_as_it_is(search: Search, it: Iterate) -> Iterate:
 
 
 def _made_to_stand(
-    search: Search, it: Iterate, trial: Linearisation, budget: float
-) -> tuple[Linearisation | None, Iterate]:
+    search: Search, it: Iterate, trial: Evaluated, budget: float
+) -> tuple[Evaluated | None, Iterate]:
     """The trial where it breaks no limit more than the iterate does and stands as built; where it only
     falls, one near it, for which more stiffness is asked, and repaired for, until it stands. None, and the
     iterate with the stiffness that it kept, where it comes to nothing within the `budget` of the objective.
@@ -220,7 +220,7 @@ def _made_to_stand(
     return None, replace(begun, fallen=it.fallen, fell=it.fell)
 
 
-def _aiming_lower(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation, Iterate]:
+def _aiming_lower(search: Search, it: Iterate, trial: Evaluated) -> tuple[Evaluated, Iterate]:
     """With no more stiffness to keep than the trial has, where it is judged as built."""
     lower = _aiming_for(search, replace(it, point=trial), min(it.stiffness, stiffness_of(search, trial)))
     return lower.point, lower
@@ -329,7 +329,7 @@ def _without_slack(search: Search, it: Iterate) -> Iterate:
     )
 
 
-def _repaired(search: Search, it: Iterate, trial: Linearisation) -> tuple[Linearisation, Iterate]:
+def _repaired(search: Search, it: Iterate, trial: Evaluated) -> tuple[Evaluated, Iterate]:
     """A few steps from the trial with the cables that are left, none of which may go slack; and the iterate
     with the window and the curvature that they found. What a step costs is no reason to refuse it: the first
     one after more stiffness is asked for costs much, which the next one gets back."""

@@ -245,7 +245,7 @@ def _exact_in_tension(slope: Reals, model: StepModel) -> Reals:
         evaluator.weights,
         evaluator.problem.minimise,
         model.quadratics,
-        model.point.measurements,
+        model.point.summands,
         strict=True,
     )
     for weight, part, own, measurement in summands:

@@ -19,7 +19,7 @@ from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.step_model import StepModel, step_model
 from shellform.problem.constraints import AtLeast, Constraint, residuals
 from shellform.problem.engineering import ModalStiffness
-from shellform.problem.evaluation import Evaluator, Linearisation
+from shellform.problem.evaluation import Evaluated, Evaluator
 from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.reliability.scenarios import FactorsAsBuilt, scenarios
@@ -115,7 +115,7 @@ class Iterate:
     evaluations `until` which a turn lasts.
     """
 
-    point: Linearisation
+    point: Evaluated
     accepted: tuple[Accepted, ...]
     history: tuple[Step, ...]
     stiffness: float
@@ -144,7 +144,7 @@ class Iterate:
 
 
 class Models:
-    """Step models and guards, made once for each linearisation: the last one's are kept for another try in a
+    """Step models and guards, made once for each design that steps start from: the last one's are kept for another try in a
     smaller window. Of more cables than are `many` for the solver only those with the least tensions are
     guarded, and no model is dense unless it is to be `whole`, as where cables keep one length."""
 
@@ -153,15 +153,18 @@ class Models:
     ) -> None:
         self.evaluator, self.solver, self.reach, self.whole = evaluator, solver, reach, whole
         self._model: StepModel | None = None
-        self._guards: tuple[Linearisation, list[Guard]] | None = None
+        self._at: Evaluated | None = None
+        self._guards: tuple[Evaluated, list[Guard]] | None = None
 
-    def at(self, point: Linearisation) -> StepModel:
+    def at(self, point: Evaluated) -> StepModel:
         """The step model at the point."""
-        if self._model is None or self._model.point is not point:
-            self._model = step_model(self.evaluator, point, whole=self.whole or not self._many(point))
+        if self._model is None or self._at is not point:
+            linear = self.evaluator.linearised(point)
+            self._model = step_model(self.evaluator, linear, whole=self.whole or not self._many(point))
+            self._at = point
         return self._model
 
-    def guards(self, point: Linearisation) -> list[Guard]:
+    def guards(self, point: Evaluated) -> list[Guard]:
         """Of the point's cables below the reach, N, under each further load; without load they may be slack."""
         if self._guards is None or self._guards[0] is not point:
             evaluator = self.evaluator
@@ -182,12 +185,12 @@ class Models:
             )
         return self._guards[1]
 
-    def _many(self, point: Linearisation) -> bool:
+    def _many(self, point: Evaluated) -> bool:
         each_cable = self.evaluator.blocks.each_cable is not None
         return each_cable and int(point.design.present.sum()) > self.solver.many
 
 
-def accepted_design(search: Search, point: Linearisation) -> Accepted:
+def accepted_design(search: Search, point: Evaluated) -> Accepted:
     """The point's design, to go back to."""
     taut = in_tension(search.problem.shell, point.design, point.states[search.base])
     return Accepted(point.design, taut, violation(search, point), point.objective)
@@ -240,7 +243,7 @@ def kept_in_mind(search: Search, design: Design, least: Mapping[int, float]) -> 
     return remembered_in(problem.shell, design, drawn)
 
 
-def stiffness_of(search: Search, point: Linearisation) -> float:
+def stiffness_of(search: Search, point: Evaluated) -> float:
     """What the softest modes keep under the further loads at the point, N/m; 0 where nothing is asked of
     them, or where a mode is unstable."""
     problem, count = search.evaluator.problem, len(search.inner.constraints)
@@ -254,17 +257,17 @@ def stiffness_of(search: Search, point: Linearisation) -> float:
     return float(np.sqrt(max(min(squares, default=0.0), 0.0)))
 
 
-def tensions(search: Search, point: Linearisation) -> Reals:
+def tensions(search: Search, point: Evaluated) -> Reals:
     """Of the present cables (c,) under the design load, N."""
     return search.problem.shell.cables(point.design).tension(point.states[search.base])
 
 
-def taut_count(search: Search, point: Linearisation) -> int:
+def taut_count(search: Search, point: Evaluated) -> int:
     """How many cables pull under the design load."""
     return int((tensions(search, point) > 0.0).sum())
 
 
-def violation(search: Search, point: Linearisation) -> float:
+def violation(search: Search, point: Evaluated) -> float:
     """Of the constraint that is broken most, as a share of its scale; 0 where all hold. What structures kept
     in mind are to bear is an aim and no limit: whoever judges draws them again."""
     limits = len(point.constraints) - _in_mind(search)
@@ -275,7 +278,7 @@ def violation(search: Search, point: Linearisation) -> float:
     return largest if largest > FEASIBLE else 0.0
 
 
-def missed(search: Search, point: Linearisation) -> float:
+def missed(search: Search, point: Evaluated) -> float:
     """By what share of what it is to bear a structure in mind misses it, beyond what an aim may be missed by."""
     aims = len(point.constraints) - _in_mind(search)
     return max(float(point.constraints[aims:].max(initial=0.0)) - _MAY_MISS, 0.0)
@@ -287,19 +290,19 @@ def _in_mind(search: Search) -> int:
     return sum(len(part.term.scenarios) for part in added if isinstance(part.term, FactorsAsBuilt))
 
 
-def merit(search: Search, point: Linearisation) -> float:
+def merit(search: Search, point: Evaluated) -> float:
     """The objective and a penalty for the constraint that is broken most, or for the aim that is missed most,
     which is made up for later more easily than a limit."""
     penalty = search.solver.penalty
     return point.objective + penalty * max(violation(search, point), _AIM * missed(search, point), 0.0)
 
 
-def noted(search: Search, it: Iterate, point: Linearisation, accepted: bool) -> Iterate:
+def noted(search: Search, it: Iterate, point: Evaluated, accepted: bool) -> Iterate:
     """With a trial added to the history, and told."""
     return replace(it, history=(*it.history, record(search, point, it.stage, accepted, it.phase)))
 
 
-def record(search: Search, point: Linearisation, stage: float, accepted: bool, phase: str) -> Step:
+def record(search: Search, point: Evaluated, stage: float, accepted: bool, phase: str) -> Step:
     """A trial as a step of the history, told to who watches."""
     problem, pull = search.evaluator.problem, tensions(search, point)
     terms = {

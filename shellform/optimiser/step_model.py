@@ -133,7 +133,7 @@ def step_model(evaluator: Evaluator, point: Linearisation, *, whole: bool) -> St
 def _distinct(evaluator: Evaluator, point: Linearisation) -> list[Squares]:
     """The sums of squares in the objective under the design load, with residuals of their own each."""
     found: list[Squares] = []
-    for part, measurement in zip(evaluator.problem.minimise, point.measurements, strict=True):
+    for part, measurement in zip(evaluator.problem.minimise, point.summands, strict=True):
         own = measurement.squares
         if (
             own is not None
@@ -155,7 +155,7 @@ def _of_terms(
 ) -> tuple[Quadratic | None, ...]:
     """Of each term of the objective its quadratic, `made` of these residuals."""
     result: list[Quadratic | None] = []
-    for part, measurement in zip(evaluator.problem.minimise, point.measurements, strict=True):
+    for part, measurement in zip(evaluator.problem.minimise, point.summands, strict=True):
         own = measurement.squares
         known = own is not None and part.term.load == evaluator.base
         result.append(

@@ -14,7 +14,7 @@ from shellform.gridshell.grouping import averaged
 from shellform.optimiser.proposal import Task
 from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted_design, noted, violation
 from shellform.optimiser.step_model import StepModel
-from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch
+from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
 from shellform.reliability.trial_structures import confirm, stands
 from shellform.structure.elements.state import State
@@ -41,8 +41,8 @@ def task(search: Search, it: Iterate, model: StepModel) -> Task:
     )
 
 
-def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Linearisation | None, Iterate]:
-    """The linearisation at the model's `y` (y,), None where an equilibrium leaves the stable branch; and the
+def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Evaluated | None, Iterate]:
+    """The design at the model's `y` (y,), None where an equilibrium leaves the stable branch; and the
     iterate with what the trial shows of the constraints' curvature."""
     evaluator = search.evaluator
     design = model.design(y)
@@ -60,8 +60,8 @@ def attempt(search: Search, it: Iterate, model: StepModel, y: Reals) -> tuple[Li
     return trial, replace(it, excess=np.where(trial.constraints > -search.solver.near, above, 0.0))
 
 
-def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indices) -> Linearisation | None:
-    """The linearisation without the cables `leaving`, the others at the rest lengths that they have: the
+def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indices) -> Evaluated | None:
+    """The design without the cables `leaving`, the others at the rest lengths that they have: the
     shell moves less than at their tensions. None where it leaves the stable branch."""
     evaluator, design = search.evaluator, it.point.design
     rest = design.rest_length.copy()
@@ -74,7 +74,7 @@ def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indi
         return None
 
 
-def sound(search: Search, before: Accepted) -> Linearisation | None:
+def sound(search: Search, before: Accepted) -> Evaluated | None:
     """The same design in the states to which the documented path leads, without its slack cables; None where
     it doesn't bear all loads there, breaks a constraint, or is worse than it was: of two equilibria side by side,
     a search from design to design may have come to the other one."""
@@ -111,7 +111,7 @@ def confirmed(search: Search, built: Design) -> bool:
     return found.stands
 
 
-def accepted(search: Search, it: Iterate, trial: Linearisation) -> Iterate:
+def accepted(search: Search, it: Iterate, trial: Evaluated) -> Iterate:
     """Goes on from `trial`, as near to the whole further loads as its stable branch allows."""
     it = _raised(search, replace(it, point=trial))
     return noted(

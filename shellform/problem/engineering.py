@@ -12,7 +12,7 @@ each; q is `SHARPNESS` over the quantity's unit. One value, so one adjoint solve
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,7 +28,7 @@ from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.answers.stability import modes
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.cable import make_cables
-from shellform.structure.elements.sections import stress_by_size
+from shellform.structure.elements.sections import Section, stress_by_size
 from shellform.structure.solve import residual
 
 # per unit: 3000 rod ends that are all used to the full are told 4 % too high, and a single one not at all
@@ -56,10 +56,16 @@ class RodUtilisation(Term):
         if not np.isfinite(rod.strength):
             raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
         section = rod.resized(design.radius).section
-        beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
-        forces, by_dof = beams.local_forces(state), beams.local_forces_by_dof(state)
-        own = beams.of_kind(ROD)
+        beams = shell.beams(design.radius)
+        forces = beams.local_forces(state)
         values = rod_stress(section, beams, forces).ravel() / rod.strength
+        alone = Measurement(np.array([_smooth(values, SHARPNESS)[1]]))
+        return replace(alone, late=lambda: self._with_slopes(at, section, forces, values))
+
+    def _with_slopes(self, at: LoadedDesign, section: Section, forces: Reals, values: Reals) -> Measurement:
+        shell, design, state, rod = at.shell, at.design, at.state, at.shell.rod
+        beams, rate = shell.beams(design.radius), shell.beams_by_radius(design.radius)
+        by_dof, own = beams.local_forces_by_dof(state), beams.of_kind(ROD)
         by_force = end_stress_by_force(beams, forces, shell.sections(design.radius))[own] / rod.strength
         rows = (by_force @ by_dof[own]).reshape(len(values), 12)
         rates = rate.local_forces(state)
@@ -186,16 +192,21 @@ class ModalStiffness(Term):
         motions = (flat / size[:, None]).T
         stiffness = found.stiffness
         weight, largest = _smooth(-stiffness * np.abs(stiffness), SHARPNESS / self.scale**2)
-        weighted = 2.0 * np.abs(stiffness) * weight * motions
-        rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
-        spread = np.zeros(len(shell.cable_ends))
-        spread[design.present] = bilinear_by_rest_length(cables, state, weighted, motions)
-        return Measurement(
-            np.array([-largest]),
-            sp.csr_array(bilinear_by_dof(assembly, state, weighted, motions)[None]),
-            sp.csr_array(spread[None]),
-            np.array([bilinear(rate, state, weighted, motions)]),
-        )
+        alone = Measurement(np.array([-largest]))
+
+        def with_slopes() -> Measurement:
+            weighted = 2.0 * np.abs(stiffness) * weight * motions
+            rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
+            spread = np.zeros(len(shell.cable_ends))
+            spread[design.present] = bilinear_by_rest_length(cables, state, weighted, motions)
+            return replace(
+                alone,
+                by_dof=sp.csr_array(bilinear_by_dof(assembly, state, weighted, motions)[None]),
+                by_rest_length=sp.csr_array(spread[None]),
+                by_radius=np.array([bilinear(rate, state, weighted, motions)]),
+            )
+
+        return replace(alone, late=with_slopes)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ to a design that does.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import scipy.sparse as sp
@@ -21,7 +21,7 @@ from shellform.gridshell.gridshell import Design
 from shellform.problem.constraints import residual_rows, residuals
 from shellform.problem.paths import follow
 from shellform.problem.problem import FEASIBLE, Problem
-from shellform.problem.terms import LoadedDesign, Measurement, Squares, measured
+from shellform.problem.terms import LoadedDesign, Measurement, Term, measured
 from shellform.problem.variables import Blocks
 from shellform.structure.answers.sensitivity import (
     by_rest_length,
@@ -43,7 +43,8 @@ _FAR = 20.0  # times the largest of the start's misfits: a trial this far off ha
 _NEAR = 0.02  # … but for one whose root mean square distance is below this share of the target's size
 
 
-COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")  # of an Evaluator's work
+# of an Evaluator's work: `factorisations` are those of its equilibria
+COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
 
 
 class OffBranch(Exception):
@@ -51,20 +52,18 @@ class OffBranch(Exception):
 
 
 @dataclass(frozen=True)
-class Linearisation:
-    """A design on the stable branch with values and first derivatives: `variables` (s,), `states` by load
-    case, `objective`, its weighted `terms`, `constraints` (k,), residuals at most 0 where met, and the
-    derivatives `objective_by_variables` (s,), `constraints_by_variables` (k, s); for the step model the
-    `measurements` of the objective's terms."""
+class Evaluated:
+    """A design on the stable branch with the values of its `problem`: `variables` (s,), `states` by load case at
+    a `stage`, `objective`, its weighted `terms`, `constraints` (k,), residuals at most 0 where met; and the
+    `measurements` of all the problem's terms."""
 
+    problem: Problem
     variables: Reals
     design: Design
     states: Mapping[str, State]
     objective: float
     terms: Reals
     constraints: Reals
-    objective_by_variables: Reals
-    constraints_by_variables: Reals
     measurements: tuple[Measurement, ...]
     stage: float
 
@@ -79,6 +78,20 @@ class Linearisation:
         violation."""
         beyond = self.violation
         return (0.0, self.objective) if beyond <= FEASIBLE else (beyond, self.objective)
+
+    @property
+    def summands(self) -> tuple[Measurement, ...]:
+        """The measurements of the objective's terms."""
+        return self.measurements[: len(self.problem.minimise)]
+
+
+@dataclass(frozen=True)
+class Linearisation(Evaluated):
+    """The same with its first derivatives (appendix A): `objective_by_variables` (s,),
+    `constraints_by_variables` (k, s)."""
+
+    objective_by_variables: Reals
+    constraints_by_variables: Reals
 
 
 class Evaluator:
@@ -118,21 +131,66 @@ class Evaluator:
         first = self.problem.design_load.force
         return np.asarray(first + stage * (self.problem.loads[name] - first))
 
-    def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Linearisation:
-        """The linearisation of a design whose equilibria `states` at the stage are known. Raises OffBranch
-        where one isn't stable, or where a term can't be measured.
+    def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Evaluated:
+        """The values of a design whose equilibria `states` at the stage are known. Raises OffBranch where a term
+        can't be measured.
         """
-        self.factorisations += len(states)
+        problem, assembly = self.problem, self.assembly(design)
         try:
-            return self._linearised(self.assembly(design), design, states, stage)
+            found = [
+                measured(term, self._at(term, design, states, stage, assembly)) for term in problem.terms
+            ]
         except (NotPositiveDefinite, NotConverged) as error:
             raise OffBranch(str(error)) from error
+        summands, kept = found[: len(problem.minimise)], found[len(problem.minimise) :]
+        objective = np.array([w * each.value.sum() for w, each in zip(self.weights, summands, strict=True)])
+        values = [residuals(part, each.value) for part, each in zip(problem.constraints, kept, strict=True)]
+        return Evaluated(
+            problem,
+            self.blocks.of(design).copy(),
+            design,
+            dict(states),
+            float(objective.sum()),
+            objective,
+            np.concatenate([np.zeros(0), *values]),
+            tuple(found),
+            stage,
+        )
+
+    def linearised(self, point: Evaluated) -> Linearisation:
+        """The point with its derivatives, which cost as much as its values: only where steps start are they
+        asked for. Raises OffBranch where an equilibrium isn't stable.
+        """
+        problem, blocks, assembly = point.problem, self.blocks, self.assembly(point.design)
+        rates = blocks.rates(point.design).multiply(blocks.unit).tocsc()
+        terms = problem.terms
+        rows = [np.zeros((0, blocks.size))] * len(terms)
+        for name in dict.fromkeys(term.load for term in terms):
+            own = [k for k, term in enumerate(terms) if term.load == name]
+            at = self._at(terms[own[0]], point.design, point.states, point.stage, assembly)
+            whole = [point.measurements[k].whole() for k in own]
+            try:
+                total = _chained(whole, at, assembly if name else None, blocks.moves_radius)
+            except NotPositiveDefinite as error:
+                raise OffBranch(str(error)) from error
+            by_variables = np.empty_like(total, shape=(len(total), blocks.size))
+            by_variables[...] = total @ rates[: total.shape[1]]
+            pieces = np.split(by_variables, np.cumsum([len(each.value) for each in whole])[:-1])
+            for k, piece in zip(own, pieces, strict=True):
+                rows[k] = piece
+        summands, kept = rows[: len(problem.minimise)], rows[len(problem.minimise) :]
+        slopes = [w * piece.sum(axis=0) for w, piece in zip(self.weights, summands, strict=True)]
+        limited = [residual_rows(part, piece) for part, piece in zip(problem.constraints, kept, strict=True)]
+        return Linearisation(
+            **{field.name: getattr(point, field.name) for field in fields(Evaluated)},
+            objective_by_variables=np.array(slopes).sum(axis=0),
+            constraints_by_variables=np.vstack([np.zeros((0, blocks.size)), *limited]),
+        )
 
     def evaluate(
         self, design: Design, near: Mapping[str, State], stage: float, *, lead: bool = False
-    ) -> Linearisation:
-        """The design's linearisation, its equilibria sought from the states `near` them; where those of
-        further loads turn out too far off, with `lead` from the design load's, along the load's own path.
+    ) -> Evaluated:
+        """The design's values, its equilibria sought from the states `near` them; where those of further loads turn out too far off, with `lead` from the design load's, along the load's own path.
         Raises OffBranch."""
         self.evaluations += 1
         before = self.factorisations
@@ -155,7 +213,7 @@ class Evaluator:
         """The design as its variables give it, to the last bit."""
         return self.blocks.design(self.blocks.of(design), design.present)
 
-    def predicted(self, point: Linearisation, design: Design, *, but: str = "") -> dict[str, State]:
+    def predicted(self, point: Evaluated, design: Design, *, but: str = "") -> dict[str, State]:
         """Where a change of the point's design, with the same cables, takes its states, to first order; all
         `but` one load's.
         """
@@ -220,55 +278,12 @@ class Evaluator:
         self.factorisations += factorisations
         self.equilibria += 1
 
-    def _linearised(
-        self, assembly: Assembly, design: Design, states: Mapping[str, State], stage: float
-    ) -> Linearisation:
-        """Values and derivatives of objective and constraints at a design whose equilibria are known
-        (appendix A)."""
-        problem, blocks = self.problem, self.blocks
-        variables = blocks.of(design)
-        rates = blocks.rates(design).multiply(blocks.unit).tocsc()
-        terms = problem.terms
-        found: list[tuple[Measurement, Reals]] = [(_NOTHING, np.zeros((0, blocks.size)))] * len(terms)
-        for name in dict.fromkeys(term.load for term in terms):
-            own = [k for k, term in enumerate(terms) if term.load == name]
-            at = LoadedDesign(
-                self.shell,
-                design,
-                states[name or self.base],
-                self.load(name or self.base, stage),
-                assembly,
-            )
-            measurements = [measured(terms[k], at) for k in own]
-            total = _chained(measurements, at, assembly if name else None, blocks.moves_radius)
-            by_variables = np.empty_like(total, shape=(len(total), blocks.size))
-            by_variables[...] = total @ rates[: total.shape[1]]
-            pieces = np.split(by_variables, np.cumsum([len(each.value) for each in measurements])[:-1])
-            for k, measurement, piece in zip(own, measurements, pieces, strict=True):
-                found[k] = (measurement, piece)
-        summands, kept = found[: len(problem.minimise)], found[len(problem.minimise) :]
-        objective = np.array(
-            [w * each.value.sum() for w, (each, _) in zip(self.weights, summands, strict=True)]
-        )
-        slopes = [w * piece.sum(axis=0) for w, (_, piece) in zip(self.weights, summands, strict=True)]
-        values = [
-            residuals(part, each.value) for part, (each, _) in zip(problem.constraints, kept, strict=True)
-        ]
-        rows = [
-            residual_rows(part, piece) for part, (_, piece) in zip(problem.constraints, kept, strict=True)
-        ]
-        return Linearisation(
-            variables.copy(),
-            design,
-            dict(states),
-            float(objective.sum()),
-            objective,
-            np.concatenate([np.zeros(0), *values]),
-            np.array(slopes).sum(axis=0),
-            np.vstack([np.zeros((0, blocks.size)), *rows]),
-            tuple(_for_the_step(each) for each, _ in summands),
-            stage,
-        )
+    def _at(
+        self, term: Term, design: Design, states: Mapping[str, State], stage: float, assembly: Assembly
+    ) -> LoadedDesign:
+        """Where the term is measured."""
+        name = term.load or self.base
+        return LoadedDesign(self.shell, design, states[name], self.load(name, stage), assembly)
 
 
 def start_weights(problem: Problem, start: Design, reached: Mapping[str, Loaded]) -> Reals:
@@ -317,11 +332,3 @@ def _chained(
     response = respond(assembly, state, columns, by_stiffness(assembly, state, *rates))
     by_state = sp.vstack([each.by_dof for each in measurements]).tocsc()[:, assembly.free].toarray()
     return gradients(response, by_state, partial)
-
-
-def _for_the_step(measurement: Measurement) -> Measurement:
-    """What a step model needs of an objective's term."""
-    return Measurement(measurement.value, squares=measurement.squares, by_tension=measurement.by_tension)
-
-
-_NOTHING = Measurement(np.zeros(0), squares=Squares(np.zeros(0), sp.csr_array((0, 0))))

@@ -9,7 +9,8 @@ uses a term never asks what it is.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -57,6 +58,9 @@ class Measurement:
     Two things the step model can use: `squares`, where the value is (nearly) a sum of squares, and
     `by_tension` (g, c) sparse, where it is a function of the cables' tensions alone: through either a cable
     without tension, which has no slope in its rest length, tells what its first tension would do.
+
+    Where derivatives cost much beside the value, `late` makes the measurement with them, and they stay None
+    here: designs that are refused are asked for values alone.
     """
 
     value: Reals
@@ -65,6 +69,11 @@ class Measurement:
     by_radius: Reals | None = None
     squares: Squares | None = None
     by_tension: sp.csr_array | None = None
+    late: Callable[[], Measurement] | None = None
+
+    def whole(self) -> Measurement:
+        """With its derivatives."""
+        return self if self.late is None else self.late()
 
     def completed(self, size: int, nodes: int, cables: int, name: str) -> Measurement:
         """With zeros in the place of None. Raises InputError where a shape isn't as said."""
@@ -122,9 +131,16 @@ class Term(ABC):
 
 
 def measured(term: Term, at: LoadedDesign) -> Measurement:
-    """The term's measurement, complete. Raises InputError where its shapes aren't those that it says."""
-    shell = at.shell
-    return term.measure(at).completed(term.size(shell), shell.node_count, len(shell.cable_ends), term.name)
+    """The term's measurement, complete but for derivatives that come late. Raises InputError where its shapes
+    aren't those that it says."""
+    shell, found = at.shell, term.measure(at)
+
+    def complete(measurement: Measurement) -> Measurement:
+        return measurement.completed(term.size(shell), shell.node_count, len(shell.cable_ends), term.name)
+
+    if found.late is None:
+        return complete(found)
+    return replace(complete(found), late=lambda: complete(found.whole()))
 
 
 @dataclass(frozen=True)

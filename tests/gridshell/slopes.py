@@ -12,7 +12,7 @@ def slopes_hold(problem, design, radius):
     """Asserts them along a direction of all rest lengths drawn by chance, and so much of the radius."""
     evaluator = Evaluator(problem, design)
     states = {name: each.equilibrium.state for name, each in evaluator.begin().items()}
-    point = evaluator.seed(design, states, 1.0)
+    point = evaluator.linearised(evaluator.seed(design, states, 1.0))
     direction = np.append(np.random.default_rng(2).normal(size=len(point.variables) - 1), radius)
     designs = [
         evaluator.blocks.design(point.variables + s * STEP * direction, point.design.present) for s in (1, -1)

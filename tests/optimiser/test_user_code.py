@@ -1,5 +1,6 @@
 """A user's own term and variable, through public names only."""
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 import scipy.sparse as sp
 
 import shellform as sf
+from shellform.problem.evaluation import Evaluator
+from shellform.problem.terms import LoadedDesign, measured
 
 
 @dataclass(frozen=True)
@@ -165,3 +168,41 @@ def test_a_term_or_variable_whose_shapes_are_not_those_that_it_says_is_refused(c
 def test_limits_bounds_and_settings_that_make_no_sense_are_refused(make, said):
     with pytest.raises(sf.InputError, match=said):
         make()
+
+
+@dataclass(frozen=True)
+class LateSag(Sag):  # the same, whose derivatives come when a step starts from the design
+    rows: int = 1
+
+    def measure(self, at):
+        found = super().measure(at)
+        whole = replace(found, by_dof=sp.csr_array(sp.vstack([found.by_dof] * self.rows)))
+        return sf.Measurement(found.value, late=lambda: whole)
+
+
+def test_a_term_whose_derivatives_come_late_leads_to_the_same_design_and_fewer_ask_for_them(
+    coarse, monkeypatch
+):
+    made = Counter()
+    for name in ("seed", "linearised"):
+        kept = getattr(Evaluator, name)
+        monkeypatch.setattr(
+            Evaluator, name, lambda *given, name=name, kept=kept: made.update([name]) or kept(*given)
+        )
+    nodes, drop = lowest(coarse, 1)
+    found = []
+    for term in (Sag("wet", nodes), LateSag("wet", nodes)):
+        case = problem(coarse, sf.AtMost(0.3 * drop[0], term), variables=[sf.RestLengths()])
+        found.append(sf.optimise(case, coarse.design(), evaluations=12))
+    early, late = found
+    np.testing.assert_array_equal(late.design.rest_length, early.design.rest_length)
+    assert [step.constraints for step in late.history] == [step.constraints for step in early.history]
+    assert made["linearised"] <= 0.7 * made["seed"], made
+
+
+def test_late_derivatives_of_another_shape_are_refused_as_early_ones_are(coarse):
+    state, design = coarse.target, coarse.design()
+    at = LoadedDesign(coarse, design, state, np.zeros((len(state.positions), 6)))
+    told = measured(LateSag("wet", (30,), rows=2), at)
+    with pytest.raises(sf.InputError, match=r"by_dof.*another shape"):
+        told.whole()

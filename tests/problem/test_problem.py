@@ -61,7 +61,7 @@ def test_gradients_of_objective_and_constraints_agree_with_re_solved_equilibria(
     evaluator = Evaluator(problem(shell, wet, radius=True), shell.design())
     reached = evaluator.begin()
     states = {name: loaded.equilibrium.state for name, loaded in reached.items()}
-    point = evaluator.seed(shell.design(), states, 1.0)
+    point = evaluator.linearised(evaluator.seed(shell.design(), states, 1.0))
     rng = np.random.default_rng(0)
     direction = 1e-5 * rng.normal(size=len(point.variables))
     at = evaluator.blocks.design

@@ -53,7 +53,7 @@ def web_picture(file: Path, *, widest: int, quality: int) -> tuple[bytes, tuple[
     if shown.width > widest:
         shown = shown.resize((widest, round(shown.height * widest / shown.width)), Image.Resampling.LANCZOS)
     content = io.BytesIO()
-    shown.save(content, "WEBP", quality=quality, method=4)
+    shown.save(content, "WEBP", quality=quality, method=2)  # beyond 2, twice the time for 2 % fewer bytes
     return content.getvalue(), shown.size
 
 

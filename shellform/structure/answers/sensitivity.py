@@ -36,7 +36,8 @@ from shellform.structure.elements.parts import Part
 from shellform.structure.elements.sections import Section
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.factorisation import Factor, Symmetric
+from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite, Symmetric
+from shellform.structure.solve.residual import held
 
 _MOST = 4000  # degrees of freedom to which K is condensed: a dense matrix of 128 MB
 _AT_ONCE = 2**26  # numbers of a block that is solved for at once: 512 MB
@@ -61,12 +62,18 @@ class Response:
 def respond(assembly: Assembly, state: State, *columns: sp.csc_array) -> Response:
     """The response at the equilibrium `state` to the design variables of all `columns` (f, k), in order.
 
-    Raises NotPositiveDefinite where the state isn't stable.
+    Raises NotPositiveDefinite where the state isn't stable, a rod's rotation about its own axis disregarded.
     """
-    tangent = assembly.evaluate(state).tangent
+    balance = assembly.evaluate(state)
+    tangent = balance.tangent
     assert tangent is not None
     together = sp.csc_array(sp.hstack(columns, format="csc"))
-    return Response(state, assembly.matrix.factor(tangent), together, assembly.matrix, tangent)
+    try:
+        factor = assembly.matrix.factor(tangent)
+    except NotPositiveDefinite:
+        tangent = held(assembly, balance)
+        factor = assembly.matrix.factor(tangent)
+    return Response(state, factor, together, assembly.matrix, tangent)
 
 
 def by_rest_length(assembly: Assembly, state: State, cables: Cables) -> sp.csc_array:
