@@ -39,9 +39,10 @@ def test_the_same_panel_gives_the_same_picture_and_another_deviation_another(pan
 
 
 @pytest.mark.parametrize("size", [(480, 300), (1600, 900), (600, 1400)])
-def test_the_words_of_a_key_stand_clear_of_its_bars_and_within_its_height(panel, size):
-    scale = scale_of([panel], Look(), size)
-    words, bars = key(scale, size[0])
+@pytest.mark.parametrize("letters", [0.0, 60.0])
+def test_the_words_of_a_key_stand_clear_of_its_bars_and_within_its_height(panel, size, letters):
+    scale = scale_of([panel], Look(letters=letters, dots=72), size)
+    words, bars = key(scale, size[0], key_height(size))
     assert len(bars) == 2
     for word in words:
         foot, top = word.at[1], word.at[1] + word.pixels
