@@ -211,6 +211,8 @@ import os, signal, sys
 from shellform.structure.elements import threads
 from shellform.__main__ import main
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where the tests run in the background
+
 class Dropped:
     def __del__(self):
         os.kill(os.getpid(), signal.SIGINT)
@@ -301,13 +303,18 @@ def test_ctrl_c_within_compiled_code_stops_as_anywhere_else(monkeypatch, capsys)
             signal.raise_signal(signal.SIGINT)
         raise SystemError("CPUDispatcher returned a result with an exception set")  # what numba makes of it
 
-    before = signal.getsignal(signal.SIGINT)
+    # Set, for it is ignored where the tests run in the background.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     monkeypatch.setattr(program, "app", interrupted)
-    with pytest.raises(SystemExit) as end:
-        program.main()
+    try:
+        with pytest.raises(SystemExit) as end:
+            program.main()
+        after = signal.getsignal(signal.SIGINT)
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert end.value.code == 130
     assert "the same command goes on from there" in capsys.readouterr().err
-    assert signal.getsignal(signal.SIGINT) is before
+    assert after is signal.default_int_handler
 
 
 def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):

@@ -48,6 +48,13 @@ def test_a_round_net_s_cables_come_in_groups_of_four_that_lie_on_each_other(dome
         np.testing.assert_allclose(folded, np.broadcast_to(folded[0], folded.shape), atol=0.02 * 0.2)
 
 
+def test_only_present_cables_get_their_group_s_mean_even_where_whole_groups_are_absent():
+    values, groups = np.array([1.0, 2.0, 6.0, 40.0, 8.0, 80.0, 5.0]), np.array([0, 1, 0, 0, 2, 3, 1])
+    present = np.array([True, True, True, False, False, False, True])
+    np.testing.assert_array_equal(averaged(values, groups, present), [3.5, 3.5, 3.5, 40.0, 8.0, 80.0, 3.5])
+    np.testing.assert_array_equal(averaged(values, groups, ~present), [1.0, 2.0, 6.0, 40.0, 8.0, 80.0, 5.0])
+
+
 def test_a_net_without_symmetry_is_refused():
     with pytest.raises(InputError, match="no mirror or half turn"):
         symmetric_groups(cap(offset=(0.37, 0.21)))

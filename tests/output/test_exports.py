@@ -170,6 +170,18 @@ def test_the_script_is_that_of_the_design(folder, built):
     assert "The vault, test" in text
 
 
+def test_the_script_goes_from_the_bent_grid_without_load_to_the_design_load(folder, built):
+    tree = ast.parse((folder / "gridshell-opensees.py").read_text(encoding="utf-8"))
+    told = {
+        node.targets[0].id: np.array(ast.literal_eval(node.value))
+        for node in tree.body
+        if isinstance(node, ast.Assign) and node.targets[0].id in ("NODES", "START", "MOVED")
+    }
+    unloaded, loaded = (built.states[name].positions for name in ("none", "design"))
+    np.testing.assert_allclose(told["NODES"] + told["START"][:, :3], unloaded, atol=1e-12)
+    np.testing.assert_allclose(told["MOVED"], loaded - unloaded, atol=1e-12)
+
+
 def test_an_unknown_load_and_a_folder_in_the_way_are_refused(built, vault, loads, tmp_path):
     with pytest.raises(InputError, match="is no load case"):
         exports.write_exports(tmp_path, built, vault, loads, load="snow")

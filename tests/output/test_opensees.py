@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 import shellform as sf
 from shellform.errors import InputError
 from shellform.output.exchange.opensees import opensees_script
+from shellform.structure.elements.state import at_rest
 
 
 def lists(text):
@@ -49,7 +50,8 @@ def test_the_script_holds_the_network_the_start_and_the_load(shell):
 def test_the_script_begins_without_load_and_compares_with_what_the_load_moves(built):
     shell, design = built.shell, built.design
     network = shell.network(design)
-    before, after = built.states["none"], built.states["additional"]
+    # The loaded state's rotations must be of no account.
+    before, after = built.states["none"], at_rest(built.states["additional"].positions)
     load = shell.point_load(6.9, every=2)
     told = lists(opensees_script(network, [before, after], load, title="", name="", case="additional"))
     np.testing.assert_allclose(np.array(told["START"])[:, :3], before.positions - network.nodes)
@@ -61,6 +63,19 @@ def test_the_script_begins_without_load_and_compares_with_what_the_load_moves(bu
     assert list(told["CABLES"][-1][:3]) == [*cable, 187.0]
     node = int(np.flatnonzero(load.any(axis=1))[0])
     assert told["LOAD"][0] == (node, *load[node].tolist())
+
+
+def test_rods_are_told_to_stand_upright_on_the_flat_grid(shell):
+    network, flat = shell.network(shell.design()), [shell.target] * 2
+    told = lists(
+        opensees_script(network, flat, np.zeros((len(network.nodes), 6)), title="", name="", case="")
+    )
+    rods = [
+        row for row in told["BEAMS"] if told["SECTIONS"][row[2]][0] == pytest.approx(shell.rod.stiffness[0])
+    ]
+    assert len(rods) == len(shell.net.grid.rod_ends)
+    # Curvature out of the surface is about the local y axis, which vecxz, the local z axis, leaves in the plane.
+    np.testing.assert_allclose(np.abs([row[3:] for row in rods]), [[0.0, 0.0, 1.0]] * len(rods), atol=1e-12)
 
 
 def test_a_bow_bent_from_a_shorter_rod_is_refused(shell):

@@ -1,5 +1,6 @@
 """Deviation maps and convergence plots."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from shellform.errors import InputError
 from shellform.output.exchange import vtp
 from shellform.output.pictures import plots, render
-from shellform.output.pictures.panel import Look, Panel
+from shellform.output.pictures.legend import key, key_height
+from shellform.output.pictures.panel import Look, Panel, scale_of
 
 
 @pytest.fixture(scope="module")
@@ -34,6 +36,35 @@ def test_the_same_panel_gives_the_same_picture_and_another_deviation_another(pan
     assert np.abs(first.astype(int) - second).max() <= 2
     far = render.image(replace(panel, deviation=np.full(81, 0.01)), Look(size=(300, 200)))
     assert (np.abs(first.astype(int) - far).max(axis=2) > 40).sum() > 500
+
+
+@pytest.mark.parametrize("size", [(480, 300), (1600, 900), (600, 1400)])
+@pytest.mark.parametrize("letters", [0.0, 60.0])
+def test_the_words_of_a_key_stand_clear_of_its_bars_and_within_its_height(panel, size, letters):
+    scale = scale_of([panel], Look(letters=letters, dots=72), size)
+    words, bars = key(scale, size[0], key_height(size))
+    assert len(bars) == 2
+    for word in words:
+        foot, top = word.at[1], word.at[1] + word.pixels
+        assert foot >= 0.0
+        assert top <= key_height(size)
+        for bar in bars:
+            assert top <= bar.low or foot >= bar.high, (word, bar)
+    assert {word.text for word in words if word.at[1] > bars[0].high} == {
+        "deviation from the target",
+        "cable force (pale: slack)",
+    }
+
+
+def test_a_cable_that_pulls_beyond_the_scale_is_drawn_as_one_at_its_end(tmp_path, panel):
+    look, drawn = Look(size=(300, 200), force=2.0), []
+    for k, most in enumerate((2.0, 5.0)):
+        forces = np.where(panel.cable_forces > 0.0, most, 0.0)
+        render.picture(tmp_path / f"{k}.svg", replace(panel, cable_forces=forces), look)
+        text = (tmp_path / f"{k}.svg").read_text(encoding="utf-8")
+        drawn.append(re.findall(r'style="[^"]*stroke-width: [^"]*"', text))
+    assert len(drawn[0]) > 10
+    assert drawn[0] == drawn[1]
 
 
 def test_a_sheet_and_a_vtp_file_are_written(tmp_path, panel):

@@ -369,7 +369,7 @@ def test_large_forces_are_told_in_kilonewtons_and_rounding_as_nothing():
     scale = scale_of([strong], SMALL, SIZE)
     told = legend.title(strong, scale, SIZE)[1].text
     assert told == "deviation: maximum 0 mm, mean 0 mm; 64 cables, 12 kN at most"
-    assert "12 kN" in [word.text for word in legend.key(scale, SIZE[0])[0]]
+    assert "12 kN" in [word.text for word in legend.key(scale, SIZE[0], legend.key_height(SIZE))[0]]
     assert legend.title(panel(), scale_of([panel()], SMALL, SIZE), SIZE)[1].text.endswith(
         "64 cables, 12 N at most"
     )
@@ -379,7 +379,9 @@ def test_large_forces_are_told_in_kilonewtons_and_rounding_as_nothing():
 def test_a_number_of_the_key_lies_within_a_hundredth_of_the_scale_from_its_tick(force):
     strong = replace(panel(), cable_forces=force / panel().cable_forces.max() * panel().cable_forces)
     words = [
-        word for word in legend.key(scale_of([strong], SMALL, SIZE), SIZE[0])[0] if word.at[0] > 0.6 * SIZE[0]
+        word
+        for word in legend.key(scale_of([strong], SMALL, SIZE), SIZE[0], legend.key_height(SIZE))[0]
+        if word.at[0] > 0.6 * SIZE[0]
     ]
     ticks = [
         float(word.text.split()[0])
@@ -392,7 +394,11 @@ def test_a_number_of_the_key_lies_within_a_hundredth_of_the_scale_from_its_tick(
 
 def test_a_value_beyond_the_scale_is_told_at_its_end_and_long_titles_shrink():
     within, beyond = (
-        legend.key(scale_of([bare(deviation=np.full(len(panel().positions), far))], SMALL, SIZE), 400)[0]
+        legend.key(
+            scale_of([bare(deviation=np.full(len(panel().positions), far))], SMALL, SIZE),
+            400,
+            legend.key_height(SIZE),
+        )[0]
         for far in (0.01, 0.02)
     )
     assert "≥ 10.0 mm" in [word.text for word in beyond]

@@ -122,6 +122,21 @@ def test_a_curve_leaves_gaps_where_there_is_no_number_and_is_cut_at_the_axis():
     assert line_chart("flat", [0], {"x": [0.0]}).svg.count("<polyline") == 1
 
 
+@pytest.mark.parametrize(("first", "last", "largest"), [(0, 60, 0.37), (200, 263, 410.0), (3, 9, 2.2e-4)])
+def test_the_axes_of_a_chart_are_divided_at_a_few_round_numbers_from_end_to_end(first, last, largest):
+    at = range(first, last + 1)
+    chart = line_chart("x", at, {"x": np.linspace(0.0, largest, len(at))})
+    for anchor, low, high in (("middle", first, last), ("end", 0.0, largest)):
+        told = re.findall(rf'text-anchor="{anchor}">([-+.e\d]+)<', chart.svg)
+        values = [float(each) for each in told]
+        steps = np.diff(values)
+        assert steps == pytest.approx(np.full(len(steps), steps[0])), told
+        assert f"{steps[0]:.0e}"[0] in "125", steps[0]
+        assert low <= values[0] < low + steps[0]
+        assert high - steps[0] < values[-1] <= high
+        assert 3 <= len(values) <= 7
+
+
 def test_pictures_are_made_small_films_go_in_as_they_are(tmp_path):
     Image.fromarray(np.zeros((900, 3200, 3), np.uint8)).save(tmp_path / "wide.png")
     Image.fromarray(np.zeros((8, 9, 4), np.uint8)).save(tmp_path / "clear.png")
@@ -197,6 +212,8 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
         [],
     )
     drawn = view_data.view_data(report.viewed(run))
+    half = 0.5 * np.ptp(shell.target.positions, axis=0)
+    assert np.array(drawn["box"]) == pytest.approx(np.array([-half, half]), rel=1e-5)
     found = drawn["designs"][0]["states"]["design"]
     assert found["length"] == pytest.approx(1e3 * shell.cables(design).lengths(moved), abs=1e-4)
     assert found["force"] == pytest.approx(shell.cables(design).tension(moved), rel=1e-5)

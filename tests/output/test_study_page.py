@@ -5,6 +5,7 @@ import re
 from dataclasses import is_dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from shellform.output.page import measures
@@ -100,6 +101,21 @@ def test_a_thumbnail_shows_each_rod_in_the_colour_of_its_distance(shell):
     assert {"#440154", "#fde725"} <= set(re.findall(r'stroke="(#\w+)"', drawn))
     assert "20.0 mm off at most" in drawn
     assert len(drawn) < 60_000
+
+
+def test_a_thumbnail_is_seen_from_40_degrees_above_the_ground_and_30_from_y(dome):
+    place = dome.target.positions
+    drawn = re.findall(r"M(\S+) (\S+?)L(\S+) (\S+?)(?=M|\")", thumbnail(dome, dome.target, 0.01, width=4000))
+    lines = np.array(drawn, dtype=float).reshape(-1, 2, 2)
+    up, aside = np.deg2rad(40.0), np.deg2rad(30.0)
+    sight = np.array([-np.sin(aside) * np.cos(up), np.cos(aside) * np.cos(up), -np.sin(up)])
+    rods = np.diff(place[dome.net.grid.rod_ends], axis=1)[:, 0]
+    seen = np.linalg.norm(rods - np.outer(rods @ sight, sight), axis=1)
+    length = np.linalg.norm(np.diff(lines, axis=1)[:, 0], axis=1)
+    scale = length.sum() / seen.sum()
+    assert np.sort(length) == pytest.approx(np.sort(scale * seen), abs=0.3)  # ends stand to a tenth
+    top = place[dome.net.grid.rod_ends][:, 0, 2].argmax()
+    assert lines[top, 0, 1] < lines[:, 0, 1].mean(), "what is high stands high in the picture"
 
 
 def test_columns_are_told_in_units_that_a_designer_uses():

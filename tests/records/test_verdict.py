@@ -108,6 +108,16 @@ def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, de
     assert {"Optimiser: uplift of supports, wind load", "Optimiser: other thing"} < set(found)
 
 
+@pytest.mark.parametrize(("value", "holds"), [(0.0, True), (0.0009, True), (0.0011, False)])
+@pytest.mark.parametrize("name", ["cable_force", "misfit.additional", "softness.additional", "uplift.wind"])
+def test_a_constraint_that_is_missed_by_up_to_a_thousandth_of_its_limit_holds(
+    shell, designs, name, value, holds
+):
+    found = checks(every(shell, designs), designs, summary(designs, constraints={name: value}), BOUNDS)
+    told = [check.cells["optimised"].holds for check in found if check.name.startswith("Optimiser")]
+    assert told == [holds]
+
+
 @pytest.mark.parametrize(
     ("bound", "load", "changes", "words"),
     [

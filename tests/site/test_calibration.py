@@ -80,6 +80,10 @@ def test_planted_connector_stiffness_is_recovered_within_2_percent_from_42_shuff
         assert abs(error) < 0.02
         assert abs(error) < 4.0 * deviation
     assert found.residual == pytest.approx(NOISE, rel=0.01)  # of this seed: 0.3 %
+    # Six unknowns lay the scans, all in one scanner's axes, and two stiffnesses are fitted besides.
+    seen = int(np.isfinite(found.after).sum())
+    assert seen == 5 * 42 - 3
+    assert np.nansum(found.after**2) / found.residual**2 == pytest.approx(3 * seen - 6 - 2, rel=1e-6)
     # A strut of 2 mm is rigid along its axis whatever its EA: that is said, and its EA stays what it was.
     assert found.held == ("axial",)
     assert found.joint.axial == shell.joint.axial

@@ -8,6 +8,7 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.reactions import reactions
+from shellform.net.grid import ROD
 from shellform.site.erection import erect, laid_out
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -59,6 +60,17 @@ def test_the_largest_stress_is_that_of_a_curvature_like_the_net_s(shell, erectio
     # Rods bend rather than stretch: stress over E r is a curvature.
     curvature = erection.worst.stress / (shell.rod.young * shell.rod.radius)
     assert 0.5 * shell.net.quality.curvature_max < curvature < 2.0 * shell.net.quality.curvature_max
+
+
+def test_a_step_tells_the_largest_stress_of_all_rod_ends_and_where_it_is(shell, erection):
+    radius, beams = shell.rod.radius, shell.beams(shell.rod.radius)
+    area, inertia = np.pi * radius**2, 0.25 * np.pi * radius**4
+    for step in (erection.steps[0], erection.worst, erection.steps[-1]):
+        force = beams.local_forces(step.state)[beams.of_kind(ROD)]
+        moments = np.hypot(force[:, [2, 5]], force[:, [3, 6]])  # about y and z, at both ends
+        stress = (np.abs(force[:, :1]) / area + moments * radius / inertia).max(axis=1)
+        assert step.stress == pytest.approx(stress.max(), rel=1e-9)
+        assert stress[step.element] == pytest.approx(stress.max(), rel=1e-9)
 
 
 def test_groups_lift_way_points_weight_and_a_load_are_stages_of_their_own(shell):

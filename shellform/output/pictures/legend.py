@@ -35,6 +35,7 @@ _SAND = np.array(
 _NOTHING = 1e-6  # of the scale: what is smaller is rounding
 _TRUE = 0.01  # of the scale: how far a tick may lie from its number
 _STEPS = 4  # of a bar
+_CAPTION = 3.2  # of a line: where the words over a bar stand
 _WIDE = 0.6  # mean width of a letter over its height, generous
 
 
@@ -116,10 +117,12 @@ def heading(text: str, size: tuple[int, int], letters: int) -> tuple[Word, ...]:
     )
 
 
-def key(scale: Scale, width: int) -> tuple[tuple[Word, ...], tuple[Ramp, ...]]:
-    """The colour scales below the panels: the quantity's, and beside it the cables' where one is taut."""
+def key(scale: Scale, width: int, height: int) -> tuple[tuple[Word, ...], tuple[Ramp, ...]]:
+    """The colour scales below the panels: the quantity's, and beside it the cables' where one is taut; in letters that
+    fit into so many pixels.
+    """
     ends = [(0.1, 0.52), (0.66, 0.92)] if scale.force > 0.0 else [(0.22, 0.78)]
-    line = min(round(0.9 * scale.letters), round(width / 38))
+    line = min(round(0.9 * scale.letters), round(width / 38), int(height / (_CAPTION + 1.0)))
     name, unit = scale.unit
     words, ramp = _bar(
         scale.quantity,
@@ -158,7 +161,7 @@ def _bar(
         value = f"{ticks[k]:.{decimals}f}"
         label = f"0 {name}".rstrip() if k == 0 else f"{last}{value} {name}".rstrip() if k == steps else value
         words.append(Word(label, (left + (right - left) * k / steps, 0.55 * line), line, justify="center"))
-    words.append(Word(quantity, (0.5 * (left + right), 3.2 * line), line, QUIET, justify="center"))
+    words.append(Word(quantity, (0.5 * (left + right), _CAPTION * line), line, QUIET, justify="center"))
     painted = colours((np.arange(right - left) + 0.5) / (right - left))
     return words, Ramp(left, right, round(1.9 * line), round(2.8 * line), painted)
 

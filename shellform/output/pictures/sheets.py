@@ -49,7 +49,7 @@ def single(panels: Sequence[Panel], look: Look) -> list[Canvas]:
     room = (width, height - strip)
     scale = scale_of(panels, look, room)
     camera = fitted(panels, look, scale, room)
-    words, ramps = legend.key(scale, width)
+    words, ramps = legend.key(scale, width, strip)
     foot = Drawing((width, strip), (0, height - strip), words, ramps)
     return [
         Canvas(
@@ -85,7 +85,7 @@ def table(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> Can
                 (across, top), (0, 0), legend.heading(heading, (across, top), round(1.25 * scale.letters))
             )
         )
-    words, ramps = legend.key(scale, min(across, 2 * width))
     wide = min(across, 2 * width)
+    words, ramps = legend.key(scale, wide, strip)
     drawings.append(Drawing((wide, strip), ((across - wide) // 2, top + height * len(rows)), words, ramps))
     return Canvas((across, top + height * len(rows) + strip), drawings, scale, camera, look)
