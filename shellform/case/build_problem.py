@@ -166,13 +166,12 @@ def shown(shell: Gridshell, design: Design, state: State, load: Reals) -> dict[s
     beams, cables = shell.beams(design.radius), shell.cables(design)
     pull = cables.tension(state)
     turn = results.twist(beams.local_deformations(state))[beams.of_kind(CONNECTOR)]
-    held = shell.net.supports
-    inner = assemble(shell.network(design)).evaluate(state, tangent=False).force
+    push = assemble(shell.network(design)).unbalanced(state, load)[shell.net.supports]
     return {
         "stress_utilisation_max": float(shell.utilisation(design, state).max()),
         "connector_turn_max": float(np.abs(turn).max(initial=0.0)),
-        "uplift_max": max(0.0, -float((inner - load)[held, 2].min())),
-        "thrust_max": float(np.hypot(*(inner - load)[held, :2].T).max()),
+        "uplift_max": max(0.0, -float(push[:, 2].min())),
+        "thrust_max": float(np.hypot(*push[:, :2].T).max()),
         "edge_utilisation_max": edge_utilisation(shell, beams, beams.local_forces(state)),
         "cable_force_max": float(pull.max(initial=0.0)),
         "cable_force_min": float(pull.min()) if len(pull) else 0.0,

@@ -79,10 +79,9 @@ class Reactions:
 
 def reactions(shell: Gridshell, design: Design, state: State, load: Reals) -> Reactions:
     """What every support of the design bears in the equilibrium `state` under the `load` (n, 6), N."""
-    internal = assemble(shell.network(design)).evaluate(state, tangent=False).force.reshape(-1, 6)
     held = shell.net.supports
     kinds = edge_of(shell.net, held)
-    force = (internal - load)[held, :3]
+    force = assemble(shell.network(design)).unbalanced(state, load)[held, :3]
     return Reactions(
         tuple(
             Support(number, int(node), *kinds[number], _three(state.positions[node]), _three(force[number]))

@@ -194,7 +194,7 @@ class Lengths:
         return self.cables.lengths(state) > self.cables.rest_length
 
     def _twice(self, state: State) -> Reals:
-        chord = state.positions[self.cables.ends[:, 1]] - state.positions[self.cables.ends[:, 0]]
+        chord, _ = self.cables.chords(state)
         scale = np.where(self._taut(state), 2.0 * self.cables.stiffness / self.cables.rest_length**3, 0.0)
         return np.hstack([-scale[:, None] * chord, scale[:, None] * chord])
 

@@ -1,4 +1,4 @@
-"""Saving a net: net.json for others (contracts/run-folder.md), net.npz for shellform itself."""
+"""Saving a net: net.json for others (documentation/reference/run.md), net.npz for shellform itself."""
 
 from __future__ import annotations
 

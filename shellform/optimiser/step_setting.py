@@ -16,7 +16,7 @@ import scipy.sparse as sp
 from shellform.arrays import Flags, Indices, Reals
 from shellform.optimiser.quadratic import LowRank
 from shellform.problem.evaluation import Evaluator, Linearisation
-from shellform.structure.answers.sensitivity import by_rest_length, element_columns
+from shellform.structure.answers.sensitivity import by_rest_length, element_columns, force_by_stiffness
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
@@ -102,9 +102,7 @@ def setting(evaluator: Evaluator, point: Linearisation) -> Setting:
     if each is not None:
         other[each] = False
     count = 0 if each is None else len(present)
-    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
-    length = np.linalg.norm(chord, axis=1)
-    unit = chord / length[:, None]
+    unit, length = cables.directions(state)
     pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))[:, :count]
     rates = blocks.rates(design)
     right = pull
@@ -140,7 +138,6 @@ def _forces(
         result = result + sp.csc_array(columns @ rate[np.flatnonzero(design.present)])
     if rate[[-1]].nnz:
         beams = shell.beams_by_radius(design.radius)
-        change = np.zeros(6 * assembly.count)
-        np.add.at(change, beams.dofs(), beams.evaluate(state, tangent=False).force)
-        result = result + sp.csc_array(change[assembly.free][:, None] * rate[[-1]].toarray())
+        change = force_by_stiffness(beams, state)[assembly.free]
+        result = result + sp.csc_array(change[:, None] * rate[[-1]].toarray())
     return sp.csc_array(result)

@@ -34,8 +34,7 @@ def kept_stiffness(
 
     Raises NotPositiveDefinite.
     """
-    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
-    length = np.linalg.norm(chord, axis=1)
+    chord, length = cables.chords(state)
     stiffness = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
     unit = np.sqrt(stiffness)[:, None] * chord / length[:, None]
     pull = element_columns(assembly, cables.dofs(), np.hstack([-unit, unit]))[:, some]

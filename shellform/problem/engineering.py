@@ -24,7 +24,7 @@ from shellform.gridshell.layers import LOCK, TwoLayers, rod_stress
 from shellform.net.grid import CONNECTOR, ROD
 from shellform.problem.terms import LoadedDesign, Measurement, Term
 from shellform.structure.answers.results import end_stress_by_force, twist
-from shellform.structure.answers.sensitivity import reaction_rows
+from shellform.structure.answers.sensitivity import force_by_stiffness, reaction_rows
 from shellform.structure.answers.stability import modes
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.cable import make_cables
@@ -225,18 +225,8 @@ class Uplift(Term):
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; supports may bear a part of the load at once."""
-        shell, design, state = at.shell, at.design, at.state
-        assembly = at.assembled()
-        held = 6 * np.asarray(shell.net.supports) + 2
-        reaction = assembly.evaluate(state, tangent=False).force.ravel()[held] - at.load.ravel()[held]
-        rows = -reaction_rows(assembly, state, held)
-        rate = shell.beams_by_radius(design.radius)
-        change = np.zeros(6 * assembly.count)
-        np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
-        cables = shell.cables(design)
-        if np.isin(cables.ends, shell.net.supports).any():
-            raise InputError("cables that end at supports are not provided for", where="uplift")
-        return _largest(shell, self.scale, -reaction, assembly.free, rows, -change[held])
+        push, free, rows, by_radius = _pushes(at, (2,), self.name)
+        return _largest(at.shell, self.scale, -push[:, 0], free, -rows, -by_radius[:, 0])
 
 
 @dataclass(frozen=True)
@@ -255,21 +245,28 @@ class Thrust(Term):
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; supports may bear a part of the load at once."""
-        shell, design, state = at.shell, at.design, at.state
-        assembly = at.assembled()
-        held = 6 * np.asarray(shell.net.supports)[:, None] + np.arange(2)
-        internal = assembly.evaluate(state, tangent=False).force.ravel()
-        push = internal[held] - at.load.ravel()[held]
+        push, free, rows, by_radius = _pushes(at, (0, 1), self.name)
         size = np.hypot(push[:, 0], push[:, 1])
         along = push / np.maximum(size, np.finfo(float).tiny)[:, None]
-        by_dof = reaction_rows(assembly, state, held.ravel())
-        rows = sp.csr_array(sum(sp.diags_array(along[:, k]) @ by_dof[k::2] for k in range(2)))
-        rate = shell.beams_by_radius(design.radius)
-        change = np.zeros(6 * assembly.count)
-        np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
-        if np.isin(shell.cables(design).ends, shell.net.supports).any():
-            raise InputError("cables that end at supports are not provided for", where="thrust")
-        return _largest(shell, self.scale, size, assembly.free, rows, (along * change[held]).sum(axis=1))
+        outward = sp.csr_array(sum(sp.diags_array(along[:, k]) @ rows[k::2] for k in range(2)))
+        return _largest(at.shell, self.scale, size, free, outward, (along * by_radius).sum(axis=1))
+
+
+def _pushes(at: LoadedDesign, axes: tuple[int, ...], name: str) -> tuple[Reals, Indices, sp.csr_array, Reals]:
+    """With what each support pushes the shell along k `axes` (s, k), N; the free degrees of freedom (f,) by which `rows`
+    (s k, f) are its derivatives, N/m; and those by the radius (s, k). Raises InputError where cables end at supports."""
+    shell, state, assembly = at.shell, at.state, at.assembled()
+    if np.isin(shell.cables(at.design).ends, shell.net.supports).any():
+        raise InputError(
+            "isn't known where cables end at supports",
+            where=name,
+            remedy="Leave out the limit, or the cables at supports.",
+        )
+    held = 6 * np.asarray(shell.net.supports)[:, None] + np.array(axes)
+    push = assembly.unbalanced(state, at.load).ravel()[held]
+    rows = reaction_rows(assembly, state, held.ravel())
+    change = force_by_stiffness(shell.beams_by_radius(at.design.radius), state)
+    return push, assembly.free, rows, change[held]
 
 
 def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, sign: float) -> Measurement:
@@ -281,8 +278,7 @@ def _of_tensions(at: LoadedDesign, chosen: Indices, unit: float, sign: float) ->
     cables = make_cables(
         shell.cable_ends[chosen], rest_length=design.rest_length[chosen], stiffness=shell.cable.stiffness
     )
-    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
-    length = np.linalg.norm(chord, axis=1)
+    chord, length = cables.chords(state)
     slope = sign * cables.stiffness / cables.rest_length
     toward = (slope / length)[:, None] * chord
     largest = _largest(

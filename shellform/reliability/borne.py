@@ -238,9 +238,8 @@ def _cables(loading: Loading) -> Cables:
 
 def _units(loading: Loading, point: _Point) -> tuple[Reals, Indices]:
     """Derivatives (p, 6) of the cables' lengths by their ends' places, and the degrees of freedom (p, 6)."""
-    cables, place = _cables(loading), point.here.state.positions
-    chord = place[cables.ends[:, 1]] - place[cables.ends[:, 0]]
-    unit = chord / np.linalg.norm(chord, axis=1)[:, None]
+    cables = _cables(loading)
+    unit, _ = cables.directions(point.here.state)
     return np.hstack([-unit, unit]), cables.dofs()
 
 

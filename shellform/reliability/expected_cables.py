@@ -49,9 +49,7 @@ class ExpectedCables:
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy (c,) J, forces (c, 6) N on the ends, packed lower tangents (c, 21) N/m, filled `into`."""
-        chord = state.positions[self.cables.ends[:, 1]] - state.positions[self.cables.ends[:, 0]]
-        length = np.linalg.norm(chord, axis=1)
-        unit = chord / length[:, None]
+        unit, length = self.cables.directions(state)
         energy, tension, slope, _ = self._law(length)
         along = tension[:, None] * unit
         force = np.hstack([-along, along])
@@ -68,8 +66,7 @@ class ExpectedCables:
 
     def force_by_rest_length(self, state: State) -> Reals:
         """Derivative (c, 6), N/m, of the end forces by the own rest length, geometry and deviation fixed."""
-        chord = state.positions[self.cables.ends[:, 1]] - state.positions[self.cables.ends[:, 0]]
-        length = np.linalg.norm(chord, axis=1)
+        chord, length = self.cables.chords(state)
         _, tension, slope, _ = self._law(length)
         rate = -tension / self.cables.rest_length - slope
         along = (rate / length)[:, None] * chord
@@ -108,8 +105,6 @@ class ExpectedCables:
 
     def _relative(self, state: State, mode: Reals) -> tuple[Reals, Reals, Reals, Reals, Reals]:
         a, b = self.cables.ends.T
-        chord = state.positions[b] - state.positions[a]
-        length = np.linalg.norm(chord, axis=1)
-        unit = chord / length[:, None]
+        unit, length = self.cables.directions(state)
         motion = mode[b, :3] - mode[a, :3]
         return unit, length, (unit * motion).sum(axis=1), (motion**2).sum(axis=1), motion

@@ -105,8 +105,7 @@ def stretch_deviation(
         errors_all.append(built_cables(cables, perfect.present, errors).rest_length - cables.rest_length)
     steps = factor.solve(np.asfortranarray(np.column_stack(right)))
     a, b = cables.ends.T
-    chord = state.positions[b] - state.positions[a]
-    unit = chord / np.linalg.norm(chord, axis=1)[:, None]
+    unit, _ = cables.directions(state)
     total = np.zeros(len(cables.ends))
     for k in range(drawn):
         step = offsets[k].ravel().copy()

@@ -216,7 +216,7 @@ class _Site:
         worst = int(np.argmax(stress))
         tension = float(cables.tension(state).max(initial=0.0))
         supports = self.shell.net.supports
-        forces = (self.assembly.evaluate(state, tangent=False).force - load)[supports, :3]
+        forces = self.assembly.unbalanced(state, load)[supports, :3]
         height = float(state.positions[:, 2].max() - state.positions[supports, 2].min())
         return ErectionStep(
             stage,

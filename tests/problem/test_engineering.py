@@ -128,6 +128,10 @@ def test_limits_that_make_no_sense_are_refused(shell, wet):
         Uplift("wet", 0.0)
     with pytest.raises(InputError, match=r"thrust\.scale"):
         Thrust("wet", 0.0)
+    hung = dataclasses.replace(shell, cable_ends=[[shell.net.supports[0], shell.net.supports[1]]])
+    for term in (Uplift("wet"), Thrust("wet")):
+        with pytest.raises(InputError, match=rf"{term.name}: isn't known where cables end at supports"):
+            term.measure(LoadedDesign(hung, hung.design(), hung.target, wet))
     unknown = dataclasses.replace(shell, rod=sf.Rod.round(young=40e9, radius=0.001))
     state = shell.target
     with pytest.raises(InputError, match="strength"):

@@ -52,7 +52,7 @@ class Analysis:
     """The last state reached and why it ended there.
 
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
-    `converged`; `increments` as the contract has them, each with the `steps` it took; `modes` and `critical`
+    `converged`; `increments` as result.json has them, each with the `steps` it took; `modes` and `critical`
     where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable branch
     from the start; None where the method (Newton's) doesn't tell. `critical_mesh`: the critical factor on
     this mesh and with beams halved.
@@ -129,7 +129,7 @@ def analyse(
     return Analysis(
         model,
         loaded,
-        assembly.evaluate(found.state, tangent=False).force - loaded,
+        assembly.unbalanced(found.state, loaded),
         replace(found, factorisations=walk.spent),
         converged,
         tuple(walk.documented),

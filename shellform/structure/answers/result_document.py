@@ -15,7 +15,7 @@ from shellform.structure.elements.sections import Section
 
 
 def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None) -> dict[str, Any]:
-    """The result document of the contract, and besides it `on_branch`, `warnings`, `beam_twists`, `cable_elongations`,
+    """The content of result.json, and besides it `on_branch`, `warnings`, `beam_twists`, `cable_elongations`,
     `energy_by_kind`, with `sections` by kind of beam `stresses` (Pa, at both ends) and `utilisation`, and
     where asked for `modes` and `critical`."""
     network, found = analysis.model.network, analysis.equilibrium

@@ -95,10 +95,15 @@ def by_stiffness(assembly: Assembly, state: State, *rates: Part) -> sp.csc_array
     """Derivatives (f, k) of the internal forces by k variables, on each of which the beams' stiffness depends
     at one of the `rates`: end forces are linear in the stiffness, so that beams with the rate for a stiffness
     have the derivative for end forces (A.27 to A.29)."""
-    change = np.zeros((6 * assembly.count, len(rates)))
-    for column, rate in zip(change.T, rates, strict=True):
-        np.add.at(column, rate.dofs(), rate.evaluate(state, tangent=False).force)
-    return sp.csc_array(change[assembly.free])
+    change = [force_by_stiffness(rate, state)[assembly.free] for rate in rates]
+    return sp.csc_array(np.stack(change, axis=1) if change else np.zeros((len(assembly.free), 0)))
+
+
+def force_by_stiffness(rate: Part, state: State) -> Reals:
+    """The same derivative (6 n,) by one variable, at every degree of freedom, held ones too."""
+    change = np.zeros(6 * len(state.positions))
+    np.add.at(change, rate.dofs(), rate.evaluate(state, tangent=False).force)
+    return change
 
 
 def stiffness_rate(beams: Beams, kind: str, rate: tuple[float, float, float, float]) -> Beams:

@@ -64,9 +64,7 @@ def bilinear_by_rest_length(cables: Cables, state: State, left: Reals, right: Re
 
 def _add_cables(cables: Cables, state: State, left: Reals, right: Reals, total: Reals) -> None:
     dofs = cables.dofs()
-    chord = state.positions[cables.ends[:, 1]] - state.positions[cables.ends[:, 0]]
-    length = np.linalg.norm(chord, axis=1)
-    unit = chord / length[:, None]
+    unit, length = cables.directions(state)
     taut = np.where(length > cables.rest_length, cables.stiffness / cables.rest_length, 0.0)
     scale = taut * (cables.rest_length / length) / length
     for first in range(0, len(length), _CHUNK):

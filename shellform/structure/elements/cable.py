@@ -59,7 +59,17 @@ class Cables:
 
     def lengths(self, state: State) -> Reals:
         """Lengths (c,), m, at the state (14)."""
-        return np.linalg.norm(self._chord(state), axis=1)
+        return self.chords(state)[1]
+
+    def chords(self, state: State) -> tuple[Reals, Reals]:
+        """From first ends to second ones (c, 3), m, and the lengths (c,), m."""
+        chord = state.positions[self.ends[:, 1]] - state.positions[self.ends[:, 0]]
+        return chord, np.linalg.norm(chord, axis=1)
+
+    def directions(self, state: State) -> tuple[Reals, Reals]:
+        """Unit vectors e (c, 3) from first ends to second ones, and the lengths (c,), m."""
+        chord, length = self.chords(state)
+        return chord / length[:, None], length
 
     def evaluate_extended(self, state: State, *, tangent: bool) -> Evaluation:
         """As `evaluate` at a state with a tail, tangents (c, 21, 2) with all their digits."""
@@ -89,16 +99,15 @@ class Cables:
         """Derivative (c, 6), N/m, of the tension by the coordinates of the two ends: EA/l0 (-e, e) if
         taut.
         """
-        chord = self._chord(state)
-        length = np.linalg.norm(chord, axis=1)
+        chord, length = self.chords(state)
         slope = np.where(length > self.rest_length, self.stiffness / self.rest_length, 0.0)
         toward = (slope / length)[:, None] * chord
         return np.hstack([-toward, toward])
 
     def force_by_rest_length(self, state: State) -> Reals:
         """Derivative (c, 6), N/m, of the end forces by the own rest length at fixed geometry (A.23)."""
-        chord = self._chord(state)
-        along = self.tension_by_rest_length(state)[:, None] * chord / np.linalg.norm(chord, axis=1)[:, None]
+        chord, length = self.chords(state)
+        along = self.tension_by_rest_length(state)[:, None] * chord / length[:, None]
         return np.hstack([-along, along])
 
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
@@ -120,9 +129,6 @@ class Cables:
             blocks,
         )
         return Evaluation(energy, force, blocks if tangent else None)
-
-    def _chord(self, state: State) -> Reals:
-        return state.positions[self.ends[:, 1]] - state.positions[self.ends[:, 0]]
 
 
 def make_cables(ends: ArrayLike, *, rest_length: ArrayLike, stiffness: ArrayLike) -> Cables:

@@ -14,6 +14,7 @@ rectangle's is in a corner.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from typing import Protocol
@@ -128,8 +129,34 @@ def mass_per_length(section: Section) -> float:
     return section.material.density * section.constants[0]
 
 
+class _Circular(ABC):
+    """A section whose bending stress doesn't ask in which direction it is bent; `radius`, m, is the outer one."""
+
+    radius: float
+
+    @property
+    @abstractmethod
+    def constants(self) -> tuple[float, float, float, float]:
+        """A, m²; J, I, I, m⁴."""
+
+    @property
+    def fibres(self) -> tuple[float, float]:
+        """The outer radius, twice."""
+        return self.radius, self.radius
+
+    def bending(self, about_y: Reals, about_z: Reals) -> Reals:
+        """|M| r / I."""
+        return np.hypot(about_y, about_z) * (self.radius / self.constants[2])
+
+    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
+        """Along the moment."""
+        moment = np.hypot(about_y, about_z)
+        share = self.radius / self.constants[2] / np.where(moment > 0.0, moment, 1.0)
+        return np.asarray(about_y * share), np.asarray(about_z * share)
+
+
 @dataclass(frozen=True)
-class Round:
+class Round(_Circular):
     """A solid round rod of `radius`, m."""
 
     radius: float
@@ -160,26 +187,13 @@ class Round:
         rate = math.pi * self.radius**3
         return np.array([[2.0 * math.pi * self.radius, 2.0 * rate, rate, rate]])
 
-    @property
-    def fibres(self) -> tuple[float, float]:
-        """The radius, twice."""
-        return self.radius, self.radius
-
-    def bending(self, about_y: Reals, about_z: Reals) -> Reals:
-        """|M| r / I."""
-        return np.hypot(about_y, about_z) * (self.radius / self.constants[2])
-
-    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
-        """Along the moment."""
-        return _along(about_y, about_z, self.radius / self.constants[2])
-
     def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
         """4 |M| / πr³ falls with the radius' cube."""
         return [-3.0 / self.radius * self.bending(about_y, about_z)]
 
 
 @dataclass(frozen=True)
-class Tube:
+class Tube(_Circular):
     """A round tube of outer `radius` and wall `thickness`, m."""
 
     radius: float
@@ -220,19 +234,6 @@ class Tube:
                 [2.0 * math.pi * inner, 2.0 * by_thickness, by_thickness, by_thickness],
             ]
         )
-
-    @property
-    def fibres(self) -> tuple[float, float]:
-        """The outer radius, twice."""
-        return self.radius, self.radius
-
-    def bending(self, about_y: Reals, about_z: Reals) -> Reals:
-        """|M| r / I."""
-        return np.hypot(about_y, about_z) * (self.radius / self.constants[2])
-
-    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
-        """Along the moment."""
-        return _along(about_y, about_z, self.radius / self.constants[2])
 
     def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
         """Of |M| r / I by radius and thickness."""
@@ -331,12 +332,6 @@ def make_section(shape: str, sizes: Iterable[float], material: Material) -> Sect
     """The section of that shape and its sizes, m, in their order. Raises InputError."""
     make: Callable[..., Section] = SHAPES[shape]
     return make(*sizes, material)
-
-
-def _along(about_y: Reals, about_z: Reals, scale: float) -> tuple[Reals, Reals]:
-    moment = np.hypot(about_y, about_z)
-    share = scale / np.where(moment > 0.0, moment, 1.0)
-    return np.asarray(about_y * share), np.asarray(about_z * share)
 
 
 def _torsion(slenderness: float) -> tuple[float, float]:

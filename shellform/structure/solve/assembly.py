@@ -121,6 +121,11 @@ class Assembly:
         self.clock["assembly"] += time.perf_counter() - began
         return Balance(energy, force.reshape(-1, 6), values, largest, turned)
 
+    def unbalanced(self, state: State, load: Reals) -> Reals:
+        """Internal forces less the `load` (n, 6), N and N·m: what the ground bears (the reactions) where degrees of
+        freedom are held, and what is out of balance elsewhere."""
+        return self.evaluate(state, tangent=False).force - load
+
     def foreseen(self, state: State, motion: Reals) -> tuple[Reals, ...]:
         """The deformations (m, 7) of each part of beams to which the `motion` (n, 6) leads to first order."""
         return tuple(part.foreseen(state, motion) for part in self.beams)
