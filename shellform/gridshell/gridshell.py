@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Flags, Indices, Reals, reals
+from shellform.arrays import Flags, Indices, Reals, indices, reals
 from shellform.errors import InputError
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_stress
@@ -166,11 +166,12 @@ class Gridshell:
     _made: dict[float, Beams] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        place = self.net.target.positions[self.cable_ends]
+        count = len(self.cable_ends)
+        ends = indices("cable_ends", self.cable_ends, (count, 2), below=self.net.node_count)
+        object.__setattr__(self, "cable_ends", ends)
+        place = self.net.target.positions[ends]
         lengths = np.linalg.norm(place[:, 1] - place[:, 0], axis=1)
-        object.__setattr__(
-            self, "cable_lengths", reals("cable_lengths", lengths, (len(self.cable_ends),), positive=True)
-        )
+        object.__setattr__(self, "cable_lengths", reals("cable_lengths", lengths, (count,), positive=True))
         object.__setattr__(self, "_edges", edge_beams(self.net, self.edge))
         object.__setattr__(self, "_locks", locks(self.net, self.rod.section, self.target))
         object.__setattr__(self, "_made", {})

@@ -43,8 +43,8 @@ def test_a_search_with_safety_resumed_in_thinning_ends_with_the_same_design_to_t
 
 
 def test_where_no_accepted_design_stands_the_search_says_so(stout, problem, monkeypatch):
-    def falls(shell, design, asked, *, first=()):
-        found = stands(shell, design, asked, first=first)
+    def falls(shell, design, asked, *, first=(), judging=None):
+        found = stands(shell, design, asked, first=first, judging=judging)
         return replace(found, stands=False)
 
     monkeypatch.setattr(trials, "stands", falls)
@@ -58,12 +58,12 @@ def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(
     best, _ = found
     before = best.design
 
-    def only_before(shell, design, asked, *, first=()):
-        own = stands(shell, design, asked, first=first)
+    def only_before(shell, design, asked, *, first=(), judging=None):
+        own = stands(shell, design, asked, first=first, judging=judging)
         return replace(own, stands=bool(np.array_equal(design.rest_length, before.rest_length)))
 
     monkeypatch.setattr(trials, "stands", only_before)
-    monkeypatch.setattr(trials, "confirm", lambda shell, design, asked: only_before(shell, design, asked))
+    monkeypatch.setattr(trials, "confirm", only_before)
     polished = sf.polish(best, evaluations=4)
     np.testing.assert_array_equal(polished.design.rest_length, before.rest_length)
     assert polished.status == "no design with less misfit was found"
