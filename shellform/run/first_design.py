@@ -18,8 +18,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from shellform.errors import InputError
-from shellform.gridshell.gridshell import Rod, erection_stress
-from shellform.gridshell.joints import following, usual_gap
+from shellform.gridshell.gridshell import erection_stress
+from shellform.gridshell.joints import turning_stress, usual_gap
 from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
 from shellform.net.edges import Edges, stand
@@ -42,7 +42,6 @@ from shellform.run.sizes import (
     DesignWish,
     Placed,
     RodChoice,
-    Rope,
     choices,
     first_choice,
     first_spacing,
@@ -77,24 +76,23 @@ _STEPS = 4  # sections tried on one net
 _EASED = 5  # times that cables are eased, by less prestrain or thicker strands
 _SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 _THINNER = 8  # thicknesses tried
+_TURNED = (
+    0.2  # of the rods' strength lost to joints that resist turning: beyond it ones that turn are proposed
+)
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
 Say = Callable[[str], None]
 
 
 @dataclass(frozen=True)
 class FirstDesign:
-    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; `choice` of rods; `rope`;
-    how many rods an edge beam has (`bundle`); the cables' `rest_ratio`; `thickness`, m, of the concrete; what
-    the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest fibre distance, m,
+    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of the concrete;
+    what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest fibre distance, m,
     that equation (1) allows rods of that material (`allowed`); what was `told` on the way."""
 
     spacing: float
     reason: str
     placed: Placed
-    choice: RodChoice
-    rope: Rope
-    bundle: int
-    rest_ratio: float
+    parts: FirstParts
     thickness: float
     tried: Followed
     standing: int
@@ -291,12 +289,13 @@ class _Search:
         self, placed: Placed, choice: RodChoice, bundle: int, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design, where it stands with the gap that follows its rods too."""
-        parts = FirstParts(choice, bundle, rest_ratio_for(self.surface, spacing), rope_for(spacing))
+        swivels = turning_stress(placed.net, choice.section.material) > _TURNED
+        parts = FirstParts(choice, bundle, rest_ratio_for(self.surface, spacing), rope_for(spacing), swivels)
         parts, tried, failure = self._solved(placed, parts, spacing, thickness)
         what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
         if placed.net.edges:
             what += f", edge beams of {bundle}"
-        gap = following(Rod(choice.section)).gap
+        gap = parts.joint.gap
         if failure is None and not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
             try:
                 placed = with_gap(self.surface, placed, spacing, gap, self.edges, self._say)
@@ -321,8 +320,7 @@ class _Search:
         material = choice.section.material
         allowed = placed.net.max_radius(young=material.young, strength=material.strength)
         return FirstDesign(
-            spacing, self.reasons[spacing], placed, choice, parts.rope, bundle, parts.rest_ratio, thickness, tried,
-            standing, DRAWN, allowed, tuple(self.told),
+            spacing, self.reasons[spacing], placed, parts, thickness, tried, standing, DRAWN, allowed, tuple(self.told),
         )  # fmt: skip
 
     def _solved(

@@ -17,7 +17,7 @@ from shellform.case.build_problem import edge_utilisation
 from shellform.errors import NotConverged
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
 from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace
-from shellform.gridshell.joints import following
+from shellform.gridshell.joints import following, swivelling
 from shellform.gridshell.layers import single
 from shellform.gridshell.loads import concrete, rods
 from shellform.gridshell.tolerances import default_tolerances
@@ -49,22 +49,31 @@ _UNLOADED = 120  # factorisations of the unloaded shell; one that stands without
 @dataclass(frozen=True)
 class FirstParts:
     """What a first design is made of: the `choice` of rods, how many rods an edge beam has (`bundle`), the
-    cables' `rest_ratio` and what `rope` they are."""
+    cables' `rest_ratio` and what `rope` they are, and whether rods turn on their joints (`swivels`)."""
 
     choice: RodChoice
     bundle: int
     rest_ratio: float
     rope: Rope
+    swivels: bool
+
+    @property
+    def joint(self) -> Joint:
+        """With the gap that follows the rods."""
+        fitting = following(Rod(self.choice.section))
+        return swivelling(fitting) if self.swivels else fitting
 
     def easier(self, tried: Followed, most: float) -> FirstParts | None:
         """What to try after a design that bears its load, `tried`, with rods that are stressed too much or cables that are
-        pulled to more than `most` of their limit: the same with slacker cables, or thicker ones; else None.
+        pulled to more than `most` of their limit: the same with joints that turn, slacker cables, or thicker ones; else None.
 
         Where the last cells end short of the edge, prestressed cables bend the rods' ends in the surface, load or none.
         """
         if tried.factor < NEEDED:
             return None
         if tried.stress > STRESSED:
+            if not self.swivels:
+                return replace(self, swivels=True)
             slacker = round(1.0 - max(0.5 * (1.0 - self.rest_ratio), LEAST_PRESTRAIN), 4)
             return replace(self, rest_ratio=slacker) if slacker > self.rest_ratio else None
         return self.eased(tried.pull) if tried.edge <= STRESSED and tried.pull > most else None
@@ -152,8 +161,7 @@ def _shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> t
     """The gridshell and its load (n, 6), N; the joint's gap is the net's."""
     rope, section = parts.rope, parts.choice.section
     rod = Rod(section)
-    fitting = following(rod)
-    joint = Joint(fitting.axial, fitting.torsion, fitting.bending, net.grid.gap)
+    joint = replace(parts.joint, gap=net.grid.gap)
     radius = math.sqrt(single(section).constants[0] / math.pi)
     edge = EdgeBeam(Bundle(radius, parts.bundle, COMPOSITE, section.material)) if net.edges else None
     shell = brace(net, rod, joint, Cable(rope.stiffness), below=surface, edge=edge)

@@ -25,7 +25,7 @@ from shellform.run.first_design import THICKNESS, FirstDesign, first_design, usu
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import with_ways_out
-from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED
+from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED, FirstParts
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish, RodChoice
 from shellform.surface.shape.target import Surface
@@ -84,8 +84,9 @@ def propose_case(
         **({} if plinths is None else {"plinths": plinths.told}),
         "spacing": f"{design.spacing:g} m, {design.reason}: {len(design.placed.net.grid.lattice)} crossings",
         "angle": f"{design.placed.angle:g}°",
-        "rods": f"{design.choice.label} of {design.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",
-        "cables": f"⌀ {1e3 * design.rope.diameter:g} mm",
+        "rods": f"{design.parts.choice.label} of {design.parts.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",
+        **({"joints": "turn, as swivel couplers do"} if design.parts.swivels else {}),
+        "cables": f"⌀ {1e3 * design.parts.rope.diameter:g} mm",
         "concrete": f"{1e3 * design.thickness:g} mm",
         "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures under 1.2 × its load with {_BUILT}",
         "edges": edges,
@@ -104,7 +105,7 @@ def _text(
     """The case file."""
     lines = "\n".join(f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in entries.items())
     k = design.spacing / _SPACING
-    placed, choice, rope = design.placed, design.choice, design.rope
+    placed, parts, choice, rope = design.placed, design.parts, design.parts.choice, design.parts.rope
     told = "\n".join(f"#   {each}" for each in design.told)
     offset = "" if placed.offset == (0.0, 0.0) else f"\noffset = {list(placed.offset)!r}"
     angle = "as asked" if wish.angle is not None else "of those tried its rods bend least"
@@ -127,10 +128,10 @@ elements = {ELEMENTS}         # beams a segment; what is asked of the design has
 catalogue = "{choice.catalogue}"
 section = "{_named(label(single(choice.section)))}"    # equation (1) allows {2e3 * design.allowed:.3g} mm where the net is curved most, to a radius of {bent:.3g} m; \
 rods at {design.tried.stress:.0%} of their strength under the load followed
-{_layers(choice)}
+{_layers(choice)}{_joint(parts)}
 [cable]
 stiffness = {_short(rope.stiffness)!r}    # EA, N: stainless strand 1 × 19, ⌀ {1e3 * rope.diameter:g} mm; much softer cables let the shell buckle
-rest_ratio = {design.rest_ratio!r}    # a prestrain that takes up what cables are off in length
+rest_ratio = {parts.rest_ratio!r}    # a prestrain that takes up what cables are off in length
 force_max = {_short(rope.force_max)!r}     # N, constraint (5): half of what breaks it
 without = false      # true: show too what the grid does without cables
 
@@ -139,7 +140,7 @@ outer = "{wish.edges}"       # {_outer(wish)}auto: ground where the edge is low,
 openings = "auto"    # [[edges.stretch]] names walls and abutments by height, box or curve
 
 [edges.beam]
-rods = {design.bundle}            # {_edges_stressed(design)}in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
+rods = {parts.bundle}            # {_edges_stressed(design)}in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
 composite = {COMPOSITE!r}      # how far they act together: 1 as if glued, 0 loose
 
 [part.concrete]      # on its true area, so that the load stays where the spacing changes
@@ -201,6 +202,17 @@ def _layers(choice: RodChoice) -> str:
     return """\
 layers = 2           # bent lath by lath, then locked by shear blocks
 composite = 0.5      # how far these make them act together: 1 as if glued, 0 loose
+"""
+
+
+def _joint(parts: FirstParts) -> str:
+    """The table of joints that turn more easily than those that follow the rods."""
+    if not parts.swivels:
+        return ""
+    return f"""
+[joint]              # what is left out follows the rods: table 1 of the paper, scaled
+torsion = {_short(parts.joint.torsion)!r}    # GJ, N·m²: a tenth of that, for rods that turn on their joints (swivel couplers, bolts tightened after bending): \
+stiffer ones bend the rods where the net's right angles are sheared
 """
 
 

@@ -13,7 +13,8 @@ from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import read_catalogue
-from shellform.gridshell.gridshell import erection_stress
+from shellform.gridshell.gridshell import Rod, erection_stress
+from shellform.gridshell.joints import following
 from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
 from shellform.run import first_trial
@@ -231,7 +232,7 @@ def test_two_layers_are_stiffer_across_the_surface_and_bent_like_one(net):
 
 
 def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0))
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0), swivels=True)
     assert 1.0 - parts.eased(PULLED + 0.2).rest_ratio == pytest.approx(0.004 - 0.2 * STRAINED, abs=1e-4)
     slack = parts.eased(3.0)
     assert slack.rest_ratio == 1.0 - LEAST_PRESTRAIN
@@ -240,7 +241,7 @@ def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none()
 
 
 def test_cables_pulled_too_much_with_the_least_prestrain_become_thicker_as_far_as_there_are_strands():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 1.0 - LEAST_PRESTRAIN, rope_for(1.0))
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 1.0 - LEAST_PRESTRAIN, rope_for(1.0), swivels=True)
     diameters = []
     while parts is not None:
         diameters.append(parts.rope.diameter)
@@ -271,7 +272,7 @@ def test_rods_that_less_concrete_does_not_spare_are_not_tried_with_still_less():
 
 
 def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_before_anything_else():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0))
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0), swivels=True)
     breaks = Followed(NEEDED, 1.4, 0.5, 2.0, 0.01, np.zeros(3), np.zeros(3))
     assert parts.easier(breaks, PULLED).rest_ratio == pytest.approx(0.998)
     assert parts.easier(breaks, PULLED).easier(breaks, PULLED).rest_ratio == 1.0 - LEAST_PRESTRAIN
@@ -279,6 +280,31 @@ def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_bef
     assert parts.easier(replace(breaks, factor=1.2), PULLED) is None, "slacker cables bear no more"
     assert parts.easier(replace(breaks, stress=0.5, pull=0.8), PULLED) is None
     assert parts.easier(replace(breaks, stress=0.5), PULLED) == parts.eased(2.0)
+
+
+def test_joints_turn_before_cables_are_made_slacker_where_rods_are_stressed_too_much():
+    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0), swivels=False)
+    breaks = Followed(NEEDED, 1.4, 0.5, 0.5, 0.01, np.zeros(3), np.zeros(3))
+    turning = parts.easier(breaks, PULLED)
+    assert turning == replace(parts, swivels=True)
+    assert turning.joint.torsion == pytest.approx(0.1 * parts.joint.torsion)
+    assert turning.easier(breaks, PULLED).rest_ratio == pytest.approx(0.998)
+
+
+def test_a_half_sphere_is_designed_with_joints_that_turn(tmp_path):
+    """Joints that resist turning stress its rods to 106 % or more, whichever rods and spacing."""
+    x, y, _ = dish(size=2.0, rise=0.0, count=29).vertices.T
+    across, along = x * np.sqrt(1.0 - 0.5 * y * y), y * np.sqrt(1.0 - 0.5 * x * x)
+    z = np.sqrt(np.maximum(1.0 - across**2 - along**2, 0.0))
+    sphere = make_surface(5.0 * np.column_stack([across, along, z]), dish(count=29).triangles)
+    file, case = as_obj(tmp_path / "half.obj", sphere), tmp_path / "case.toml"
+    wish = DesignWish(rod="gfrp_rods/22 mm", spacing=0.7, layers=2, angle=45.0)
+    told = propose_case(file, case, {}, allow_scripts=False, wish=wish)
+    assert "turn" in told["joints"]
+    found = load_case(case).joint
+    fitting = following(Rod(wished(wish.rod, 2)[0].section))
+    assert found.torsion == pytest.approx(0.1 * fitting.torsion, rel=0.01)
+    assert found.bending == pytest.approx(fitting.bending)
 
 
 def test_a_shell_that_tips_is_refused_with_walls_all_round_on_which_its_case_then_stands(tmp_path):
@@ -308,7 +334,7 @@ def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_afte
 
     monkeypatch.setattr(first_trial, "Workshop", Bench)
     monkeypatch.setattr(first_trial, "perfect", lambda *_: None)
-    parts = FirstParts(wished("gfrp_rods/2 mm")[0], 19, 0.998, rope_for(0.1))
+    parts = FirstParts(wished("gfrp_rods/2 mm")[0], 19, 0.998, rope_for(0.1), swivels=False)
     assert first_trial.drawn_standing(net, barrel(), parts, 0.002) == 5
     assert drawn == [0, 1, 2, 3, 4, 5]
 
