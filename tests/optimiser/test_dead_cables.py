@@ -8,6 +8,7 @@ import pytest
 import shellform as sf
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _leaving, _without_slack
+from shellform.optimiser.thinning import kept_stiffness
 from shellform.problem.paths import in_tension, without_slack
 from shellform.structure.elements.state import State
 from tests.problems import misfit_and_force
@@ -106,3 +107,14 @@ def test_thinning_takes_away_cables_that_pull_and_none_that_is_needed(dome, dead
     assert len(leaving) == 12
     assert (pull[leaving] > 0.0).all()
     assert not needed[leaving].any()
+
+
+def test_no_cable_that_goes_first_pulls_more_and_holds_the_shell_more_than_another(dome, dead):
+    search, it, _ = dead
+    state, ties = it.point.states["wet"], dome.cables(it.point.design)
+    pull, model = ties.tension(state), search.models.at(it.point)
+    loss = 1.0 - np.diag(kept_stiffness(model.assembly, state, ties))  # of stiffness along it, without it
+    none = np.zeros(len(pull), dtype=bool)
+    first = _leaving(search, replace(it, needed=none, batch=1), model)[0]
+    assert not ((pull > 0.0) & (pull < pull[first]) & (loss < loss[first])).any()
+    assert loss[first] < np.median(loss[pull > 0.0])
