@@ -367,6 +367,7 @@ def test_a_search_goes_back_to_the_last_design_that_stands(returning, monkeypatc
         ({6}, {6}, 6, "ended"),
         ({5}, {5}, 5, "ended; the last design that a fresh sample confirms"),
         ({4, 3, 0}, {4}, 4, "ended; the last design that a fresh sample confirms"),  # 6, 5, 3, then 4
+        ({4, 3, 0}, set(range(7)), 4, "ended; the last design that a fresh sample confirms"),
         ({0}, {0}, 0, "ended; the last design that a fresh sample confirms"),
         (
             {4, 3, 1},
