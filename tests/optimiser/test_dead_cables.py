@@ -8,7 +8,9 @@ import pytest
 import shellform as sf
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _leaving, _without_slack
+from shellform.optimiser.proposal import propose
 from shellform.optimiser.thinning import kept_stiffness
+from shellform.optimiser.trials import task
 from shellform.problem.paths import in_tension, without_slack
 from shellform.structure.elements.state import State
 from tests.problems import misfit_and_force
@@ -118,3 +120,16 @@ def test_no_cable_that_goes_first_pulls_more_and_holds_the_shell_more_than_anoth
     first = _leaving(search, replace(it, needed=none, batch=1), model)[0]
     assert not ((pull > 0.0) & (pull < pull[first]) & (loss < loss[first])).any()
     assert loss[first] < np.median(loss[pull > 0.0])
+
+
+def test_a_step_leaves_cables_that_must_pull_the_least_they_may_and_empties_others(dead):
+    search, it, _ = dead
+    model = search.models.at(it.point)
+    taut = model.origin > 0.3
+    must = taut & (np.arange(len(taut)) % 2 == 0)
+    asked = task(search, replace(it, tensioned=must, window=2.0 * search.tension), model)
+    least = 0.05 * float(np.median(model.origin[taut]))
+    y, _ = propose(replace(asked, least=least))
+    assert (y[must] >= least * (1.0 - 1e-6)).all()
+    assert (y[must] <= least * (1.0 + 1e-3)).any(), "some would go lower"
+    assert (y[taut & ~must] < 0.1 * least).any()
