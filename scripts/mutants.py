@@ -29,13 +29,14 @@ import os
 import random
 import resource
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 import tomllib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import CodeType, FrameType, FunctionType
@@ -269,6 +270,7 @@ class Planter:
         self._fixtures: dict[str, set[tuple[str, int]]] = {}
         self._itself: dict[str, set[tuple[str, int]]] = {}
         self._seconds: dict[str, float] = {}
+        self._waited: dict[str, float] = {}
         self._kept: list[pytest.FixtureDef[object]] = []
 
     def _trace(self, frame: FrameType, event: str, value: object) -> None:
@@ -305,11 +307,12 @@ class Planter:
         """All tests, then all faults."""
         items = [*session.items]
         for k, item in enumerate(items):
-            began, self.failed = time.process_time(), ""
+            began, since, self.failed = time.process_time(), time.monotonic(), ""
             sys.settrace(self._trace)
             self._run(item, items[(k + 1) % len(items)])
             sys.settrace(None)
             self._seconds[item.nodeid] = time.process_time() - began
+            self._waited[item.nodeid] = time.monotonic() - since
             if self.failed:
                 print(f"left out: {self.failed} fails without any fault", file=self.told, flush=True)
                 self._itself.pop(item.nodeid, None)
@@ -317,21 +320,29 @@ class Planter:
         print(f"{len(items)} tests, {spent:.0f} s of processor time", file=self.told, flush=True)
         by_name = {item.nodeid: item for item in items}
         for fault in self.faults:
-            chosen = [by_name[name] for name in self._calling(fault)]
-            told = self._forked(fault, chosen, items[0])
-            if (
-                told is not None
-                and told.startswith(_DEATH)
-                and self._forked(fault, chosen, items[0], planted=False)
-            ):
-                print(f"left out: {told} without any fault", file=self.told, flush=True)
-                told = None
+            told = self._noticed(fault, by_name, items[0])
             if told is None:
                 self.rest.append(fault)
                 continue
             self.rows[fault] = told
             tell(fault, told, self.told)
         return True
+
+    def _noticed(self, fault: Fault, items: Mapping[str, pytest.Item], last: pytest.Item) -> str | None:
+        """What notices a fault, as `_forked`. A test in which a forked process dies or waits for ever without any fault
+        too, for a thread that wasn't forked with it, is left out from then on."""
+        while True:
+            chosen = [items[name] for name in self._calling(fault)]
+            told = self._forked(fault, chosen, last)
+            if told is None or not told.startswith(_DEATH):
+                return told
+            sound = self._forked(fault, chosen, last, planted=False)
+            if not sound:
+                return told
+            name = sound.split(" in ", 1)[1] if sound.startswith(_DEATH) else sound
+            print(f"left out: {sound} without any fault", file=self.told, flush=True)
+            if self._itself.pop(name, None) is None:
+                return None
 
     def _run(self, item: pytest.Item, following: pytest.Item) -> None:
         item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
@@ -383,6 +394,7 @@ class Planter:
     ) -> str:
         longest = int(time.process_time() + 10.0 * sum(self._seconds[item.nodeid] for item in items)) + 60
         resource.setrlimit(resource.RLIMIT_CPU, (longest, longest))
+        waiting = int(5.0 * max(self._waited[item.nodeid] for item in items)) + 60
         try:
             if planted and not plant(fault):
                 return "not planted"
@@ -394,6 +406,7 @@ class Planter:
                 fixture.cached_result = None
         for k, item in enumerate(items):
             self.failed = ""
+            signal.alarm(waiting)  # for one that waits for ever
             os.write(told, f"{_NEXT}{item.nodeid}".encode())
             self._run(item, items[k + 1] if k + 1 < len(items) else last)
             if self.failed:

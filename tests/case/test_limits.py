@@ -188,6 +188,14 @@ def test_what_is_shown_of_a_loaded_design_is_what_its_supports_cables_and_connec
     bears = np.array([each.force for each in reactions(shell, design, state, load).supports])
     assert seen["uplift_max"] == pytest.approx(max(-bears[:, 2].min(), 0.0))
     assert seen["thrust_max"] == pytest.approx(np.sqrt((bears[:, :2] ** 2).sum(axis=1)).max())
+    # A force on the support itself goes straight into it: the state is the same, what holds it isn't.
+    pushed, push = load.copy(), [40.0, -30.0, 20.0]
+    pushed[shell.net.supports[3], :3] += push
+    bears[3] -= push
+    told = shown(shell, design, state, pushed)
+    assert told["uplift_max"] == pytest.approx(-bears[:, 2].min())
+    assert told["thrust_max"] == pytest.approx(np.sqrt((bears[:, :2] ** 2).sum(axis=1)).max())
+    assert told["thrust_max"] > 2.0 * seen["thrust_max"]
     # frames that lay along x in the flat grid turn against each other, nearly all about the connector
     one, other = (matrices(state.quaternions[shell.net.grid.crossing_nodes[:, k]])[:, :, 0] for k in (0, 1))
     turn = np.arccos(np.clip(np.sum(one * other, axis=1), -1.0, 1.0))

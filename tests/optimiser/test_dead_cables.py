@@ -7,8 +7,12 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser.optimise import begin
-from shellform.optimiser.phases import _without_slack
+from shellform.optimiser.phases import _leaving, _without_slack
+from shellform.optimiser.proposal import propose
+from shellform.optimiser.thinning import kept_stiffness
+from shellform.optimiser.trials import task
 from shellform.problem.paths import in_tension, without_slack
+from shellform.structure.elements.state import State
 from tests.problems import misfit_and_force
 
 
@@ -84,6 +88,10 @@ def test_cables_that_are_slack_under_every_load_leave_the_search_once_they_are_a
     marked = replace(it, tensioned=np.arange(count) % 2 == 0, needed=np.arange(count) % 3 == 0)
     assert _without_slack(search, marked) is marked, "a seventh is few"
     few = replace(search, solver=sf.SequentialConvex(idle=0.1))
+    wide = it.point.states["wet"]
+    wide = State(1.2 * wide.positions, wide.quaternions)  # pulls every cable
+    other = replace(marked, point=replace(it.point, states={**it.point.states, "wetter": wide}))
+    assert _without_slack(few, other) is other, "each pulls under one load or the other"
     found = _without_slack(few, marked)
     left = np.arange(count) % 7 != 0
     np.testing.assert_array_equal(found.point.design.present[it.point.design.present], left)
@@ -91,3 +99,37 @@ def test_cables_that_are_slack_under_every_load_leave_the_search_once_they_are_a
     np.testing.assert_array_equal(found.needed, marked.needed[left])
     assert len(found.accepted) == len(marked.accepted)
     assert found.accepted[-1].design is found.point.design
+
+
+def test_thinning_takes_away_cables_that_pull_and_none_that_is_needed(dome, dead):
+    search, it, _ = dead
+    pull = dome.cables(it.point.design).tension(it.point.states["wet"])
+    needed = np.arange(len(pull)) % 2 == 0
+    leaving = _leaving(search, replace(it, needed=needed, batch=12), search.models.at(it.point))
+    assert len(leaving) == 12
+    assert (pull[leaving] > 0.0).all()
+    assert not needed[leaving].any()
+
+
+def test_no_cable_that_goes_first_pulls_more_and_holds_the_shell_more_than_another(dome, dead):
+    search, it, _ = dead
+    state, ties = it.point.states["wet"], dome.cables(it.point.design)
+    pull, model = ties.tension(state), search.models.at(it.point)
+    loss = 1.0 - np.diag(kept_stiffness(model.assembly, state, ties))  # of stiffness along it, without it
+    none = np.zeros(len(pull), dtype=bool)
+    first = _leaving(search, replace(it, needed=none, batch=1), model)[0]
+    assert not ((pull > 0.0) & (pull < pull[first]) & (loss < loss[first])).any()
+    assert loss[first] < np.median(loss[pull > 0.0])
+
+
+def test_a_step_leaves_cables_that_must_pull_the_least_they_may_and_empties_others(dead):
+    search, it, _ = dead
+    model = search.models.at(it.point)
+    taut = model.origin > 0.3
+    must = taut & (np.arange(len(taut)) % 2 == 0)
+    asked = task(search, replace(it, tensioned=must, window=2.0 * search.tension), model)
+    least = 0.05 * float(np.median(model.origin[taut]))
+    y, _ = propose(replace(asked, least=least))
+    assert (y[must] >= least * (1.0 - 1e-6)).all()
+    assert (y[must] <= least * (1.0 + 1e-3)).any(), "some would go lower"
+    assert (y[taut & ~must] < 0.1 * least).any()

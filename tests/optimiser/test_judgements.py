@@ -275,6 +275,31 @@ def test_a_repair_takes_steps_that_lower_the_merit_whatever_the_first_one_costs(
     assert after.window == pytest.approx(1.6 * 0.2)
 
 
+def test_while_cables_are_taken_away_only_those_that_pull_and_stay_are_kept_taut(bare, monkeypatch):
+    model = SimpleNamespace(origin=np.array([1.0, 2.0, 3.0, 4.0, 0.0]))
+    leaving, kept_taut = [np.array([1, 3]), np.array([2]), np.array([], dtype=int)], []
+    without = [Point(0.9, "without two"), None]
+
+    def repaired(search, it, trial):
+        kept_taut.append(it.tensioned.tolist())
+        return trial, it
+
+    monkeypatch.setattr(phases, "_without_slack", lambda search, it: it)
+    monkeypatch.setattr(phases, "_leaving", lambda *_: leaving.pop(0))
+    monkeypatch.setattr(phases, "attempt_without", lambda *_: without.pop(0))
+    monkeypatch.setattr(phases, "_repaired", repaired)
+    monkeypatch.setattr(phases, "_made_to_stand", lambda search, it, trial, budget: (trial, it))
+    monkeypatch.setattr(phases, "stiffness_of", lambda *_: 0.0)
+    none = np.zeros(5, dtype=bool)
+    start = standing_at(Point(1.0, "start"), tensioned=none, needed=none, thrifty=2.0, batch=2)
+    search = searching(models=SimpleNamespace(at=lambda point: model))
+    end = phases._thin(search, start)
+    assert kept_taut == [[True, False, True, False, False]]
+    assert [point.name for point, _ in bare.taken] == ["without two"]
+    assert end.needed.tolist() == [False, False, True, False, False], "which could not go alone"
+    assert end.failures == 1
+
+
 def accepted_ones(count):
     return tuple(
         Accepted(SimpleNamespace(number=k, present=np.ones(1, dtype=bool)), np.ones(1, dtype=bool), 0.0)
@@ -342,6 +367,7 @@ def test_a_search_goes_back_to_the_last_design_that_stands(returning, monkeypatc
         ({6}, {6}, 6, "ended"),
         ({5}, {5}, 5, "ended; the last design that a fresh sample confirms"),
         ({4, 3, 0}, {4}, 4, "ended; the last design that a fresh sample confirms"),  # 6, 5, 3, then 4
+        ({4, 3, 0}, set(range(7)), 4, "ended; the last design that a fresh sample confirms"),
         ({0}, {0}, 0, "ended; the last design that a fresh sample confirms"),
         (
             {4, 3, 1},

@@ -19,6 +19,7 @@ from shellform.problem.engineering import (
 )
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.terms import LoadedDesign
+from shellform.structure.elements.state import moved
 
 
 @pytest.fixture(scope="module")
@@ -66,6 +67,18 @@ def test_the_gradient_of_each_limit_agrees_with_re_solved_equilibria(shell, wet,
     # Extrapolated to a step of 0, what is left is the gradient's own error.
     best = (4.0 * slopes[1] - slopes[0]) / 3.0
     assert point.constraints_by_variables[0] @ direction == pytest.approx(best, rel=1e-5)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_the_slope_of_the_largest_turn_is_1_along_the_turn_whichever_way_it_goes(dome, way):
+    nodes = dome.net.grid.crossing_nodes[7]
+    axis = np.diff(dome.target.positions[nodes], axis=0)[0]
+    spin = np.zeros((dome.node_count, 6))
+    spin[nodes[1], 3:] = way * axis / np.linalg.norm(axis)
+    turned = LoadedDesign(dome, dome.design(), moved(dome.target, 0.9 * spin), np.zeros_like(spin))
+    told = ConnectorTurn("wet").measure(turned)
+    assert 0.5 < told.value[0] < 1.3, "more than others are turned in the net"
+    assert (told.by_dof @ spin.ravel())[0] == pytest.approx(1.0, rel=0.05)
 
 
 def test_the_smooth_maximum_is_never_below_the_largest_and_little_above(shell, wet):

@@ -1,5 +1,7 @@
 """The design problem on the paper-scale vault: gradients, tension model, optimum."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,6 +84,24 @@ def test_gradients_of_objective_and_constraints_agree_with_re_solved_equilibria(
     assert point.objective_by_variables @ only_radius == pytest.approx(
         (plus.objective - minus.objective) / 2, rel=1e-5
     )
+
+
+def test_a_change_of_rest_lengths_and_radius_is_predicted_to_second_order(dome):
+    load = dome.point_load(3.0, every=2)
+    evaluator = Evaluator(problem(dome, load, radius=True), dome.design())
+    states = {name: loaded.equilibrium.state for name, loaded in evaluator.begin().items()}
+    point = evaluator.seed(dome.design(), states, 1.0)
+    shorter = 0.001 * np.random.default_rng(5).normal(size=len(dome.cable_ends))
+    errors = []
+    for size in (1.0, 0.5):
+        rest = (1.0 + size * shorter) * point.design.rest_length
+        design = replace(point.design, rest_length=rest, radius=(1.0 + 0.02 * size) * point.design.radius)
+        near = evaluator.predicted(point, design, but="wetter")
+        assert set(near) == {"wet"}
+        found = evaluator.settle(evaluator.assembly(design), near["wet"], load)
+        errors.append(np.abs(found.positions - near["wet"].positions).max())
+    assert errors[0] > 1e-7
+    assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3
 
 
 def test_direct_and_adjoint_sensitivities_are_the_same(shell, wet):

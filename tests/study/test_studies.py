@@ -28,6 +28,7 @@ from shellform.study.outcome import Outcome, Row, Status, flat
 from shellform.study.search import _beyond
 from shellform.study.store import Log, read_table
 from shellform.study.studies import run_study
+from tests.command import begin
 from tests.stubs import ROOT, deadly, quick, stuck, study_file
 
 GRID = """
@@ -233,18 +234,7 @@ def test_ctrl_c_stops_a_study_with_130_and_keeps_its_table(tmp_path):
     file = study_file(
         tmp_path, "until = 'net'\n[vary]\nnet.spacing = { low = 0.11, high = 0.13, count = 200 }\n"
     )
-    command = [
-        sys.executable,
-        "-m",
-        "shellform",
-        "study",
-        str(file),
-        "--output",
-        str(tmp_path / "out"),
-        "--workers",
-        "2",
-    ]
-    job = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT, start_new_session=True)
+    job = begin("study", file, "--output", tmp_path / "out", "--workers", 2, start_new_session=True)
     wait_for_rows(tmp_path / "out", 3)
     os.killpg(job.pid, signal.SIGINT)
     _, said = job.communicate(timeout=60)
