@@ -252,6 +252,14 @@ def test_importing_shellform_loads_no_large_library():
     assert result.stdout.strip() == "[]"
 
 
+def test_designing_does_not_wait_for_scipys_statistics():
+    code = (
+        "import sys, shellform.run.optimising, shellform.run.examination; print('scipy.stats' in sys.modules)"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "False"
+
+
 def test_no_module_is_longer_than_a_reader_can_hold():
     length = {
         path.relative_to(PACKAGE).as_posix(): len(path.read_text(encoding="utf-8").splitlines())

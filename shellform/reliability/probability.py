@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from scipy.stats import beta
+from scipy.special import betaincinv  # scipy.stats would take a seventh of every start to load
 
 from shellform.errors import InputError
 
@@ -38,6 +38,6 @@ def counted(drawn: int, standing: int, *, seed: int, confidence: float = CONFIDE
         raise InputError("more stand than were drawn, or none was", where="drawn", value=(drawn, standing))
     if not 0.0 < confidence < 1.0:
         raise InputError("must lie between 0 and 1", where="confidence", value=confidence)
-    least = 0.0 if standing == 0 else float(beta.ppf(1.0 - confidence, standing, drawn - standing + 1))
-    most = 1.0 if standing == drawn else float(beta.ppf(confidence, standing + 1, drawn - standing))
+    least = 0.0 if standing == 0 else float(betaincinv(standing, drawn - standing + 1, 1.0 - confidence))
+    most = 1.0 if standing == drawn else float(betaincinv(standing + 1, drawn - standing, confidence))
     return Standing(drawn, standing, least, most, confidence, seed)

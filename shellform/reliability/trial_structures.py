@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
@@ -280,7 +280,7 @@ def confirm(
 def _known(safety: Safety, name: str, design_load: str) -> int:
     """How many of the structures tried may fall under a load by the probability that is asked for."""
     wanted = safety.required(name, design_load, None)
-    return allowed(float(norm.cdf(norm.ppf(wanted) / safety.enlarged)), safety.tried)
+    return allowed(float(ndtr(ndtri(wanted) / safety.enlarged)), safety.tried)
 
 
 def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
