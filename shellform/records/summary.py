@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import Damaged, InputError
+from shellform.net.quality import NetNumbers
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.files import ANEW, plain, read_record, text_of
 from shellform.records.scattering import RobustRecord
@@ -48,8 +49,8 @@ class EdgeRecord:
 
 
 @dataclass(frozen=True)
-class NetRecord:
-    """The net: its counts, its quality (net/quality.py), what was left out of it (`notes`, a sentence each),
+class NetRecord(NetNumbers):
+    """The net: how good it is (net/quality.py), its counts, what was left out of it (`notes`, a sentence each),
     the farthest that a rod's outermost fibre may lie from its axis (`rod_radius_max`), the curvature that the
     rods bear, 1/m, and how much of it the net uses; `angle`, rad, and `offset` in spacings."""
 
@@ -58,18 +59,6 @@ class NetRecord:
     rods: int
     supports: int
     spacing_v: float
-    distance_max: float
-    distance_mean: float
-    spacing_error_max: float
-    shear_angle_min: float
-    curvature_max: float
-    curvature_out_of_plane_max: float
-    curvature_in_plane_max: float
-    pull_max: float
-    pull_mean: float
-    uncovered_area: float
-    gaussian_curvature: float
-    factorisations: int
     notes: tuple[str, ...] = ()
     rod_radius_max: float | None = None
     curvature_limit: float | None = None
