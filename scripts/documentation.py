@@ -3,20 +3,24 @@
     scripts/docs [FOLDER]
 
 What can be read from the package is written by it: commands from their options, the case file from its schema,
-the public names from their docstrings, verification from the cases that `shellform verify` runs, speed from
+the keys of summary.json from its records, the public names from their docstrings, verification from the cases that `shellform verify` runs, speed from
 scripts/benchmark.json. The rest stands in shellform/documentation as it is.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import typing
 from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +30,7 @@ import shellform
 from shellform import lazy, verification
 from shellform.case.case import Case
 from shellform.cli.program import app
+from shellform.records.summary import Summary
 
 ROOT = Path(__file__).parent.parent
 PAGES = ROOT / "shellform/documentation"
@@ -46,6 +51,7 @@ def gather(folder: Path) -> None:
         "reference/commands.md": commands(),
         "reference/case.md": case_file(),
         "reference/python.md": names(),
+        "reference/summary.md": summary_keys(),
         "verification.md": verified(),
         "speed.md": speed(),
     }.items():
@@ -259,6 +265,79 @@ def names() -> str:
                 f"### sf.{name} {{ #sf-{name} }}\n\n::: {whole}\n    options:\n      show_root_toc_entry: false\n      heading_level: 4\n"
             )
     return "\n".join(text)
+
+
+def summary_keys() -> str:
+    """The page of summary.json, from the records that write and read it."""
+    parts = [
+        "# summary.json\n\nEvery number of a run, written from the records that write and read the file. SI units; "
+        "a key without a value is left out. Keys may be added, never renamed or dropped. Beside it: "
+        "[the run folder](run.md).\n"
+    ]
+    for record, place in summary_records().items():
+        hints = typing.get_type_hints(record)
+        rows = [[f"`{each.name}`", _value(hints[each.name])] for each in dataclasses.fields(record)]
+        said = "\n\n".join(
+            inspect.getdoc(each) or "" for each in record.__mro__ if dataclasses.is_dataclass(each)
+        )
+        parts.append(f"## {place}\n\n{said}\n\n{table(['key', 'value'], rows)}\n")
+    return "\n".join(parts)
+
+
+def summary_records() -> dict[type, str]:
+    """The records of summary.json, and the place of each in the file."""
+    found: dict[type, str] = {Summary: "the file"}
+    waiting = [(Summary, "")]
+    while waiting:
+        record, place = waiting.pop(0)
+        hints = typing.get_type_hints(record)
+        for each in dataclasses.fields(record):
+            several = _origin(hints[each.name])
+            inside = (
+                f"{place}{each.name}{'.NAME' if several is Mapping else '[]' if several is tuple else ''}"
+            )
+            for kind in _inside(hints[each.name]):
+                if dataclasses.is_dataclass(kind) and kind not in found:
+                    found[kind] = inside
+                    waiting.append((kind, f"{inside}."))
+    return found
+
+
+def _origin(hint: Any) -> Any:
+    """Mapping or tuple, where a field holds several records, be it optional."""
+    return next(
+        (
+            typing.get_origin(each)
+            for each in (hint, *typing.get_args(hint))
+            if typing.get_origin(each) in (Mapping, tuple)
+        ),
+        None,
+    )
+
+
+def _inside(hint: Any) -> list[Any]:
+    """The types that a hint is made of."""
+    return [hint, *(inner for each in typing.get_args(hint) for inner in _inside(each))]
+
+
+def _value(hint: Any) -> str:
+    """The words for a field's type."""
+    words = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+    if hint in words:
+        return words[hint]
+    if dataclasses.is_dataclass(hint):
+        return f"table [{summary_records()[hint]}](#{_anchor(summary_records()[hint])})"
+    parts = [each for each in typing.get_args(hint) if each not in (type(None), ...)]
+    if typing.get_origin(hint) is tuple:
+        return f"{len(parts)} values" if len(parts) > 1 else f"list of {_value(parts[0])}"
+    if typing.get_origin(hint) is Mapping:
+        return f"{_value(parts[1])}, by name"
+    return " or ".join(_value(each) for each in parts)
+
+
+def _anchor(place: str) -> str:
+    """The anchor that the site gives to a heading."""
+    return re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", place).strip().lower())
 
 
 def verified() -> str:

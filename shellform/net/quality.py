@@ -31,20 +31,17 @@ _SAMPLE = 0.25  # of the spacing, between points at which the cover is looked fo
 
 
 @dataclass(frozen=True)
-class Quality:
-    """Lengths in m, angles in rad, curvature in 1/m. For the summary:
+class NetNumbers:
+    """How good a net is, in numbers. Lengths in m, angles in rad, curvature in 1/m.
 
     `distance_max`, `distance_mean`: of crossings (the middle between their two nodes) from the surface;
     `spacing_error_max`: largest |chord between neighbouring crossings / spacing - 1|; `shear_angle_min`:
     smallest angle between the two rods of a crossing; `curvature_max`: largest resultant curvature of a rod,
-    and its parts out of and in the surface's tangent plane; `pull_max`, `pull_mean`: what the springs still
+    `curvature_out_of_plane_max` and `curvature_in_plane_max` its parts out of and in the surface's tangent
+    plane; `pull_max`, `pull_mean`: what the springs still
     pull, in EI/s² of the rods, the paper's measure of how forced the grid is; `uncovered_area`, m², farther
     from any rod than three quarters of the spacing; `gaussian_curvature`, rad, of the surface added up over
     the net's cells; `factorisations` that the pulling took.
-
-    For maps: `distance` (c,), signed, and `shear_angle` (c,) of crossings; `spacing_error` (p,), signed, of
-    the pairs of neighbours; `curvature` (m, 2, 2) of rod elements at their two ends, out of and in plane;
-    `pull` (n,) of nodes.
     """
 
     distance_max: float
@@ -59,6 +56,14 @@ class Quality:
     uncovered_area: float
     gaussian_curvature: float
     factorisations: int
+
+
+@dataclass(frozen=True)
+class Quality(NetNumbers):
+    """The numbers, and what maps show: `distance` (c,), signed, and `shear_angle` (c,) of crossings;
+    `spacing_error` (p,), signed, of the pairs of neighbours; `curvature` (m, 2, 2) of rod elements at their
+    two ends, out of and in plane; `pull` (n,) of nodes."""
+
     distance: Reals
     shear_angle: Reals
     spacing_error: Reals
@@ -72,8 +77,7 @@ class Quality:
 
     def summary(self) -> dict[str, Any]:
         """The numbers without the maps."""
-        names = [field.name for field in dataclasses.fields(self) if field.name not in MAPS]
-        return {name: getattr(self, name) for name in names}
+        return {field.name: getattr(self, field.name) for field in dataclasses.fields(NetNumbers)}
 
 
 MAPS = ("distance", "shear_angle", "spacing_error", "curvature", "pull")
@@ -195,7 +199,8 @@ def refuse_distance(quality: Quality, grid: Grid, state: State) -> None:
 
 def nearness(quality: Quality, grid: Grid, state: State) -> str:
     """Where neighbouring crossings lie nearer than their spacing or farther, by more than `SPACING_ERROR`, in
-    words; empty where none do. Where a rod of length s bends to a radius R its chord is s²/(24 R²) shorter."""
+    words; empty where none do. Where a rod of length s bends to a radius R its chord is s²/(24 R²)
+    shorter."""
     error = quality.spacing_error
     if quality.spacing_error_max <= SPACING_ERROR:
         return ""
@@ -209,7 +214,8 @@ def nearness(quality: Quality, grid: Grid, state: State) -> str:
 
 
 def refuse_nearness(quality: Quality, grid: Grid, state: State) -> None:
-    """Raises NoNet for a net whose neighbouring crossings lie nearer than its spacing or farther (nearness)."""
+    """Raises NoNet for a net whose neighbouring crossings lie nearer than its spacing or farther
+    (nearness)."""
     told = nearness(quality, grid, state)
     if told:
         refusal = NoNet(

@@ -15,8 +15,9 @@ from dataclasses import dataclass, field, replace
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
 from shellform.records.as_built import AsBuilt, critical_checks, guide_checks, standing_checks
 from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, share_of
+from shellform.records.optimisation import OptimisationRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
-from shellform.records.summary import DesignRecord, LoadRecord, OptimisationRecord, Summary
+from shellform.records.summary import DesignRecord, LoadRecord, Summary
 from shellform.records.words import constraint_title, load_title, number
 
 BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class CauseRecord:
-    """A cause of scatter: its share of the shape's scatter, and of the misfit's variance."""
+    """A cause of scatter: its share of the scatter of the `shape`, and of the misfit's `variance`."""
 
     shape: float
     variance: float
@@ -16,7 +16,8 @@ class CauseRecord:
 
 @dataclass(frozen=True)
 class SampleRecord:
-    """Drawn structures: their `count`, those `lost` without an equilibrium, and the others' misfit, m²."""
+    """Drawn structures: their `count`, those `lost` without an equilibrium, and the others' `misfit_mean` and
+    `misfit_deviation`, m²."""
 
     count: int
     lost: int
@@ -26,8 +27,10 @@ class SampleRecord:
 
 @dataclass(frozen=True)
 class RobustRecord:
-    """What scatter does to a `design`: misfits, m², as sums over all nodes, distances, m, as root mean
-    squares a node; `wander_max`, m: the largest scatter of a node; `causes` by name."""
+    """What scatter does to a `design`: its `misfit` as planned, `misfit_mean` and `misfit_deviation`, m², as
+    sums over all nodes; `deviation_rms` as planned and `deviation_rms_mean`, m, root mean squares over the
+    nodes; `wander_max`, m: the largest scatter of a node; `causes` by name; the same in `sentences`; and a
+    drawn `sample`."""
 
     design: str
     misfit: float

@@ -12,8 +12,10 @@ from pathlib import Path
 from typing import Any
 
 from shellform.errors import Damaged, InputError
+from shellform.net.quality import NetNumbers
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.files import ANEW, plain, read_record, text_of
+from shellform.records.optimisation import OptimisationRecord, SectionRecord
 from shellform.records.scattering import RobustRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.written import write_text
@@ -37,8 +39,8 @@ class SurfaceRecord:
 
 @dataclass(frozen=True)
 class EdgeRecord:
-    """A stretch of the net's edge: its `kind` (net/edges.py) and `name`, whether it goes round an `opening`,
-    its `length`, m, and lowest and highest level, m."""
+    """A stretch of the net's edge: its `kind` (ground, wall, abutment, pin, beam or free) and `name`, whether
+    it goes round an `opening`, its `length`, m, and `height`: lowest and highest level, m."""
 
     kind: str
     name: str
@@ -48,28 +50,18 @@ class EdgeRecord:
 
 
 @dataclass(frozen=True)
-class NetRecord:
-    """The net: its counts, its quality (net/quality.py), what was left out of it (`notes`, a sentence each),
-    the farthest that a rod's outermost fibre may lie from its axis (`rod_radius_max`), the curvature that the
-    rods bear, 1/m, and how much of it the net uses; `angle`, rad, and `offset` in spacings."""
+class NetRecord(NetNumbers):
+    """The net: how many `crossings`, `rods` and `supports`, at a `spacing` and one along rods v, `spacing_v`,
+    m; what was left out of it (`notes`, a sentence each); `rod_radius_max`, m, the farthest that a rod's
+    outermost fibre may lie from its axis; `curvature_limit`, 1/m, that the rods bear, and
+    `curvature_utilisation`, how much of it the net uses; its `angle`, rad, and `offset`, in spacings, on the
+    surface; and its `edges`."""
 
     spacing: float
     crossings: int
     rods: int
     supports: int
     spacing_v: float
-    distance_max: float
-    distance_mean: float
-    spacing_error_max: float
-    shear_angle_min: float
-    curvature_max: float
-    curvature_out_of_plane_max: float
-    curvature_in_plane_max: float
-    pull_max: float
-    pull_mean: float
-    uncovered_area: float
-    gaussian_curvature: float
-    factorisations: int
     notes: tuple[str, ...] = ()
     rod_radius_max: float | None = None
     curvature_limit: float | None = None
@@ -81,7 +73,8 @@ class NetRecord:
 
 @dataclass(frozen=True)
 class ModelRecord:
-    """How large the structural model is; `freedoms` are its degrees of freedom."""
+    """How large the structural model is: `nodes`, `beams`, candidate `cables`; `freedoms`, its degrees of
+    freedom."""
 
     nodes: int
     beams: int
@@ -107,16 +100,18 @@ class StandingRecord:
 class LoadRecord:
     """A design under one load case, `factor` times the design load.
 
-    Deviations are distances between a node and its place on the target, over all nodes. `stable`: in a stable
-    equilibrium; `on_branch`: reached without snapping through; `residual`: unbalanced over largest force.
-    Utilisations are stresses over the flexural strength, of bending alone and with axial force.
-    `critical_factor`: of this load, at which stability ends, by a point of `critical_kind` ("none": it
-    doesn't up to that factor, the most that was tried), `critical_factor_halved` the same with rod elements
-    halved, and `critical_factor_error` what the coarser mesh is off by, as are `deviation_max_error`,
-    `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without tension, by name;
-    `stands`: as built; `expected_stiffness`, N/m: the least of the softest mode on the path to this load, cables
-    counted for what they are worth under their errors.
-    """
+    `deviation_max`, `deviation_mean`, `deviation_rms`, m: distances between a node and its place on the
+    target, over all nodes. `stable`: in a stable equilibrium; `on_branch`: reached without snapping through;
+    `residual`: unbalanced over largest force. Of the rods, stresses over the flexural strength:
+    `rod_utilisation_max` by bending alone, `stress_utilisation_max` with axial force, `edge_utilisation_max`
+    in edge beams (0 without); `connector_turn_max`, rad. Of a support at most `uplift_max`, N, to hold it
+    down with, and `thrust_max`, N, sideways. `cable_force_max`, `cable_force_min`, N, and how many
+    `cables_slack`. `critical_factor`: of this load, at which stability ends, by a point of `critical_kind`
+    ("none": it doesn't up to `critical_sought`, the most that was tried), `critical_factor_halved` the same
+    with rod elements halved, and `critical_factor_error` what the coarser mesh is off by, as are
+    `deviation_max_error`, `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without
+    tension, by name; `stands`: as built; `expected_stiffness`, N/m: the least of the softest mode on the path
+    to this load, cables counted for what they are worth under their errors."""
 
     factor: float
     deviation_max: float
@@ -165,9 +160,10 @@ _UNEXAMINED: dict[str, Any] = dict.fromkeys(
 
 @dataclass(frozen=True)
 class DesignRecord:
-    """A design: its `cables`, `rod_radius`, tensions under the design load, and its `loads` by name. Of a
-    rounded one the `section`, whether it is `feasible`, `why_not`, and its `objective`; where a critical
-    factor was asked for, whether it is kept."""
+    """A design: how many `cables`, its `rod_radius`, m, their tensions under the design load
+    (`cable_force_sum`, `cable_force_max`, N), and its `loads` by name. Of a rounded one the `section`,
+    whether it is `feasible`, `why_not`, and its `objective`; where a critical factor was asked for,
+    `critical_factor_kept`."""
 
     cables: int
     rod_radius: float
@@ -182,66 +178,10 @@ class DesignRecord:
 
 
 @dataclass(frozen=True)
-class CableCountRecord:
-    """How many cables were `asked` for at the most, how many there are, and whether the wish is `kept`."""
-
-    asked: int
-    cables: int
-    kept: bool
-
-
-@dataclass(frozen=True)
-class SymmetryRecord:
-    """The `groups` of cables that symmetry makes alike, and whether each has one length."""
-
-    groups: int
-    kept: bool
-
-
-@dataclass(frozen=True)
-class OptimisationRecord:
-    """What came of the optimisation: the objective at start and end, the work that it took, `stiffness_min`,
-    N/m, that the softest mode had to keep, its `status`, a sentence, `constraints` as value over limit less
-    1, whether the optimised design is `feasible`; why it was `not_polished`; wishes for cables."""
-
-    objective_start: float
-    objective_end: float
-    iterations: int
-    evaluations: int
-    equilibria: int
-    factorisations: int
-    status: str
-    constraints: Mapping[str, float]
-    rejected: int = 0
-    factorisations_rejected: int = 0
-    stiffness_min: float | None = None
-    feasible: bool | None = None
-    not_polished: str | None = None
-    cables_max: CableCountRecord | None = None
-    symmetric: SymmetryRecord | None = None
-
-
-@dataclass(frozen=True)
-class SectionRecord:
-    """A section of the catalogue that was tried in rounding; numbers are None where it has no design."""
-
-    section: str
-    rod_radius: float
-    rod_mass: float
-    rounded_up: bool
-    objective: float | None = field(metadata={"beside": "section"})
-    deviation_max: float | None = field(metadata={"beside": "section"})
-    deviation_mean: float | None = field(metadata={"beside": "section"})
-    cables: int | None = field(metadata={"beside": "section"})
-    stress_utilisation_max: float | None = field(metadata={"beside": "section"})
-    feasible: bool
-    why_not: str
-
-
-@dataclass(frozen=True)
 class DocumentsRecord:
-    """What was drawn for the workshop: the `design`, bars of `stock_length`, m, and the fewest possible, the
-    share that is `waste`, rods that are `spliced`, and to how many lengths cables are cut."""
+    """What was drawn for the workshop: the `design`; how many `bars` of `stock_length`, m, and the fewest
+    possible, `bars_least`; the share that is `waste`; rods that are `spliced`; `notes`, a sentence each; of
+    how many `rest_lengths` the cables are, and to how many `cut_lengths` they are cut."""
 
     design: str
     stock_length: float
@@ -267,8 +207,13 @@ class VerdictRecord:
 
 @dataclass(frozen=True)
 class Summary:
-    """What a run found so far; a part is None or empty until its stage is done. `seconds` by stage, why
-    stages `failed`, and whether it is a `sketch`."""
+    """What a run found so far; a part is left out until its stage is done.
+
+    The file's `format` and its `version`, and which `shellform` wrote it; `seconds` by stage. The `surface`,
+    the `net`, the structural `model`; `designs` by name; the `optimisation`; `sections` that were tried in
+    rounding; what scatter does (`robust`), how the design fails (`failure`) and how rarely (`rare`);
+    `thicker` rods that would do; what was drawn (`documents`); the `verdict`; why stages `failed`, by name;
+    and whether it is a `sketch`."""
 
     format: str = FORMAT
     version: int = VERSION

@@ -28,14 +28,9 @@ from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.problem.terms import CableForces, Misfit, Share
 from shellform.problem.variables import RestLengths
 from shellform.records.history import write_history
+from shellform.records.optimisation import CableCountRecord, OptimisationRecord, SectionRecord, SymmetryRecord
 from shellform.records.progress import Event, Kind
-from shellform.records.summary import (
-    CableCountRecord,
-    OptimisationRecord,
-    SectionRecord,
-    Summary,
-    SymmetryRecord,
-)
+from shellform.records.summary import Summary
 from shellform.reliability.trial_structures import Judging
 from shellform.run.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
 from shellform.run.designs import followed, forget, keep

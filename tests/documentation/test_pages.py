@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +22,7 @@ import pytest
 import typer.main
 
 import shellform as sf
+from scripts import documentation
 from shellform import lazy
 from shellform.case.case import Case
 from shellform.cli.program import app
@@ -35,7 +36,13 @@ ALONE = {
     "how-to/sketch.md": "--watch, which goes on for ever: tests/cli/test_watch.py",
     "reference/study.md": "the four shipped studies, an hour: tests/study reads and begins them",
 }
-GENERATED = {"reference/commands.md", "reference/case.md", "reference/python.md", "verification.md"}
+GENERATED = {
+    "reference/commands.md",
+    "reference/case.md",
+    "reference/python.md",
+    "reference/summary.md",
+    "verification.md",
+}
 # In place of the command: the package as it stands here, and small settings, which a case of any kind takes.
 SHIM = """#!/usr/bin/env bash
 small=()
@@ -172,6 +179,18 @@ def test_every_public_name_has_a_docstring_to_be_written_from():
             thing = getattr(package, name)
             documented = isinstance(thing, (type, type(sf))) or callable(thing)
             assert not documented or (thing.__doc__ or "").strip(), name
+
+
+def test_every_key_of_a_summary_is_named_where_its_record_is_described():
+    records = documentation.summary_records()
+    assert len(records) == 20
+    for record in records:
+        said = " ".join(each.__doc__ or "" for each in record.__mro__ if is_dataclass(each))
+        assert [each.name for each in fields(record) if f"`{each.name}`" not in said] == [], record.__name__
+    page = documentation.summary_keys()
+    assert "## designs.NAME.loads.NAME.stands\n" in page
+    for place in re.findall(r"\(#([\w-]+)\)", page):
+        assert place in anchors(page)
 
 
 def test_blocks_that_are_only_read_are_those_that_are_told_why():

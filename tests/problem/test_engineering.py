@@ -141,7 +141,7 @@ def test_limits_that_make_no_sense_are_refused(shell, wet):
         Uplift("wet", 0.0)
     with pytest.raises(InputError, match=r"thrust\.scale"):
         Thrust("wet", 0.0)
-    hung = dataclasses.replace(shell, cable_ends=[[shell.net.supports[0], shell.net.supports[1]]])
+    hung = dataclasses.replace(shell, cable_ends=np.array([shell.net.supports[:2]]))
     for term in (Uplift("wet"), Thrust("wet")):
         with pytest.raises(InputError, match=rf"{term.name}: isn't known where cables end at supports"):
             term.measure(LoadedDesign(hung, hung.design(), hung.target, wet))

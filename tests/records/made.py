@@ -1,14 +1,7 @@
 """Records for tests, as a sound run would leave them."""
 
-from shellform.records.summary import (
-    DesignRecord,
-    LoadRecord,
-    ModelRecord,
-    NetRecord,
-    OptimisationRecord,
-    Summary,
-    SurfaceRecord,
-)
+from shellform.records.optimisation import OptimisationRecord
+from shellform.records.summary import DesignRecord, LoadRecord, ModelRecord, NetRecord, Summary, SurfaceRecord
 
 SURFACE = SurfaceRecord("vault.py", 0.56, (0.9, 0.55, 0.21), 9775)
 MODEL = ModelRecord(1539, 1683, 290, 9234)

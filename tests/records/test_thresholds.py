@@ -8,8 +8,9 @@ import pytest
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
 from shellform.records.check import SLACK, below, share_of
 from shellform.records.checks import Bounds, checks
+from shellform.records.optimisation import CableCountRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
-from shellform.records.summary import CableCountRecord, StandingRecord
+from shellform.records.summary import StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, headline, to_build, verdict
 from shellform.records.words import critical_words, load_title, number, standing_words

@@ -9,8 +9,8 @@ import pytest
 
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
+from shellform.records.optimisation import CableCountRecord, SymmetryRecord
 from shellform.records.stages import STAGES
-from shellform.records.summary import CableCountRecord, SymmetryRecord
 from shellform.run import checkpoint, documents, optimising
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
