@@ -237,6 +237,8 @@ def test_locks_are_cut_with_their_rods_and_scatter_with_them(shells, solved, tmp
     beams = finer.network.beams
     assert beams.of_kind("lock").sum() == beams.of_kind("rod").sum() == 2 * len(shell.net.grid.rod_ends)
     np.testing.assert_allclose(beams.local_forces(finer.start)[beams.of_kind("lock")], 0.0, atol=1e-8)
+    alone = rods_halved(replace(model, start=None)).network.beams
+    assert alone.of_kind("lock").sum() == len(shell.net.grid.rod_ends), "no start tells how locks are bent"
     assembly, none = assemble(finer.network), 0.0 * finer.loads["load"]
     before = find_equilibrium(assembly, finer.start, none).state
     after = find_equilibrium(assembly, before, finer.loads["load"]).state

@@ -6,9 +6,11 @@ from pathlib import Path
 import pytest
 
 from shellform.errors import InputError, NotConverged
-from shellform.records.summary import read_summary
+from shellform.output.page.ended import facts
+from shellform.records.summary import Summary, read_summary
 from shellform.run import broken_off
 from shellform.run.run import run_case
+from tests.records import made
 from tests.run.small_run import small_case
 
 ROOT = Path(__file__).parent.parent.parent
@@ -49,6 +51,18 @@ def test_a_run_with_a_design_that_deforms_too_much_shows_it_and_says_so_first(tm
     assert "The initial design does not hold" in page
     verdict = page.index("ended without a result: The initial design deforms excessively")
     assert verdict < page.index("How far off is the shell?")
+
+
+def test_what_was_found_before_the_end_is_told_in_millimetres_and_degrees():
+    design = made.design("additional", stable=False)
+    told = dict(facts(Summary(surface=made.SURFACE, net=made.NET, designs={"initial": design})))
+    assert told["surface"] == "vault.py, 900 × 550 × 210 mm, 0.56 m²"
+    assert told["net from the surface"] == "0.1 mm at most"
+    assert told["smallest angle between rods"] == "68.8°"
+    assert told["largest curvature"] == "4.5 1/m, a radius of 222 mm"
+    assert told["thickest round rod that bears it"] == "⌀ 2.86 mm"
+    assert told["initial design, load design"] == "4 mm off at most, stands"
+    assert told["initial design, load additional"] == "8 mm off at most, snapped through or unstable"
 
 
 def test_a_page_that_can_not_be_written_is_told_with_the_cause(tmp_path, monkeypatch):

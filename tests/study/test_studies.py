@@ -22,7 +22,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.run import run
 from shellform.run.folder import alone, read_run
 from shellform.study.engine import engine, sweep
-from shellform.study.front import Front
+from shellform.study.front import Front, signed
 from shellform.study.jobs import Job, work
 from shellform.study.outcome import Outcome, Row, Status, flat
 from shellform.study.search import _beyond
@@ -101,6 +101,7 @@ def test_a_study_has_a_row_a_design_and_a_second_call_computes_nothing(tmp_path,
     assert few.to_pydict() == {"number": [1], "case.net.spacing": [0.1], "cables": [44]}
     seconds = (tmp_path / "out/seconds.csv").read_text()
     assert seconds.count(",here,here,0.01\n") == 12
+    assert "<h1>Study of dome.toml</h1>" in (tmp_path / "out/study.html").read_text(encoding="utf-8")
 
 
 def test_equal_designs_are_computed_once_and_new_ones_alone_are_added(tmp_path, on_two):
@@ -382,7 +383,7 @@ def test_a_search_is_the_same_from_its_seed_however_often_it_was_stopped(tmp_pat
 
 
 def test_the_front_holds_what_nothing_beats_and_keeps_limits():
-    front = Front({"a": 1.0, "b": -1.0}, {"a": 5.0})
+    front = Front(signed({"a": "min", "b": "max"}), {"a": 5.0})
     for key, a, b, off in [
         ("one", 1, 1, []),
         ("worse", 2, 1, ["worse"]),
