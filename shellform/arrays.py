@@ -87,7 +87,7 @@ def read_arrays(path: Path) -> Arrays:
     damaged.
     """
     if not path.is_file():
-        raise InputError("isn't there", where=str(path))
+        raise InputError("isn't there", where=str(path), remedy="Run again with --fresh.")
     try:
         with np.load(path, allow_pickle=False) as data:
             return Arrays(path, {name: data[name] for name in data.files})

@@ -36,7 +36,9 @@ class OwnNetwork:
     def index(self, key: Hashable) -> int:
         """The node's number. Raises InputError where there is none."""
         if key not in self.keys:
-            raise InputError("is no node of the network", where="key", value=key)
+            raise InputError(
+                "is no node of the network", where="key", value=key, remedy="Name a node as the graph does."
+            )
         return self.keys.index(key)
 
 
@@ -59,7 +61,12 @@ def from_arrays(
     beams, ties = _pairs("rods", rods, len(places)), _pairs("cables", cables, len(places))
     rest = None if rest_lengths is None else np.asarray(rest_lengths, dtype=float)
     if rest is not None and rest.shape != (len(ties),):
-        raise InputError("has another length than cables", where="rest_lengths", value=rest.shape)
+        raise InputError(
+            "has another length than cables",
+            where="rest_lengths",
+            value=rest.shape,
+            remedy="Give a rest length for each cable, or leave rest_lengths out.",
+        )
     held = supports if isinstance(supports, Mapping) else dict.fromkeys(supports, "pinned")
     forces = {name: _numbers(f"loads[{name!r}]", force, 3) for name, force in (loads or {}).items()}
     for name, force in forces.items():
@@ -83,7 +90,10 @@ def from_networkx(graph: Any, *, rod: Rod | None = None, cable: float | None = N
     their `kind` is "cable", which may have a `rest_length`, m. Raises InputError naming the node or edge."""
     if not callable(getattr(graph, "nodes", None)) or not callable(getattr(graph, "edges", None)):
         raise InputError(
-            "is no graph: it has no nodes() and edges()", where="graph", value=type(graph).__name__
+            "is no graph: it has no nodes() and edges()",
+            where="graph",
+            value=type(graph).__name__,
+            remedy="Give a graph of networkx, or arrays to from_arrays.",
         )
     nodes = [(key, dict(data)) for key, data in graph.nodes(data=True)]
     edges = [(a, b, dict(data)) for a, b, data in graph.edges(data=True)]
@@ -100,6 +110,7 @@ def from_compas(data: Any, *, rod: Rod | None = None, cable: float | None = None
             "is no graph, network or mesh of COMPAS: it has no node_attribute or vertex_attribute",
             where="data",
             value=type(data).__name__,
+            remedy="Give a Graph, Network or Mesh of COMPAS, or arrays to from_arrays.",
         )
     keys: Iterable[Hashable] = data.nodes() if kind == "node" else data.vertices()
     of: Callable[[Hashable, str], Any] = getattr(data, f"{kind}_attribute")
@@ -140,7 +151,10 @@ def _from_attributes(
     for a, b, data in edges:
         if data.get("kind") not in known:
             raise InputError(
-                "is neither a rod nor a cable", where=f"edge {a!r}, {b!r}: kind", value=data["kind"]
+                "is neither a rod nor a cable",
+                where=f"edge {a!r}, {b!r}: kind",
+                value=data["kind"],
+                remedy='Set kind to "rod" or "cable".',
             )
     rods, cables = _Lines(), _Lines()
     for a, b, data in edges:
@@ -232,7 +246,10 @@ def _pairs(name: str, given: ArrayLike, count: int) -> list[tuple[int, int]]:
         raise InputError("needs pairs of node numbers", where=name, value=values.shape)
     if values.min() < 0 or values.max() >= count:
         raise InputError(
-            f"names a node that isn't there: there are {count}", where=name, value=int(values.max())
+            f"names a node that isn't there: there are {count}",
+            where=name,
+            value=int(values.max()),
+            remedy="Nodes are counted from 0.",
         )
     return [(int(a), int(b)) for a, b in values]
 

@@ -88,7 +88,9 @@ def rod_of(entry: OwnRodEntry | StockRodEntry, net: Net) -> Rod:
     radius = net.max_radius(young=material.young, strength=material.strength)
     if not math.isfinite(radius):
         raise InputError(
-            "is needed: the net is straight, so that it bears rods of any size", where="rod.radius"
+            "is needed: the net is straight, so that it bears rods of any size",
+            where="rod.radius",
+            remedy="Give rod.radius, in m, or rods of a catalogue.",
         )
     return Rod(layered(entry, Round(radius, material)))
 
@@ -147,7 +149,12 @@ def load_cases(case: Case, shell: Gridshell, surface: Surface) -> dict[str, Real
         else:
             found[each.name] = loads.combined(parts, each.factors, where=where)
     if len(found) < sum(max(1, len(each.stages)) for each in entry):
-        raise InputError("a stage has the name of another case", where="load.stages", value=list(found))
+        raise InputError(
+            "a stage has the name of another case",
+            where="load.stages",
+            value=list(found),
+            remedy="Give the stage another name.",
+        )
     if not found["design"][:, 2].any():
         raise InputError(
             "weighs nothing", where="load 'design'", remedy="Give its parts factors other than 0."

@@ -72,7 +72,10 @@ def _read(entry: SurfaceEntry, *, allow_scripts: bool) -> Surface:
         return _built(file, entry)
     if entry.dimensions:
         raise InputError(
-            "only builder scripts have dimensions", where="surface.dimensions", value=entry.dimensions
+            "only builder scripts have dimensions",
+            where="surface.dimensions",
+            value=entry.dimensions,
+            remedy="Leave out surface.dimensions, or name a builder script (.py).",
         )
     from shellform.surface.readers.reading import read_surface
 

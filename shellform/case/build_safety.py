@@ -43,7 +43,7 @@ def critical_factors_asked(case: Case) -> dict[str, float]:
     if not is_required(case):
         return {}
     own = case.safety.critical_factor
-    return ({} if own is None else {"design": own}) | case.safety.critical_further
+    return ({"design": own} if own > 0.0 else {}) | case.safety.critical_further
 
 
 def is_required(case: Case) -> bool:

@@ -147,11 +147,23 @@ def read_toml(file: Path) -> dict[str, Any]:
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"can't be read: {error}", where=str(file)) from error
+        raise InputError(
+            f"can't be read: {error}",
+            where=str(file),
+            remedy="Name a case file that is there, or lay one with: shellform example vault.",
+        ) from error
     except ValueError as error:  # TOMLDecodeError, and Python's for a number of thousands of digits
-        raise InputError(f"isn't valid TOML: {error}", where=str(file)) from error
+        raise InputError(
+            f"isn't valid TOML: {error}",
+            where=str(file),
+            remedy="Mend that line: NAME = VALUE, text in quotation marks, lists in [ ].",
+        ) from error
     except RecursionError as error:
-        raise InputError("isn't valid TOML: it is nested too deeply", where=str(file)) from error
+        raise InputError(
+            "isn't valid TOML: it is nested too deeply",
+            where=str(file),
+            remedy="Take tables and lists out of one another.",
+        ) from error
 
 
 def make_case(data: Mapping[str, Any], file: Path) -> Case:
@@ -162,7 +174,12 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
         raise refusal(error, Case, file) from error
     name = case.surface.file
     if "\0" in name or max(len(part.encode()) for part in ("", *Path(name).parts)) > _NAME:
-        raise InputError("is no file's name", where="surface.file", value=f"{name[:30]} …")
+        raise InputError(
+            "is no file's name",
+            where="surface.file",
+            value=f"{name[:30]} …",
+            remedy="Name the surface's file, relative to the case file.",
+        )
     place = (file.parent / name).resolve()
     fill = _fill(case)
     found: dict[str, Any] = {
@@ -282,7 +299,12 @@ def set_entry(data: dict[str, Any], key: str, value: Any, *, where: str) -> None
     for table in tables:
         data = data.setdefault(table, {})
         if not isinstance(data, dict):
-            raise InputError("names an entry inside a value", where=where, value=key)
+            raise InputError(
+                "names an entry inside a value",
+                where=where,
+                value=key,
+                remedy="Name an entry of a table, as net.spacing.",
+            )
     data[last] = value
 
 

@@ -67,10 +67,10 @@ class SafetyEntry(Entry):
         lt=1.0,
         description="under every other load; left out: no less than of the initial design",
     )
-    critical_factor: float | None = Field(
+    critical_factor: float = Field(
         1.25,
-        ge=1.0,
-        description="of the perfect structure under the design load, with rod elements halved",
+        ge=0.0,
+        description="of the perfect structure under the design load, with rod elements halved; 0: not asked",
     )
     critical_further: dict[str, Annotated[float, Field(gt=1.0)]] = Field(
         {}, description="the same of further load cases, by name: { half = 1.2 }"
@@ -90,6 +90,8 @@ class SafetyEntry(Entry):
     def _enough(self) -> SafetyEntry:
         if self.compared > self.drawn:
             raise ValueError("compared must not exceed drawn")
+        if 0.0 < self.critical_factor < 1.0:
+            raise ValueError("critical_factor must be 0 (not asked) or at least 1")
         if 0 < self.rare < 20:
             raise ValueError("rare must be 0 or at least 20")
         return self

@@ -150,5 +150,8 @@ def tell_cases(rows: Iterable[Any]) -> None:
         mark = "pass" if row.passed else "FAIL"
         print(f"{row.case:40} {row.quantity:38} {numbers} {mark}  {row.source}", flush=True)
     if failed:
-        raise NotConverged(f"{failed} of {number} numbers do not hold")
+        raise NotConverged(
+            f"{failed} of {number} numbers do not hold",
+            remedy="Compare the versions of NumPy, SciPy and Numba with scripts/locks.",
+        )
     print(f"all {number} numbers of {len(cases)} cases hold")

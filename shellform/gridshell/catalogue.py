@@ -99,7 +99,11 @@ def read_catalogue(source: str | Path) -> Catalogue:
             what[:1].lower() + what[1:], where=f"catalogue {path}: {place.strip('`$.') or 'top'}"
         ) from error
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"isn't valid TOML: {error}", where=f"catalogue {path}") from error
+        raise InputError(
+            f"isn't valid TOML: {error}",
+            where=f"catalogue {path}",
+            remedy="Mend that line: NAME = VALUE, text in quotation marks, lists in [ ].",
+        ) from error
     material = _checked(f"catalogue {path}", lambda: _material(document.material))
     sections = [
         _checked(f"catalogue {path}: sizes.{shape}[{k}]", partial(_bought, shape, size, material))

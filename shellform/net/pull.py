@@ -175,7 +175,12 @@ def _watched(progress: Progress | None, density: float) -> Callable[[int, float]
         residuals.append(residual)
         recent = residuals[-_STALL:]
         if len(recent) == _STALL and max(recent) < _LITTLE and residual > 0.8 * recent[0]:
-            raise NotConverged(f"The residual stays at {residual:.1e}", residual=residual, iterations=spent)
+            raise NotConverged(
+                f"The residual stays at {residual:.1e}",
+                residual=residual,
+                iterations=spent,
+                remedy="Choose a smaller spacing or another angle.",
+            )
 
     return watch
 

@@ -44,6 +44,7 @@ def minimise(
             "the start lies outside the bounds",
             where="variables",
             value=int(np.argmax((start < lower) | (start > upper))),
+            remedy="Start from a design within the variables' bounds, or widen them.",
         )
     memory: dict[bytes, tuple[float, Reals, Reals, Reals]] = {}
 

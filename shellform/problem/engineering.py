@@ -54,7 +54,11 @@ class RodUtilisation(Term):
         shell, design, state = at.shell, at.design, at.state
         rod = shell.rod
         if not np.isfinite(rod.strength):
-            raise InputError("isn't known, so that their utilisation can't be limited", where="rod.strength")
+            raise InputError(
+                "isn't known, so that their utilisation can't be limited",
+                where="rod.strength",
+                remedy="Give rod.strength, in Pa, or leave out limits.utilisation.",
+            )
         section = rod.resized(design.radius).section
         beams = shell.beams(design.radius)
         forces = beams.local_forces(state)

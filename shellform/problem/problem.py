@@ -53,18 +53,28 @@ class Problem:
     def __post_init__(self) -> None:
         names = [case.name for case in self.load_cases]
         if len(set(names)) < len(names):
-            raise InputError("two load cases have the same name", where="problem", value=", ".join(names))
+            raise InputError(
+                "two load cases have the same name",
+                where="problem",
+                value=", ".join(names),
+                remedy="Give each load case a name of its own.",
+            )
         for name in sorted({term.load for term in self.terms} | {self.decisive, *self.built_under}):
             if name and name not in names:
                 raise InputError(
                     f"there is no load case {name!r}", where="problem", remedy=f"Known: {', '.join(names)}."
                 )
         if not self.variables:
-            raise InputError("nothing is varied", where="problem.variables")
+            raise InputError(
+                "nothing is varied", where="problem.variables", remedy="Name variables, as RestLengths()."
+            )
         total = sum(part.share for part in self.minimise)
         if abs(total - 1.0) > 1e-9:
             raise InputError(
-                "the shares of the objective must add up to 1", where="problem.minimise", value=total
+                "the shares of the objective must add up to 1",
+                where="problem.minimise",
+                value=total,
+                remedy="Divide each share by their sum.",
             )
 
     def __repr__(self) -> str:

@@ -87,6 +87,7 @@ class Measurement:
                     f"has another shape than the size {size} of the term says, {wanted[each]}",
                     where=f"{name}.{each}",
                     value=np.shape(found),
+                    remedy="Give arrays of those shapes, or another size.",
                 )
         rows = {each: sp.csr_array(shapes[each]) if found is None else found for each, found in made.items()}
         return Measurement(

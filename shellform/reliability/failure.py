@@ -57,7 +57,12 @@ def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: 
     errors = errors_of(nominal.members, tolerances, z)
     end = workshop.limit(errors, most=1.0)
     if end.factor >= 1.0 or end.factor == 0.0:
-        raise InputError("the structure hasn't fallen under its load", where="number", value=number)
+        raise InputError(
+            "the structure hasn't fallen under its load",
+            where="number",
+            value=number,
+            remedy="Choose a structure that falls under this load.",
+        )
     active = [cause for cause in CAUSES if getattr(tolerances, cause) > 0.0]
 
     def left(cause: str) -> Limit:

@@ -132,7 +132,12 @@ def judge(
     design's judgement. Raises InputError where there is no design load, NotConverged where the perfect
     structure has no unloaded equilibrium."""
     if design_load not in loads or not loads[design_load].any():
-        raise InputError("there is no design load to judge a design under", where="loads", value=design_load)
+        raise InputError(
+            "there is no design load to judge a design under",
+            where="loads",
+            value=design_load,
+            remedy='Name a load case "design", or the one to judge by.',
+        )
     found: dict[str, UnderLoad] = {}
     failed = []
     for largest, shares in paths(loads).items():

@@ -140,7 +140,11 @@ def surface_entry(file: Path | None, options: Mapping[str, Any]) -> SurfaceEntry
         where = ".".join(["surface", *(str(part) for part in first["loc"])])
         raise InputError(str(first["msg"]).lower(), where=where, value=first["input"]) from error
     if not Path(entry.file).is_file():
-        raise InputError("there is no such file", where=entry.file)
+        raise InputError(
+            "there is no such file",
+            where=entry.file,
+            remedy="Check the path; one in a case file is relative to it.",
+        )
     return entry
 
 
@@ -216,7 +220,11 @@ def _angle(text: str) -> float | Literal["auto"]:
     try:
         angle = float(np.deg2rad(float(text)))
     except ValueError as error:
-        raise InputError("must be degrees or auto", where="--angle", value=text) from error
+        raise InputError(
+            "must be degrees or auto", where="--angle", value=text, remedy="For example --angle 45."
+        ) from error
     if not math.isfinite(angle):
-        raise InputError("must be degrees or auto", where="--angle", value=text)
+        raise InputError(
+            "must be degrees or auto", where="--angle", value=text, remedy="For example --angle 45."
+        )
     return angle

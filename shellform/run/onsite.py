@@ -348,7 +348,9 @@ def _surveyed(
         places = METRES[options.unit] * places
         seen = np.isfinite(places).all(axis=1)
         if not seen.any():
-            raise InputError("no node was seen", where=str(path))
+            raise InputError(
+                "no node was seen", where=str(path), remedy="Give at least one node a measured place."
+            )
         nodes, places = nodes[seen], places[seen]
         away = np.linalg.norm(places - expected.positions[nodes], axis=1)
         worst = int(np.argmax(away))

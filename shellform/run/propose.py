@@ -224,7 +224,9 @@ def _named(told: str) -> str:
 def _check(output: Path) -> None:
     """Raises InputError where the case can't be written there."""
     if output.suffix.lower() != ".toml":
-        raise InputError("must end in .toml", where="--output", value=str(output))
+        raise InputError(
+            "must end in .toml", where="--output", value=str(output), remedy="For example --output mine.toml."
+        )
     if output.exists():
         raise InputError(
             "is there already and is not overwritten", where=str(output), remedy="Choose another --output."

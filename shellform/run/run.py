@@ -123,7 +123,11 @@ def _run(
         raise InputError("is no stage", where="--until", value=until, remedy=f"Stages: {', '.join(STAGES)}.")
     file = Path(case.surface.file)
     if not file.is_file():
-        raise InputError("there is no such file", where=f"surface.file: {file}")
+        raise InputError(
+            "there is no such file",
+            where=f"surface.file: {file}",
+            remedy="Check the path; one in a case file is relative to it.",
+        )
     check_script(file, allow_scripts=allow_scripts)
     keys = stage_keys(case, sketch=sketch)
     began = time.perf_counter()

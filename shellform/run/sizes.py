@@ -114,7 +114,9 @@ class DesignWish:
             if value is not None and not (value > 0.0 and math.isfinite(value)):
                 raise InputError("must be positive and finite", where=f"--{name}", value=value)
         if self.angle is not None and not math.isfinite(self.angle):
-            raise InputError("must be degrees or auto", where="--angle", value=self.angle)
+            raise InputError(
+                "must be degrees or auto", where="--angle", value=self.angle, remedy="For example --angle 45."
+            )
         if self.layers not in (None, 1, 2):
             raise InputError("must be 1 or 2", where="--layers", value=self.layers)
         if self.edges not in EDGES:

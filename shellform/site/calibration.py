@@ -394,5 +394,7 @@ class _Fit:
 def _checked(shell: Gridshell, nodes: Indices) -> Indices:
     markers = indices("nodes", nodes, (None,), below=shell.node_count)
     if len(np.unique(markers)) < len(markers):
-        raise InputError("a node is marked twice", where="nodes")
+        raise InputError(
+            "a node is marked twice", where="nodes", remedy="Give each marker a node of its own."
+        )
     return markers

@@ -36,7 +36,11 @@ def read_table(
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"can't be read: {error}", where=str(file)) from error
+        raise InputError(
+            f"can't be read: {error}",
+            where=str(file),
+            remedy="Give a table as CSV in UTF-8, with a head line.",
+        ) from error
     kept = [
         (k, line)
         for k, line in enumerate(text.splitlines(), 1)
@@ -58,12 +62,14 @@ def read_table(
             )
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"has two columns {name!r}", where=str(file))
+            raise InputError(f"has two columns {name!r}", where=str(file), remedy="Name each column once.")
     rows = []
     for (number, _), cells in zip(kept[1:], lines[1:], strict=True):
         if len(cells) > len(names):
             raise InputError(
-                f"has {len(cells)} cells for {len(names)} columns", where=f"{file}, line {number}"
+                f"has {len(cells)} cells for {len(names)} columns",
+                where=f"{file}, line {number}",
+                remedy="Give each line a cell for each column, empty ones too.",
             )
         values = {}
         for name in [each for each in (*needed, *optional) if each in names]:
@@ -81,7 +87,11 @@ def has_column(path: str | Path, name: str) -> bool:
     try:
         text = Path(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"can't be read: {error}", where=str(path)) from error
+        raise InputError(
+            f"can't be read: {error}",
+            where=str(path),
+            remedy="Give a table as CSV in UTF-8, with a head line.",
+        ) from error
     first = next(
         (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
     )
@@ -101,7 +111,7 @@ def nodes_of(path: str | Path, rows: list[MeasuredRow], shell: Gridshell) -> Ind
                 at = _index(row.values[name], where, count)
                 node = at if name == "node" else int(crossings[at])
                 if node in found:
-                    raise InputError("is there twice", where=where, value=at)
+                    raise InputError("is there twice", where=where, value=at, remedy="Keep one of the rows.")
                 found.append(node)
                 break
     return np.array(found, dtype=np.int64)
@@ -180,13 +190,21 @@ def read_way(path: str | Path, shell: Gridshell) -> list[Reals]:
             )
         places = stops.setdefault(row.values["stop"], {})
         if node in places:
-            raise InputError("is there twice in one stop", where=where, value=node)
+            raise InputError(
+                "is there twice in one stop",
+                where=where,
+                value=node,
+                remedy="Give each support one row a stop.",
+            )
         places[node] = [row.values[axis] for axis in "xyz"]
     for stop, places in stops.items():
         lacking = [node for node in supports if node not in places]
         if lacking:
             raise InputError(
-                f"stop {stop:g} lacks {len(lacking)} supports", where=str(path), value=lacking[0]
+                f"stop {stop:g} lacks {len(lacking)} supports",
+                where=str(path),
+                value=lacking[0],
+                remedy="Give every support a row in each stop.",
             )
     return [np.array([stops[stop][node] for node in supports]) for stop in sorted(stops)]
 

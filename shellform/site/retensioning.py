@@ -61,7 +61,7 @@ class Crew:
             if not (getattr(self, name) > 0.0 and np.isfinite(getattr(self, name))):
                 raise InputError("must be positive", where=f"crew.{name}", value=getattr(self, name))
         if self.step > self.largest:
-            raise InputError("is more than the largest change", where="crew.step", value=self.step)
+            raise InputError("must not be more than the largest change", where="crew.step", value=self.step)
         if self.cables < 1:
             raise InputError("must be at least 1", where="crew.cables", value=self.cables)
 
@@ -135,7 +135,7 @@ def drawn(shell: Gridshell, design: Design, state: State, load: Reals, *, length
         raise InputError("must be positive", where="length_error", value=length_error)
     count = int(design.present.sum())
     if count == 0:
-        raise InputError("has no cables to turn", where="design")
+        raise InputError("has no cables to turn", where="design", remedy="Name a design that has cables.")
     return Belief(design, length_error**2 * np.eye(count), state, np.asarray(load))
 
 
@@ -152,7 +152,9 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
         raise InputError("must be a point for each node", where="survey", value=measured.shape)
     seen = np.isfinite(measured).all(axis=1)
     if not seen.any():
-        raise InputError("no node was seen", where="survey")
+        raise InputError(
+            "no node was seen", where="survey", remedy="Give at least one node a measured place."
+        )
     if not (noise > 0.0 and np.isfinite(noise)):
         raise InputError("must be positive", where="noise", value=noise)
     goal, marked = measured[seen].ravel(), marked[seen]

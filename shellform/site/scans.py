@@ -99,7 +99,11 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
     try:
         text = file.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"can't be read: {error}", where=str(file)) from error
+        raise InputError(
+            f"can't be read: {error}",
+            where=str(file),
+            remedy="Give a text file: x, y, z of a point in each line.",
+        ) from error
     numbered = [
         (k, line)
         for k, line in enumerate(text.splitlines(), 1)
@@ -126,7 +130,9 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
                     remedy="Name the columns x, y, z in the first line.",
                 ) from error
     if not found:
-        raise InputError("has no points", where=str(file))
+        raise InputError(
+            "has no points", where=str(file), remedy="Give a text file: x, y, z of a point in each line."
+        )
     return METRES[unit] * reals(str(file), found, (None, 3))
 
 

@@ -105,14 +105,20 @@ def read_model(path: str | Path) -> Model:
     try:
         content = file.read_bytes()
     except OSError as error:
-        raise InputError(f"can't be read: {error}", where=str(file)) from error
+        raise InputError(
+            f"can't be read: {error}",
+            where=str(file),
+            remedy="Name a model file, such as RUN/designs/optimised.json.",
+        ) from error
     try:
         try:
             document = msgspec.json.decode(content, type=_ModelFile)
         except msgspec.ValidationError as error:
             refuse(error, _PARTS)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise InputError(f"isn't JSON: {error}") from error
+            raise InputError(
+                f"isn't JSON: {error}", remedy="Mend that place; json.dump writes what is valid."
+            ) from error
         del content
         return _model(document)
     except InputError as error:
@@ -208,7 +214,7 @@ def _model(document: _ModelFile) -> Model:
     nodes = _array(document.nodes, "nodes", 3)
     count = len(nodes)
     if count == 0:
-        raise InputError("there are none", where="nodes")
+        raise InputError("there are none", where="nodes", remedy="Give at least one node: [x, y, z] in m.")
     beams, cables = _beams(document.beams, nodes), _cables(document.cables, nodes)
     fixed, imposed, supported = _supports(document.supports, count)
     loads = {name: _load(entries, f"loads.{name}", count) for name, entries in document.loads.items()}
@@ -307,18 +313,12 @@ def _cables(entries: list[_Cable], nodes: Reals) -> Cables:
         [np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float
     )
     _positive(rest, "cables", "rest_length")
-    looped = ends[:, 0] == ends[:, 1]
-    if looped.any():
-        cable = int(np.argmax(looped))
-        raise InputError(
-            "the cable joins a node to itself", where=f"cables[{cable}]", value=int(ends[cable, 0])
-        )
     length = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
-    meeting = np.isnan(rest) & (length == 0.0)
+    meeting = np.isnan(rest) & (length == 0.0) & (ends[:, 0] != ends[:, 1])
     if meeting.any():
         cable = int(np.argmax(meeting))
         raise InputError(
-            "the two nodes of the cable coincide", where=f"cables[{cable}]", value=ends[cable].tolist()
+            "the cable's nodes must not coincide", where=f"cables[{cable}]", value=ends[cable].tolist()
         )
     return make_cables(ends, rest_length=np.where(np.isnan(rest), length, rest), stiffness=stiffness)
 
@@ -364,7 +364,7 @@ def _array(rows: Any, where: str, width: int) -> Reals:
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(
-            f"holds a number beyond {_HUGE:g}", where=f"{where}[{row}]", value=array[row].tolist()
+            f"must be below {_HUGE:g}, in SI units", where=f"{where}[{row}]", value=array[row].tolist()
         )
     return array
 
@@ -373,7 +373,7 @@ def _pairs(pairs: list[tuple[int, int]], name: str, count: int) -> np.ndarray:
     try:
         ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
     except OverflowError as error:
-        raise InputError("a node number is out of range", where=name) from error
+        raise InputError("must be numbers of nodes, counted from 0", where=name) from error
     outside = ((ends < 0) | (ends >= count)).any(axis=1)
     if outside.any():
         element = int(np.argmax(outside))

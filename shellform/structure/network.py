@@ -44,7 +44,10 @@ class Network:
             if ends.size and ends.max() >= count:
                 element = int(np.argmax(ends.max(axis=1) >= count))
                 raise InputError(
-                    "a node number is out of range", where=f"{name}[{element}]", value=ends[element].tolist()
+                    "a node number is out of range",
+                    where=f"{name}[{element}]",
+                    value=ends[element].tolist(),
+                    remedy="Nodes are counted from 0.",
                 )
 
 

@@ -31,7 +31,7 @@ def refuse(error: msgspec.ValidationError, parts: Mapping[str, Any]) -> NoReturn
             said.replace("`", "").lower(), where=where, remedy="See the model file's description."
         ) from error
     if field[1] == "required":
-        raise InputError(f"the field {field[2]!r} is missing", where=where) from error
+        raise InputError(f"the field {field[2]!r} is missing", where=where, remedy="Add it.") from error
     part = next(key for key in ("beams", "cables", "supports", "loads", "start", "") if where.startswith(key))
     known = parts[part].__struct_fields__
     near = difflib.get_close_matches(field[2], known, n=1)

@@ -110,7 +110,12 @@ def engine(
             try:
                 client = Client(scheduler, timeout="10s", set_as_default=False)
             except (OSError, ValueError, ImportError) as error:
-                raise InputError(f"doesn't answer: {error}", where="--scheduler", value=scheduler) from error
+                raise InputError(
+                    f"doesn't answer: {error}",
+                    where="--scheduler",
+                    value=scheduler,
+                    remedy="Start one (dask scheduler), mend the address, or leave --scheduler out.",
+                ) from error
             try:
                 yield Engine(client, client.dashboard_link or "")
             finally:

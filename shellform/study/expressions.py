@@ -58,18 +58,35 @@ def evaluate(text: str, where: str, entry: Callable[[str], float]) -> float:
     finite.
     """
     if len(text) > _LONGEST:
-        raise InputError(f"is longer than {_LONGEST} characters", where=where)
+        raise InputError(
+            f"is longer than {_LONGEST} characters", where=where, remedy="Split it into functions."
+        )
     try:
         tree = ast.parse(text.strip(), mode="eval")
         value = _value(tree.body, where, entry)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"can't be worked out: {error}", where=where, value=text) from error
+        raise InputError(
+            f"can't be worked out: {error}",
+            where=where,
+            value=text,
+            remedy="Mend the expression, or the numbers that it is given.",
+        ) from error
     except (ArithmeticError, TypeError) as error:
-        raise InputError(f"can't be worked out: {error}", where=where, value=text) from error
+        raise InputError(
+            f"can't be worked out: {error}",
+            where=where,
+            value=text,
+            remedy="Mend the expression, or the numbers that it is given.",
+        ) from error
     if not math.isfinite(value):
-        raise InputError("isn't finite", where=where, value=text)
+        raise InputError(
+            "isn't finite",
+            where=where,
+            value=text,
+            remedy="Mend the expression, or the numbers that it is given.",
+        )
     return value
 
 

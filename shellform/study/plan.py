@@ -218,7 +218,11 @@ def make_plan(study: Study, file: Path) -> Plan:
             ranges[name] = lambda at, entry=entry: ranged(entry, at)  # type: ignore[misc]
     plan = Plan(study, file, tables, base, lists, ranges)
     if length(plan) > _MOST:
-        raise InputError(f"makes {length(plan):,} designs; up to {_MOST:,} are taken", where=str(file))
+        raise InputError(
+            f"makes {length(plan):,} designs; up to {_MOST:,} are taken",
+            where=str(file),
+            remedy="Give fewer values a variable, or sample them.",
+        )
     if study.method != "search":
         resolved(plan, next(iter(changes(plan))))  # what is wrong with all designs is wrong with the study
     return plan
@@ -295,7 +299,11 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
             return found[name]
         if name in study.function:
             if name in asked:
-                raise InputError("follows from itself", where=f"{plan.file}: function.{name}")
+                raise InputError(
+                    "follows from itself",
+                    where=f"{plan.file}: function.{name}",
+                    remedy="Take the function out of its own expression.",
+                )
             asked.append(name)
             text = study.function[name]
             found[name] = (
@@ -306,7 +314,12 @@ def resolved(plan: Plan, own: Mapping[str, Value]) -> tuple[Case, dict[str, Valu
             return found[name]
         value = given[name] if name in given else _value_of(plan.base, name)
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise InputError("is no number of the case", where=f"{plan.file}: function", value=name)
+            raise InputError(
+                "is no number of the case",
+                where=f"{plan.file}: function",
+                value=name,
+                remedy="Name an entry of the case that is a number, as net.spacing, or another function.",
+            )
         return float(value)
 
     follow = {name: _as_the_base(plan, name, entry(name)) for name in study.function}
@@ -359,11 +372,26 @@ def _inside(file: Path, name: str, where: str) -> Path:
 def _files(file: Path, pattern: str, where: str) -> list[str]:
     root = file.parent.resolve()
     if Path(pattern).is_absolute() or ".." in Path(pattern).parts or not pattern.strip():
-        raise InputError("leads out of the study file's folder", where=f"{file}: {where}", value=pattern)
+        raise InputError(
+            "leads out of the study file's folder",
+            where=f"{file}: {where}",
+            value=pattern,
+            remedy="Put the study file beside or above them.",
+        )
     try:
         found = sorted(str(_inside(file, str(each), where)) for each in root.glob(pattern) if each.is_file())
     except (ValueError, NotImplementedError, OSError) as error:
-        raise InputError(f"is no pattern: {error}", where=f"{file}: {where}", value=pattern) from error
+        raise InputError(
+            f"is no pattern: {error}",
+            where=f"{file}: {where}",
+            value=pattern,
+            remedy="For example shells/*.obj.",
+        ) from error
     if not found:
-        raise InputError("there is no such file", where=f"{file}: {where}", value=pattern)
+        raise InputError(
+            "there is no such file",
+            where=f"{file}: {where}",
+            value=pattern,
+            remedy="Name a file below the study file's folder.",
+        )
     return found

@@ -105,7 +105,11 @@ class Log:
         file.seek(self._places[key])
         outcome = _outcome(file.readline())
         if outcome is None:
-            raise InputError("has been changed by somebody else", where=str(self.file))
+            raise InputError(
+                "has been changed by somebody else",
+                where=str(self.file),
+                remedy="Let it finish alone, then run the study again.",
+            )
         return outcome
 
     def add(self, outcomes: Sequence[Outcome]) -> None:

@@ -212,7 +212,11 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
         case, values = resolved(study.plan, own)
         file = Path(case.surface.file)
         if not file.is_file():
-            raise InputError("there is no such file", where=f"surface.file: {file}")
+            raise InputError(
+                "there is no such file",
+                where=f"surface.file: {file}",
+                remedy="Check the path; one in a case file is relative to it.",
+            )
         check_script(file, allow_scripts=study.allow_scripts)
         keys = stage_keys(case)
     except InputError as error:
@@ -333,7 +337,10 @@ def _finish(study: _Studying) -> Finding:
             found = picked(outcome.values, plan.study.column)
             empty -= {name for name, value in found.items() if value is not None}
     if failed == count:
-        raise NotConverged(f"None of {count} designs has a result. The first was {reason}")
+        raise NotConverged(
+            f"None of {count} designs has a result. The first was {reason}",
+            remedy="Run one of them alone with shellform design, and mend what it says.",
+        )
     old = sum(study.log.old(key) for key in set(keys))
     return Finding(
         count,

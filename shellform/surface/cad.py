@@ -84,7 +84,11 @@ def import_surface(
     """The surface of a STEP, IGES or BREP file as `read_cad` reads it, in this process, and z up."""
     file = Path(path)
     if not file.is_file():
-        raise InputError("there is no such file", where=str(file))
+        raise InputError(
+            "there is no such file",
+            where=str(file),
+            remedy="Check the path; one in a case file is relative to it.",
+        )
     kind = FORMATS.get(file.suffix.lower())
     if kind is None:
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
@@ -240,7 +244,11 @@ def write_cad(path: str | Path, script: str | Path, **dimensions: float) -> None
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")
     module = load_script(source)
     if hasattr(module, "form"):
-        raise InputError("is form-found on a mesh, of which there is no CAD file", where=str(source))
+        raise InputError(
+            "is form-found on a mesh, of which there is no CAD file",
+            where=str(source),
+            remedy="Build its mesh instead (cad.build_surface).",
+        )
     build = function_of(module, "build", source)
     named = named_dimensions(build, dimensions, source)
     with session(), errors(source, "the script fails", "Check the script and its dimensions."):

@@ -6,6 +6,7 @@ import pytest
 
 from shellform.case.build_gridshell import rounding_catalogue
 from shellform.case.build_rod import given_section
+from shellform.case.build_safety import critical_factors_asked
 from shellform.case.case import check_script, dump_case, load_case, shipped_surfaces
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import label
@@ -39,6 +40,15 @@ def test_rods_in_two_layers_are_laths_of_a_catalogue_twice(tmp_path):
     assert section.composite == 0.7
     assert {label(each) for each in rounding_catalogue(case).sections} > {"2 layers of 50 × 35 mm"}
     assert load_case(write(tmp_path, dump_case(case))) == case
+
+
+def test_a_critical_factor_that_is_not_asked_for_stays_unasked_in_the_run_folder(tmp_path):
+    case = load_case(ROOT / "scripts/scale_model.toml", ["safety.critical_factor=0"])
+    again = load_case(write(tmp_path, dump_case(case)))
+    assert again == case
+    assert critical_factors_asked(again) == {}
+    with pytest.raises(InputError, match=r"critical_factor must be 0 .* or at least 1"):
+        load_case(ROOT / "scripts/scale_model.toml", ["safety.critical_factor=0.5"])
 
 
 def test_settings_take_the_place_of_entries():

@@ -49,7 +49,7 @@ def bow():
         (lambda m: m["beams"][3].update(EA=-1.0), r"beams\[3\].EA.*positive"),
         (lambda m: m["beams"][3].update(rest_length=0.0), r"beams\[3\].rest_length.*positive"),
         (lambda m: m["beams"][3].update(EIy=1e300), r"beams\[3\].EIy.*beyond what can be calculated"),
-        (lambda m: m["nodes"].__setitem__(3, [1e300, 0, 0]), r"nodes\[3\].*beyond 1e\+30"),
+        (lambda m: m["nodes"].__setitem__(3, [1e300, 0, 0]), r"nodes\[3\].*below 1e\+30, in SI units"),
         (lambda m: m["beams"][3].update(nodes=[3, 99]), r"beams\[3\].nodes.*out of range.*0 to 8"),
         (lambda m: m["beams"][3].update(nodes=[3, 2**70]), r"beams"),
         (lambda m: m["beams"][3].update(nodes=[3, 3]), r"beams\[3\].*coincide"),

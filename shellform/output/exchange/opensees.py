@@ -154,6 +154,7 @@ def opensees_script(
             "its rest length isn't the distance of its nodes, which OpenSees' frames can't say",
             where=f"beams[{which}].rest_length",
             value=float(beams.rest_length[which]),
+            remedy="Export another design, or analyse it with shellform analyse.",
         )
     stiffness = np.column_stack([beams.axial, beams.torsion, beams.bending_y, beams.bending_z])
     sections, section = np.unique(stiffness, axis=0, return_inverse=True)

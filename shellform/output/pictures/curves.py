@@ -30,7 +30,10 @@ def read_history(table: Mapping[str, Sequence[object]] | Iterable[Mapping[str, o
     step = next((name for name in ("evaluation", "iteration") if name in columns), None)
     if step is None or not len(columns[step]):
         raise InputError(
-            "has no rows with a column evaluation or iteration", where="history", value=sorted(columns)
+            "has no rows with a column evaluation or iteration",
+            where="history",
+            value=sorted(columns),
+            remedy="Draw the history.csv of a run that has been optimised.",
         )
     wanted = [
         step,

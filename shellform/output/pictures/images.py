@@ -65,7 +65,7 @@ def write_film(path: str | Path, frames: Sequence[NDArray[np.uint8]], *, rate: i
     """
     target = door(path, *FILMS)
     if not frames:
-        raise InputError("has no frames", where=str(target))
+        raise InputError("has no frames", where=str(target), remedy="Draw one picture at least.")
     still = [*frames, *[frames[-1]] * round(_HOLD * rate)]
     with whole(target) as partial:
         (_write_gif if target.suffix.lower() == ".gif" else _write_mp4)(partial, still, rate)

@@ -65,7 +65,12 @@ def panel_of(
             "is nothing to draw", where="quantity", value=quantity, remedy=f"Known: {', '.join(QUANTITIES)}."
         )
     if len(state.positions) != shell.node_count:
-        raise InputError("belongs to another shell", where="state", value=len(state.positions))
+        raise InputError(
+            "belongs to another shell",
+            where="state",
+            value=len(state.positions),
+            remedy="Draw a state with the shell that it was solved for.",
+        )
     chosen = shell.unbraced() if design is None else design
     seen = QUANTITIES[quantity](shell, chosen, state)
     cables = shell.cables(chosen)

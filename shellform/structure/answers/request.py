@@ -27,7 +27,11 @@ def check_request(
     if increments < 1:
         raise InputError("must be at least 1", where="--increments", value=increments)
     if not (np.isfinite(factor) and 0.0 < tolerance < 1.0):
-        raise InputError("--factor must be finite and --tolerance between 0 and 1", value=(factor, tolerance))
+        raise InputError(
+            "--factor must be finite and --tolerance between 0 and 1",
+            value=(factor, tolerance),
+            remedy="For example --factor 1 --tolerance 1e-9.",
+        )
     if method not in METHODS:
         raise InputError(
             "unknown method", where="--method", value=method, remedy=f"Known: {', '.join(METHODS)}."
@@ -63,6 +67,7 @@ def check_imposed_turns(network: Network) -> None:
         raise InputError(
             "a rotation can be imposed only where all three rotations are fixed",
             where=f"supports at node {int(np.argmax(partly))}",
+            remedy="Fix all three rotations of that node, or impose none.",
         )
 
 

@@ -109,7 +109,11 @@ def read_sections(path: str | Path) -> dict[str, Section]:
     try:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"can't be read: {error}", where=str(file)) from error
+        raise InputError(
+            f"can't be read: {error}",
+            where=str(file),
+            remedy="Give the sections as TOML, a table for each kind of beam.",
+        ) from error
     return {kind: _section(table, f"{file}: [{kind}]") for kind, table in tables.items()}
 
 
@@ -127,12 +131,12 @@ def _section(table: object, where: str) -> Section:
             )
     for name in (*sizes, "young"):
         if name not in table:
-            raise InputError(f"the entry {name!r} is missing", where=where)
+            raise InputError(f"the entry {name!r} is missing", where=where, remedy="Add it.")
     for name, value in table.items():
         if name != "shape" and (isinstance(value, bool) or not isinstance(value, int | float)):
             raise InputError("must be a number", where=f"{where}.{name}", value=value)
     if ("shear" in table) == ("poisson" in table):
-        raise InputError("give either shear or poisson", where=where)
+        raise InputError("needs either shear or poisson", where=where)
     known = {name: float(table[name]) for name in ("density", "strength") if name in table}
     if "shear" in table:
         material = Material(float(table["young"]), float(table["shear"]), **known)

@@ -40,14 +40,17 @@ class Cables:
         count = len(self.ends)
         put = object.__setattr__
         put(self, "ends", indices("cables.ends", self.ends, (count, 2), below=np.iinfo(np.int64).max))
-        put(self, "rest_length", reals("cables.rest_length", self.rest_length, (count,), positive=True))
-        put(self, "stiffness", reals("cables.stiffness", self.stiffness, (count,), positive=True))
         looped = self.ends[:, 0] == self.ends[:, 1]
         if looped.any():
             cable = int(np.argmax(looped))
             raise InputError(
-                "the cable joins a node to itself", where=f"cables[{cable}]", value=int(self.ends[cable, 0])
+                "the cable joins a node to itself",
+                where=f"cables[{cable}]",
+                value=int(self.ends[cable, 0]),
+                remedy="Give it two different nodes, or leave it out.",
             )
+        put(self, "rest_length", reals("cables.rest_length", self.rest_length, (count,), positive=True))
+        put(self, "stiffness", reals("cables.stiffness", self.stiffness, (count,), positive=True))
 
     def dofs(self) -> Indices:
         """Translations (c, 6) of the two ends."""

@@ -217,5 +217,10 @@ def _carried(assembly: Assembly, state: State, drive: Drive, change: float) -> t
     else:
         then = moved(state, assembly.chords.corrected(state, step.reshape(-1, 6)))
     if _folded(assembly, state, then):
-        raise NotConverged("Supports that move fold an element", state=state, iterations=1)
+        raise NotConverged(
+            "Supports that move fold an element",
+            state=state,
+            iterations=1,
+            remedy="Move them by less, or in more stops.",
+        )
     return then, 1

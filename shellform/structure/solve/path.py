@@ -175,7 +175,10 @@ class _Path:
         found = np.flatnonzero(self.assembly.free == 6 * lead[0] + lead[1])
         if not len(found):
             raise InputError(
-                "is held or doesn't exist; only a free displacement can lead", where="path", value=lead[:2]
+                "is held or doesn't exist; only a free displacement can lead",
+                where="path",
+                value=lead[:2],
+                remedy="Choose a node that is free along that axis.",
             )
         return int(found[0])
 

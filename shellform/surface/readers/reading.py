@@ -118,7 +118,11 @@ def surface_of(
 def kind_of(file: Path) -> str:
     """The format of a file, one of ENDINGS' values. Raises InputError for what can't be read here."""
     if not file.is_file():
-        raise InputError("there is no such file", where=str(file))
+        raise InputError(
+            "there is no such file",
+            where=str(file),
+            remedy="Check the path; one in a case file is relative to it.",
+        )
     size = file.stat().st_size
     if size == 0:
         raise InputError("is empty", where=str(file), remedy="Copy or export it anew.")

@@ -18,7 +18,11 @@ from shellform.errors import InputError
 
 def load_script(path: Path) -> ModuleType:
     if not path.is_file():
-        raise InputError("there is no such file", where=str(path))
+        raise InputError(
+            "there is no such file",
+            where=str(path),
+            remedy="Check the path; one in a case file is relative to it.",
+        )
     spec = importlib.util.spec_from_file_location(f"surface_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise InputError("isn't a Python script", where=str(path), remedy="Builder scripts end in .py.")
@@ -26,7 +30,11 @@ def load_script(path: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # whatever somebody's script raises
-        raise InputError(f"the script fails: {type(error).__name__}: {error}", where=str(path)) from error
+        raise InputError(
+            f"the script fails: {type(error).__name__}: {error}",
+            where=str(path),
+            remedy="Mend the script: build(size, **dimensions) draws the surface with gmsh.",
+        ) from error
     return module
 
 
