@@ -386,6 +386,8 @@ def speed() -> str:
     told = "; ".join([*found["notes"], f"load of the machine before: {found['load_before']:g}"])
     missed = [row["what"] for row in found["rows"] if row["holds"] is False]
     told += f". Aims not met: {'; '.join(missed)}" if missed else ""
+    if f"version {shellform.__version__};" not in told:
+        told = f"**Not of this version ({shellform.__version__}), but of an older one:** {told}"
     notes = (PAGES / "speed.md").read_text(encoding="utf-8")
     return notes + f"\n## The numbers\n\n{told}.\n\n" + table(["what", "value", "unit", "aim"], cells) + "\n"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt, model_validator
 
@@ -10,8 +10,10 @@ from shellform.case.entries import Entry
 from shellform.gridshell.tolerances import SOURCES
 
 
-def _default(name: str) -> str:
-    return f"{SOURCES[name]}; left out: by the shell's size"
+def _deviation(unit: str, name: str) -> Any:
+    """The field of a standard deviation: its unit, the source of its size, and what holds where it is left out."""
+    words = f"{unit}: {SOURCES[name]}; left out: by the shell's size"
+    return Field(None, description=words)
 
 
 class TolerancesEntry(Entry):
@@ -19,33 +21,17 @@ class TolerancesEntry(Entry):
     follows the shell's size, as run folders' case files say with its source.
     """
 
-    cable_length: NonNegativeFloat | None = Field(None, description=f"m: {_default('cable_length')}")
-    cable_stiffness: NonNegativeFloat | None = Field(
-        None, description=f"share: {_default('cable_stiffness')}"
-    )
-    supports: NonNegativeFloat | None = Field(None, description=f"m, each coordinate: {_default('supports')}")
-    marks: NonNegativeFloat | None = Field(
-        None, description=f"m, of crossings along rods: {_default('marks')}"
-    )
-    rod_stiffness: NonNegativeFloat | None = Field(
-        None, description=f"share, of each rod: {_default('rod_stiffness')}"
-    )
-    rod_bow: NonNegativeFloat | None = Field(
-        None, description=f"rise over length of each rod: {_default('rod_bow')}"
-    )
-    connectors: NonNegativeFloat | None = Field(None, description=f"share: {_default('connectors')}")
-    load_each: NonNegativeFloat | None = Field(
-        None, description=f"share, of each crossing's load: {_default('load_each')}"
-    )
-    load_all: NonNegativeFloat | None = Field(
-        None, description=f"share, of the whole load: {_default('load_all')}"
-    )
-    load_uneven: NonNegativeFloat | None = Field(
-        None, description=f"share, of one half's load: {_default('load_uneven')}"
-    )
-    shape: NonNegativeFloat | None = Field(
-        None, description=f"amplitude of each soft mode over the span: {_default('shape')}"
-    )
+    cable_length: NonNegativeFloat | None = _deviation("m", "cable_length")
+    cable_stiffness: NonNegativeFloat | None = _deviation("share", "cable_stiffness")
+    supports: NonNegativeFloat | None = _deviation("m, each coordinate", "supports")
+    marks: NonNegativeFloat | None = _deviation("m, of crossings along rods", "marks")
+    rod_stiffness: NonNegativeFloat | None = _deviation("share, of each rod", "rod_stiffness")
+    rod_bow: NonNegativeFloat | None = _deviation("rise over length of each rod", "rod_bow")
+    connectors: NonNegativeFloat | None = _deviation("share", "connectors")
+    load_each: NonNegativeFloat | None = _deviation("share, of each crossing's load", "load_each")
+    load_all: NonNegativeFloat | None = _deviation("share, of the whole load", "load_all")
+    load_uneven: NonNegativeFloat | None = _deviation("share, of one half's load", "load_uneven")
+    shape: NonNegativeFloat | None = _deviation("amplitude of each soft mode over the span", "shape")
     cable_stiffness_all: NonNegativeFloat | None = Field(
         None, description=f"share, of all cables together; left out: 0, {SOURCES['cable_stiffness_all']}"
     )

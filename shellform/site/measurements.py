@@ -24,6 +24,17 @@ class MeasuredRow:
     values: dict[str, float]
 
 
+_TABLE = "Give a table as CSV in UTF-8, with a head line."
+
+
+def text_of(path: str | Path, remedy: str) -> str:
+    """The text of a file in UTF-8, without a mark at its beginning. Raises InputError, with the `remedy`."""
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"can't be read: {error}", where=str(path), remedy=remedy) from error
+
+
 def read_table(
     path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = (), *, empty: tuple[str, ...] = ()
 ) -> list[MeasuredRow]:
@@ -32,15 +43,7 @@ def read_table(
 
     Raises InputError naming file, line and column.
     """
-    file = Path(path)
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"can't be read: {error}",
-            where=str(file),
-            remedy="Give a table as CSV in UTF-8, with a head line.",
-        ) from error
+    file, text = Path(path), text_of(path, _TABLE)
     kept = [
         (k, line)
         for k, line in enumerate(text.splitlines(), 1)
@@ -84,14 +87,7 @@ def read_table(
 
 def has_column(path: str | Path, name: str) -> bool:
     """Whether the first line of a file that can be read names the column."""
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"can't be read: {error}",
-            where=str(path),
-            remedy="Give a table as CSV in UTF-8, with a head line.",
-        ) from error
+    text = text_of(path, _TABLE)
     first = next(
         (line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")), ""
     )

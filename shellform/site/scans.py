@@ -21,6 +21,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
+from shellform.site.measurements import text_of
 from shellform.structure.elements.state import State
 from shellform.surface.units import METRES
 
@@ -95,15 +96,7 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
         raise InputError(
             "isn't a known unit", where="scan.unit", value=unit, remedy=f"Known: {', '.join(METRES)}."
         )
-    file = Path(path)
-    try:
-        text = file.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"can't be read: {error}",
-            where=str(file),
-            remedy="Give a text file: x, y, z of a point in each line.",
-        ) from error
+    file, text = Path(path), text_of(path, "Give a text file: x, y, z of a point in each line.")
     numbered = [
         (k, line)
         for k, line in enumerate(text.splitlines(), 1)

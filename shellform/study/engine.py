@@ -106,16 +106,7 @@ def engine(
     } | ({} if dashboard else {"distributed.scheduler.http.routes": []})
     with dask.config.set(settings):
         if scheduler is not None:
-            _reach(scheduler)
-            try:
-                client = Client(scheduler, timeout="10s", set_as_default=False)
-            except (OSError, ValueError, ImportError) as error:
-                raise InputError(
-                    f"doesn't answer: {error}",
-                    where="--scheduler",
-                    value=scheduler,
-                    remedy="Start one (dask scheduler), mend the address, or leave --scheduler out.",
-                ) from error
+            client = _client(scheduler)
             try:
                 yield Engine(client, client.dashboard_link or "")
             finally:
@@ -153,6 +144,22 @@ def _restore(variables: Mapping[str, str | None]) -> None:
             os.environ.pop(name, None)
         else:
             os.environ[name] = value
+
+
+def _client(scheduler: str) -> Any:
+    """Dask's client of the scheduler at the address. Raises InputError where it doesn't answer."""
+    from distributed import Client
+
+    _reach(scheduler)
+    try:
+        return Client(scheduler, timeout="10s", set_as_default=False)
+    except (OSError, ValueError, ImportError) as error:
+        raise InputError(
+            f"doesn't answer: {error}",
+            where="--scheduler",
+            value=scheduler,
+            remedy="Start one (dask scheduler), mend the address, or leave --scheduler out.",
+        ) from error
 
 
 def _reach(address: str) -> None:

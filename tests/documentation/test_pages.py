@@ -193,6 +193,13 @@ def test_every_key_of_a_summary_is_named_where_its_record_is_described():
         assert place in anchors(page)
 
 
+def test_speeds_of_another_version_are_told_as_such(monkeypatch):
+    measured = re.search(r"version ([\d.]+);", documentation.speed())[1]
+    for version, older in ((measured, False), ("99.0", True)):
+        monkeypatch.setattr(sf, "__version__", version)
+        assert ("Not of this version (99.0), but of an older one" in documentation.speed()) == older
+
+
 def test_blocks_that_are_only_read_are_those_that_are_told_why():
     assert set(pages("console")) == set(ALONE)
 
