@@ -141,9 +141,8 @@ def mesh_patches(
         gmsh.model.occ.synchronize()
         if not _faces_connected():
             tolerance = _SEWN * float(extent().max())
-            gmsh.model.occ.healShapes(
-                gmsh.model.occ.getEntities(2), tolerance, False, False, False, True, False
-            )
+            # Of all shapes at once, which an empty list means: named ones are sewn each by itself, to nothing.
+            gmsh.model.occ.healShapes([], tolerance, False, False, False, True, False)
             gmsh.model.occ.synchronize()
         return _draft(where, size, up, face)
 

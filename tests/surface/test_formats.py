@@ -18,6 +18,7 @@ from shellform.errors import InputError
 from shellform.surface import cad
 from shellform.surface.readers import rhino
 from shellform.surface.readers.meshes import write_mesh
+from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.reading import read_surface
 from tests.surface.brought import rhino_mesh
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl, y_up
@@ -368,6 +369,22 @@ def test_curved_patches_are_cut_at_their_trims_and_holes():
     level = np.sqrt(x**2 / 9 + y**2 / 4)
     assert level.min() == pytest.approx(0.3, abs=1e-4)
     assert level.max() == pytest.approx(0.8, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("side", "gap", "sewn"), [(80.0, 2e-5, True), (80.0, 1e-3, False), (0.5, 1e-7, True)]
+)
+def test_patches_are_sewn_over_gaps_of_up_to_a_millionth_of_their_extent(side, gap, sewn):
+    def flat(first, last):
+        corner = [[(x, y, 0.0) for y in (0.0, 0.5 * side)] for x in (first, last)]
+        return Patch(np.array(corner), np.ones((2, 2)), ([0.0, 0.0, 1.0, 1.0],) * 2, (1, 1))
+
+    halves = [flat(0.0, 0.5 * side), flat(0.5 * side + gap, side)]
+    draft = cad.mesh_patches(halves, size=side, up="z", face=None, where=Path("halves.3dm"))
+    sides = np.sort(np.vstack([draft.triangles[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    found, count = np.unique(sides, axis=0, return_counts=True)
+    middle = np.abs(draft.points[found[count == 1], 0] - 0.5 * side).max(axis=1) < 0.01 * side
+    assert middle.any() == (not sewn)
 
 
 def test_a_surface_of_revolution_closes_over_its_seam_and_pole(tmp_path):

@@ -1,0 +1,72 @@
+"""What the search for a first design calls a failure, and how much less concrete it tries next. What a design came to
+is stood in for, so that each case is the one that is meant."""
+
+from collections import namedtuple
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.run import first_design
+from shellform.run.first_design import FirstDesign, _Search
+from shellform.run.first_trial import Followed
+from shellform.run.unbuildable import Obstacle, Why
+
+Choice = namedtuple("Choice", "section")
+PARTS = SimpleNamespace(easier=lambda tried, most: None, choice=None)
+
+
+def came_to(factor, stress, edge, pull):
+    return Followed(factor, stress, edge, pull, 0.01, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    ("found", "why", "stress"),
+    [
+        ((1.5, 0.94, 0.94, 0.99), None, None),
+        ((1.49, 0.94, 0.94, 0.99), Why.STABILITY, 0.94),
+        ((0.0, 0.99, 0.1, 0.1), Why.STABILITY, 0.99),
+        ((0.0, 1.01, 0.1, 0.1), Why.STRENGTH, 1.01),  # broken before any load
+        ((1.5, 0.96, 0.99, 0.1), Why.STRENGTH, 0.96),
+        ((1.5, 0.1, 0.96, 0.1), Why.EDGES, 0.96),
+        ((1.5, 0.1, 0.1, 1.01), Why.CABLES, 1.01),
+    ],
+)
+def test_a_design_fails_by_load_then_by_its_rods_edge_beams_and_cables(found, why, stress):
+    search = SimpleNamespace(_followed=lambda placed, parts, thickness: came_to(*found))
+    _, tried, failure = _Search._solved(search, None, PARTS, 0.5, 0.05)
+    assert tried.factor == found[0]
+    if why is None:
+        assert failure is None
+        return
+    assert (failure.why, failure.stress, failure.factor) == (why, stress, found[0])
+    assert failure.where[0] == (2.0 if why is Why.STRENGTH else 1.0)
+
+
+@pytest.mark.parametrize(
+    ("why", "factor", "millimetres"),
+    [
+        (Why.STABILITY, 0.9, 28),  # 0.95 of what it bears of 1.5 times 50 mm
+        (Why.STABILITY, 1.45, 40),  # at least a fifth less
+        (Why.SCATTER, 1.6, 40),  # structures as built fall: as if it bore nine tenths of what is needed
+        (Why.SCATTER, 0.6, 19),
+    ],
+)
+def test_concrete_is_thinned_by_what_the_design_falls_short_of(monkeypatch, why, factor, millimetres):
+    tried = []
+
+    def stands(placed, choice, spacing, thickness):
+        tried.append(round(1e3 * thickness, 6))
+        return object.__new__(FirstDesign)
+
+    monkeypatch.setattr(first_design, "choices", lambda *_: ())
+    choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
+    search = SimpleNamespace(
+        best=Obstacle(why, 0.5, 0.05, factor, choice, SimpleNamespace(net=None)),
+        wish=SimpleNamespace(rod=None, thickness=None),
+        allowance=SimpleNamespace(thins=True, over=False),
+        _stands=stands,
+    )
+    assert isinstance(_Search._thinner(search, 0.02, 0.02), FirstDesign)
+    assert tried == [millimetres]
