@@ -23,7 +23,8 @@ ROOT = Path(__file__).parent.parent
 CASE = ROOT / "scripts/vault.toml"
 KINDS = {"InputError", "Damaged", "NotConverged", "NoNet"}
 SAYS = ("must", "needs")
-# Their words come from elsewhere (another refusal, pydantic's, the search's), or nobody outside meets them.
+# Their words come from elsewhere (another refusal, pydantic's, the search's), nobody outside meets them, or, as where
+# no surface near a crumpled one is smooth, no remedy is known to work.
 EXCUSED = {
     "case/case.py": 1,
     "cli/analyse.py": 1,
@@ -36,6 +37,7 @@ EXCUSED = {
     "run/first_refusal.py": 1,
     "structure/model.py": 1,
     "surface/readers/foreign.py": 2,
+    "surface/shape/fairing.py": 2,
     "tables.py": 1,
 }
 

@@ -107,7 +107,6 @@ def _rounded(start: Surface, fit: _Fit, radius: float) -> Faired:
         "is left at one place",
         residual=radius / left - 1.0,
         iterations=_ROUNDS * _STEPS,
-        remedy="Ask for a smaller radius.",
     )
 
 
@@ -326,5 +325,4 @@ def _refuse_folds(start: Surface, at: Reals, radius: float) -> None:
             f"Rounded to {radius:.3g} m the surface folds over",
             residual=float("nan"),
             iterations=_ROUNDS * _STEPS,
-            remedy="Ask for a smaller radius.",
         )
