@@ -152,6 +152,6 @@ def tell_cases(rows: Iterable[Any]) -> None:
     if failed:
         raise NotConverged(
             f"{failed} of {number} numbers do not hold",
-            remedy="Compare the versions of NumPy, SciPy and Numba with scripts/locks.",
+            remedy="Tell us, with what shellform --version says.",
         )
     print(f"all {number} numbers of {len(cases)} cases hold")
