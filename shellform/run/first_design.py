@@ -76,9 +76,8 @@ _STEPS = 4  # sections tried on one net
 _EASED = 5  # times that cables are eased, by less prestrain or thicker strands
 _SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 _THINNER = 8  # thicknesses tried
-_TURNED = (
-    0.2  # of the rods' strength lost to joints that resist turning: beyond it ones that turn are proposed
-)
+# of the rods' strength lost to joints that resist turning: beyond it no others are tried
+_TURNED = 0.5
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
 Say = Callable[[str], None]
 
@@ -332,9 +331,13 @@ class _Search:
             easier = parts.easier(tried, PULLED if turn == 0 else STRESSED)
             if easier is None:
                 break
-            before = tried
+            before = parts, tried
             parts, tried = easier, self._followed(placed, easier, thickness)
-            if tried.stress > max(STRESSED, _SPARED * before.stress):
+            if tried.stress > max(STRESSED, _SPARED * before[1].stress):
+                if (
+                    tried.stress > before[1].stress or tried.factor < NEEDED
+                ):  # joints that turn stiffen less, too
+                    parts, tried = before
                 break
         why = None
         if tried.factor < NEEDED:  # what breaks before any load has no stability to speak of
