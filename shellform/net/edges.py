@@ -10,7 +10,8 @@ them off. Each stretch of such a curve has a kind:
 
 `Edges` says which: the first of its stretches that a place lies in decides, and elsewhere the geometry. What
 lies within two hundredths of the surface's larger extent in plan above the ground stands on the ground; what
-is higher has an edge beam, which is carried down along the edge to where the edge stops falling, its foot.
+is higher has an edge beam, which is carried down along the edge to where the edge stops falling steeply, its
+foot: an edge that undulates on the ground keeps it.
 A beam round an opening is a closed ring.
 
 The beam's axis lies on the edge itself, half a gap from the rods, with a node for each rod's end, one for
@@ -39,6 +40,7 @@ HELD = ("ground", "wall", "abutment", "pin")  # kinds of stretches that hold the
 KINDS = (*HELD, "beam", "free")
 LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
 _LONGEST = 0.5  # of the spacing: edge beams' elements aren't longer
+_STEEP = 0.1  # fall over length in plan: edges that stand on the ground, but unevenly, fall less
 _CLOSE = 0.05  # of the spacing: ends nearer to each other share a node of the edge beam
 
 
@@ -190,8 +192,6 @@ def _sort_out(loop: Rim, edges: Edges, low: float) -> None:
         for last in (0, count - 1):
             if loop.kinds[last] == "beam":
                 loop.kinds[last], loop.found[last] = "free", False
-    height = loop.points[:, 2]
-    falling = 1e-6 * float(np.ptp(height))
     for first, last in _runs(loop.kinds):
         if loop.kinds[first] != "beam" or last - first + 1 >= count:
             continue
@@ -200,10 +200,15 @@ def _sort_out(loop: Rim, edges: Edges, low: float) -> None:
                 loop.found[here]
                 and loop.kinds[here] == "ground"
                 and loop.found[(here + way) % count]
-                and height[(here + way) % count] < height[here] - falling
+                and _falls(loop.points[here], loop.points[(here + way) % count])
             ):
                 loop.kinds[here] = "beam"
                 here = (here + way) % count
+
+
+def _falls(here: Reals, there: Reals) -> bool:
+    """Whether an edge falls steeply between two of its points."""
+    return bool(here[2] - there[2] > _STEEP * np.linalg.norm(there[:2] - here[:2]))
 
 
 def _runs(kinds: Sequence[str]) -> list[tuple[int, int]]:

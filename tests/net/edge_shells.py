@@ -43,3 +43,17 @@ def sail(size=0.9, rise=0.16):
     x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(-size / 2, size / 2, 41)], indexing="ij"))
     z = rise * (2.0 - (2.0 * x / size) ** 2 - (2.0 * y / size) ** 2)
     return _sheet(np.column_stack([x, y, z]), 41, 41)
+
+
+def undulating(radius=0.6, rise=0.22, wave=0.025):
+    """A paraboloid on a circle whose edge rises and falls by 0.025 m four times round, a little more than what counts as ground."""
+    r, angle = (
+        each.ravel()
+        for each in np.meshgrid(np.linspace(0.0, radius, 24)[1:], 2.0 * np.pi * np.arange(96) / 96, indexing="ij")
+    )  # fmt: skip
+    share = r / radius
+    z = rise * (1.0 - share**2) + 0.5 * wave * share**2 * (1.0 + np.cos(4.0 * angle))
+    ring = _sheet(np.column_stack([r * np.cos(angle), r * np.sin(angle), z]), 23, 96, closed=True)
+    middle = np.array([(0.0, 0.0, rise)])
+    cap = [(len(ring.vertices), k, (k + 1) % 96) for k in range(96)]
+    return make_surface(np.vstack([ring.vertices, middle]), np.vstack([ring.triangles, cap]))

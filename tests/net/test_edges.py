@@ -7,7 +7,7 @@ import shellform as sf
 from shellform.errors import InputError
 from shellform.net.edges import Edges, Place, stand
 from shellform.net.saved import load_net, net_document, save_net
-from tests.net.edge_shells import barrel, oculus, sail
+from tests.net.edge_shells import barrel, oculus, sail, undulating
 
 SPACING = 0.055
 
@@ -56,6 +56,18 @@ def test_arches_hang_on_edge_beams_that_come_down_to_feet_on_the_ground(vault_of
         assert length.max() <= 0.5 * SPACING * 1.001
         assert length.sum() == pytest.approx(2 * 0.9 * 0.5, rel=1e-3)
         assert set(line.nodes[[0, -1]]) <= set(found.supports)
+
+
+def test_an_edge_that_undulates_on_the_ground_stands_on_it_but_where_it_is_high():
+    """A beam that went on down to where such an edge stops falling left it three supports."""
+    surface = undulating()
+    found = stand(pulled(surface), surface)
+    low = 0.02 * surface.size[:2].max()
+    ends = found.target.positions[found.rod_ends]
+    standing = ends[:, 2] < low - 0.0005
+    assert 0.5 < standing.mean() < 0.95
+    assert set(found.rod_ends[standing].tolist()) <= set(found.supports.tolist())
+    assert len(found.edges) == 4
 
 
 def test_nothing_is_held_above_the_ground_unasked(vault_of_two_arches, round_opening):
