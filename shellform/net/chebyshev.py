@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from shellform.arrays import Reals, reals
 from shellform.errors import InputError
@@ -210,11 +211,9 @@ def _origin(
         along_u, along_v = (reals(f"net.guides[{k}]", each, (None, 2)) for k, each in enumerate(guides))
         plan, halves = _halves(along_u, along_v)
     else:
-        corners = surface.vertices[surface.triangles]
-        areas = triangle_areas(surface.vertices, surface.triangles)
         heading = np.array([np.cos(angle), np.sin(angle)])
         shift = offset[0] * steps[0] * heading + offset[1] * steps[1] * np.array([-heading[1], heading[0]])
-        plan = (areas @ corners.mean(axis=1) / areas.sum())[:2] + shift
+        plan = _middle(surface, finder) + shift
     away = np.linalg.norm(surface.vertices[:, :2] - plan, axis=1)
     origin = raised(finder, plan, surface.vertices[np.argmin(away)])
     foot = finder.foot(origin[None])
@@ -244,6 +243,19 @@ def _origin(
         lines = (Guide(along), Guide(-along), Guide(side), Guide(-side))
     frame = np.column_stack([along, np.cross(normal, along), normal])
     return origin, frame, (lines[0], lines[1], lines[2], lines[3])
+
+
+def _middle(surface: Surface, finder: Finder) -> Reals:
+    """The middle of the plan (2,): its centroid, or where that lies off the surface, as in the bend of an L, the place
+    farthest from the edge."""
+    corners = surface.vertices[surface.triangles]
+    areas = triangle_areas(surface.vertices, surface.triangles)
+    centroid = np.asarray(areas @ corners.mean(axis=1) / areas.sum())[:2]
+    nearest = surface.vertices[np.argmin(np.linalg.norm(surface.vertices[:, :2] - centroid, axis=1))]
+    if finder.past_outline(finder.foot(raised(finder, centroid, nearest)[None]))[0] <= 0.0:
+        return centroid
+    edge = cKDTree(surface.vertices[np.concatenate(surface.boundary)])
+    return surface.vertices[np.argmax(edge.query(surface.vertices)[0]), :2]
 
 
 def _halves(along_u: Reals, along_v: Reals) -> tuple[Reals, list[Reals]]:

@@ -95,3 +95,19 @@ def test_a_surface_with_a_spike_is_refused(vault):
 def test_settings_that_cannot_work_are_refused(vault, settings, said):
     with pytest.raises(InputError, match=said):
         sf.pull_net(vault, **settings)
+
+
+def test_where_the_centroid_lies_in_the_bend_of_an_l_the_net_begins_on_the_surface():
+    size, width, count = 1.2, 0.3, 49
+    x, y = (each.ravel() for each in np.meshgrid(*2 * [np.linspace(0.0, size, count)], indexing="ij"))
+    i = np.arange(count * count).reshape(count, count)
+    quads = np.column_stack([each.ravel() for each in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:])])
+    quads = quads[np.minimum(x[quads], y[quads]).mean(axis=1) < width]
+    used, quads = np.unique(quads, return_inverse=True)
+    quads = quads.reshape(-1, 4)
+    place = np.column_stack([x, y, 0.2 * (x * (size - x) + y * (size - y))])[used]
+    surface = sf.make_surface(place, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    net = sf.pull_net(surface, spacing=0.06, gap=0.002, elements=2)
+    ends = net.crossings[:, :2]
+    assert (ends.min(axis=1) < width + 0.01).all()
+    assert ends.max() > size - 0.06
