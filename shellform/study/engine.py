@@ -5,7 +5,8 @@ they don't fight for cores. Jobs are handed out within a window of twice the thr
 passed on as they come, so that memory doesn't grow with the study. A job on which others build is one task on
 which theirs depend: Dask runs it once, before them. When a worker dies, Dask starts another and gives its
 jobs out again; a job that has taken three workers with it is tried once more when all others are done, then
-given up.
+given up. A cluster that has been without any worker for longer than the study waits ends the sweep, wherever it
+waits: for the next job to end, or for an outcome that was lost with its worker.
 """
 
 from __future__ import annotations
@@ -18,11 +19,12 @@ import os
 import time
 import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from concurrent.futures import wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from shellform.errors import InputError, not_installed
+from shellform.errors import InputError, NotConverged, not_installed
 from shellform.study.jobs import Job
 from shellform.study.outcome import Outcome, Status
 
@@ -31,6 +33,8 @@ _DEATHS = 2  # that a job survives
 _AHEAD = 2  # jobs handed out for each thread
 _ANSWERS = 5.0  # seconds in which a scheduler has to
 _RECOUNT = 1.0  # seconds after which the cluster's threads are counted anew
+_LOOKS = 0.1  # seconds between looks at what has ended, as Dask's own
+_OURS, _THEIRS = 300.0, 3600.0  # seconds that a study waits for workers: of its cluster, of another's
 _ONE_THREAD = {
     name: "1"
     for name in (
@@ -54,10 +58,17 @@ for name in ("distributed", "distributed.worker", "distributed.nanny"):
 
 @dataclass(frozen=True)
 class Engine:
-    """A running cluster: Dask's client and the address of its dashboard, "" where it has none."""
+    """A running cluster: Dask's client, the address of its dashboard, "" where it has none, and for how many
+    seconds without any worker a study waits (`patience`).
+    """
 
     client: Any
     dashboard: str
+    patience: float
+
+
+class NoWorkers(NotConverged):
+    """A cluster without any worker for longer than its study waits."""
 
 
 @contextmanager
@@ -103,12 +114,16 @@ def engine(
         "distributed.worker.memory.spill": False,
         "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
         "distributed.comm.timeouts.connect": "30s",
+        # A worker that dies is begun anew by its nanny. Where that takes longer than this, the cluster ends the
+        # nanny, and nothing begins a worker any more: at six times the load that its cores can bear, a worker
+        # took 33 to 41 s, and Dask waits 15.
+        "distributed.deploy.lost-worker-timeout": "1h",
     } | ({} if dashboard else {"distributed.scheduler.http.routes": []})
     with dask.config.set(settings):
         if scheduler is not None:
             client = _client(scheduler)
             try:
-                yield Engine(client, client.dashboard_link or "")
+                yield Engine(client, client.dashboard_link or "", _THEIRS)
             finally:
                 _close(client)
             return
@@ -130,7 +145,7 @@ def engine(
         try:
             client = Client(cluster, set_as_default=False)
             try:
-                yield Engine(client, cluster.dashboard_link if dashboard else "")
+                yield Engine(client, cluster.dashboard_link if dashboard else "", _OURS)
             finally:
                 _close(client)
         finally:
@@ -191,61 +206,121 @@ def _close(part: Any) -> None:
         part.close(timeout=10)
 
 
-def sweep(engine: Engine, jobs: Iterable[Job], work: Work) -> Iterator[list[Outcome]]:
-    """Runs `work` on each job and gives the outcomes in the batches in which they come, in no order."""
+@dataclass
+class _Threads:
+    """How many threads a cluster has, `counted` anew each second, and since when it has been seen to have none
+    (`gone`), by the monotonic clock; `tell` hears for how many seconds."""
+
+    engine: Engine
+    tell: Callable[[float], None]
+    number: int = 1
+    counted: float = -math.inf
+    gone: float = math.inf
+
+    def look(self) -> None:
+        """Counts them where a second is over. Raises NoWorkers where there has been none for too long."""
+        now = time.monotonic()
+        if now <= self.counted + _RECOUNT:
+            return
+        self.number, self.counted = sum(self.engine.client.nthreads().values()), now
+        self.gone = math.inf if self.number else min(self.gone, now)
+        without = max(0.0, now - self.gone)
+        self.tell(without)
+        if without > self.engine.patience:
+            raise NoWorkers(
+                f"The cluster has had no worker for {without:.0f} s",
+                remedy="Look why its workers can't be begun (memory, processes, a cluster's queue) and run the "
+                "same command again: it goes on from here.",
+            )
+
+
+def sweep(
+    engine: Engine,
+    jobs: Iterable[Job],
+    work: Work,
+    *,
+    without: Callable[[float], None] = lambda seconds: None,
+) -> Iterator[list[Outcome]]:
+    """Runs `work` on each job and gives the outcomes in the batches in which they come, in no order. `without`
+    is told, each second, for how many there has been no worker. Raises NoWorkers where that lasts too long.
+    """
+    threads = _Threads(engine, without)
     again: list[Job] = []
-    yield from _pass(engine, jobs, work, lambda job, reason: again.append(job))
+    yield from _pass(threads, jobs, work, lambda job, reason: again.append(job))
     lost: list[Outcome] = []
     for job in again:  # alone, so that no other job is blamed
-        yield from _pass(engine, [job], work, lambda job, reason: lost.append(_crashed(job, reason)))
+        yield from _pass(threads, [job], work, lambda job, reason: lost.append(_crashed(job, reason)))
     if lost:
         yield lost
 
 
 def _pass(
-    engine: Engine, jobs: Iterable[Job], work: Work, died: Callable[[Job, str], None]
+    threads: _Threads, jobs: Iterable[Job], work: Work, died: Callable[[Job, str], None]
 ) -> Iterator[list[Outcome]]:
     from distributed import as_completed
 
-    client, waiting = engine.client, iter(jobs)
+    client, waiting = threads.engine.client, iter(jobs)
     running: dict[str, tuple[Job, Any]] = {}
     shared: dict[str, list[Any]] = {}  # a job before others: its future, and how many running ones need it
     finished = as_completed([], loop=client.loop)
-    threads, asked = 1, -math.inf
     while True:
-        if time.monotonic() > asked + _RECOUNT:
-            threads, asked = max(1, sum(client.nthreads().values())), time.monotonic()
-        room = _AHEAD * threads - len(running)
+        threads.look()
+        room = _AHEAD * max(1, threads.number) - len(running)
         fresh = list(itertools.islice(waiting, max(0, room)))
         futures = _submit(client, fresh, work, shared)
         running |= {future.key: (job, future) for job, future in zip(fresh, futures, strict=True)}
         finished.update(futures)
         if not running:
             return
-        batch = finished.next_batch(block=True)
+        while not finished.has_ready():
+            threads.look()
+            with finished.thread_condition:
+                finished.thread_condition.wait(_LOOKS)
+        batch = finished.next_batch(block=False)
         for future in batch:
             for each in running[future.key][0].before:
                 shared[each.key][1] -= 1
                 if not shared[each.key][1]:
                     del shared[each.key]
-        yield _gathered(client, [(running.pop(future.key)[0], future) for future in batch], died)
+        yield _gathered(threads, [(running.pop(future.key)[0], future) for future in batch], died)
 
 
-def _gathered(client: Any, ended: list[tuple[Job, Any]], died: Callable[[Job, str], None]) -> list[Outcome]:
+def _gathered(
+    threads: _Threads, ended: list[tuple[Job, Any]], died: Callable[[Job, str], None]
+) -> list[Outcome]:
     """The outcomes of jobs that ended, asked for at once; one by one where a worker was lost between the end
     and the asking.
     """
     try:
-        found: list[Outcome] = client.gather([future for _, future in ended])
-        return found
+        return _answers(threads, [future for _, future in ended])
+    except NoWorkers:
+        raise
     except Exception:  # `work` raises nothing: a worker was lost
         done = []
         for job, future in ended:
             try:
-                done.append(future.result())
+                done += _answers(threads, [future])
+            except NoWorkers:
+                raise
             except Exception as error:
                 died(job, _reason(error))
         return done
+
+
+def _answers(threads: _Threads, futures: list[Any]) -> list[Outcome]:
+    """What the futures hold. One that was lost with its worker is computed anew, for which there has to be
+    another."""
+    client = threads.engine.client
+    asked = asyncio.run_coroutine_threadsafe(
+        client.gather(futures, asynchronous=True), client.loop.asyncio_loop
+    )
+    try:
+        while not wait([asked], _RECOUNT).done:
+            threads.look()
+        found: list[Outcome] = asked.result()
+        return found
+    finally:
+        asked.cancel()
 
 
 def _submit(client: Any, jobs: list[Job], work: Work, shared: dict[str, list[Any]]) -> list[Any]:

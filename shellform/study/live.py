@@ -9,6 +9,7 @@ from shellform.study.outcome import Status, Value
 from shellform.study.studies import StudyProgress
 
 _EVERY = 10.0  # seconds between lines
+_WITHOUT = 10.0  # seconds without a worker that are told: one that died is begun anew within a few
 
 
 class Live:
@@ -58,7 +59,8 @@ def _line(progress: StudyProgress) -> str:
         else ""
     )
     failed = f", {progress.failed} without a result" if progress.failed else ""
-    return f"study: {ready} of {progress.total} designs{failed}{rest}"
+    idle = f", no worker for {progress.without:.0f} s" if progress.without > _WITHOUT else ""
+    return f"study: {ready} of {progress.total} designs{failed}{idle}{rest}"
 
 
 def _table(progress: StudyProgress) -> Any:

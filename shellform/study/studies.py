@@ -32,7 +32,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.records.stages import STAGES
 from shellform.run.folder import alone
 from shellform.run.keys import stage_keys
-from shellform.study.engine import Engine, Work, engine, sweep
+from shellform.study.engine import Engine, NoWorkers, Work, engine, sweep
 from shellform.study.front import Front, signed
 from shellform.study.jobs import Job, disk_is_full, work
 from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
@@ -52,13 +52,15 @@ _SHORT = 32  # hexadecimal digits of a key: 128 bits
 
 @dataclass
 class StudyProgress:
-    """How far a study is, as it goes on; `rows` are the latest with the columns asked for."""
+    """How far a study is, as it goes on; `rows` are the latest with the columns asked for, `without` the
+    seconds for which there has been no worker."""
 
     total: int = 0
     done: int = 0
     failed: int = 0
     found: int = 0
     dashboard: str = ""
+    without: float = 0.0
     began: float = field(default_factory=time.perf_counter)
     rows: list[Row] = field(default_factory=list)
 
@@ -117,7 +119,8 @@ def run_study(
 
     `workers` processes on this machine, or those of a Dask `scheduler`, which have to see the folder by the
     same name. Dask's `dashboard` is open to everybody on this machine. `show` is called with the progress.
-    Raises InputError for a bad study, NotConverged where the disk is full or no design has a result.
+    Raises InputError for a bad study, NotConverged where the disk is full, no worker is there for 5 minutes (of a
+    `scheduler`: an hour), or no design has a result.
     """
     plan = read_study(file)
     arrow()  # before hours are spent on designs
@@ -254,8 +257,14 @@ def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]
 
 def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) -> None:
     written, cost = time.perf_counter(), 0.0
+
+    def without(seconds: float) -> None:
+        if seconds or study.progress.without:
+            study.progress.without = seconds
+            study.show(study.progress)
+
     try:
-        for outcomes in sweep(opened, jobs, work):
+        for outcomes in sweep(opened, jobs, work, without=without):
             _enter(study, outcomes)
             study.show(study.progress)
             now = time.perf_counter()
@@ -263,7 +272,7 @@ def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) 
                 write_table(study.folder, study.log, study.plan.study.column)
                 written = time.perf_counter()
                 cost = written - now
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, NoWorkers):
         with Log(study.log.file) as log:  # read anew: the last lines may be written and not yet entered
             write_table(study.folder, log, study.plan.study.column)
         raise

@@ -1,5 +1,6 @@
 """A study ends with the same table whatever happens to it on the way, and computes nothing twice."""
 
+import asyncio
 import csv
 import errno
 import json
@@ -13,17 +14,22 @@ import time
 import urllib.error
 import urllib.request
 import zlib
+from contextlib import nullcontext
 from dataclasses import replace
 
+import dask
 import pytest
+from dask.utils import parse_timedelta
+from distributed.nanny import WorkerProcess
 
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.run import run
 from shellform.run.folder import alone, read_run
-from shellform.study.engine import engine, sweep
+from shellform.study.engine import NoWorkers, _gathered, _Threads, engine, sweep
 from shellform.study.front import Front, signed
 from shellform.study.jobs import Job, work
+from shellform.study.live import _line
 from shellform.study.outcome import Outcome, Row, Status, flat
 from shellform.study.search import _beyond
 from shellform.study.store import Log, read_table
@@ -62,8 +68,6 @@ def two():
 @pytest.fixture
 def on_two(two, monkeypatch):
     """Studies use the engine that runs already."""
-    from contextlib import nullcontext
-
     monkeypatch.setattr("shellform.study.studies.engine", lambda **_: nullcontext(two))
 
 
@@ -170,6 +174,63 @@ def test_a_design_that_kills_its_workers_is_recorded_and_the_rest_goes_on(tmp_pa
     clean = tmp_path / "clean"
     run_study(file, clean, work=quick)
     assert table(clean) == table(tmp_path / "out")
+
+
+def test_a_study_waits_for_a_worker_that_takes_long_to_begin(tmp_path, monkeypatch):
+    """Not for Dask's 15 s only, after which it would end what begins a worker anew."""
+    begins = WorkerProcess.start
+
+    async def slow_to_begin(process):
+        await asyncio.sleep(2.0)
+        return await begins(process)
+
+    with engine(workers=1) as one:
+        assert parse_timedelta(dask.config.get("distributed.deploy.lost-worker-timeout")) > one.patience
+        monkeypatch.setattr(WorkerProcess, "start", slow_to_begin)
+        monkeypatch.setattr("shellform.study.studies.engine", lambda **_: nullcontext(one))
+        told = []
+        file = study_file(tmp_path, "[vary]\ncable.stiffness = [333, 187]\n")
+        found = run_study(file, tmp_path / "out", work=deadly, show=lambda now: told.append(now.without))
+    assert (found.designs, found.failed) == (2, 0)
+    assert max(told) > 1.0
+    assert told[-1] == 0.0
+
+
+async def in_vain(process):
+    raise OSError(errno.EAGAIN, "no process can be begun")
+
+
+def test_a_study_without_workers_ends_with_what_it_has_and_goes_on_later(tmp_path, on_two, monkeypatch):
+    file = study_file(tmp_path, "[vary]\ncable.stiffness = [100, 120, 150, 666, 187, 200]\n")
+    told = []
+    with monkeypatch.context() as changed, engine(workers=1) as one:
+        changed.setattr(WorkerProcess, "start", in_vain)
+        changed.setattr("shellform.study.studies.engine", lambda **_: nullcontext(replace(one, patience=2.0)))
+        changed.setattr("shellform.study.live._WITHOUT", 0.5)
+        with pytest.raises(NotConverged, match=r"no worker for \d s.*the same command again: it goes on"):
+            run_study(file, tmp_path / "out", work=deadly, show=lambda now: told.append(_line(now)))
+    kept = rows(tmp_path / "out")
+    done = len(kept)
+    assert 2 <= done <= 3  # the third's may be lost with the worker
+    assert {row["status"] for row in kept} == {"done"}
+    assert f"study: {done} of 6 designs, no worker for 1 s" in told[-2]
+    assert run_study(file, tmp_path / "out", work=quick).found == done
+
+
+def test_an_outcome_that_was_lost_with_the_last_worker_is_not_waited_for_for_ever(monkeypatch):
+    with monkeypatch.context() as changed, engine(workers=1) as one:
+        changed.setattr(WorkerProcess, "start", in_vain)
+        future = one.client.submit(os.getpid)
+        os.kill(future.result(), signal.SIGKILL)
+        while one.client.nthreads():
+            time.sleep(0.02)
+        lost = one.client.submit(os.getcwd)
+        told = []
+        threads = _Threads(replace(one, patience=2.0), told.append)
+        with pytest.raises(NoWorkers, match="no worker for"):
+            _gathered(threads, [(None, lost)], pytest.fail)
+    assert told[0] == 0.0
+    assert told == sorted(told)
 
 
 def test_a_design_that_hangs_is_ended_with_its_worker_and_the_rest_goes_on(tmp_path, on_two):
