@@ -333,10 +333,9 @@ class _Search:
                 break
             before = parts, tried
             parts, tried = easier, self._followed(placed, easier, thickness)
-            if tried.stress > max(STRESSED, _SPARED * before[1].stress):
-                if (
-                    tried.stress > before[1].stress or tried.factor < NEEDED
-                ):  # joints that turn stiffen less, too
+            fell = tried.factor < NEEDED  # joints that turn and slacker cables stiffen less
+            if fell or tried.stress > max(STRESSED, _SPARED * before[1].stress):
+                if fell or tried.stress > before[1].stress:
                     parts, tried = before
                 break
         why = None

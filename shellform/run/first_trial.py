@@ -65,17 +65,16 @@ class FirstParts:
 
     def easier(self, tried: Followed, most: float) -> FirstParts | None:
         """What to try after a design that bears its load, `tried`, with rods that are stressed too much or cables that are
-        pulled to more than `most` of their limit: the same with joints that turn, slacker cables, or thicker ones; else None.
+        pulled to more than `most` of their limit: the same with slacker cables and joints that turn, or thicker cables; else None.
 
         Where the last cells end short of the edge, prestressed cables bend the rods' ends in the surface, load or none.
         """
         if tried.factor < NEEDED:
             return None
         if tried.stress > STRESSED:
-            if not self.swivels:
-                return replace(self, swivels=True)
             slacker = round(1.0 - max(0.5 * (1.0 - self.rest_ratio), LEAST_PRESTRAIN), 4)
-            return replace(self, rest_ratio=slacker) if slacker > self.rest_ratio else None
+            eased = replace(self, rest_ratio=max(slacker, self.rest_ratio), swivels=True)
+            return None if eased == self else eased
         return self.eased(tried.pull) if tried.edge <= STRESSED and tried.pull > most else None
 
     def eased(self, pull: float) -> FirstParts | None:

@@ -70,3 +70,18 @@ def test_concrete_is_thinned_by_what_the_design_falls_short_of(monkeypatch, why,
     )
     assert isinstance(_Search._thinner(search, 0.02, 0.02), FirstDesign)
     assert tried == [millimetres]
+
+
+@pytest.mark.parametrize(
+    ("factor", "stress", "kept"), [(1.2, 0.5, "as before"), (1.5, 1.3, "as before"), (1.5, 1.0, "eased")]
+)
+def test_what_is_eased_is_kept_only_where_it_bears_the_load_and_spares_rods(factor, stress, kept):
+    """Joints that turn and slacker cables stiffen the shell less."""
+    eased = SimpleNamespace(easier=lambda tried, most: None, choice=None)
+    before = SimpleNamespace(easier=lambda tried, most: eased, choice=None)
+    found = {id(before): came_to(1.5, 1.2, 0.1, 0.1), id(eased): came_to(factor, stress, 0.1, 0.1)}
+    search = SimpleNamespace(_followed=lambda placed, parts, thickness: found[id(parts)])
+    parts, tried, failure = _Search._solved(search, None, before, 0.5, 0.05)
+    assert parts is (before if kept == "as before" else eased)
+    assert tried is found[id(parts)]
+    assert failure.why is Why.STRENGTH
