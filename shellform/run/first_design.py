@@ -18,12 +18,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from shellform.errors import InputError
-from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.joints import turning_stress, usual_gap
 from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
 from shellform.net.edges import Edges, stand
-from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
 from shellform.run.first_trial import (
@@ -35,6 +33,17 @@ from shellform.run.first_trial import (
     Followed,
     drawn_standing,
     followed,
+)
+from shellform.run.next_trial import (
+    AIMED,
+    BUNDLES,
+    EASES,
+    HEAVY,
+    after,
+    bears_most,
+    edges_may_help,
+    fails_by,
+    next_section,
 )
 from shellform.run.sizes import (
     CURVED,
@@ -48,11 +57,11 @@ from shellform.run.sizes import (
     hopeless,
     least_spacing,
     load_borne,
-    next_choice,
-    next_thinner,
     practical,
     rest_ratio_for,
     rope_for,
+    usual_thickness,
+    whole_mm,
     wished,
 )
 from shellform.run.unbuildable import (
@@ -63,22 +72,18 @@ from shellform.run.unbuildable import (
     refuse_tipping,
     refused,
     sharpest,
+    too_curved,
 )
 from shellform.surface.shape.target import Surface
 
-BUNDLES = (19, 37)  # rods of an edge beam
-THICKNESS, LEAST_THICKNESS = 0.05, 0.015  # m: usual; a first layer of sprayed concrete
-_SLENDER = 80.0  # thicknesses across the larger side of a model, on which 50 mm would be a block
+LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
-_AIMED = 0.92  # of it, for which concrete is thinned
 _STEPS = 4  # sections tried on one net
 _EASED = 5  # times that cables are eased, by less prestrain or thicker strands
 _SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 _THINNER = 8  # thicknesses tried
-# of the rods' strength lost to joints that resist turning: beyond it no others are tried
-_TURNED = 0.5
-_NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
+_TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
 
@@ -120,10 +125,12 @@ class _Search:
         self.surface, self.wish, self._say, self.allowance = surface, wish, say, allowance
         self.told: list[str] = []
         self.best: Obstacle | None = None
+        self.failures: list[Obstacle] = []
         self.reasons: dict[float, str] = {}
         self.edges = Edges(outer=wish.edges)
         one = (1,) if wish.rod else (1, 2)
         self.layers: Sequence[int] = one if wish.layers is None else (wish.layers,)
+        self.lightest = 0  # of the bundles, with which edge beams begin
         self.angles: Sequence[float] = ANGLES  # worth trying; with a finer spacing only those that were best
 
     def say(self, text: str) -> None:
@@ -181,23 +188,50 @@ class _Search:
             if result is not None:
                 return result
         if self.best is None:
-            self._keep(self._too_curved(placed, spacing, thickness))
-        return None
+            self._keep(too_curved(placed, wished(self.wish.rod, self.layers[0]), spacing, thickness))
+        return self._on_heavier_edges(placed, spacing, thickness) if placed.net.edges else None
+
+    def _on_heavier_edges(self, placed: Placed, spacing: float, thickness: float) -> FirstDesign | None:
+        """The design on far heavier edge beams, without which no rods help where edges give way; None where these let the
+        shell bear hardly more."""
+        nearest = self.best
+        assert nearest is not None
+        falls = nearest.factor > 0.0 and nearest.spacing == spacing and nearest.why is not Why.SCATTER
+        if nearest.choice is None or not falls or self.lightest or self.allowance.over:
+            return None
+        before = list(self.failures)
+        self.lightest = HEAVY
+        result = self._stands(placed, nearest.choice, spacing, thickness)
+        if isinstance(result, FirstDesign):
+            return result
+        if result.eases(nearest, NEEDED) < EASES:
+            self.lightest, self.failures, self.best = 0, before, nearest
+            return None
+        possible = choices(placed.net, spacing, self.wish.rod, layers_of(nearest.choice.section))
+        tried = {possible.index(nearest.choice): result}
+        return self._first_that_stands(placed, possible, spacing, thickness, tried)
 
     def _first_that_stands(
-        self, placed: Placed, possible: Sequence[RodChoice], spacing: float, thickness: float
+        self,
+        placed: Placed,
+        possible: Sequence[RodChoice],
+        spacing: float,
+        thickness: float,
+        tried: dict[int, Obstacle] | None = None,
     ) -> FirstDesign | None:
-        """The design with the first of the `possible` sections, by rising stiffness, that stands; None where
-        none does that is likely to."""
-        if hopeless(self.surface, spacing, possible[-1], NEEDED * pressure(thickness, 2500.0)):
+        """The design with the first of the `possible` sections, by rising stiffness, that stands, none of those that
+        were `tried`; None where none does that is likely to."""
+        needed = NEEDED * pressure(thickness, 2500.0)
+        if hopeless(self.surface, spacing, possible[-1], needed):
             place = sharpest(placed.net)
             self._keep(Obstacle(Why.STABILITY, spacing, thickness, 0.0, possible[-1], placed, place))
             self.say(
                 f"{possible[-1].label} ({possible[-1].catalogue}) and thinner: far too thin for the load"
             )
             return None
-        at = first_choice(placed.net, self.surface, spacing, possible, NEEDED * pressure(thickness, 2500.0))
-        tried: dict[int, Obstacle] = {}
+        first = None if tried else first_choice(placed.net, self.surface, spacing, possible, needed)
+        tried = tried or {}
+        at = after(placed.net, possible, tried) if first is None else first
         while at not in tried and len(tried) < _STEPS:
             if tried and self.allowance.over:
                 break
@@ -205,21 +239,18 @@ class _Search:
             if isinstance(result, FirstDesign):
                 return result
             tried[at] = result
-            at = _next(placed.net, possible, at, result)
-            if at in tried and result.why is Why.STRENGTH:  # stiffer ones only bend harder
-                least = min(tried, key=lambda each: tried[each].stress)
-                at = next_thinner(possible, least, _AIMED * STRESSED / tried[least].stress)
+            at = after(placed.net, possible, tried)
         return None
 
     def _thinner(self, spacing: float, thickness: float) -> FirstDesign:
         """The thickest concrete that stands where the design falls. Raises where less than a layer is left,
         or another was asked for."""
-        failure = self.best
-        assert failure is not None
+        assert self.best is not None
+        failure = bears_most(self.failures, self.best)
         if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
             raise refused(self.surface, failure, self.wish)
         asked, thinner = thickness, failure.thickness
-        placed, choice, nearest = failure.placed, failure.choice, failure
+        placed, choice, nearest = failure.placed, failure.choice, self.best
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
         seen = {choice}
@@ -228,14 +259,14 @@ class _Search:
                 break
             other = choice
             if failure.why is Why.STRENGTH and choice in possible:
-                other = possible[_next(placed.net, possible, possible.index(choice), failure)]
+                other = possible[next_section(placed.net, possible, possible.index(choice), failure)]
             if other in seen:  # else the load is kept, and rods that leave more of their strength are tried
                 share = min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
                 if failure.why is Why.STRENGTH:
-                    share = min(max(load_borne(placed.net, choice, failure.stress, _AIMED), 0.5), 0.9)
-                thinner, other = _whole_mm(share * thinner), choice
+                    share = min(max(load_borne(placed.net, choice, failure.stress, AIMED), 0.5), 0.9)
+                thinner, other = whole_mm(share * thinner), choice
             seen.add(other)
-            choice, before = other, failure
+            choice, kept, before = other, choice, failure
             if thinner < 0.002:
                 break
             result = self._stands(placed, choice, failure.spacing, thinner)
@@ -244,9 +275,12 @@ class _Search:
                     nearest = replace(nearest, thickness=asked)
                     raise refused(self.surface, nearest, self.wish, bears=thinner)
                 return result
-            failure, placed = result, result.placed or placed
-            if failure.why is Why.NET:
+            if result.why is Why.NET:
                 break
+            if choice != kept and result.factor < before.factor:  # rods that break less, and fall instead
+                choice = kept
+                continue
+            failure, placed = result, result.placed or placed
             if failure.breaks_unloaded(before, STRESSED):
                 nearest = failure
                 break
@@ -278,9 +312,9 @@ class _Search:
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design with these rods and this load, and the lightest edge beams with which it stands."""
-        for bundle in BUNDLES:
+        for bundle in BUNDLES[self.lightest : self.lightest + HEAVY]:
             result = self._with_edges(placed, choice, bundle, spacing, thickness)
-            if isinstance(result, FirstDesign) or not (placed.net.edges and _edges_may_help(result)):
+            if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
                 break
         return result
 
@@ -338,13 +372,7 @@ class _Search:
                 if fell or tried.stress > before[1].stress:
                     parts, tried = before
                 break
-        why = None
-        if tried.factor < NEEDED:  # what breaks before any load has no stability to speak of
-            why = Why.STRENGTH if tried.factor == 0.0 and tried.stress > 1.0 else Why.STABILITY
-        elif max(tried.stress, tried.edge) > STRESSED:
-            why = Why.STRENGTH if tried.stress > STRESSED else Why.EDGES
-        elif tried.pull > 1.0:
-            why = Why.CABLES
+        why = fails_by(tried)
         if why is None:
             return parts, tried, None
         stress = {Why.EDGES: tried.edge, Why.CABLES: tried.pull}.get(why, tried.stress)
@@ -357,41 +385,9 @@ class _Search:
         self.allowance.spend(len(placed.net.grid.lattice))
         return followed(placed.net, self.surface, parts, thickness)
 
-    def _too_curved(self, placed: Placed, spacing: float, thickness: float) -> Obstacle:
-        """The failure of a net on which every section breaks, or is too deep for the spacing."""
-        net, place = placed.net, sharpest(placed.net)
-        least = min(
-            wished(self.wish.rod, self.layers[0]), key=lambda each: erection_stress(net, each.section)
-        )
-        stress = erection_stress(net, least.section) / least.section.material.strength
-        why = Why.CURVATURE if stress > 1.0 else Why.SPACING
-        return Obstacle(why, spacing, thickness, 0.0, least, placed, place, stress)
-
     def _keep(self, failure: Obstacle) -> Obstacle:
         """The failure, kept if it came nearer than those before."""
+        self.failures.append(failure)
         if self.best is None or failure.near(NEEDED) >= self.best.near(NEEDED):
             self.best = failure
         return failure
-
-
-def usual_thickness(surface: Surface) -> float:
-    """Of the concrete with which `new` begins, m: 50 mm, less on models of under 4 m."""
-    return max(min(THICKNESS, _whole_mm(float(surface.size[:2].max()) / _SLENDER)), 0.002)
-
-
-def _edges_may_help(failure: Obstacle) -> bool:
-    """Whether stronger edge beams may."""
-    falls = failure.why in (Why.STABILITY, Why.SCATTER)
-    return failure.why is Why.EDGES or (falls and failure.nearness(NEEDED) >= _NEAR * NEEDED)
-
-
-def _next(net: Net, possible: Sequence[RodChoice], at: int, failure: Obstacle) -> int:
-    """The section to try after the one that failed."""
-    times = 0.0
-    if failure.why is not Why.STRENGTH:
-        times = max(1.3, (1.1 * NEEDED / max(failure.nearness(NEEDED), 0.1)) ** 1.3)
-    return next_choice(net, possible, at, failure.stress, times, STRESSED)
-
-
-def _whole_mm(thickness: float) -> float:
-    return math.floor(1e3 * thickness) / 1e3

@@ -21,13 +21,13 @@ from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.run.first_design import THICKNESS, FirstDesign, first_design, usual_thickness
+from shellform.run.first_design import FirstDesign, first_design
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import with_ways_out
 from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED, FirstParts
 from shellform.run.plinths import plinths_for
-from shellform.run.sizes import DesignWish, RodChoice
+from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 

@@ -1,4 +1,4 @@
-"""What is sized before anything is solved: the spacing, the cables, and with which section to begin.
+"""What is sized before anything is solved: the spacing, the cables, the concrete, and with which section to begin.
 
 Spacing. A net is refused, or its rods break, where cells are large against the surface's radius of curvature;
 so it is at most a third of the radius that all but a twentieth of the surface keeps (a quantile of area: one
@@ -36,6 +36,8 @@ _CROSSINGS = 260.0  # to begin with
 MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
 CURVED = 600  # crossings for the sake of curvature, at the most: what asks for more are creases
 _USUAL = 1.0  # m, of rods on site
+THICKNESS = 0.05  # m: usual
+_SLENDER = 80.0  # thicknesses across the larger side of a model, on which 50 mm would be a block
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
 _LATHS = "timber_laths"  # whose rods are built in two layers
@@ -176,6 +178,16 @@ def practical(spacing: float) -> float:
         return round(0.05 * math.floor(spacing / 0.05 + 1e-9), 2)
     step = 10.0 ** (math.floor(math.log10(spacing)) - 1)
     return float(f"{step * math.floor(spacing / step + 1e-9):.2g}")
+
+
+def usual_thickness(surface: Surface) -> float:
+    """Of the concrete with which `new` begins, m: 50 mm, less on models of under 4 m."""
+    return max(min(THICKNESS, whole_mm(float(surface.size[:2].max()) / _SLENDER)), 0.002)
+
+
+def whole_mm(thickness: float) -> float:
+    """Rounded down."""
+    return math.floor(1e3 * thickness) / 1e3
 
 
 def rope_for(spacing: float) -> Rope:

@@ -8,6 +8,7 @@ nearest says why.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError, NotConverged
+from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
 from shellform.net.net import Net
@@ -112,6 +114,13 @@ class Obstacle:
         `needed`.
         """
         return min(self.factor, 0.9 * needed) if self.why is Why.SCATTER else self.factor
+
+    def eases(self, before: Obstacle, needed: float) -> float:
+        """How many times as much of its load as with the failure `before` the shell bears; where both bear what is
+        `needed`, how many times less it is stressed."""
+        if min(self.factor, before.factor) >= needed:
+            return before.stress / self.stress
+        return self.factor / max(before.factor, 1e-12)
 
     def breaks_unloaded(self, before: Obstacle, most: float) -> bool:
         """Whether this failure and the one `before`, of the same rods under more concrete, say that these would be
@@ -286,6 +295,15 @@ def _thinner_rods(wish: DesignWish) -> str:
 
 def _said(error: NoNet | Stalled) -> str:
     return error.what if isinstance(error, InputError) else str(error)
+
+
+def too_curved(placed: Placed, possible: Sequence[RodChoice], spacing: float, thickness: float) -> Obstacle:
+    """The failure of a net on which every one of the `possible` sections breaks, or is too deep for the spacing."""
+    net = placed.net
+    least = min(possible, key=lambda each: erection_stress(net, each.section))
+    stress = erection_stress(net, least.section) / least.section.material.strength
+    why = Why.CURVATURE if stress > 1.0 else Why.SPACING
+    return Obstacle(why, spacing, thickness, 0.0, least, placed, sharpest(net), stress)
 
 
 def sharpest(net: Net) -> Reals:

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.run import first_design
+from shellform.run import first_design, next_trial
 from shellform.run.first_design import FirstDesign, _Search
 from shellform.run.first_trial import Followed
+from shellform.run.next_trial import bears_most
 from shellform.run.unbuildable import Obstacle, Why
 
 Choice = namedtuple("Choice", "section")
@@ -64,12 +65,55 @@ def test_concrete_is_thinned_by_what_the_design_falls_short_of(monkeypatch, why,
     choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
     search = SimpleNamespace(
         best=Obstacle(why, 0.5, 0.05, factor, choice, SimpleNamespace(net=None)),
+        failures=[],
         wish=SimpleNamespace(rod=None, thickness=None),
         allowance=SimpleNamespace(thins=True, over=False),
         _stands=stands,
     )
     assert isinstance(_Search._thinner(search, 0.02, 0.02), FirstDesign)
     assert tried == [millimetres]
+
+
+def test_concrete_is_thinned_for_the_rods_that_broke_where_less_stressed_ones_fall(monkeypatch):
+    """At once after ones that fall, where thinning for these would end with next to none."""
+    deep, thin = (Choice(sf.Rod.round(young=40e9, radius=radius).section) for radius in (0.02, 0.01))
+    net = SimpleNamespace(net=None)
+    breaks = Obstacle(Why.STRENGTH, 0.5, 0.05, 1.5, deep, net, stress=1.2)
+    tried = []
+
+    def stands(placed, choice, spacing, thickness):
+        tried.append((choice, round(1e3 * thickness, 6)))
+        if thickness == 0.05:
+            return Obstacle(Why.STABILITY, 0.5, 0.05, 0.2, choice, net, stress=0.1)
+        return object.__new__(FirstDesign)
+
+    monkeypatch.setattr(first_design, "choices", lambda *_: [thin, deep])
+    monkeypatch.setattr(first_design, "next_section", lambda *_: 0)
+    for module in (first_design, next_trial):
+        monkeypatch.setattr(module, "load_borne", lambda *_: 0.75)
+    search = SimpleNamespace(
+        best=breaks,
+        failures=[breaks],
+        wish=SimpleNamespace(rod=None, thickness=None),
+        allowance=SimpleNamespace(thins=True, over=False),
+        _stands=stands,
+    )
+    assert isinstance(_Search._thinner(search, 0.5, 0.05), FirstDesign)
+    assert tried == [(thin, 50.0), (deep, 37.0)]
+
+
+def test_concrete_is_thinned_for_the_rods_that_bear_most_of_it_not_for_those_that_break_least(monkeypatch):
+    strong, weak = (Choice(sf.Rod.round(young=40e9, radius=radius).section) for radius in (0.02, 0.01))
+    net = SimpleNamespace(net=None)
+    breaks_least = Obstacle(Why.STRENGTH, 0.5, 0.05, 1.5, strong, net, stress=1.1)
+    falls = Obstacle(Why.STABILITY, 0.5, 0.05, 1.2, weak, net, stress=0.5)
+    gives_way = Obstacle(Why.EDGES, 0.5, 0.05, 1.5, weak, net, stress=2.0)
+    coarser = Obstacle(Why.STABILITY, 0.7, 0.05, 1.4, weak, net)
+    left = {1.1: 0.3}
+    monkeypatch.setattr(next_trial, "load_borne", lambda net, choice, stress, most: left[stress])
+    assert bears_most([breaks_least, falls, gives_way, coarser], breaks_least) is falls, "0.8, 0.5 and 0.3"
+    left[1.1] = 0.9
+    assert bears_most([breaks_least, falls, gives_way, coarser], breaks_least) is breaks_least
 
 
 @pytest.mark.parametrize(
