@@ -9,7 +9,7 @@ from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.tolerances import Tolerances, default_tolerances
 from shellform.reliability.safety import Safety
 
-SEARCHED = 60  # structures at the most with which a search judges its designs
+SEARCHED = 200  # structures at the most with which a search confirms its design
 
 
 def case_tolerances(case: Case, shell: Gridshell) -> Tolerances:

@@ -82,16 +82,19 @@ def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem)
 
 def test_a_search_tries_more_structures_where_its_start_bears_none_with_enlarged_errors(stout, problem):
     asked = replace(ASKED, enlarged=1.5, drawn=60)
-    for factor, enlarged, searched, confirming in ((1.0, 1.5, 6, MOST), (2.2, 1.0, MOST, 60)):
+    for factor, enlarged, searched in ((1.0, 1.5, 6), (2.2, 1.0, MOST)):
         loads = {"wet": factor * problem.loads["wet"]}
         found = demand(stout, stout.design(), loads, asked, design_load="wet")
         trial, fresh = found.trial.safety, found.confirmed.safety
-        assert (trial.enlarged, trial.tried, fresh.enlarged, fresh.tried) == (
-            enlarged,
-            searched,
-            1.0,
-            confirming,
-        )
+        assert (trial.enlarged, trial.tried, fresh.enlarged, fresh.tried) == (enlarged, searched, 1.0, 60)
+
+
+def test_a_fresh_sample_as_large_as_the_final_one_confirms_and_lets_one_fall_less(stout, problem):
+    asked = replace(ASKED, enlarged=1.5, drawn=200, probability_design=0.99)
+    found = demand(stout, stout.design(), {"wet": problem.loads["wet"]}, asked, design_load="wet")
+    assert found.confirmed.safety.tried == 200
+    assert found.confirmed.fallen == {"wet": 1}
+    assert found.confirmed.safety.seed != found.trial.safety.seed
 
 
 def test_no_more_is_asked_of_designs_than_the_start_shows(stout, problem):

@@ -192,7 +192,7 @@ def test_tolerances_of_the_case_take_the_place_of_the_defaults(file, whole):
     found = case_tolerances(load_case(file, ["tolerances.marks=0.001", "tolerances.shape=0"]), shell)
     assert found == replace(default_tolerances(shell), marks=0.001, shape=0.0)
     safety = case_safety(load_case(file, ["safety.drawn=500", "safety.seed=7"]), shell)
-    assert (safety.drawn, safety.seed) == (60, 8)
+    assert (safety.drawn, safety.seed) == (200, 8)
     assert case_safety(load_case(file, ["safety.required=false"]), shell) is None
 
 
