@@ -44,6 +44,7 @@ from shellform.run.next_trial import (
     edges_may_help,
     fails_by,
     next_section,
+    thinner_rods,
 )
 from shellform.run.sizes import (
     CURVED,
@@ -77,6 +78,7 @@ from shellform.run.unbuildable import (
 from shellform.surface.shape.target import Surface
 
 LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
+_TOO_THIN = 0.3  # of it: nobody pours so little
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
 _STEPS = 4  # sections tried on one net
@@ -250,15 +252,16 @@ class _Search:
         if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
             raise refused(self.surface, failure, self.wish)
         asked, thinner = thickness, failure.thickness
+        least = min(LEAST_THICKNESS, 0.5 * asked)
         placed, choice, nearest = failure.placed, failure.choice, self.best
         layers = layers_of(choice.section)
         possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
-        seen = {choice}
+        seen, less_deep = {choice}, None
         for _ in range(_THINNER if self.allowance.thins else 0):
             if failure.factor == 0.0 or self.allowance.over:  # without any concrete it doesn't stand
                 break
-            other = choice
-            if failure.why is Why.STRENGTH and choice in possible:
+            other = less_deep or choice
+            if failure.why is Why.STRENGTH and choice in possible and less_deep is None:
                 other = possible[next_section(placed.net, possible, possible.index(choice), failure)]
             if other in seen:  # else the load is kept, and rods that leave more of their strength are tried
                 share = min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
@@ -267,23 +270,25 @@ class _Search:
                 thinner, other = whole_mm(share * thinner), choice
             seen.add(other)
             choice, kept, before = other, choice, failure
-            if thinner < 0.002:
+            if thinner < _TOO_THIN * least:
                 break
             result = self._stands(placed, choice, failure.spacing, thinner)
             if isinstance(result, FirstDesign):
-                if self.wish.thickness is not None or thinner < min(LEAST_THICKNESS, 0.5 * asked):
+                if self.wish.thickness is not None or thinner < least:
                     nearest = replace(nearest, thickness=asked)
                     raise refused(self.surface, nearest, self.wish, bears=thinner)
                 return result
             if result.why is Why.NET:
                 break
-            if choice != kept and result.factor < before.factor:  # rods that break less, and fall instead
-                choice = kept
+            if choice != kept and less_deep is None and result.factor < before.factor:
+                choice = kept  # rods that break less, and fall instead
                 continue
-            failure, placed = result, result.placed or placed
+            failure, placed, less_deep = result, result.placed or placed, None
             if failure.breaks_unloaded(before, STRESSED):
-                nearest = failure
-                break
+                nearest, thinner = failure, before.thickness  # rods that bending stresses less, under as much
+                less_deep = thinner_rods(possible, choice, failure)
+                if less_deep in seen or thinner < least:
+                    break
         raise refused(self.surface, nearest, self.wish)
 
     def _net(self, spacing: float, gap: float) -> Placed:

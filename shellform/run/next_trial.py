@@ -45,8 +45,17 @@ def after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]
     found = next_section(net, possible, at, failure)
     if found in tried and failure.why is Why.STRENGTH:  # stiffer ones only bend harder
         least = min(tried, key=lambda each: tried[each].stress)
-        return next_thinner(possible, least, AIMED * STRESSED / tried[least].stress)
+        return possible.index(thinner_rods(possible, possible[least], tried[least]))
     return found
+
+
+def thinner_rods(possible: Sequence[RodChoice], choice: RodChoice, failure: Obstacle) -> RodChoice:
+    """Of the `possible` sections the stiffest that is so much less deep than the `choice` that bending stresses it no more
+    than it may be; the `choice` itself where there is none."""
+    if choice not in possible:
+        return choice
+    share = AIMED * STRESSED / failure.stress
+    return possible[next_thinner(possible, possible.index(choice), share)]
 
 
 def bears_most(failures: Sequence[Obstacle], nearest: Obstacle) -> Obstacle:

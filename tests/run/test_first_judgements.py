@@ -129,3 +129,32 @@ def test_what_is_eased_is_kept_only_where_it_bears_the_load_and_spares_rods(fact
     assert parts is (before if kept == "as before" else eased)
     assert tried is found[id(parts)]
     assert failure.why is Why.STRENGTH
+
+
+def test_where_rods_would_break_without_any_concrete_less_deep_ones_are_tried_with_as_much(monkeypatch):
+    """And thinned for by what they bear, where they fall."""
+    deep, thin = (Choice(sf.Rod.round(young=40e9, radius=radius).section) for radius in (0.02, 0.015))
+    net, tried = SimpleNamespace(net=None), []
+    breaks = Obstacle(Why.STRENGTH, 0.5, 0.05, 1.5, deep, net, stress=1.05)
+    outcome = iter([(Why.STRENGTH, 1.5, 1.03), (Why.STABILITY, 1.2, 0.6)])
+
+    def stands(placed, choice, spacing, thickness):
+        tried.append((choice, round(1e3 * thickness, 6)))
+        why, factor, stress = next(outcome, (None, None, None))
+        if why is None:
+            return object.__new__(FirstDesign)
+        return Obstacle(why, 0.5, thickness, factor, choice, net, stress=stress)
+
+    monkeypatch.setattr(first_design, "choices", lambda *_: [thin, deep])
+    monkeypatch.setattr(first_design, "next_section", lambda *_: 1)
+    for module in (first_design, next_trial):
+        monkeypatch.setattr(module, "load_borne", lambda *_: 0.5)
+    search = SimpleNamespace(
+        best=breaks,
+        failures=[breaks],
+        wish=SimpleNamespace(rod=None, thickness=None),
+        allowance=SimpleNamespace(thins=True, over=False),
+        _stands=stands,
+    )
+    assert isinstance(_Search._thinner(search, 0.5, 0.05), FirstDesign)
+    assert tried == [(deep, 25.0), (thin, 50.0), (thin, 38.0)]
