@@ -1,8 +1,11 @@
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import pytest
+
+from shellform import compiled
 
 CODE = """
 import numpy as np
@@ -137,3 +140,25 @@ def test_long_compiling_tells_how_far_it_has_come_and_estimates_leave_it_out(tmp
     passed, left_out, compiling = map(float, done.stdout.split())
     assert 0.0 < compiling < passed
     assert left_out == pytest.approx(compiling, abs=1e-2)
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_compiling_is_told_at_its_start_and_after_10_20_and_40_s(monkeypatch, capsys, quiet):
+    now = 0.0
+    monkeypatch.setattr(compiled, "time", SimpleNamespace(perf_counter=lambda: now))
+    compiling = compiled._Compilation(quiet=quiet)
+    for _ in range(35):  # each with another loop within it, which isn't counted
+        compiling.on_start(None)
+        compiling.on_start(None)
+        now += 1.0
+        compiling.on_end(None)
+        now += 1.0
+        compiling.on_end(None)
+        now += 5.0  # of other work
+    assert compiling.seconds == 70.0
+    told = capsys.readouterr().err.splitlines()
+    if quiet:
+        assert told == []
+        return
+    assert told[0].startswith("shellform: compiling its loops for this machine, once")
+    assert told[1:] == [f"shellform: {loops} loops compiled in {2 * loops} s ..." for loops in (5, 10, 20)]

@@ -68,7 +68,7 @@ class Engine:
 
 
 class NoWorkers(NotConverged):
-    """A cluster without any worker for longer than its study waits."""
+    """A cluster that can't begin its workers, or has been without any for longer than its study waits."""
 
 
 @contextmanager
@@ -85,7 +85,8 @@ def engine(
     Scheduler and workers of this machine listen on its loopback address alone and speak to nobody without the
     certificate that is made for each cluster. Its `dashboard` answers everybody on the machine, so that it has
     to be asked for. With `processes` False the workers are
-    threads, to try out the engine. Raises InputError where a cluster doesn't answer.
+    threads, to try out the engine. Raises InputError where a cluster doesn't answer, NoWorkers where processes
+    can't be begun.
     """
     try:
         import dask
@@ -128,20 +129,28 @@ def engine(
                 _close(client)
             return
         before = {name: os.environ.get(name) for name in _ONE_THREAD}
-        cluster = LocalCluster(
-            n_workers=workers or _cores(),
-            threads_per_worker=1,
-            memory_limit="auto"
-            if processes
-            else None,  # in one process each would take the whole one for its own
-            processes=processes,
-            host="127.0.0.1" if processes else None,
-            security=processes
-            or None,  # certificates of its own, in memory: nobody else on the machine can send it work
-            dashboard_address="127.0.0.1:0",
-            worker_dashboard_address=None,
-            scheduler_kwargs={"dashboard": dashboard},
-        )
+        try:
+            cluster = LocalCluster(
+                n_workers=workers or _cores(),
+                threads_per_worker=1,
+                memory_limit="auto"
+                if processes
+                else None,  # in one process each would take the whole one for its own
+                processes=processes,
+                host="127.0.0.1" if processes else None,
+                security=processes
+                or None,  # certificates of its own, in memory: nobody else on the machine can send it work
+                dashboard_address="127.0.0.1:0",
+                worker_dashboard_address=None,
+                scheduler_kwargs={"dashboard": dashboard},
+            )
+        except (OSError, RuntimeError) as error:
+            _restore(before)
+            raise NoWorkers(
+                f"The workers can't be begun: {error}",
+                remedy="Look whether memory and processes are free, or ask for fewer (--workers), and run the "
+                "same command again.",
+            ) from error
         try:
             client = Client(cluster, set_as_default=False)
             try:

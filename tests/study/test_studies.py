@@ -217,6 +217,12 @@ def test_a_study_without_workers_ends_with_what_it_has_and_goes_on_later(tmp_pat
     assert run_study(file, tmp_path / "out", work=quick).found == done
 
 
+def test_a_study_whose_workers_cannot_be_begun_says_so(tmp_path, monkeypatch):
+    monkeypatch.setattr(WorkerProcess, "start", in_vain)
+    with pytest.raises(NotConverged, match=r"can't be begun.*ask for fewer \(--workers\)"):
+        run_study(study_file(tmp_path, GRID), tmp_path / "out", workers=2, work=quick)
+
+
 def test_an_outcome_that_was_lost_with_the_last_worker_is_not_waited_for_for_ever(monkeypatch):
     with monkeypatch.context() as changed, engine(workers=1) as one:
         changed.setattr(WorkerProcess, "start", in_vain)
