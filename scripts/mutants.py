@@ -68,6 +68,7 @@ _COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
 _COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
 }  # fmt: skip
+_LOOP = "@njit"  # before a function that is compiled
 _NEXT = "\n"  # between what a child tells
 _DEATH = "status"  # the first word of how a child ended that told nothing
 _CALLED = {"min": "max", "max": "min", "minimum": "maximum", "maximum": "minimum", "any": "all", "all": "any"}
@@ -430,8 +431,17 @@ def _function(fault: Fault) -> tuple[int, int]:
 
 
 def is_compiled(fault: Fault) -> bool:
-    """Whether it lies in a file of compiled loops."""
-    return "njit" in (ROOT / fault.file).read_text(encoding="utf-8")
+    """Whether it lies in a compiled loop, or outside of all functions in a file of such, from where loops take it."""
+    text = (ROOT / fault.file).read_text(encoding="utf-8")
+    if _LOOP not in text:
+        return False
+    around = [
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.FunctionDef) and node.lineno <= fault.line <= (node.end_lineno or 0)
+    ]
+    loops = [each for node in around for each in node.decorator_list if _LOOP[1:] in ast.unparse(each)]
+    return not around or bool(loops)
 
 
 def in_one_process(faults: Sequence[Fault], tests: Sequence[str], told: TextIO) -> Planter:
@@ -452,7 +462,7 @@ def caught_by(fault: Fault, copy: Path, files: Sequence[str], left_out: Sequence
     file = copy / fault.file
     whole, then = file.read_bytes(), file.stat()
     file.write_bytes(with_fault(fault, whole))
-    own = tempfile.mkdtemp(prefix="mutant-") if b"njit" in whole else None
+    own = tempfile.mkdtemp(prefix="mutant-") if _LOOP.encode() in whole else None
     try:
         return failed(copy, files, own, left_out)
     finally:
