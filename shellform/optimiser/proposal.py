@@ -32,6 +32,7 @@ from shellform.problem.constraints import Constraint
 _WIDE = 1e3  # windows, no bound on a group's step beside those on its cables
 _TOLERANCE = 1e-9  # relative, of the convex model's optimum: well below what a step is judged by
 _FEW = 8  # constraints, beyond which MMA's dual may not come to an end
+_DUAL = 100  # evaluations of a dual: those that end take fewer, and the answers of others aren't kept
 _KEPT = 1e-9  # of a constraint, by which MMA's answer may be worse than its start's
 _NONE = 1e-3  # of the mean tension: less is none, which MMA leaves of cables that die
 
@@ -113,7 +114,14 @@ def _from_there(
     """Where MMA comes to from a `start` (y,) that keeps the constraints: the start itself where that is lower."""
     before, _, values, _ = evaluate(start)
     found, _ = minimise(
-        evaluate, start, low, high, constraints=len(values), evaluations=evaluations, tolerance=_TOLERANCE
+        evaluate,
+        start,
+        low,
+        high,
+        constraints=len(values),
+        evaluations=evaluations,
+        tolerance=_TOLERANCE,
+        dual_evaluations=_DUAL,
     )
     after, _, left, _ = evaluate(found)
     kept = (left <= np.maximum(values, 0.0) + _KEPT).all()
