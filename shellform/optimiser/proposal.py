@@ -8,9 +8,8 @@ are those of the window, of the variables (3), (4) and of cable forces (5) under
 Interior points (quadratic.py) solve it, and NLopt's MMA goes on from their answer. From the window's middle
 MMA's separable approximations come to the optimum only while windows are narrow: of a stiff dome's first step
 it found half of what could be gained after 2,000 evaluations, of the second a tenth. Where cables are to stay
-taut under the further loads (guards.py), cables alike keep one length (grouping.py), many structures are kept
-in mind (minding.py) or cables are thousands, there are more constraints or variables than MMA's dual comes to
-an end with.
+taut under the further loads (guards.py), cables alike keep one length (grouping.py) or many structures are kept
+in mind (minding.py), there are more constraints than MMA's dual comes to an end with.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.optimiser.convex import minimise
-from shellform.optimiser.guards import Guard
+from shellform.optimiser.guards import Guard, SolvedGuard
 from shellform.optimiser.quadratic import LowRank, minimise_quadratic
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.step_model import StepModel
@@ -32,7 +31,9 @@ from shellform.problem.constraints import Constraint
 _WIDE = 1e3  # windows, no bound on a group's step beside those on its cables
 _TOLERANCE = 1e-9  # relative, of the convex model's optimum: well below what a step is judged by
 _FEW = 8  # constraints, beyond which MMA's dual may not come to an end
+_DUAL = 100  # evaluations of a dual: those that end take fewer, and the answers of others aren't kept
 _KEPT = 1e-9  # of a constraint, by which MMA's answer may be worse than its start's
+_LET = 1e-3  # of the least tension, by which a cable that isn't guarded yet may fall below it
 _NONE = 1e-3  # of the mean tension: less is none, which MMA leaves of cables that die
 
 
@@ -71,11 +72,8 @@ def propose(task: Task) -> tuple[Reals, float]:
     upper = np.maximum(np.minimum(upper, model.origin + width), lower)
     slope = _slope(task)
     values = model.point.constraints + task.excess
-    falls, margins = _guarding(task, width)
-    scaled_slope, scaled_rows = slope * width, np.vstack([model.constraints_by_y * width, falls])
-    values = np.append(values, margins)
+    scaled_slope, scaled_rows = slope * width, model.constraints_by_y * width
     scaled_curvature = _curvature(model, width)
-
     low, high = (lower - model.origin) / width, (upper - model.origin) / width
 
     def evaluate(u: Reals) -> tuple[float, Reals, Reals, Reals]:
@@ -83,20 +81,22 @@ def propose(task: Task) -> tuple[Reals, float]:
         value = float(scaled_slope @ u + 0.5 * u @ bent)
         return value, scaled_slope + bent, values + scaled_rows @ u, scaled_rows
 
-    u: Reals | None
-    if task.groups is not None:
-        u = _equal_steps(
-            task, width, scaled_curvature, scaled_slope, scaled_rows, np.minimum(values, 0.0), low, high
-        )
-    else:
-        asked = scaled_curvature, scaled_slope, scaled_rows, values, low, high
+    def solved(falls: Reals, margins: Reals) -> Reals:
+        rows, limits = np.vstack([scaled_rows, falls]), np.append(values, margins)
+        asked = scaled_curvature, scaled_slope, rows, limits, low, high
+        if task.groups is not None:
+            return _equal_steps(task, width, *asked)
         u = minimise_quadratic(*asked)
         if u is None:
             u = _as_far_as_can_be(task, *asked)
-        elif not task.guards and len(values) <= _FEW and model.tensions <= task.solver.many:
+        elif not task.guards and len(limits) <= _FEW:
             u = _from_there(evaluate, np.clip(u, low, high), low, high, task.solver.model_evaluations)
-        if u is None:
-            u = np.clip(np.zeros(len(width)), low, high)
+        return np.clip(np.zeros(len(width)), low, high) if u is None else u
+
+    if any(isinstance(held, SolvedGuard) for held in task.guards):
+        u = _guarded_in_turn(task, width, solved)
+    else:
+        u = solved(*_guarding(task, width))
     y = model.origin + width * u
     if task.groups is None:
         y[:count][y[:count] < _NONE * task.tension] = 0.0
@@ -113,7 +113,14 @@ def _from_there(
     """Where MMA comes to from a `start` (y,) that keeps the constraints: the start itself where that is lower."""
     before, _, values, _ = evaluate(start)
     found, _ = minimise(
-        evaluate, start, low, high, constraints=len(values), evaluations=evaluations, tolerance=_TOLERANCE
+        evaluate,
+        start,
+        low,
+        high,
+        constraints=len(values),
+        evaluations=evaluations,
+        tolerance=_TOLERANCE,
+        dual_evaluations=_DUAL,
     )
     after, _, left, _ = evaluate(found)
     kept = (left <= np.maximum(values, 0.0) + _KEPT).all()
@@ -191,7 +198,7 @@ def _equal_steps(
     high: Reals,
 ) -> Reals:
     """The model's optimum in windows (y,) among steps that change all rest lengths of a group by the same: u
-    = W⁻¹ (∂l0/∂y)⁻¹ G v.
+    = W⁻¹ (∂l0/∂y)⁻¹ G v. What is broken may stay so.
     """
     assert task.groups is not None
     assert isinstance(task.model.answers, WholeAnswers)
@@ -206,7 +213,7 @@ def _equal_steps(
         steps.T @ curvature @ steps,
         steps.T @ slope,
         np.vstack([rows @ steps, box]),
-        np.concatenate([values, -np.maximum(high, 0.0), np.minimum(low, 0.0)]),
+        np.concatenate([np.minimum(values, 0.0), -np.maximum(high, 0.0), np.minimum(low, 0.0)]),
         np.full(steps.shape[1], -_WIDE),
         np.full(steps.shape[1], _WIDE),
     )
@@ -219,15 +226,48 @@ def _guarding(task: Task, width: Reals) -> tuple[Reals, Reals]:
     rows, values = [np.zeros((0, len(width)))], [np.zeros(0)]
     solver = task.solver
     for held in task.guards:
-        falls = -task.model.answers.by_parameters(held.tension_by_design) * width
-        scale = np.abs(falls).sum(axis=1)
-        asked = np.minimum((task.least - held.tension) / scale, solver.recovery)
+        falls, scale, asked = _falls(task, held, np.arange(len(held.tension)), width)
         # Where no step within the window lets a cable go slack, there is nothing to guard; of the others the
         # nearest count.
         near = np.argsort(-asked, kind="stable")[: int(np.clip((asked > -1.0).sum(), 0, solver.guards))]
         rows.append(falls[near] / scale[near, None])
         values.append(asked[near])
     return np.vstack(rows), np.concatenate(values)
+
+
+def _guarded_in_turn(task: Task, width: Reals, solved: Callable[[Reals, Reals], Reals]) -> Reals:
+    """The step (y,), in windows, `solved` for with the same rows and values, but only of cables that steps
+    without them would let fall: they join until a step lets no other one fall, which is the optimum with all
+    of them."""
+    chosen = [np.zeros(0, dtype=np.int64) for _ in task.guards]
+    rows, values = np.zeros((0, len(width))), np.zeros(0)
+    while True:
+        u = solved(rows, values)
+        change = task.model.answers.parameters_changed(width * u)
+        fallen = [_let_fall(task, held, own, change) for held, own in zip(task.guards, chosen, strict=True)]
+        if not any(map(len, fallen)):
+            return u
+        chosen = [np.append(own, more) for own, more in zip(chosen, fallen, strict=True)]
+        for held, more in zip(task.guards, fallen, strict=True):
+            falls, scale, asked = _falls(task, held, more, width)
+            rows, values = np.vstack([rows, falls / scale[:, None]]), np.append(values, asked)
+
+
+def _let_fall(task: Task, held: Guard, chosen: Indices, change: Reals) -> Indices:
+    """Guarded cables beside the `chosen` ones that a `change` (p,) of the parameters takes below their least
+    tension, those that fall farthest where they are more than can be guarded."""
+    tension = held.tension + held.changed(change)
+    tension[chosen] = np.inf
+    fallen = np.argsort(tension, kind="stable")[: (tension < (1.0 - _LET) * task.least).sum()]
+    return np.asarray(fallen[: task.solver.guards - len(chosen)])
+
+
+def _falls(task: Task, held: Guard, some: Indices, width: Reals) -> tuple[Reals, Reals, Reals]:
+    """Of some guarded cables, the falls (k, y) of their tensions, N, in windows; what a whole window can
+    change of each (k,), N; and the share of that (k,) by which it has to rise, or may fall where negative."""
+    falls = -task.model.answers.by_parameters(held.by_design(some)) * width
+    scale = np.abs(falls).sum(axis=1)
+    return falls, scale, np.minimum((task.least - held.tension[some]) / scale, task.solver.recovery)
 
 
 def _exact_in_tension(slope: Reals, model: StepModel) -> Reals:

@@ -13,7 +13,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
-from shellform.optimiser.guards import Guard, guard
+from shellform.optimiser.guards import Guard, solved_guard, whole_guard
 from shellform.optimiser.optimum import Checkpoint, Optimum, Step
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.step_model import StepModel, step_model
@@ -145,8 +145,8 @@ class Iterate:
 
 class Models:
     """Step models and guards, made once for each design that steps start from: the last one's are kept for another try in a
-    smaller window. Of more cables than are `many` for the solver only those with the least tensions are
-    guarded, and no model is dense unless it is to be `whole`, as where cables keep one length."""
+    smaller window. Of more cables than are `many` for the solver neither is dense, unless it is to be `whole`, as
+    where cables keep one length."""
 
     def __init__(
         self, evaluator: Evaluator, solver: SequentialConvex, reach: float, *, whole: bool = False
@@ -160,7 +160,7 @@ class Models:
         """The step model at the point."""
         if self._model is None or self._at is not point:
             linear = self.evaluator.linearised(point)
-            self._model = step_model(self.evaluator, linear, whole=self.whole or not self._many(point))
+            self._model = step_model(self.evaluator, linear, whole=self._whole(point))
             self._at = point
         return self._model
 
@@ -175,19 +175,16 @@ class Models:
             names = [
                 name for name in evaluator.problem.used() if name != evaluator.base and loads[name].any()
             ]
-            most = self.solver.guards if self._many(point) else None
+            guard = whole_guard if self._whole(point) else solved_guard
             self._guards = (
                 point,
-                [
-                    guard(assembly, point.states[name], cables, self.reach, *rates, most=most)
-                    for name in names
-                ],
+                [guard(assembly, point.states[name], cables, self.reach, *rates) for name in names],
             )
         return self._guards[1]
 
-    def _many(self, point: Evaluated) -> bool:
+    def _whole(self, point: Evaluated) -> bool:
         each_cable = self.evaluator.blocks.each_cable is not None
-        return each_cable and int(point.design.present.sum()) > self.solver.many
+        return self.whole or not each_cable or int(point.design.present.sum()) <= self.solver.many
 
 
 def accepted_design(search: Search, point: Evaluated) -> Accepted:

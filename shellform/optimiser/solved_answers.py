@@ -49,6 +49,18 @@ class SolvedAnswers:
         """The free degrees of freedom's changes (f,)."""
         return -self.factor.solve(self.setting.right @ change)
 
+    def parameters_changed(self, change: Reals) -> Reals:
+        """The changes (p,), m, of the present rest lengths and, where it moves, the radius."""
+        at = self.setting
+        values = np.zeros(at.evaluator.blocks.size)
+        values[at.other] = change[at.tensions :]
+        if at.each is not None:
+            ea = at.evaluator.shell.cable.stiffness
+            longer = (ea / (ea + at.tension)) * self.lengthened(change)
+            tensed = ea * at.length / (ea + at.tension) ** 2 * change[: at.tensions]
+            values[at.each.start + at.present] = longer - tensed
+        return np.asarray(at.parameters @ values)
+
     def by_variables(self, rows: Reals) -> Reals:
         """(k, y) from (k, s), or (y,) from (s,)."""
         found = self._by_values(np.atleast_2d(rows) / self.setting.evaluator.blocks.unit)

@@ -45,8 +45,8 @@ class SequentialConvex:
 
     Cables under further loads:
     - `least_tension`: of cables that are to stay in tension.
-    - `guards`: cables of each load that are kept from going slack, the nearest ones: the step's problem is
-      dense in them.
+    - `guards`: cables of each load that are kept from going slack at most, the nearest ones: the step's
+      problem is dense in them.
     - `recovery`: of what a window can change at most, which a cable below its least tension must regain.
 
     Thinning:
@@ -67,8 +67,8 @@ class SequentialConvex:
     - `softer`: of the stiffness of a design that stands, which the next batch is asked to keep.
 
     The step's problem:
-    - `many`: cables, beyond which its answers come by solves of their own instead of dense matrices: of 1,646
-      those take seven times as long already.
+    - `many`: cables, beyond which its answers come by solves of their own instead of dense matrices, whose time
+      grows with the cube of their number: of 1,644 those take five times as long.
     - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA to go on from the interior points' answer.
     """
 
@@ -105,7 +105,7 @@ class SequentialConvex:
     stiffenings: int = 3
     softer: float = 0.95
 
-    many: int = 2000
+    many: int = 600
     model_evaluations: int = 200
 
     def __post_init__(self) -> None:

@@ -81,6 +81,9 @@ class Answers(Protocol):
     def moved(self, change: Reals) -> Reals:
         """The free degrees of freedom's changes (f,)."""
 
+    def parameters_changed(self, change: Reals) -> Reals:
+        """Those of `Setting.parameters` (p,), m."""
+
     def by_variables(self, rows: Reals) -> Reals:
         """(k, y) from (k, s), or (y,) from (s,)."""
 

@@ -45,6 +45,10 @@ class WholeAnswers:
         force = at.right @ change + at.right[:, : at.tensions] @ (self.middle @ change)
         return np.asarray(-at.assembly.factor(at.state).solve(force))
 
+    def parameters_changed(self, change: Reals) -> Reals:
+        """The changes (p,), m, of the present rest lengths and, where it moves, the radius."""
+        return np.asarray(self.parameters_by_y @ change)
+
     def by_variables(self, rows: Reals) -> Reals:
         """(k, y) from (k, s), or (y,) from (s,)."""
         return np.asarray(rows @ self.variables_by_y)

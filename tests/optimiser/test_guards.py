@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.optimiser.guards import guard
+from shellform.optimiser.guards import whole_guard
 from shellform.optimiser.quadratic import minimise_quadratic
 from shellform.problem.evaluation import Evaluator
 from tests.problems import misfit_and_force
@@ -36,7 +36,7 @@ def test_a_guard_predicts_tensions_under_the_additional_load_to_second_order(she
     cables = shell.cables(point.design)
     tension = cables.tension(point.states["wetter"])
     reach = float(np.median(tension))
-    held = guard(evaluator.assembly(point.design), point.states["wetter"], cables, reach)
+    held = whole_guard(evaluator.assembly(point.design), point.states["wetter"], cables, reach)
     near = (tension > 0.0) & (tension < reach)
     np.testing.assert_array_equal(held.tension, tension[near])
     errors = []

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.optimiser.guards import guard
+from shellform.optimiser.guards import SolvedGuard, solved_guard, whole_guard
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _leaving
-from shellform.optimiser.proposal import propose
+from shellform.optimiser.proposal import _let_fall, propose
 from shellform.optimiser.quadratic import LowRank, _low_rank, minimise_quadratic
 from shellform.optimiser.solved_answers import SolvedAnswers
 from shellform.optimiser.step_model import step_model
@@ -58,6 +58,7 @@ def test_answers_by_solves_are_those_of_dense_matrices(shell, radius):
     for one, other in [
         (whole.answers.lengthened(change), solved.answers.lengthened(change)),
         (whole.answers.moved(change), solved.answers.moved(change)),
+        (whole.answers.parameters_changed(change), solved.answers.parameters_changed(change)),
         (whole.answers.by_parameters(rows), solved.answers.by_parameters(rows)),
         (whole.constraints_by_y, solved.constraints_by_y),
         (whole.quadratics[0].slope, solved.quadratics[0].slope),
@@ -116,18 +117,59 @@ def test_eased_cables_have_the_stiffness_that_their_tensions_alone_give(shell):
     np.testing.assert_array_equal(one.force, other.force)
 
 
-def test_of_thousands_of_cables_those_with_the_least_tensions_are_guarded(shell):
+@pytest.mark.parametrize("radius", [False, True])
+def test_a_guard_by_solves_is_that_of_dense_matrices(shell, radius):
+    search, it = searched(shell, radius=radius)
+    design, state = it.point.design, it.point.states["wetter"]
+    cables, rates = shell.cables(design), [shell.beams_by_radius(design.radius)] if radius else []
+    reach = float(np.median(cables.tension(state)))
+    assembly = search.evaluator.assembly(design)
+    whole = whole_guard(assembly, state, cables, reach, *rates)
+    solved = solved_guard(assembly, state, cables, reach, *rates)
+    search.evaluator.linearised(it.point)  # factorises in the assembly, which the guard has to outlive
+    np.testing.assert_array_equal(solved.tension, whole.tension)
+    some = np.array([3, 0, len(whole.tension) - 1])
+    np.testing.assert_allclose(solved.by_design(some), whole.by_design(some), rtol=1e-9, atol=1e-9)
+    change = 1e-5 * np.random.default_rng(8).normal(size=len(cables.ends) + radius)
+    np.testing.assert_allclose(solved.changed(change), whole.changed(change), rtol=1e-8)
+
+
+def guarded_widely(shell):
+    """What a step is asked for whose window lets cables fall that aren't guarded."""
     search, it = searched(shell)
-    cables, state = shell.cables(it.point.design), it.point.states["wetter"]
-    assembly, tension = (
-        search.evaluator.assembly(it.point.design),
-        shell.cables(it.point.design).tension(state),
+    return task(search, replace(it, guarded=True, window=0.7 * search.tension), search.models.at(it.point))
+
+
+def test_a_step_lets_none_of_the_guarded_cables_fall_and_solves_for_few_of_them(shell, monkeypatch):
+    asked = guarded_widely(shell)
+    solved = []
+    by_design = SolvedGuard.by_design
+    monkeypatch.setattr(
+        SolvedGuard, "by_design", lambda held, some: solved.extend(some) or by_design(held, some)
     )
-    every = guard(assembly, state, cables, float(tension.max()))
-    least = guard(assembly, state, cables, float(tension.max()), most=5)
-    np.testing.assert_array_equal(np.sort(least.tension), np.sort(every.tension)[:5])
-    rows = [np.flatnonzero(every.tension == each)[0] for each in least.tension]
-    np.testing.assert_allclose(least.tension_by_design, every.tension_by_design[rows], rtol=1e-9, atol=1e-9)
+    y, _ = propose(asked)
+    change = asked.model.answers.parameters_changed(y - asked.model.origin)
+    without, _ = propose(replace(asked, guards=[]))
+    free = asked.model.answers.parameters_changed(without - asked.model.origin)
+    (held,) = asked.guards
+    low = held.tension < asked.least
+    assert (held.tension + held.changed(free))[~low].min() < 0.9 * asked.least  # or there is nothing to guard
+    assert (held.tension + held.changed(change))[~low].min() > 0.99 * asked.least
+    assert 0 < len(solved) < len(held.tension)
+    assert len(set(solved)) == len(solved)
+
+
+def test_no_more_cables_are_guarded_than_asked_for_those_that_fall_farthest(shell):
+    asked = guarded_widely(shell)
+    (held,) = asked.guards
+    without, _ = propose(replace(asked, guards=[]))
+    change = asked.model.answers.parameters_changed(without - asked.model.origin)
+    every = _let_fall(asked, held, np.zeros(0, dtype=int), change)
+    assert len(every) > 2
+    two = replace(asked, solver=replace(asked.solver, guards=2))
+    np.testing.assert_array_equal(_let_fall(two, held, np.zeros(0, dtype=int), change), every[:2])
+    np.testing.assert_array_equal(_let_fall(two, held, every[:1], change), every[1:2])
+    assert not len(_let_fall(two, held, every[:2], change))
 
 
 def test_what_cables_keep_of_the_stiffness_is_the_same_of_some(shell):

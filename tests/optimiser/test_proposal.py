@@ -68,3 +68,19 @@ def test_mma_s_answer_counts_only_where_it_is_lower_and_keeps_the_constraints(mo
     for there, kept in ((0.5, True), (0.4, False), (0.9, False)):
         monkeypatch.setattr(proposal, "minimise", lambda *_, u=there, **__: (np.array([u]), "told"))
         assert proposal._from_there(one, here, *bounds, 10)[0] == (there if kept else 0.8)
+
+
+def test_a_dual_problem_is_left_after_the_evaluations_that_it_may_take():
+    rows = np.array([[1.0, 2.0, 0.5], [-3.0, 1.0, 1.0]])
+
+    def evaluate(u):
+        return float(u @ u - u.sum()), 2.0 * u - 1.0, rows @ u - 0.3, rows
+
+    def broken(**given):
+        asked = {"constraints": 2, "evaluations": 1 + 1, "tolerance": 1e-9, **given}
+        found, _ = proposal.minimise(evaluate, np.zeros(3), -np.ones(3), np.ones(3), **asked)
+        return found
+
+    np.testing.assert_array_equal(broken(dual_evaluations=100_000), broken())
+    np.testing.assert_array_equal(broken(dual_evaluations=100), broken())
+    assert np.abs(broken(dual_evaluations=2) - broken()).max() > 1e-3

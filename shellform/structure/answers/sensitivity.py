@@ -225,12 +225,18 @@ def state_by_design(response: Response) -> Reals:
     return -response.factor.solve(_dense(response.force_by_design))
 
 
+def state_change(response: Response, change: Reals) -> Reals:
+    """The free degrees of freedom's changes (f,) with a `change` (s,) of the design variables, to first
+    order."""
+    return np.asarray(-response.factor.solve(response.force_by_design @ change))
+
+
 def predicted(assembly: Assembly, response: Response, change: Reals) -> State:
     """Where the equilibrium goes with a `change` (s,) of the design variables, to first order: a start for
     the next one.
     """
     step = np.zeros(6 * assembly.count)
-    step[assembly.free] = -response.factor.solve(response.force_by_design @ change)
+    step[assembly.free] = state_change(response, change)
     return moved(response.state, assembly.chords.corrected(response.state, step.reshape(-1, 6)))
 
 
