@@ -99,7 +99,9 @@ def test_processes_that_compile_side_by_side_lose_no_entry_and_take_no_other_s_c
         assert "data saved" not in text
 
 
-def test_code_that_an_older_version_of_a_function_left_is_never_taken(tmp_path):
+def test_code_that_an_older_version_of_a_function_left_is_never_taken_and_other_functions_keep_theirs(
+    tmp_path,
+):
     variables = {
         **os.environ,
         "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
@@ -108,18 +110,19 @@ def test_code_that_an_older_version_of_a_function_left_is_never_taken(tmp_path):
     }
     code = (
         "import loop\nimport numpy as np\nfrom shellform import compiled\n"
-        "print(compiled.njit(cache=True)(loop.times)(1.0))\n"
+        "print(*(compiled.njit(cache=True)(each)(1.0) for each in (loop.times, loop.more)))\n"
     )
     told = []
     for factor in ("2.0", "30.0"):  # two lengths, for the stamp is time and size
-        (tmp_path / "loop.py").write_text(f"def times(x):\n    return {factor} * x\n", encoding="utf-8")
+        text = f"def times(x):\n    return {factor} * x\n\n\ndef more(x):\n    return {factor} + x\n"
+        (tmp_path / "loop.py").write_text(text, encoding="utf-8")
         told.append(
             subprocess.run(
                 [sys.executable, "-c", code], env=variables, capture_output=True, text=True, check=True
             ).stdout
         )
-    assert told == ["2.0\n", "30.0\n"]
-    assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 1
+    assert told == ["2.0 3.0\n", "30.0 31.0\n"]
+    assert len(list((tmp_path / "cache").rglob("*.nbc"))) == 2
 
 
 def test_long_compiling_tells_how_far_it_has_come_and_estimates_leave_it_out(tmp_path):
@@ -147,8 +150,10 @@ def test_compiling_is_told_at_its_start_and_after_10_20_and_40_s(monkeypatch, ca
     now = 0.0
     monkeypatch.setattr(compiled, "time", SimpleNamespace(perf_counter=lambda: now))
     compiling = compiled._Compilation(quiet=quiet)
-    for _ in range(35):  # each with another loop within it, which isn't counted
+    for loop in range(35):  # each with another within it, which isn't counted
         compiling.on_start(None)
+        if loop == 0:
+            begun = capsys.readouterr().err
         compiling.on_start(None)
         now += 1.0
         compiling.on_end(None)
@@ -158,7 +163,7 @@ def test_compiling_is_told_at_its_start_and_after_10_20_and_40_s(monkeypatch, ca
     assert compiling.seconds == 70.0
     told = capsys.readouterr().err.splitlines()
     if quiet:
-        assert told == []
+        assert (begun, told) == ("", [])
         return
-    assert told[0].startswith("shellform: compiling its loops for this machine, once")
-    assert told[1:] == [f"shellform: {loops} loops compiled in {2 * loops} s ..." for loops in (5, 10, 20)]
+    assert begun.startswith("shellform: compiling its loops for this machine, once")
+    assert told == [f"shellform: {loops} loops compiled in {2 * loops} s ..." for loops in (5, 10, 20)]
