@@ -99,28 +99,7 @@ def engine(
 
     for name in ("distributed", "distributed.client", "bokeh", "tornado", "tornado.application"):
         logging.getLogger(name).setLevel(logging.CRITICAL)  # what matters of what they tell is in the rows
-    settings = {
-        "distributed.scheduler.allowed-failures": _DEATHS,
-        "distributed.scheduler.worker-saturation": 1.0,
-        "distributed.worker.preload": [_QUIET] if processes else [],
-        "distributed.worker.daemon": False,  # surface readers are processes of their own
-        # What the processes do for themselves takes 1.8 % of a core in all with these three, 7.1 % as Dask
-        # has them.
-        "distributed.admin.tick.interval": "500ms",
-        "distributed.admin.system-monitor.interval": "2s",
-        "distributed.worker.memory.monitor-interval": "500ms",
-        # it keeps some 0.6 MB for each second of work, for an hour
-        "distributed.worker.profile.enabled": False,
-        "distributed.worker.memory.target": False,
-        "distributed.worker.memory.spill": False,
-        "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
-        "distributed.comm.timeouts.connect": "30s",
-        # A worker that dies is begun anew by its nanny. Where that takes longer than this, the cluster ends the
-        # nanny, and nothing begins a worker any more: at six times the load that its cores can bear, a worker
-        # took 33 to 41 s, and Dask waits 15.
-        "distributed.deploy.lost-worker-timeout": "1h",
-    } | ({} if dashboard else {"distributed.scheduler.http.routes": []})
-    with dask.config.set(settings):
+    with dask.config.set(_settings(processes, dashboard)):
         if scheduler is not None:
             client = _client(scheduler)
             try:
@@ -160,6 +139,31 @@ def engine(
         finally:
             _close(cluster)
             _restore(before)  # Dask leaves its processes' environment in this one
+
+
+def _settings(processes: bool, dashboard: bool) -> dict[str, Any]:
+    """Dask's settings of a cluster."""
+    return {
+        "distributed.scheduler.allowed-failures": _DEATHS,
+        "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.worker.preload": [_QUIET] if processes else [],
+        "distributed.worker.daemon": False,  # surface readers are processes of their own
+        # What the processes do for themselves takes 1.8 % of a core in all with these three, 7.1 % as Dask
+        # has them.
+        "distributed.admin.tick.interval": "500ms",
+        "distributed.admin.system-monitor.interval": "2s",
+        "distributed.worker.memory.monitor-interval": "500ms",
+        # it keeps some 0.6 MB for each second of work, for an hour
+        "distributed.worker.profile.enabled": False,
+        "distributed.worker.memory.target": False,
+        "distributed.worker.memory.spill": False,
+        "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
+        "distributed.comm.timeouts.connect": "30s",
+        # A worker that dies is begun anew by its nanny. Where that takes longer than this, the cluster ends the
+        # nanny, and nothing begins a worker any more: at six times the load that its cores can bear, a worker
+        # took 33 to 41 s, and Dask waits 15.
+        "distributed.deploy.lost-worker-timeout": "1h",
+    } | ({} if dashboard else {"distributed.scheduler.http.routes": []})
 
 
 def _restore(variables: Mapping[str, str | None]) -> None:
