@@ -266,6 +266,7 @@ def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) 
     try:
         for outcomes in sweep(opened, jobs, work, without=without):
             _enter(study, outcomes)
+            study.progress.without = 0.0  # somebody answered
             study.show(study.progress)
             now = time.perf_counter()
             if now - written > max(2.0, cost / _SHARE_OF_TIME):
