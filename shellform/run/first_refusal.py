@@ -18,6 +18,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.net.edges import stretches_of
 from shellform.run.first_design import first_design
 from shellform.run.first_net import Allowance
+from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
 from shellform.run.way_out import BUILDABLE, COVERED, renewed, with_way_out
@@ -82,6 +83,8 @@ class _Rounded:
 
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""
+        plinths = plinths_for(surface)  # which whoever follows gets too
+        surface = surface if plinths is None else plinths.surface
         try:
             _trial("rounded", self._wish, self._brief, self._say)(surface)
         except (InputError, NotConverged) as error:

@@ -14,6 +14,7 @@ from shellform.run import first_refusal
 from shellform.run.first_design import first_design
 from shellform.run.first_look import net_alone
 from shellform.run.first_refusal import shares
+from shellform.run.plinths import Plinths
 from shellform.run.propose import propose_case
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Unbuildable, Why
@@ -136,6 +137,16 @@ def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path
     assert tried == ["auto", "wall"]
     assert "(in metres, with --edges wall)" in told.remedy
     assert named(told).is_file()
+
+
+def test_a_rounded_surface_is_tried_on_the_plinths_that_whoever_follows_gets(tmp_path, monkeypatch):
+    cut, tried = sheet(lambda x, y: 2.0 - 0.02 * y * y), []
+    monkeypatch.setattr(first_refusal, "first_design", lambda surface, *_: tried.append(surface))
+    monkeypatch.setattr(first_refusal, "plinths_for", lambda surface: Plinths(cut, 0.1, 0.1, 0.5))
+    refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
+    told = first_refusal.with_ways_out(refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", print)
+    assert tried == [cut]
+    assert read_surface(named(told)).size[2] > cut.size[2], "it is offered whole"
 
 
 def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
