@@ -41,7 +41,7 @@ _TRIAL = 12  # factorisations for one trial equilibrium; from a near design five
 _LED = 0.5  # of a further load, the steps by which it is led
 _FAR = 20.0  # times the largest of the start's misfits: a trial this far off has left the branch unnoticed …
 _NEAR = 0.02  # … but for one whose root mean square distance is below this share of the target's size
-
+_KNOWN = 16  # measurements of terms that need no equilibrium, which are kept
 
 # of an Evaluator's work: `factorisations` are those of its equilibria
 COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
@@ -105,6 +105,7 @@ class Evaluator:
         self.factorisations = self.equilibria = self.evaluations = self.rejected = self.wasted = 0
         self._assembly: Assembly | None = None
         self._present: Flags | None = None
+        self._known: list[tuple[Term, Design, Measurement]] = []
         self._far = np.inf
 
     def begin(self) -> dict[str, Loaded]:
@@ -137,9 +138,7 @@ class Evaluator:
         """
         problem, assembly = self.problem, self.assembly(design)
         try:
-            found = [
-                measured(term, self._at(term, design, states, stage, assembly)) for term in problem.terms
-            ]
+            found = [self._measured(term, design, states, stage, assembly) for term in problem.terms]
         except (NotPositiveDefinite, NotConverged) as error:
             raise OffBranch(str(error)) from error
         summands, kept = found[: len(problem.minimise)], found[len(problem.minimise) :]
@@ -277,6 +276,20 @@ class Evaluator:
     def _count(self, factorisations: int) -> None:
         self.factorisations += factorisations
         self.equilibria += 1
+
+    def _measured(
+        self, term: Term, design: Design, states: Mapping[str, State], stage: float, assembly: Assembly
+    ) -> Measurement:
+        """The term's measurement. One that needs no equilibrium is the same whatever the states: a search goes
+        back to designs in other states, and drawn structures that it keeps in mind take longer than all else."""
+        if not term.load:
+            for known, other, found in self._known:
+                if known is term and other is design:
+                    return found
+        found = measured(term, self._at(term, design, states, stage, assembly))
+        if not term.load:
+            self._known = [*self._known[1 - _KNOWN :], (term, design, found)]
+        return found
 
     def _at(
         self, term: Term, design: Design, states: Mapping[str, State], stage: float, assembly: Assembly

@@ -1,6 +1,7 @@
 """What terms, limits and variables amount to: their values and units, which gradients alone don't tell."""
 
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from shellform.errors import InputError
 from shellform.gridshell.reactions import reactions
 from shellform.problem.constraints import count, residual_rows, residuals
 from shellform.problem.engineering import ConnectorTurn, LargestCableForce, Thrust, Uplift
+from shellform.problem.evaluation import Evaluator
 from shellform.problem.terms import LoadedDesign
 from shellform.problem.variables import Blocks
 
@@ -48,6 +50,35 @@ def test_cable_forces_are_stiffness_times_strain_and_absent_cables_have_none(mov
     assert force.max() - 1e-9 <= largest <= force.max() + 5.0 * np.log(len(force)) / 200.0
     assert sf.RodRadius().measure(at).value == pytest.approx([at.design.radius])
     assert (force[at.design.present] > 0.0).sum() > 40
+
+
+class Told(sf.RodRadius):
+    """The rods' radius, and at which designs it was asked for."""
+
+    asked: ClassVar[list[sf.Design]] = []
+
+    def measure(self, at):
+        self.asked.append(at.design)
+        return super().measure(at)
+
+
+def test_what_needs_no_equilibrium_is_measured_once_for_a_design_in_whatever_states(dome):
+    wet = sf.LoadCase("wet", dome.point_load(2.0, every=2))
+    problem = sf.Problem(dome, wet, [sf.Share(0.5, sf.Misfit("wet")), sf.Share(0.5, Told())])
+    design = dome.design()
+    evaluator = Evaluator(problem, design)
+    state = evaluator.begin()["wet"].equilibrium.state
+    other = replace(state, positions=state.positions + 1e-3)
+    Told.asked.clear()
+    first, again = evaluator.seed(design, {"wet": state}, 1.0), evaluator.seed(design, {"wet": other}, 1.0)
+    assert Told.asked == [design]
+    assert again.terms[1] == first.terms[1]
+    assert again.terms[0] > first.terms[0]
+    evaluator.seed(replace(design, radius=0.9 * design.radius), {"wet": state}, 1.0)
+    assert len(Told.asked) == 2
+    evaluator.problem = replace(problem, minimise=[problem.minimise[0], sf.Share(0.5, Told())])
+    evaluator.seed(design, {"wet": state}, 1.0)  # another term
+    assert len(Told.asked) == 3
 
 
 def test_limits_are_told_as_shares_of_themselves_above_and_below():
