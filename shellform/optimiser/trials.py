@@ -4,6 +4,7 @@ loads that a design doesn't bear whole.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
-from shellform.reliability.trial_structures import confirm, stands
+from shellform.reliability.trial_structures import JudgedTrial, confirm, stands
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 
@@ -103,12 +104,14 @@ def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]
     return found.stands, replace(it, fallen=tuple(fallen), fell=not found.stands)
 
 
-def confirmed(search: Search, built: Design) -> bool:
-    """Whether a fresh sample agrees that the design stands as built."""
+def confirmed(search: Search, built: Design, first: Sequence[int]) -> JudgedTrial:
+    """Whether a fresh sample agrees that the design stands as built, its structures of the numbers `first` before the
+    others."""
     assert search.asked is not None
-    found = confirm(search.problem.shell, built, search.asked.confirmed, judging=search.judging)
+    asked = search.asked.confirmed
+    found = confirm(search.problem.shell, built, asked, first=first, judging=search.judging)
     search.evaluator.factorisations += found.factorisations
-    return found.stands
+    return found
 
 
 def accepted(search: Search, it: Iterate, trial: Evaluated) -> Iterate:

@@ -265,10 +265,16 @@ def stands(
 
 
 def confirm(
-    shell: Gridshell, design: Design, asked: Required, *, judging: Judging | None = None
+    shell: Gridshell,
+    design: Design,
+    asked: Required,
+    *,
+    first: Sequence[int] = (),
+    judging: Judging | None = None,
 ) -> JudgedTrial:
     """As `stands`, and with the critical factor kept on the mesh with rod elements halved."""
-    found, factor = stands(shell, design, asked, judging=judging), asked.safety.critical_factor
+    found = stands(shell, design, asked, first=first, judging=judging)
+    factor = asked.safety.critical_factor
     if not found.stands or factor is None:
         return found
     end = critical_on_halved(shell, design, asked.loads[asked.design_load], factor)

@@ -382,10 +382,24 @@ def test_a_search_goes_back_to_the_last_design_that_stands(returning, monkeypatc
 def test_a_search_ends_with_the_last_design_that_a_fresh_sample_confirms(
     returning, monkeypatch, confirmed, sound, end, words
 ):
-    monkeypatch.setattr(going_back, "confirmed", lambda search, built: built.number in confirmed)
+    known, told_first = [], []
+
+    def judged(search, built, first):
+        told_first.append(list(first))
+        if not first:  # begun anew, from a design that the documented path led to
+            known.clear()
+        assert list(first) == known
+        stands = built.number in confirmed
+        fallen = () if stands else (10 + built.number, 7)
+        known[:] = dict.fromkeys([*fallen, *known])
+        return SimpleNamespace(stands=stands, fallen={"wet": fallen, "wetter": fallen})
+
+    monkeypatch.setattr(going_back, "confirmed", judged)
     sound_are(monkeypatch, sound)
     found = going_back.last_confirmed(searching(asked=1), returning(7))
     assert (found.accepted[-1].design.number, found.status) == (end, words)
+    if 6 not in confirmed:
+        assert told_first[1] == [16, 7], "those that fell come first"
 
 
 @pytest.mark.parametrize(
