@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import functools
 import gc
 import json
 import os
@@ -68,6 +69,7 @@ _COMPARED: dict[type[ast.cmpop], type[ast.cmpop]] = {
 _COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult,
 }  # fmt: skip
+_REMEMBERING = type(functools.cache(len))
 _LOOP = "@njit"  # before a function that is compiled
 _NEXT = "\n"  # between what a child tells
 _DEATH = "status"  # the first word of how a child ended that told nothing
@@ -218,13 +220,17 @@ def plant(fault: Fault) -> bool:
     text = with_fault(fault, file.read_bytes())
     module = sys.modules[fault.file.removesuffix(".py").replace("/", ".").removesuffix(".__init__")]
     faulty = {_key(code): code for code in _codes(compile(text, str(file), "exec"))}
+    planted = False
     for each in gc.get_objects():
         if isinstance(each, FunctionType) and each.__code__.co_filename == str(file):
             first, last = _lines(each.__code__)
             other = faulty.get(_key(each.__code__))
             if first <= fault.line <= last and other is not None and other != each.__code__:
-                each.__code__ = other
-                return True
+                each.__code__ = other  # and in the others that were made of it
+                planted = True
+    if planted:
+        _forget()
+        return True
     for node in ast.parse(text).body:
         if isinstance(node, ast.Assign) and node.lineno <= fault.line <= fault.end_line <= (
             node.end_lineno or 0
@@ -237,6 +243,13 @@ def plant(fault: Fault) -> bool:
                     setattr(other_module, name, value)
             return before is not None
     return False
+
+
+def _forget() -> None:
+    """What functions of the package remember was found by the sound one."""
+    for each in gc.get_objects():
+        if isinstance(each, _REMEMBERING) and (each.__module__ or "").startswith("shellform"):
+            each.cache_clear()
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:

@@ -1,6 +1,8 @@
 """Networks of one's own: the same model from arrays, from networkx, from COMPAS, whose documented calls stand-ins
 answer here; and honest errors."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -110,6 +112,7 @@ def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
         (lambda: sf.networks.from_arrays(NODES, [[0, 1]]), "rod: is needed"),
         (lambda: sf.networks.from_arrays(NODES, cables=[[0, 1]]), "cable: is needed"),
         (lambda: sf.networks.from_arrays(NODES, [[0, 7]], rod=ROD), "names a node that isn't there"),
+        (lambda: sf.networks.from_arrays(NODES, [[-1, 1]], rod=ROD), "names a node that isn't there"),
         (lambda: sf.networks.from_arrays(NODES, [[0.5, 1]], rod=ROD), "pairs of node numbers"),
         (lambda: sf.networks.from_arrays([[0, 0]], rod=ROD), "rows of 3 numbers"),
         (lambda: sf.networks.from_arrays([["x", 0, 0]]), "must be numbers"),
@@ -124,6 +127,7 @@ def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
             "another length",
         ),
         (lambda: sf.networks.from_networkx([1, 2]), "is no graph"),
+        (lambda: sf.networks.from_networkx(SimpleNamespace(nodes=dict)), "is no graph"),
         (lambda: sf.networks.from_networkx(Graph({"a": {}}, [])), "node 'a': has no three numbers"),
         (
             lambda: sf.networks.from_networkx(Graph(points(), [("a", "c", {"kind": "string"})]), rod=ROD),
