@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 
@@ -29,6 +30,16 @@ class InputError(ShellformError, ValueError):
         found = "" if value is None else f" (found {value!r})"
         tail = f". {remedy}" if remedy else ""
         super().__init__(f"{head}{found}{tail}")
+
+
+def require_file(file: Path, *, where: str = "") -> None:
+    """Raises InputError where there is no such file; `where` it is named, unless by itself."""
+    if not file.is_file():
+        raise InputError(
+            "there is no such file",
+            where=where or str(file),
+            remedy="Check the path; one in a case file is relative to it.",
+        )
 
 
 def not_installed(what: str, extra: str, error: ImportError) -> InputError:

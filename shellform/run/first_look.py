@@ -16,7 +16,7 @@ import shellform
 from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
 from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
-from shellform.errors import InputError
+from shellform.errors import InputError, require_file
 from shellform.gridshell.joints import usual_gap
 from shellform.net.edges import stand
 from shellform.net.net import Net
@@ -139,12 +139,7 @@ def surface_entry(file: Path | None, options: Mapping[str, Any]) -> SurfaceEntry
         first = error.errors()[0]
         where = ".".join(["surface", *(str(part) for part in first["loc"])])
         raise InputError(str(first["msg"]).lower(), where=where, value=first["input"]) from error
-    if not Path(entry.file).is_file():
-        raise InputError(
-            "there is no such file",
-            where=entry.file,
-            remedy="Check the path; one in a case file is relative to it.",
-        )
+    require_file(Path(entry.file), where=entry.file)
     return entry
 
 

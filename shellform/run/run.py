@@ -22,7 +22,7 @@ from shellform.arrays import Reals
 from shellform.case.build_gridshell import gridshell, rod_limits
 from shellform.case.build_net import net_of, net_record, size_text, surface_of, surface_record, with_rods
 from shellform.case.case import Case, check_script, dump_case
-from shellform.errors import InputError, NotConverged, ShellformError
+from shellform.errors import InputError, NotConverged, ShellformError, require_file
 from shellform.gridshell.gridshell import Gridshell, TooCurved
 from shellform.gridshell.joints import doubts as joint_doubts
 from shellform.gridshell.tolerances import default_tolerances
@@ -122,12 +122,7 @@ def _run(
     if until not in STAGES:
         raise InputError("is no stage", where="--until", value=until, remedy=f"Stages: {', '.join(STAGES)}.")
     file = Path(case.surface.file)
-    if not file.is_file():
-        raise InputError(
-            "there is no such file",
-            where=f"surface.file: {file}",
-            remedy="Check the path; one in a case file is relative to it.",
-        )
+    require_file(file, where=f"surface.file: {file}")
     check_script(file, allow_scripts=allow_scripts)
     keys = stage_keys(case, sketch=sketch)
     began = time.perf_counter()

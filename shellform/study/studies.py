@@ -28,7 +28,7 @@ from typing import Any
 
 import shellform
 from shellform.case.case import Case, check_script
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_file
 from shellform.records.stages import STAGES
 from shellform.run.folder import alone
 from shellform.run.keys import stage_keys
@@ -214,12 +214,7 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
     try:
         case, values = resolved(study.plan, own)
         file = Path(case.surface.file)
-        if not file.is_file():
-            raise InputError(
-                "there is no such file",
-                where=f"surface.file: {file}",
-                remedy="Check the path; one in a case file is relative to it.",
-            )
+        require_file(file, where=f"surface.file: {file}")
         check_script(file, allow_scripts=study.allow_scripts)
         keys = stage_keys(case)
     except InputError as error:

@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_file
 from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.nurbs import Patch
@@ -83,12 +83,7 @@ def import_surface(
 ) -> Surface:
     """The surface of a STEP, IGES or BREP file as `read_cad` reads it, in this process, and z up."""
     file = Path(path)
-    if not file.is_file():
-        raise InputError(
-            "there is no such file",
-            where=str(file),
-            remedy="Check the path; one in a case file is relative to it.",
-        )
+    require_file(file)
     kind = FORMATS.get(file.suffix.lower())
     if kind is None:
         raise InputError("isn't a CAD file", where=str(file), remedy=f"Known endings: {', '.join(FORMATS)}.")

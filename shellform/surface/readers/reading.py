@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shellform.errors import InputError
+from shellform.errors import InputError, require_file
 from shellform.surface.readers import compas, foreign, plain
 from shellform.surface.readers.draft import Choice, Draft
 from shellform.surface.readers.fills import filled
@@ -117,12 +117,7 @@ def surface_of(
 
 def kind_of(file: Path) -> str:
     """The format of a file, one of ENDINGS' values. Raises InputError for what can't be read here."""
-    if not file.is_file():
-        raise InputError(
-            "there is no such file",
-            where=str(file),
-            remedy="Check the path; one in a case file is relative to it.",
-        )
+    require_file(file)
     size = file.stat().st_size
     if size == 0:
         raise InputError("is empty", where=str(file), remedy="Copy or export it anew.")

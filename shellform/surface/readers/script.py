@@ -13,16 +13,11 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from shellform.errors import InputError
+from shellform.errors import InputError, require_file
 
 
 def load_script(path: Path) -> ModuleType:
-    if not path.is_file():
-        raise InputError(
-            "there is no such file",
-            where=str(path),
-            remedy="Check the path; one in a case file is relative to it.",
-        )
+    require_file(path)
     spec = importlib.util.spec_from_file_location(f"surface_{path.stem}", path)
     if spec is None or spec.loader is None:
         raise InputError("isn't a Python script", where=str(path), remedy="Builder scripts end in .py.")
