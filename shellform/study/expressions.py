@@ -64,30 +64,19 @@ def evaluate(text: str, where: str, entry: Callable[[str], float]) -> float:
     try:
         tree = ast.parse(text.strip(), mode="eval")
         value = _value(tree.body, where, entry)
-    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(
-            f"can't be worked out: {error}",
-            where=where,
-            value=text,
-            remedy="Mend the expression, or the numbers that it is given.",
-        ) from error
-    except (ArithmeticError, TypeError) as error:
-        raise InputError(
-            f"can't be worked out: {error}",
-            where=where,
-            value=text,
-            remedy="Mend the expression, or the numbers that it is given.",
-        ) from error
+    except InputError:
+        raise
+    except (SyntaxError, ValueError, RecursionError, MemoryError, ArithmeticError, TypeError) as error:
+        raise _unworkable(f"can't be worked out: {error}", where, text) from error
     if not math.isfinite(value):
-        raise InputError(
-            "isn't finite",
-            where=where,
-            value=text,
-            remedy="Mend the expression, or the numbers that it is given.",
-        )
+        raise _unworkable("isn't finite", where, text)
     return value
+
+
+def _unworkable(what: str, where: str, text: str) -> InputError:
+    return InputError(
+        what, where=where, value=text, remedy="Mend the expression, or the numbers that it is given."
+    )
 
 
 def _value(node: ast.AST, where: str, entry: Callable[[str], float]) -> float:
