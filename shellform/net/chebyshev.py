@@ -214,8 +214,7 @@ def _origin(
         heading = np.array([np.cos(angle), np.sin(angle)])
         shift = offset[0] * steps[0] * heading + offset[1] * steps[1] * np.array([-heading[1], heading[0]])
         plan = _middle(surface, finder) + shift
-    away = np.linalg.norm(surface.vertices[:, :2] - plan, axis=1)
-    origin = raised(finder, plan, surface.vertices[np.argmin(away)])
+    origin = _above(surface, finder, plan)
     foot = finder.foot(origin[None])
     if finder.past_outline(foot)[0] > 0.0:
         raise InputError(
@@ -251,11 +250,16 @@ def _middle(surface: Surface, finder: Finder) -> Reals:
     corners = surface.vertices[surface.triangles]
     areas = triangle_areas(surface.vertices, surface.triangles)
     centroid = np.asarray(areas @ corners.mean(axis=1) / areas.sum())[:2]
-    nearest = surface.vertices[np.argmin(np.linalg.norm(surface.vertices[:, :2] - centroid, axis=1))]
-    if finder.past_outline(finder.foot(raised(finder, centroid, nearest)[None]))[0] <= 0.0:
+    if finder.past_outline(finder.foot(_above(surface, finder, centroid)[None]))[0] <= 0.0:
         return centroid
     edge = cKDTree(surface.vertices[np.concatenate(surface.boundary)])
     return surface.vertices[np.argmax(edge.query(surface.vertices)[0]), :2]
+
+
+def _above(surface: Surface, finder: Finder, plan: Reals) -> Reals:
+    """The place (3,) on the surface over a `plan` (2,), sought from the vertex nearest to it there."""
+    away = np.linalg.norm(surface.vertices[:, :2] - plan, axis=1)
+    return raised(finder, plan, surface.vertices[np.argmin(away)])
 
 
 def _halves(along_u: Reals, along_v: Reals) -> tuple[Reals, list[Reals]]:

@@ -231,9 +231,10 @@ class _Search:
                 f"{possible[-1].label} ({possible[-1].catalogue}) and thinner: far too thin for the load"
             )
             return None
-        first = None if tried else first_choice(placed.net, self.surface, spacing, possible, needed)
-        tried = tried or {}
-        at = after(placed.net, possible, tried) if first is None else first
+        if tried:
+            at = after(placed.net, possible, tried)
+        else:
+            tried, at = {}, first_choice(placed.net, self.surface, spacing, possible, needed)
         while at not in tried and len(tried) < _STEPS:
             if tried and self.allowance.over:
                 break
