@@ -22,6 +22,26 @@ def came_to(factor, stress, edge, pull):
     return Followed(factor, stress, edge, pull, 0.01, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
 
 
+def thinned(failure, spacing, thickness, stands):
+    """What thinning the concrete comes to after a `failure`, where trials come to what `stands` says."""
+    search = SimpleNamespace(
+        best=failure,
+        failures=[failure],
+        wish=SimpleNamespace(rod=None, thickness=None),
+        allowance=SimpleNamespace(thins=True, over=False),
+        _stands=stands,
+    )
+    return _Search._thinner(search, spacing, thickness)
+
+
+def stand_in_sizes(monkeypatch, possible, following, borne):
+    """Of the `possible` sections the one after another is `following`, and rods bear a share `borne` of the load."""
+    monkeypatch.setattr(first_design, "choices", lambda *_: possible)
+    monkeypatch.setattr(first_design, "next_section", lambda *_: following)
+    for module in (first_design, next_trial):
+        monkeypatch.setattr(module, "load_borne", lambda *_: borne)
+
+
 @pytest.mark.parametrize(
     ("found", "why", "stress"),
     [
@@ -63,14 +83,8 @@ def test_concrete_is_thinned_by_what_the_design_falls_short_of(monkeypatch, why,
 
     monkeypatch.setattr(first_design, "choices", lambda *_: ())
     choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
-    search = SimpleNamespace(
-        best=Obstacle(why, 0.5, 0.05, factor, choice, SimpleNamespace(net=None)),
-        failures=[],
-        wish=SimpleNamespace(rod=None, thickness=None),
-        allowance=SimpleNamespace(thins=True, over=False),
-        _stands=stands,
-    )
-    assert isinstance(_Search._thinner(search, 0.02, 0.02), FirstDesign)
+    failure = Obstacle(why, 0.5, 0.05, factor, choice, SimpleNamespace(net=None))
+    assert isinstance(thinned(failure, 0.02, 0.02, stands), FirstDesign)
     assert tried == [millimetres]
 
 
@@ -87,18 +101,8 @@ def test_concrete_is_thinned_for_the_rods_that_broke_where_less_stressed_ones_fa
             return Obstacle(Why.STABILITY, 0.5, 0.05, 0.2, choice, net, stress=0.1)
         return object.__new__(FirstDesign)
 
-    monkeypatch.setattr(first_design, "choices", lambda *_: [thin, deep])
-    monkeypatch.setattr(first_design, "next_section", lambda *_: 0)
-    for module in (first_design, next_trial):
-        monkeypatch.setattr(module, "load_borne", lambda *_: 0.75)
-    search = SimpleNamespace(
-        best=breaks,
-        failures=[breaks],
-        wish=SimpleNamespace(rod=None, thickness=None),
-        allowance=SimpleNamespace(thins=True, over=False),
-        _stands=stands,
-    )
-    assert isinstance(_Search._thinner(search, 0.5, 0.05), FirstDesign)
+    stand_in_sizes(monkeypatch, [thin, deep], 0, 0.75)
+    assert isinstance(thinned(breaks, 0.5, 0.05, stands), FirstDesign)
     assert tried == [(thin, 50.0), (deep, 37.0)]
 
 
@@ -145,16 +149,6 @@ def test_where_rods_would_break_without_any_concrete_less_deep_ones_are_tried_wi
             return object.__new__(FirstDesign)
         return Obstacle(why, 0.5, thickness, factor, choice, net, stress=stress)
 
-    monkeypatch.setattr(first_design, "choices", lambda *_: [thin, deep])
-    monkeypatch.setattr(first_design, "next_section", lambda *_: 1)
-    for module in (first_design, next_trial):
-        monkeypatch.setattr(module, "load_borne", lambda *_: 0.5)
-    search = SimpleNamespace(
-        best=breaks,
-        failures=[breaks],
-        wish=SimpleNamespace(rod=None, thickness=None),
-        allowance=SimpleNamespace(thins=True, over=False),
-        _stands=stands,
-    )
-    assert isinstance(_Search._thinner(search, 0.5, 0.05), FirstDesign)
+    stand_in_sizes(monkeypatch, [thin, deep], 1, 0.5)
+    assert isinstance(thinned(breaks, 0.5, 0.05, stands), FirstDesign)
     assert tried == [(deep, 25.0), (thin, 50.0), (thin, 38.0)]
