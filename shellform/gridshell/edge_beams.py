@@ -2,8 +2,10 @@
 
 They follow the lines that the net has for them (net/edges.py) in straight elements, and are made in their
 final curve, so that they are without stress in the target. Each rod's end is clamped to the beam's axis by a
-short beam across half the gap, as stiff as the edge beam itself and without stress in the target too: the
-rods are bent first, then clamped. Where an edge beam has a foot it is pinned.
+short beam, half the gap long or longer where ends share a node, without stress in the target too: the rods are bent first,
+then clamped. It is as stiff as the edge beam, but never stiffer between its ends than a rod half the gap long: nothing gives
+way there that counts, and stiffer ones would leave more to rounding than the load. Where an edge beam has a foot it is
+pinned.
 
 A bundle of n rods of radius r, packed as close as circles pack round a middle one, has with the distances d
 of their axes from the bundle's
@@ -118,9 +120,9 @@ class EdgeBeam:
         return stiffness(self.section)
 
 
-def edge_beams(net: Net, edge: EdgeBeam | None) -> Beams | None:
-    """The elements of the net's edge beams, then their clamps; None where it has none. Raises InputError
-    where the net has edge beams, but nothing is said of what they are."""
+def edge_beams(net: Net, edge: EdgeBeam | None, rod: tuple[float, float, float, float]) -> Beams | None:
+    """The elements of the net's edge beams, then their clamps, no stiffer than a `rod` (EA, N; GJ, EI_y, EI_z, N·m²) half
+    the gap long; None where it has none. Raises InputError where the net has edge beams, but nothing is said of what they are."""
     if not net.edges:
         return None
     if edge is None:
@@ -129,21 +131,39 @@ def edge_beams(net: Net, edge: EdgeBeam | None) -> Beams | None:
             where="edge",
             remedy="Give an EdgeBeam, or let the net stand otherwise (net.edges).",
         )
-    axial, torsion, bending_y, bending_z = edge.stiffness
     turned = matrices(net.target.quaternions)
     along = np.vstack([line.ends for line in net.edges])
     upwards = turned[along][..., 2].sum(axis=1)
     clamps = np.vstack([line.clamps for line in net.edges])
     reach = net.target.positions[clamps[:, 1]] - net.target.positions[clamps[:, 0]]
     across = np.eye(3)[np.argmin(np.abs(reach), axis=1)]
-    first, second = (
-        built_in(
-            net.target, ends, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z,
-            z_axis=z, kind=kind
-        )
-        for ends, z, kind in ((along, upwards, EDGE), (clamps, across, CLAMP))
+    return joined(
+        _built(net, along, edge.stiffness, upwards, EDGE),
+        _built(net, clamps, _no_stiffer(edge.stiffness, rod, reach, 0.5 * net.grid.gap), across, CLAMP),
+    )
+
+
+def _built(
+    net: Net, ends: Indices, stiffness: Sequence[float] | Sequence[Reals], z_axis: Reals, kind: str
+) -> Beams:
+    """Beams between the nodes, without stress in the target."""
+    axial, torsion, bending_y, bending_z = stiffness
+    return built_in(
+        net.target, ends, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z, z_axis=z_axis, kind=kind
     )  # fmt: skip
-    return joined(first, second)
+
+
+def _no_stiffer(
+    edge: Sequence[float], rod: Sequence[float], reach: Reals, shortest: float
+) -> tuple[Reals, Reals, Reals, Reals]:
+    """EA, GJ, EI_y, EI_z (c,) of clamps that reach (c, 3), m: the edge beam's, but between their ends, EA/L, GJ/L and
+    12 EI/L³, at most those of a rod so short, m."""
+    times = np.linalg.norm(reach, axis=1) / shortest
+    axial, torsion, about_y, about_z = (
+        np.minimum(most, own * times**power)
+        for most, own, power in zip(edge, rod, (1.0, 1.0, 3.0, 3.0), strict=True)
+    )
+    return axial, torsion, about_y, about_z
 
 
 def lengths(net: Net) -> Reals:

@@ -172,7 +172,7 @@ class Gridshell:
         place = self.net.target.positions[ends]
         lengths = np.linalg.norm(place[:, 1] - place[:, 0], axis=1)
         object.__setattr__(self, "cable_lengths", reals("cable_lengths", lengths, (count,), positive=True))
-        object.__setattr__(self, "_edges", edge_beams(self.net, self.edge))
+        object.__setattr__(self, "_edges", edge_beams(self.net, self.edge, self.rod.stiffness))
         object.__setattr__(self, "_locks", locks(self.net, self.rod.section, self.target))
         object.__setattr__(self, "_made", {})
 

@@ -41,7 +41,10 @@ KINDS = (*HELD, "beam", "free")
 LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
 _LONGEST = 0.5  # of the spacing: edge beams' elements aren't longer
 _STEEP = 0.1  # fall over length in plan: edges that stand on the ground, but unevenly, fall less
-_CLOSE = 0.05  # of the spacing: ends nearer to each other share a node of the edge beam
+_CLOSE = (
+    0.2  # of the spacing: ends nearer to each other share a node of the edge beam, whose elements would drown
+)
+# the load in what rounding leaves of forces: their stiffness goes with the third power of how short they are
 
 
 @dataclass(frozen=True)
@@ -254,15 +257,13 @@ class _Builder:
         )
         if not own:
             return
-        close = _CLOSE * self.net.grid.scale
         nodes: list[int] = []
         arcs: list[float] = []
         links: list[tuple[int, int]] = []
-        for at, each in own:
-            if not nodes or at - arcs[-1] > close:
-                nodes.append(self._new(each.middle))
-                arcs.append(at)
-            links.append((nodes[-1], each.node))
+        for group in _near(own, _CLOSE * self.net.grid.scale):
+            nodes.append(self._new(np.mean([each.middle for _, each in group], axis=0)))
+            arcs.append(sum(at for at, _ in group) / len(group))
+            links += [(nodes[-1], each.node) for _, each in group]
         if not closed:
             length = (float(loop.along[after]) - origin) % total or total
             if loop.kinds[before] in HELD:
@@ -307,6 +308,16 @@ class _Builder:
                 return foot
         self.feet.append(self._new(place))
         return self.feet[-1]
+
+
+def _near(ends: Sequence[tuple[float, End]], close: float) -> list[list[tuple[float, End]]]:
+    """The ends with their places along the edge, m, in order, as groups no longer than `close`, m."""
+    groups = list[list[tuple[float, End]]]()
+    for at, each in ends:
+        if not groups or at - groups[-1][0][0] > close:
+            groups.append([])
+        groups[-1].append((at, each))
+    return groups
 
 
 def _upright(normals: Reals) -> Reals:

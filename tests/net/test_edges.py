@@ -91,7 +91,7 @@ def test_every_rod_s_end_is_held_or_clamped_to_an_edge_beam_by_half_the_gap(
             found.target.positions[clamps[:, 1]] - found.target.positions[clamps[:, 0]], axis=1
         )
         assert reach.min() == pytest.approx(0.5 * found.grid.gap, rel=1e-6)
-        assert reach.max() < 0.06 * SPACING
+        assert reach.max() < 0.2 * SPACING  # ends nearer to each other share a node between them
 
 
 def test_the_edge_beam_of_an_opening_is_a_closed_ring(round_opening):

@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from shellform.arrays import Reals
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.edge_beams import EDGE, lengths
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.net.net import Net
+from shellform.net.net import EdgeLine, Net
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.tables import Table, Value
@@ -22,8 +23,8 @@ def edge_names(net: Net) -> list[str]:
 
 def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], rods: Sequence[str]) -> Table:
     """The edge beams, a line a node of their axes in the target: where it is, how far along the beam, and
-    which rod's end is clamped to it; the section forces there in each of the `states`. `rods` are the rods'
-    names."""
+    which rods' ends are clamped to it, with how far before or behind it where there are more of them; the section forces
+    there in each of the `states`. `rods` are the rods' names."""
     net, beams = shell.net, shell.beams(design.radius)
     place = shell.target.positions
     ends = {
@@ -38,7 +39,7 @@ def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], ro
         count = len(line.ends)
         step = np.linalg.norm(place[line.ends[:, 1]] - place[line.ends[:, 0]], axis=1)
         at = np.append(0.0, np.cumsum(step))
-        held = {int(node): ends[int(end)] for node, end in line.clamps}
+        held = _clamped(line, place, ends)
         for k, node in enumerate(line.nodes.tolist()):
             own = [each[before + min(k, count - 1)] for each in forces.values()]
             first = 1 if k < count else 4
@@ -49,7 +50,7 @@ def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], ro
             ]
             rows.append((name, float(at[k]), *place[node].tolist(), held.get(node, ""), *pushed))
         before += count
-    heads = ["edge beam", "along it [m]", "x [m]", "y [m]", "z [m]", "rod's end clamped there"]
+    heads = ["edge beam", "along it [m]", "x [m]", "y [m]", "z [m]", "rods' ends clamped there"]
     for name in forces:
         heads += [f"{name}: axial force [N]", f"{name}: bending moment [N m]"]
     edge = shell.edge
@@ -61,3 +62,20 @@ def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], ro
         if edge is not None
     )
     return Table("edge_beams", tuple(heads), tuple(rows), notes)
+
+
+def _clamped(line: EdgeLine, place: Reals, ends: Mapping[int, str]) -> dict[int, str]:
+    """For nodes of the line what is clamped to them: the names of `ends`, of several each with its place, mm, along the
+    beam from the node."""
+    onward = np.gradient(place[line.nodes], axis=0)
+    onward /= np.linalg.norm(onward, axis=1, keepdims=True)
+    way = dict(zip(line.nodes.tolist(), onward, strict=True))
+    there: dict[int, list[tuple[float, str]]] = {}
+    for node, end in line.clamps.tolist():
+        there.setdefault(node, []).append((float((place[end] - place[node]) @ way[node]), ends[end]))
+    return {
+        node: own[0][1]
+        if len(own) == 1
+        else ", ".join(f"{name} ({1e3 * at:+.0f} mm)" for at, name in sorted(own))
+        for node, own in there.items()
+    }
