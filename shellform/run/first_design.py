@@ -5,8 +5,8 @@ solved under its growing load, for the rods with which the estimate says to begi
 where it falls, two layers where the stiffest that equation (1) allows falls, finer spacings, and thinner
 concrete last.
 What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
-sixteen structures are drawn and loaded (first_trial.py). Edge beams are bundles, of more rods where few of
-them are stressed too much or the shell nearly stands.
+sixteen structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or stiffer steel tubes where
+these are stressed too much or the shell nearly stands (first_edges.py).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -23,6 +23,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
 from shellform.net.edges import Edges, stand
 from shellform.net.refusal import NoNet, Stalled
+from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
 from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
 from shellform.run.first_trial import (
     DRAWN,
@@ -36,9 +37,7 @@ from shellform.run.first_trial import (
 )
 from shellform.run.next_trial import (
     AIMED,
-    BUNDLES,
     EASES,
-    HEAVY,
     after,
     bears_most,
     edges_may_help,
@@ -132,7 +131,7 @@ class _Search:
         self.edges = Edges(outer=wish.edges)
         one = (1,) if wish.rod else (1, 2)
         self.layers: Sequence[int] = one if wish.layers is None else (wish.layers,)
-        self.lightest = 0  # of the bundles, with which edge beams begin
+        self.lightest = 0  # of the choices of edge beams, with which they begin
         self.angles: Sequence[float] = ANGLES  # worth trying; with a finer spacing only those that were best
 
     def say(self, text: str) -> None:
@@ -318,22 +317,22 @@ class _Search:
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design with these rods and this load, and the lightest edge beams with which it stands."""
-        for bundle in BUNDLES[self.lightest : self.lightest + HEAVY]:
-            result = self._with_edges(placed, choice, bundle, spacing, thickness)
+        for edge in edge_choices(choice)[self.lightest :]:
+            result = self._with_edges(placed, choice, edge, spacing, thickness)
             if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
                 break
         return result
 
     def _with_edges(
-        self, placed: Placed, choice: RodChoice, bundle: int, spacing: float, thickness: float
+        self, placed: Placed, choice: RodChoice, edge: EdgeChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design, where it stands with the gap that follows its rods too."""
         swivels = turning_stress(placed.net, choice.section.material) > _TURNED
-        parts = FirstParts(choice, bundle, rest_ratio_for(self.surface, spacing), rope_for(spacing), swivels)
+        parts = FirstParts(choice, edge, rest_ratio_for(self.surface, spacing), rope_for(spacing), swivels)
         parts, tried, failure = self._solved(placed, parts, spacing, thickness)
         what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
         if placed.net.edges:
-            what += f", edge beams of {bundle}"
+            what += f", edge beams of {edge.label}"
         gap = parts.joint.gap
         if failure is None and not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
             try:

@@ -7,7 +7,6 @@ more would be needed for (trial_structures.py).
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,10 +14,9 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.case.build_problem import edge_utilisation
 from shellform.errors import NotConverged
-from shellform.gridshell.edge_beams import Bundle, EdgeBeam, weight
+from shellform.gridshell.edge_beams import EdgeBeam, weight
 from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace
 from shellform.gridshell.joints import following, swivelling
-from shellform.gridshell.layers import single
 from shellform.gridshell.loads import concrete, rods
 from shellform.gridshell.tolerances import default_tolerances
 from shellform.net.net import Net
@@ -26,6 +24,7 @@ from shellform.problem.paths import deviations
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.reliability.trial_structures import enlarged
+from shellform.run.first_edges import EdgeChoice
 from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, RodChoice, Rope, thicker
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -39,7 +38,6 @@ ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path
 DRAWN, SEED, ENLARGED = 16, 1, 1.25
 STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
-COMPOSITE = 0.5  # how far the rods of an edge beam act together
 _SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
 _TOGETHER = 2  # structures drawn, until one falls: what falls takes ten times as long as what stands
 _SETTLED = 1e-3  # residual: rods too thin for the load are not solved with twice the digits to be told so
@@ -48,11 +46,11 @@ _UNLOADED = 120  # factorisations of the unloaded shell; one that stands without
 
 @dataclass(frozen=True)
 class FirstParts:
-    """What a first design is made of: the `choice` of rods, how many rods an edge beam has (`bundle`), the
+    """What a first design is made of: the `choice` of rods, what edge beams are (`edge`), the
     cables' `rest_ratio` and what `rope` they are, and whether rods turn on their joints (`swivels`)."""
 
     choice: RodChoice
-    bundle: int
+    edge: EdgeChoice
     rest_ratio: float
     rope: Rope
     swivels: bool
@@ -161,8 +159,7 @@ def _shell(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> t
     rope, section = parts.rope, parts.choice.section
     rod = Rod(section)
     joint = replace(parts.joint, gap=net.grid.gap)
-    radius = math.sqrt(single(section).constants[0] / math.pi)
-    edge = EdgeBeam(Bundle(radius, parts.bundle, COMPOSITE, section.material)) if net.edges else None
+    edge = EdgeBeam(parts.edge.section) if net.edges else None
     shell = brace(net, rod, joint, Cable(rope.stiffness), below=surface, edge=edge)
     own = rods(net, section)
     if edge is not None:

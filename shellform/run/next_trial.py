@@ -9,8 +9,6 @@ from shellform.run.first_trial import NEEDED, STRESSED, Followed
 from shellform.run.sizes import RodChoice, load_borne, next_choice, next_thinner
 from shellform.run.unbuildable import Obstacle, Why
 
-BUNDLES = (19, 37, 61, 91)  # rods of an edge beam
-HEAVY = 2  # from which of them on they are far heavier
 EASES = 1.4  # times the load that heavier edge beams have to let it bear, or the stress that they have to spare it
 AIMED = 0.92  # of what rods may be stressed to, for which concrete is thinned
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help

@@ -17,15 +17,17 @@ from typing import Any
 from shellform.case.build_net import FAR, counted_from, distant_origin, size_text, surface_of
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import label
+from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.first_design import FirstDesign, first_design
+from shellform.run.first_edges import TUBES
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import with_ways_out
-from shellform.run.first_trial import ADDITIONAL, COMPOSITE, ELEMENTS, ENLARGED, NEEDED, FirstParts
+from shellform.run.first_trial import ADDITIONAL, ELEMENTS, ENLARGED, NEEDED, FirstParts
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
 from shellform.surface.shape.target import Surface
@@ -140,8 +142,7 @@ outer = "{wish.edges}"       # {_outer(wish)}auto: ground where the edge is low,
 openings = "auto"    # [[edges.stretch]] names walls and abutments by height, box or curve
 
 [edges.beam]
-rods = {parts.bundle}            # {_edges_stressed(design)}in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
-composite = {COMPOSITE!r}      # how far they act together: 1 as if glued, 0 loose
+{_edge_beams(design)}
 
 [part.concrete]      # on its true area, so that the load stays where the spacing changes
 kind = "concrete"
@@ -189,6 +190,18 @@ def _thickness_told(surface: Surface, design: FirstDesign, wish: DesignWish) -> 
 
 def _outer(wish: DesignWish) -> str:
     return "" if wish.edges == "auto" else "as asked; "
+
+
+def _edge_beams(design: FirstDesign) -> str:
+    """The entries of [edges.beam]."""
+    section, told = design.parts.edge.section, _edges_stressed(design)
+    if isinstance(section, Bundle):
+        return f"""\
+rods = {section.count}            # {told}in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
+composite = {section.composite!r}      # how far they act together: 1 as if glued, 0 loose"""
+    return f"""\
+catalogue = "{TUBES}"
+section = "{_named(label(section))}"    # {told}rolled to the edge's curve; or rods in a bundle, width and height, radius and wall"""
 
 
 def _edges_stressed(design: FirstDesign) -> str:

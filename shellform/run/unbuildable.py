@@ -116,11 +116,12 @@ class Obstacle:
         return min(self.factor, 0.9 * needed) if self.why is Why.SCATTER else self.factor
 
     def eases(self, before: Obstacle, needed: float) -> float:
-        """How many times as much of its load as with the failure `before` the shell bears; where both bear what is
-        `needed`, how many times less it is stressed."""
-        if min(self.factor, before.factor) >= needed:
-            return before.stress / self.stress
-        return self.factor / max(before.factor, 1e-12)
+        """How many times as much of its load as with the failure `before` the shell bears; once it bears what is
+        `needed`, times how many times less it is stressed."""
+        more = min(self.factor, needed) / max(min(before.factor, needed), 1e-12)
+        if self.factor < needed or (self.stress > before.stress and before.factor < needed):
+            return more
+        return more * before.stress / self.stress
 
     def breaks_unloaded(self, before: Obstacle, most: float) -> bool:
         """Whether this failure and the one `before`, of the same rods under more concrete, say that these would be

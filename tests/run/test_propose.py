@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -13,12 +14,15 @@ from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.catalogue import read_catalogue
+from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.gridshell import Rod, erection_stress
 from shellform.gridshell.joints import following
+from shellform.gridshell.layers import single
 from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
 from shellform.run import first_trial
 from shellform.run.first_design import first_design
+from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
 from shellform.run.propose import propose_case
@@ -51,6 +55,7 @@ from shellform.run.unbuildable import (
     refuse_tipping,
     refused,
 )
+from shellform.structure.elements.sections import Round, Tube, mass_per_length, stiffness
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.target import curvature, make_surface
 from tests.net.edge_shells import barrel, sail
@@ -233,7 +238,13 @@ def test_two_layers_are_stiffer_across_the_surface_and_bent_like_one(net):
 
 
 def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0), swivels=True)
+    parts = FirstParts(
+        wished("gfrp_rods/6 mm")[0],
+        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
+        0.996,
+        rope_for(1.0),
+        swivels=True,
+    )
     assert 1.0 - parts.eased(PULLED + 0.2).rest_ratio == pytest.approx(0.004 - 0.2 * STRAINED, abs=1e-4)
     slack = parts.eased(3.0)
     assert slack.rest_ratio == 1.0 - LEAST_PRESTRAIN
@@ -242,7 +253,13 @@ def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none()
 
 
 def test_cables_pulled_too_much_with_the_least_prestrain_become_thicker_as_far_as_there_are_strands():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 1.0 - LEAST_PRESTRAIN, rope_for(1.0), swivels=True)
+    parts = FirstParts(
+        wished("gfrp_rods/6 mm")[0],
+        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
+        1.0 - LEAST_PRESTRAIN,
+        rope_for(1.0),
+        swivels=True,
+    )
     diameters = []
     while parts is not None:
         diameters.append(parts.rope.diameter)
@@ -271,13 +288,34 @@ def test_what_heavier_edge_beams_gain_is_load_until_all_is_borne_and_stress_from
 
 
 def test_a_shell_on_four_feet_that_no_rods_hold_up_stands_on_heavier_edge_beams():
-    """Its edges are arches of 20 m between the feet. On bundles of 19 and 37 rods it bore 16 mm of concrete."""
+    """Its edges are arches of 20 m between the feet. On bundles of 19 and 37 rods it bore 16 mm of concrete, on such of 61 25 mm."""
     said: list[str] = []
     dome = dish(size=20.0, rise=3.0, count=25)
     found = first_design(dome, DesignWish(spacing=1.4, angle=0.0), said.append)
-    assert found.parts.bundle >= 61
-    assert found.thickness >= 0.02
-    assert any("edge beams of 19" in each for each in said)
+    assert isinstance(found.parts.edge.section, Tube)
+    assert found.thickness >= 0.03
+    assert found.parts.edge != edge_choices(found.parts.choice)[0]
+    assert any("edge beams of" in each and found.parts.edge.label not in each for each in said)
+
+
+@pytest.mark.parametrize(
+    "rods", ["gfrp_rods/1.5 mm", "gfrp_rods/50 mm", "gfrp_tubes/76 x 5 mm", "steel_tubes/88.9 x 4 mm"]
+)
+def test_edge_beams_that_are_tried_are_each_much_stiffer_than_the_one_before_and_never_heavier_than_bundles(
+    rods,
+):
+    for layers in (1, 2):
+        choice = wished(rods, layers)[0]
+        own = single(choice.section)
+        found = [each.section for each in edge_choices(choice)]
+        stiff = [stiffness(each)[2] for each in found]
+        assert all(after > 2.0 * before for before, after in pairwise(stiff))
+        assert isinstance(found[0], Bundle) == isinstance(own, Round), "laths and tubes don't pack"
+        for section, count in zip(found, (19, 37, 61, 91), strict=True):
+            radius = np.sqrt(own.constants[0] / np.pi)
+            bundle = Bundle(radius, count, 0.5, own.material)
+            assert mass_per_length(section) <= mass_per_length(bundle)
+            assert stiffness(section)[2] >= stiffness(bundle)[2]
 
 
 def test_rods_that_less_concrete_does_not_spare_are_not_tried_with_still_less():
@@ -291,7 +329,13 @@ def test_rods_that_less_concrete_does_not_spare_are_not_tried_with_still_less():
 
 
 def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_before_anything_else():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0), swivels=True)
+    parts = FirstParts(
+        wished("gfrp_rods/6 mm")[0],
+        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
+        0.996,
+        rope_for(1.0),
+        swivels=True,
+    )
     breaks = Followed(NEEDED, 1.4, 0.5, 2.0, 0.01, np.zeros(3), np.zeros(3))
     assert parts.easier(breaks, PULLED).rest_ratio == pytest.approx(0.998)
     assert parts.easier(breaks, PULLED).easier(breaks, PULLED).rest_ratio == 1.0 - LEAST_PRESTRAIN
@@ -302,7 +346,13 @@ def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_bef
 
 
 def test_joints_turn_where_cables_are_made_slacker_for_rods_that_are_stressed_too_much():
-    parts = FirstParts(wished("gfrp_rods/6 mm")[0], 19, 0.996, rope_for(1.0), swivels=False)
+    parts = FirstParts(
+        wished("gfrp_rods/6 mm")[0],
+        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
+        0.996,
+        rope_for(1.0),
+        swivels=False,
+    )
     breaks = Followed(NEEDED, 1.4, 0.5, 0.5, 0.01, np.zeros(3), np.zeros(3))
     eased = parts.easier(breaks, PULLED)
     assert eased == replace(parts, rest_ratio=0.998, swivels=True)

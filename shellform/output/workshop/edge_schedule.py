@@ -55,7 +55,7 @@ def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], ro
         heads += [f"{name}: axial force [N]", f"{name}: bending moment [N m]"]
     edge = shell.edge
     notes = tuple(
-        f"{name}: {label(edge.section)}, {length:.3f} m{', closed' if line.closed else ''}"
+        f"{name}: {label(edge.section)}, E {edge.section.material.young / 1e9:.4g} GPa, {length:.3f} m{', closed' if line.closed else ''}"
         + (f", {mass_per_length(edge.section) * length:.3g} kg" if edge.section.material.density else "")
         + ". It is made in its final curve, and rods are clamped to it once they are bent."
         for name, line, length in zip(edge_names(net), net.edges, lengths(net), strict=True)
