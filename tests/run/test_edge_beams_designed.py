@@ -27,8 +27,8 @@ gap = 0.0024
 stiffness = 2000.0
 force_max = 20.0
 without = false
-[edges.beam]            # 10,000 times as stiff as the rods: rounding hides the load in double precision
-radius = 0.008
+[edges.beam]            # two million times as stiff as the rods: rounding hides the load in double precision
+radius = 0.03
 young = 210e9
 strength = 355e6
 density = 7850.0
