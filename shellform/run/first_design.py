@@ -36,14 +36,12 @@ from shellform.run.first_trial import (
     followed,
 )
 from shellform.run.next_trial import (
-    AIMED,
     EASES,
     after,
     bears_most,
     edges_may_help,
     fails_by,
-    next_section,
-    thinner_rods,
+    thinned,
 )
 from shellform.run.sizes import (
     CURVED,
@@ -56,12 +54,10 @@ from shellform.run.sizes import (
     first_spacing,
     hopeless,
     least_spacing,
-    load_borne,
     practical,
     rest_ratio_for,
     rope_for,
     usual_thickness,
-    whole_mm,
     wished,
 )
 from shellform.run.unbuildable import (
@@ -77,13 +73,11 @@ from shellform.run.unbuildable import (
 from shellform.surface.shape.target import Surface
 
 LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
-_TOO_THIN = 0.3  # of it: nobody pours so little
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
 _STEPS = 4  # sections tried on one net
 _EASED = 5  # times that cables are eased, by less prestrain or thicker strands
 _SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
-_THINNER = 8  # thicknesses tried
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
@@ -251,45 +245,19 @@ class _Search:
         failure = bears_most(self.failures, self.best)
         if failure.choice is None or failure.placed is None or failure.why in (Why.CURVATURE, Why.SPACING):
             raise refused(self.surface, failure, self.wish)
-        asked, thinner = thickness, failure.thickness
-        least = min(LEAST_THICKNESS, 0.5 * asked)
-        placed, choice, nearest = failure.placed, failure.choice, self.best
-        layers = layers_of(choice.section)
-        possible = choices(placed.net, failure.spacing, self.wish.rod, layers)
-        seen, less_deep = {choice}, None
-        for _ in range(_THINNER if self.allowance.thins else 0):
-            if failure.factor == 0.0 or self.allowance.over:  # without any concrete it doesn't stand
-                break
-            other = less_deep or choice
-            if failure.why is Why.STRENGTH and choice in possible and less_deep is None:
-                other = possible[next_section(placed.net, possible, possible.index(choice), failure)]
-            if other in seen:  # else the load is kept, and rods that leave more of their strength are tried
-                share = min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
-                if failure.why is Why.STRENGTH:
-                    share = min(max(load_borne(placed.net, choice, failure.stress, AIMED), 0.5), 0.9)
-                thinner, other = whole_mm(share * thinner), choice
-            seen.add(other)
-            choice, kept, before = other, choice, failure
-            if thinner < _TOO_THIN * least:
-                break
-            result = self._stands(placed, choice, failure.spacing, thinner)
-            if isinstance(result, FirstDesign):
-                if self.wish.thickness is not None or thinner < least:
-                    nearest = replace(nearest, thickness=asked)
-                    raise refused(self.surface, nearest, self.wish, bears=thinner)
-                return result
-            if result.why is Why.NET:
-                break
-            if choice != kept and less_deep is None and result.factor < before.factor:
-                choice = kept  # rods that break less, and fall instead
-                continue
-            failure, placed, less_deep = result, result.placed or placed, None
-            if failure.breaks_unloaded(before, STRESSED):
-                nearest, thinner = failure, before.thickness  # rods that bending stresses less, under as much
-                less_deep = thinner_rods(possible, choice, failure)
-                if less_deep in seen or thinner < least:
-                    break
-        raise refused(self.surface, nearest, self.wish)
+        if not self.allowance.thins:
+            raise refused(self.surface, self.best, self.wish)
+        layers, least = layers_of(failure.choice.section), min(LEAST_THICKNESS, 0.5 * thickness)
+        possible = choices(failure.placed.net, failure.spacing, self.wish.rod, layers)
+        nearest, result = thinned(
+            failure, self.best, possible, least, self._stands, lambda: self.allowance.over
+        )
+        if result is None:
+            raise refused(self.surface, nearest, self.wish)
+        if self.wish.thickness is not None or result.thickness < least:
+            nearest = replace(nearest, thickness=thickness)
+            raise refused(self.surface, nearest, self.wish, bears=result.thickness)
+        return result
 
     def _net(self, spacing: float, gap: float) -> Placed:
         """The net that bends its rods least, among several angles and offsets. Raises NoNet or Stalled."""

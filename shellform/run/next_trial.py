@@ -1,17 +1,21 @@
-"""What a trial of `shellform new` fails by, and what it tries next: which section, and which edge beams."""
+"""What a trial of `shellform new` fails by, and what it tries next: which section, which edge beams, how much concrete."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
 
 from shellform.net.net import Net
 from shellform.run.first_trial import NEEDED, STRESSED, Followed
-from shellform.run.sizes import RodChoice, load_borne, next_choice, next_thinner
+from shellform.run.sizes import Placed, RodChoice, load_borne, next_choice, next_thinner, whole_mm
 from shellform.run.unbuildable import Obstacle, Why
 
 EASES = 1.4  # times the load that heavier edge beams have to let it bear, or the stress that they have to spare it
+_THINNED = 8  # trials with less concrete
+_TOO_THIN = 0.3  # of the least layer: nobody pours so little
 AIMED = 0.92  # of what rods may be stressed to, for which concrete is thinned
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
+Stands = TypeVar("Stands")
 
 
 def fails_by(tried: Followed) -> Why | None:
@@ -77,3 +81,58 @@ def bears_most(failures: Sequence[Obstacle], nearest: Obstacle) -> Obstacle:
         each for each in failures if each.spacing == nearest.spacing and each.thickness == nearest.thickness
     ]
     return max([nearest, *alike], key=borne)
+
+
+def thinned(
+    failure: Obstacle,
+    nearest: Obstacle,
+    possible: Sequence[RodChoice],
+    least: float,
+    stands: Callable[[Placed, RodChoice, float, float], Stands | Obstacle],
+    over: Callable[[], bool],
+) -> tuple[Obstacle, Stands | None]:
+    """What stands with the most concrete where the `failure` has shown that its rods don't bear theirs, if anything does, and
+    what came nearest to the thickness asked for: the `nearest` until now, or rods that bending breaks less.
+
+    Rods that break give way to others of the `possible` that break less; once these are known the concrete is thinned for those
+    that bear most, to about what the last trial says that they bear. Rods that would break without any
+    concrete give way to less deep ones under as much as before. `stands` tries a net, rods, a spacing and a thickness, m; `least`,
+    m, is the thinnest layer that is poured; nothing is tried once it is `over`.
+    """
+    assert failure.choice is not None
+    rods, thickness = failure.choice, failure.thickness
+    seen, less_deep = {rods}, None
+    for _ in range(_THINNED):
+        if failure.factor == 0.0 or over():  # without any concrete it doesn't stand
+            break
+        assert failure.placed is not None
+        other = less_deep or rods
+        if less_deep is None and failure.why is Why.STRENGTH and rods in possible:
+            other = possible[next_section(failure.placed.net, possible, possible.index(rods), failure)]
+        if other in seen:
+            thickness, other = whole_mm(_borne(failure, rods) * thickness), rods
+        seen.add(other)
+        if thickness < _TOO_THIN * least:
+            break
+        result = stands(failure.placed, other, failure.spacing, thickness)
+        if not isinstance(result, Obstacle):
+            return nearest, result
+        if result.why is Why.NET:
+            break
+        if other != rods and less_deep is None and result.factor < failure.factor:
+            continue  # they break less, and fall instead
+        before, failure, rods, less_deep = failure, result, other, None
+        if failure.breaks_unloaded(before, STRESSED):
+            nearest, thickness = failure, before.thickness
+            less_deep = thinner_rods(possible, rods, failure)
+            if less_deep in seen or thickness < least:
+                break
+    return nearest, None
+
+
+def _borne(failure: Obstacle, rods: RodChoice) -> float:
+    """About what share of its concrete the shell bears that failed so."""
+    if failure.why is not Why.STRENGTH:
+        return min(0.8, 0.95 * failure.nearness(NEEDED) / NEEDED)
+    assert failure.placed is not None
+    return min(max(load_borne(failure.placed.net, rods, failure.stress, AIMED), 0.5), 0.9)

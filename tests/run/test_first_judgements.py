@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.run import first_design, next_trial
-from shellform.run.first_design import FirstDesign, _Search
+from shellform.run import next_trial
+from shellform.run.first_design import _Search
 from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
 from shellform.run.unbuildable import Obstacle, Why
@@ -22,24 +22,18 @@ def came_to(factor, stress, edge, pull):
     return Followed(factor, stress, edge, pull, 0.01, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
 
 
-def thinned(failure, spacing, thickness, stands):
+STANDS = "stands"
+
+
+def thinned(failure, stands, possible=()):
     """What thinning the concrete comes to after a `failure`, where trials come to what `stands` says."""
-    search = SimpleNamespace(
-        best=failure,
-        failures=[failure],
-        wish=SimpleNamespace(rod=None, thickness=None),
-        allowance=SimpleNamespace(thins=True, over=False),
-        _stands=stands,
-    )
-    return _Search._thinner(search, spacing, thickness)
+    return next_trial.thinned(failure, failure, possible, 0.01, stands, lambda: False)[1]
 
 
-def stand_in_sizes(monkeypatch, possible, following, borne):
-    """Of the `possible` sections the one after another is `following`, and rods bear a share `borne` of the load."""
-    monkeypatch.setattr(first_design, "choices", lambda *_: possible)
-    monkeypatch.setattr(first_design, "next_section", lambda *_: following)
-    for module in (first_design, next_trial):
-        monkeypatch.setattr(module, "load_borne", lambda *_: borne)
+def stand_in_sizes(monkeypatch, following, borne):
+    """The section after another is `following`, and rods bear a share `borne` of the load."""
+    monkeypatch.setattr(next_trial, "next_section", lambda *_: following)
+    monkeypatch.setattr(next_trial, "load_borne", lambda *_: borne)
 
 
 @pytest.mark.parametrize(
@@ -74,17 +68,16 @@ def test_a_design_fails_by_load_then_by_its_rods_edge_beams_and_cables(found, wh
         (Why.SCATTER, 0.6, 19),
     ],
 )
-def test_concrete_is_thinned_by_what_the_design_falls_short_of(monkeypatch, why, factor, millimetres):
+def test_concrete_is_thinned_by_what_the_design_falls_short_of(why, factor, millimetres):
     tried = []
 
     def stands(placed, choice, spacing, thickness):
         tried.append(round(1e3 * thickness, 6))
-        return object.__new__(FirstDesign)
+        return STANDS
 
-    monkeypatch.setattr(first_design, "choices", lambda *_: ())
     choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
     failure = Obstacle(why, 0.5, 0.05, factor, choice, SimpleNamespace(net=None))
-    assert isinstance(thinned(failure, 0.02, 0.02, stands), FirstDesign)
+    assert thinned(failure, stands) is STANDS
     assert tried == [millimetres]
 
 
@@ -99,10 +92,10 @@ def test_concrete_is_thinned_for_the_rods_that_broke_where_less_stressed_ones_fa
         tried.append((choice, round(1e3 * thickness, 6)))
         if thickness == 0.05:
             return Obstacle(Why.STABILITY, 0.5, 0.05, 0.2, choice, net, stress=0.1)
-        return object.__new__(FirstDesign)
+        return STANDS
 
-    stand_in_sizes(monkeypatch, [thin, deep], 0, 0.75)
-    assert isinstance(thinned(breaks, 0.5, 0.05, stands), FirstDesign)
+    stand_in_sizes(monkeypatch, 0, 0.75)
+    assert thinned(breaks, stands, [thin, deep]) is STANDS
     assert tried == [(thin, 50.0), (deep, 37.0)]
 
 
@@ -146,9 +139,21 @@ def test_where_rods_would_break_without_any_concrete_less_deep_ones_are_tried_wi
         tried.append((choice, round(1e3 * thickness, 6)))
         why, factor, stress = next(outcome, (None, None, None))
         if why is None:
-            return object.__new__(FirstDesign)
+            return STANDS
         return Obstacle(why, 0.5, thickness, factor, choice, net, stress=stress)
 
-    stand_in_sizes(monkeypatch, [thin, deep], 1, 0.5)
-    assert isinstance(thinned(breaks, 0.5, 0.05, stands), FirstDesign)
+    stand_in_sizes(monkeypatch, 1, 0.5)
+    assert thinned(breaks, stands, [thin, deep]) is STANDS
     assert tried == [(deep, 25.0), (thin, 50.0), (thin, 38.0)]
+
+
+def test_no_less_is_poured_than_three_tenths_of_a_layer_and_nothing_is_tried_once_the_work_is_spent():
+    choice = Choice(sf.Rod.round(young=40e9, radius=0.01).section)
+    failure = Obstacle(Why.STABILITY, 0.5, 0.05, 0.1, choice, SimpleNamespace(net=None))
+    tried = []
+    stands = lambda placed, rods, spacing, thickness: tried.append(thickness) or STANDS  # noqa: E731
+    assert next_trial.thinned(failure, failure, (), 0.0151, stands, lambda: False) == (failure, None)
+    assert next_trial.thinned(failure, failure, (), 0.01, stands, lambda: True) == (failure, None)
+    assert tried == []
+    assert next_trial.thinned(failure, failure, (), 0.01, stands, lambda: False) == (failure, STANDS)
+    assert tried == [0.003]
