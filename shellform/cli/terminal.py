@@ -108,7 +108,7 @@ def tell_as_built(summary: Summary) -> None:
                 parts.append(f"critical factor {end}")
             if row.stands is not None:
                 own = row.stands
-                parts.append(standing_words(own.drawn, own.standing, own.at_least, own.confidence))
+                parts.append(standing_words(own))
             if row.expected_stiffness is not None:
                 parts.append(f"softest mode as built {row.expected_stiffness:.3g} N/m")
             if parts:

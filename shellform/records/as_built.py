@@ -127,7 +127,7 @@ def _drawn(design: DesignRecord, load: str, rods: RodsOf, fallen: int, safety: A
     if row is None or row.stands is None:
         return replace(UNKNOWN, asked=safety.required and row is not None)
     own = row.stands
-    words = standing_words(own.drawn, own.standing, own.at_least, own.confidence)
+    words = standing_words(own)
     if own.drawn - own.standing > fallen:
         lowest = own.lowest or 0.0
         remedy = rods.stronger(1.0 / lowest if lowest > 0.0 else math.inf)

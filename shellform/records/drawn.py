@@ -13,12 +13,22 @@ from shellform.written import write_text
 
 
 @dataclass(frozen=True)
+class DrawnSnap:
+    """Structure `number` came to rest after a local snap at a `factor` of the load, in which a node went `far`, m."""
+
+    number: int
+    factor: float
+    far: float
+
+
+@dataclass(frozen=True)
 class DrawnPath:
-    """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, and which of
-    them `stand`."""
+    """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, which of
+    them `stand`, and the local `snaps` on their ways."""
 
     factors: tuple[float, ...] = ()
     stand: tuple[bool, ...] = ()
+    snaps: tuple[DrawnSnap, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ class ModelRecord:
 class StandingRecord:
     """Of `drawn` imperfect structures `standing` bear the load; so at least the share `at_least` of all do,
     with `confidence`. Drawn from `seed`; `lowest`, the load factor that the weakest of them bears (1 where
-    all stand)."""
+    all stand). Of those that stand, so many have `snapped` at a rod's end or a cell before, by `snap`, m, at the most."""
 
     drawn: int
     standing: int
@@ -94,6 +94,8 @@ class StandingRecord:
     confidence: float
     seed: int
     lowest: float | None = None
+    snapped: int = 0
+    snap: float = 0.0
 
 
 @dataclass(frozen=True)

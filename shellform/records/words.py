@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from shellform.records.failures import RareRecord
+from shellform.records.summary import StandingRecord
 
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
 TITLES = {
@@ -78,11 +79,16 @@ def number(value: float, digits: int = 3) -> str:
     return f"{value:.{digits}g}"
 
 
-def standing_words(drawn: int, standing: int, at_least: float, confidence: float) -> str:
+def standing_words(own: StandingRecord) -> str:
     """How many structures as built stand."""
+    snapped = (
+        f", {own.snapped} of them after a rod's end or a cell has snapped by up to {number(1e3 * own.snap, 2)} mm"
+        if own.snapped
+        else ""
+    )
     return (
-        f"{standing} of {drawn} structures as built stand (at least {math.floor(100.0 * at_least):.0f} % "
-        f"with {number(100.0 * confidence)} % confidence)"
+        f"{own.standing} of {own.drawn} structures as built stand{snapped} (at least {math.floor(100.0 * own.at_least):.0f} % "
+        f"with {number(100.0 * own.confidence)} % confidence)"
     )
 
 

@@ -55,7 +55,7 @@ def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: 
     nominal = workshop.nominal
     z = variables(nominal.members, seed, number)
     errors = errors_of(nominal.members, tolerances, z)
-    end = workshop.limit(errors, most=1.0)
+    end = workshop.fall(errors, most=1.0)
     if end.factor >= 1.0 or end.factor == 0.0:
         raise InputError(
             "the structure hasn't fallen under its load",
@@ -67,7 +67,7 @@ def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: 
 
     def left(cause: str) -> Limit:
         other = {**z, cause: np.zeros_like(z[cause])}
-        return workshop.limit(errors_of(nominal.members, tolerances, other), most=_MOST)
+        return workshop.fall(errors_of(nominal.members, tolerances, other), most=_MOST)
 
     found = {cause: each.factor for cause, each in zip(active, side_by_side(left, active), strict=True)}
     assembly = assemble(nominal.network)

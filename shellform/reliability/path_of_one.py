@@ -13,7 +13,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
-from shellform.reliability.branch import ON_THE_WAY, Branch, Foreseen, Here
+from shellform.reliability.branch import ON_THE_WAY, STRAY, Branch, Foreseen, Here
 from shellform.reliability.drawing import (
     Errors,
     built_beams,
@@ -40,13 +40,25 @@ MARKED = 1 / 512  # of the load, next to a factor at which it counts on which si
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
 _RELAXING = 15  # of the unloaded state, before it is relaxed instead
 _RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none
+SNAPS = 3  # local ones, that a structure may go on after
+_BEYOND = 2.0  # resolutions of its path, where a structure is relaxed that may have snapped
+_SNAPPING, _LOOKS = 15, 4  # factorisations after which it is looked how far it has gone, and how often
+
+
+@dataclass(frozen=True)
+class Snap:
+    """A rod's end or a cell snaps beyond a load `factor`, and the structure comes to rest: how `far`, m, the node goes that
+    goes farthest."""
+
+    factor: float
+    far: float
 
 
 @dataclass(frozen=True)
 class DrawnOutcome:
     """One drawn structure: the load `factor` up to which its stable branch was followed, whether it `stands`,
     how `far`, m, a node ends from the perfect structure's place (inf where it fell), its last `state` on the
-    branch, and the `factorisations` spent."""
+    branch, the `factorisations` spent, and the local `snaps` on the way."""
 
     number: int
     factor: float
@@ -54,6 +66,7 @@ class DrawnOutcome:
     far: float
     state: State
     factorisations: int
+    snaps: tuple[Snap, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -99,19 +112,66 @@ class Loading(Branch):
         cables = built_cables(network.cables, nominal.present, errors, shape)
         own = bench.assembly.with_parts((beams, cables))
         super().__init__(own, built_load(nominal.load, errors), nominal.members.span)
+        self.snaps: list[Snap] = []
 
     def outcome(self, step: float, smallest: float, marks: Sequence[float] = ()) -> DrawnOutcome:
         nominal = self.nominal
-        here, factor = self.followed(1.0, step, smallest, marks=marks)
+        here, factor = self.borne(1.0, step, smallest, marks=marks)
+        snaps = tuple(self.snaps)
         if here is None:
-            return DrawnOutcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent)
+            return DrawnOutcome(self.number, 0.0, False, np.inf, nominal.unloaded, self.spent, snaps)
         if factor < 1.0:
-            return DrawnOutcome(self.number, factor, False, np.inf, here.state, self.spent)
+            return DrawnOutcome(self.number, factor, False, np.inf, here.state, self.spent, snaps)
         far = np.inf
         if nominal.bears:
             far = float(np.linalg.norm(here.state.positions - nominal.states[-1].positions, axis=1).max())
         stands = far <= FAR * nominal.members.span
-        return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent)
+        return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent, snaps)
+
+    def borne(
+        self,
+        most: float,
+        step: float,
+        smallest: float,
+        *,
+        begin: tuple[float, State] | None = None,
+        marks: Sequence[float] = (),
+    ) -> tuple[Here | None, float]:
+        """As `followed`, but going on after local snaps, which are kept in `snaps`: where the structure falls."""
+        here, factor = self.followed(most, step, smallest, begin=begin, marks=marks)
+        while here is not None and factor < most and len(self.snaps) < SNAPS:
+            goal = min(factor + _BEYOND * smallest, most)
+            there = self._rested(here, goal)
+            if there is None:
+                break
+            self.snaps.append(Snap(factor, self._farthest(there.state, here.state)))
+            here, factor = self.followed(most, step, smallest, begin=(goal, there.state), marks=marks)
+        return here, factor
+
+    def _rested(self, here: Here, goal: float) -> Here | None:
+        """Where the structure comes to rest under the load factor `goal`, whose stable branch has ended `here` below
+        it; None where a node goes farther than STRAY of the span: it falls."""
+        state, load = here.state, goal * self.load
+        for _ in range(_LOOKS):
+            try:
+                rest = find_equilibrium(self.assembly, state, load, limit=_SNAPPING)
+            except NotConverged as error:
+                self.spent += error.iterations
+                if not isinstance(error.state, State):
+                    return None
+                state = error.state
+                if self._farthest(state, here.state) > STRAY * self.span:
+                    return None
+                continue
+            self.spent += rest.factorisations
+            if self._farthest(rest.state, here.state) > STRAY * self.span:
+                return None
+            return self.newton(rest.state, load, limit=2, tolerance=ON_THE_WAY)
+        return None
+
+    def _farthest(self, state: State, before: State) -> float:
+        """How far, m, the node has gone that has gone farthest."""
+        return float(np.linalg.norm(state.positions - before.positions, axis=1).max())
 
     def followed(
         self,

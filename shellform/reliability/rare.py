@@ -62,7 +62,7 @@ def rare_failure(
 
     def one(z: Reals) -> float:
         errors = errors_of(members, tolerances, _by_cause(members, names, z))
-        return workshop.limit(errors, most=most, step=_STEP, resolution=RESOLUTION).factor - 1.0
+        return workshop.fall(errors, most=most, step=_STEP, resolution=RESOLUTION).factor - 1.0
 
     values, asked = list(known), 0
 

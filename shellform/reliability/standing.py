@@ -8,8 +8,9 @@ its end among them, and no node lands farther than `STRAY` of the span from wher
 halved, as on any path. So the large steps lead along the same branch as small ones do.
 
 A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther
-than `FAR` of the span from the perfect structure's; one that loses stability on the way has fallen, whatever
-it would snap to, and how far it came is its load factor.
+than `FAR` of the span from the perfect structure's. One that loses stability on the way is relaxed under a little more load. Where
+it comes to rest before any node has gone farther than `STRAY` of the span, one rod's end or one cell has snapped, it goes on from
+there, and the snap is told; else it has fallen, whatever it would come to, and how far it came is its load factor.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from shellform.arrays import Reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
+from shellform.reliability.branch import Here
 from shellform.reliability.drawing import (
     Errors,
     errors_of,
@@ -123,12 +125,34 @@ class Workshop:
 
         def ended(loading: Loading) -> Limit:
             here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks)
-            if here is None:
-                return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
-            kind = BORNE if factor >= most else (loading.kind(here) if tell else ENDED)
-            return Limit(factor, kind, here.state, loading.spent)
+            return self._ended(loading, here, factor, most, tell)
 
         return self.with_structure(errors, ended)
+
+    def fall(
+        self,
+        errors: Errors,
+        *,
+        most: float,
+        step: float = STEP,
+        resolution: float = 1 / 64,
+        tell: bool = True,
+        begin: tuple[float, State] | None = None,
+        marks: Sequence[float] = (),
+    ) -> Limit:
+        """As `limit`, but going on after local snaps: where the structure falls."""
+
+        def ended(loading: Loading) -> Limit:
+            here, factor = loading.borne(most, step, resolution, begin=begin, marks=marks)
+            return self._ended(loading, here, factor, most, tell)
+
+        return self.with_structure(errors, ended)
+
+    def _ended(self, loading: Loading, here: Here | None, factor: float, most: float, tell: bool) -> Limit:
+        if here is None:
+            return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)
+        kind = BORNE if factor >= most else (loading.kind(here) if tell else ENDED)
+        return Limit(factor, kind, here.state, loading.spent)
 
     def with_structure(self, errors: Errors, work: Callable[[Loading], Found], *, number: int = 0) -> Found:
         """What `work` finds of the structure with the errors, on an assembly that is its own meanwhile."""

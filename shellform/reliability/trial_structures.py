@@ -185,7 +185,8 @@ def tried(
             if number == PERFECT:  # whose path is known so far
                 most, begin = wanted, nominal.known_to(wanted)
             errors = drawn(nominal.members, larger, safety.seed + SEED, number)
-            found = workshop.limit(
+            bears = workshop.limit if number == PERFECT else workshop.fall
+            found = bears(
                 errors,
                 most=most,
                 step=STEP,

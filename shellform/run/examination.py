@@ -248,14 +248,25 @@ def _guided(each: _Examined, largest: str, shares: Mapping[str, float], seed: in
 
 def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
     """Under a load that is a share of the path's own."""
-    fallen = [factor for factor, stands in zip(path.factors, path.stand, strict=True) if not stands]
-    if share < 1.0:
-        fallen = [factor for factor in fallen if factor < share * (1.0 - _SAME)]
+    fallen = {
+        number: factor
+        for number, (factor, stands) in enumerate(zip(path.factors, path.stand, strict=True))
+        if not stands and (share == 1.0 or factor < share * (1.0 - _SAME))
+    }
+    snaps = {own.number: own for own in path.snaps if own.factor < share and own.number not in fallen}
     drawn = len(path.factors)
     entry = case.safety
     found = counted(drawn, drawn - len(fallen), seed=entry.seed, confidence=entry.confidence)
-    lowest = min(fallen, default=share) / share
-    return StandingRecord(drawn, found.standing, found.at_least, entry.confidence, entry.seed, lowest)
+    return StandingRecord(
+        drawn,
+        found.standing,
+        found.at_least,
+        entry.confidence,
+        entry.seed,
+        min(fallen.values(), default=share) / share,
+        len(snaps),
+        max((own.far for own in path.snaps if own.number in snaps), default=0.0),
+    )
 
 
 def _rare(workspace: Workspace, each: _Examined) -> tuple[RareRecord, ...] | None:

@@ -14,7 +14,7 @@ from shellform.arrays import Reals
 from shellform.compiled import clock_without_compiling
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.records.drawn import DrawnPath, read_drawn, write_drawn
+from shellform.records.drawn import DrawnPath, DrawnSnap, read_drawn, write_drawn
 from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
@@ -79,13 +79,20 @@ def drawn_of(
             marks=tuple(paths(loads).get(load, {}).values()),
         )
         path = DrawnPath(
-            (*path.factors, *(each.factor for each in some)), (*path.stand, *(each.stands for each in some))
+            (*path.factors, *(each.factor for each in some)),
+            (*path.stand, *(each.stands for each in some)),
+            (
+                *path.snaps,
+                *(DrawnSnap(each.number, own.factor, own.far) for each in some for own in each.snaps),
+            ),
         )
         kept = kept.also(load, path)
         write_drawn(folder, name, kept)
         clock.took(len(some), clock_without_compiling() - began)
         tell(len(path.factors))
-    return DrawnPath(path.factors[:count], path.stand[:count])
+    return DrawnPath(
+        path.factors[:count], path.stand[:count], tuple(own for own in path.snaps if own.number < count)
+    )
 
 
 def key_of(

@@ -264,8 +264,12 @@ def test_words_of_loads_paths_and_structures_keep_their_numbers():
     assert critical_words(3.0, "none", 0.0) == "beyond 3 ×"
     assert critical_words(1.31, "limit point", -0.007) == "1.310 × (limit point) ± 0.007"
     assert critical_words(1.31, "bifurcation") == "1.310 × (bifurcation)"
-    assert standing_words(200, 199, 0.9769, 0.95) == (
+    assert standing_words(StandingRecord(200, 199, 0.9769, 0.95, 0)) == (
         "199 of 200 structures as built stand (at least 97 % with 95 % confidence)"
+    )
+    assert standing_words(StandingRecord(200, 199, 0.9769, 0.95, 0, snapped=3, snap=0.0214)) == (
+        "199 of 200 structures as built stand, 3 of them after a rod's end or a cell has snapped by up to 21 mm "
+        "(at least 97 % with 95 % confidence)"
     )
 
 

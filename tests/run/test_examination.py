@@ -9,7 +9,7 @@ from shellform.case.build_safety import case_safety, case_tolerances, critical_f
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.tolerances import SOURCES, default_tolerances
-from shellform.records.drawn import DrawnPath
+from shellform.records.drawn import DrawnPath, DrawnSnap
 from shellform.records.progress import Kind
 from shellform.records.summary import read_summary
 from shellform.reliability.probability import counted
@@ -90,6 +90,20 @@ def test_under_a_share_of_a_load_those_stand_that_bear_it_and_the_lowest_factor_
         assert told.at_least == counted(6, told.standing, seed=5, confidence=0.9).at_least
         assert (told.confidence, told.seed) == (0.9, 5)
     assert _standing(DrawnPath((1.0,), (True,)), 0.8, case).lowest == 1.0
+
+
+def test_of_those_that_stand_it_is_counted_which_have_snapped_below_the_load_and_how_far(file):
+    case = load_case(file)
+    snaps = (
+        DrawnSnap(0, 0.3, 0.04),
+        DrawnSnap(1, 0.7, 0.02),
+        DrawnSnap(1, 0.9, 0.03),
+        DrawnSnap(3, 0.95, 0.01),
+    )
+    path = DrawnPath((0.4, 1.0, 1.0, 1.0), (False, True, True, True), snaps)
+    share, whole = (_standing(path, each, case) for each in (0.8, 1.0))
+    assert (whole.standing, whole.snapped, whole.snap) == (3, 2, 0.03), "the one that fell counts as fallen"
+    assert (share.standing, share.snapped) == (3, 1)
 
 
 def test_sampling_tells_how_far_it_is_and_how_long_it_takes_at_most(whole):
