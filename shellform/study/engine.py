@@ -219,15 +219,28 @@ def _close(part: Any) -> None:
         part.close(timeout=10)
 
 
+@dataclass(frozen=True)
+class Manned:
+    """How a cluster is manned: its `workers`, the `most` that it was seen to have, and for how many seconds it has
+    had `fewer` than those, and been `without` any."""
+
+    workers: int = 0
+    most: int = 0
+    fewer: float = 0.0
+    without: float = 0.0
+
+
 @dataclass
 class _Threads:
-    """How many threads a cluster has, `counted` anew each second, and since when it has been seen to have none
-    (`gone`), by the monotonic clock; `tell` hears for how many seconds."""
+    """How many threads a cluster has, `counted` anew each second, the `most` workers that it was seen to have, since
+    when it has been seen to have fewer (`lost`) and none (`gone`), by the monotonic clock; `tell` hears of it."""
 
     engine: Engine
-    tell: Callable[[float], None]
+    tell: Callable[[Manned], None]
     number: int = 1
+    most: int = 0
     counted: float = -math.inf
+    lost: float = math.inf
     gone: float = math.inf
 
     def look(self) -> None:
@@ -235,10 +248,13 @@ class _Threads:
         now = time.monotonic()
         if now <= self.counted + _RECOUNT:
             return
-        self.number, self.counted = sum(self.engine.client.nthreads().values()), now
+        threads = self.engine.client.nthreads()
+        self.number, self.counted, workers = sum(threads.values()), now, len(threads)
+        self.most = max(self.most, workers)
+        self.lost = min(self.lost, now) if workers < self.most else math.inf
         self.gone = math.inf if self.number else min(self.gone, now)
         without = max(0.0, now - self.gone)
-        self.tell(without)
+        self.tell(Manned(workers, self.most, max(0.0, now - self.lost), without))
         if without > self.engine.patience:
             raise NoWorkers(
                 f"The cluster has had no worker for {without:.0f} s",
@@ -252,12 +268,12 @@ def sweep(
     jobs: Iterable[Job],
     work: Work,
     *,
-    without: Callable[[float], None] = lambda seconds: None,
+    manned: Callable[[Manned], None] = lambda now: None,
 ) -> Iterator[list[Outcome]]:
-    """Runs `work` on each job and gives the outcomes in the batches in which they come, in no order. `without`
-    is told, each second, for how many there has been no worker. Raises NoWorkers where that lasts too long.
+    """Runs `work` on each job and gives the outcomes in the batches in which they come, in no order. `manned`
+    hears each second how the cluster is. Raises NoWorkers where it is without any worker for too long.
     """
-    threads = _Threads(engine, without)
+    threads = _Threads(engine, manned)
     again: list[Job] = []
     yield from _pass(threads, jobs, work, lambda job, reason: again.append(job))
     lost: list[Outcome] = []

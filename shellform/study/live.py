@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from shellform.study.engine import Manned
 from shellform.study.outcome import Status, Value
 from shellform.study.studies import StudyProgress
 
 _EVERY = 10.0  # seconds between lines
-_WITHOUT = 10.0  # seconds without a worker that are told: one that died is begun anew within a few
+_SHORT = 10.0  # seconds short of workers that are told: one that died is begun anew within a few
 
 
 class Live:
@@ -59,8 +60,16 @@ def _line(progress: StudyProgress) -> str:
         else ""
     )
     failed = f", {progress.failed} without a result" if progress.failed else ""
-    idle = f", no worker for {progress.without:.0f} s" if progress.without > _WITHOUT else ""
-    return f"study: {ready} of {progress.total} designs{failed}{idle}{rest}"
+    return f"study: {ready} of {progress.total} designs{failed}{_short(progress.manned)}{rest}"
+
+
+def _short(now: Manned) -> str:
+    """That workers are missing, where they have been for a while."""
+    if now.without > _SHORT:
+        return f", no worker for {now.without:.0f} s"
+    if now.fewer > _SHORT:
+        return f", {now.most - now.workers} of {now.most} workers gone for {now.fewer:.0f} s"
+    return ""
 
 
 def _table(progress: StudyProgress) -> Any:

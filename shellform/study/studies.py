@@ -21,7 +21,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ from shellform.errors import InputError, NotConverged, require_file
 from shellform.records.stages import STAGES
 from shellform.run.folder import alone
 from shellform.run.keys import stage_keys
-from shellform.study.engine import Engine, NoWorkers, Work, engine, sweep
+from shellform.study.engine import Engine, Manned, NoWorkers, Work, engine, sweep
 from shellform.study.front import Front, signed
 from shellform.study.jobs import Job, disk_is_full, work
 from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
@@ -52,15 +52,15 @@ _SHORT = 32  # hexadecimal digits of a key: 128 bits
 
 @dataclass
 class StudyProgress:
-    """How far a study is, as it goes on; `rows` are the latest with the columns asked for, `without` the
-    seconds for which there has been no worker."""
+    """How far a study is, as it goes on; `rows` are the latest with the columns asked for, `manned` tells of
+    the workers."""
 
     total: int = 0
     done: int = 0
     failed: int = 0
     found: int = 0
     dashboard: str = ""
-    without: float = 0.0
+    manned: Manned = field(default_factory=Manned)
     began: float = field(default_factory=time.perf_counter)
     rows: list[Row] = field(default_factory=list)
 
@@ -253,15 +253,16 @@ def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]
 def _compute(study: _Studying, opened: Engine, jobs: Iterator[Job], work: Work) -> None:
     written, cost = time.perf_counter(), 0.0
 
-    def without(seconds: float) -> None:
-        if seconds or study.progress.without:
-            study.progress.without = seconds
+    def manned(now: Manned) -> None:
+        short = now.fewer or study.progress.manned.fewer
+        study.progress.manned = now
+        if short:
             study.show(study.progress)
 
     try:
-        for outcomes in sweep(opened, jobs, work, without=without):
+        for outcomes in sweep(opened, jobs, work, manned=manned):
             _enter(study, outcomes)
-            study.progress.without = 0.0  # somebody answered
+            study.progress.manned = replace(study.progress.manned, without=0.0)  # somebody answered
             study.show(study.progress)
             now = time.perf_counter()
             if now - written > max(2.0, cost / _SHARE_OF_TIME):

@@ -16,6 +16,7 @@ import urllib.request
 import zlib
 from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import dask
 import pytest
@@ -26,7 +27,7 @@ from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.run import run
 from shellform.run.folder import alone, read_run
-from shellform.study.engine import NoWorkers, _gathered, _Threads, engine, sweep
+from shellform.study.engine import Engine, Manned, NoWorkers, _gathered, _Threads, engine, sweep
 from shellform.study.front import Front, signed
 from shellform.study.jobs import Job, work
 from shellform.study.live import _line
@@ -35,7 +36,7 @@ from shellform.study.search import _beyond
 from shellform.study.store import Log, read_table
 from shellform.study.studies import run_study
 from tests.command import begin
-from tests.stubs import ROOT, deadly, quick, stuck, study_file
+from tests.stubs import ROOT, deadly, quick, slow, stuck, study_file
 
 GRID = """
 [vary]
@@ -190,7 +191,9 @@ def test_a_study_waits_for_a_worker_that_takes_long_to_begin(tmp_path, monkeypat
         monkeypatch.setattr("shellform.study.studies.engine", lambda **_: nullcontext(one))
         told = []
         file = study_file(tmp_path, "[vary]\ncable.stiffness = [333, 187]\n")
-        found = run_study(file, tmp_path / "out", work=deadly, show=lambda now: told.append(now.without))
+        found = run_study(
+            file, tmp_path / "out", work=deadly, show=lambda now: told.append(now.manned.without)
+        )
     assert (found.designs, found.failed) == (2, 0)
     assert max(told) > 1.0
     assert told[-1] == 0.0
@@ -206,7 +209,7 @@ def test_a_study_without_workers_ends_with_what_it_has_and_goes_on_later(tmp_pat
     with monkeypatch.context() as changed, engine(workers=1) as one:
         changed.setattr(WorkerProcess, "start", in_vain)
         changed.setattr("shellform.study.studies.engine", lambda **_: nullcontext(replace(one, patience=2.0)))
-        changed.setattr("shellform.study.live._WITHOUT", 0.5)
+        changed.setattr("shellform.study.live._SHORT", 0.5)
         with pytest.raises(NotConverged, match=r"no worker for \d s.*the same command again: it goes on"):
             run_study(file, tmp_path / "out", work=deadly, show=lambda now: told.append(_line(now)))
     kept = rows(tmp_path / "out")
@@ -215,6 +218,43 @@ def test_a_study_without_workers_ends_with_what_it_has_and_goes_on_later(tmp_pat
     assert {row["status"] for row in kept} == {"done"}
     assert f"study: {done} of 6 designs, no worker for 1 s" in told[-2]
     assert run_study(file, tmp_path / "out", work=quick).found == done
+
+
+def test_a_study_that_lost_some_of_its_workers_says_how_many_and_ends(tmp_path, monkeypatch):
+    file = study_file(tmp_path, f"[vary]\ncable.stiffness = {list(range(100, 160))}\n")
+    told = []
+    with monkeypatch.context() as changed, engine(workers=2) as one:
+        processes = list(one.client.run(os.getpid).values())
+        changed.setattr(WorkerProcess, "start", in_vain)
+        changed.setattr("shellform.study.studies.engine", lambda **_: nullcontext(one))
+        changed.setattr("shellform.study.live._SHORT", 0.5)
+
+        def show(now):
+            if now.done and len(processes) == 2:
+                os.kill(processes.pop(), signal.SIGKILL)
+            told.append(_line(now))
+
+        found = run_study(file, tmp_path / "out", work=slow, show=show)
+    assert (found.designs, found.failed) == (60, 0)
+    assert [line for line in told if ", 1 of 2 workers gone for 1 s" in line]
+
+
+def test_workers_that_come_back_are_no_longer_told_as_gone(monkeypatch):
+    now, told, threads = [0.0], [], {"a": 1, "b": 2, "c": 1}
+    monkeypatch.setattr("shellform.study.engine.time", SimpleNamespace(monotonic=lambda: now[0]))
+    seen = _Threads(Engine(SimpleNamespace(nthreads=lambda: dict(threads)), "", 60.0), told.append)
+    for clock, there in [(2.0, "abc"), (4.0, "ac"), (9.0, "a"), (12.0, "axy"), (14.0, ""), (16.0, "wxyz")]:
+        threads = dict.fromkeys(there, 1)
+        now[0] = clock
+        seen.look()
+    assert told == [
+        Manned(3, 3, 0.0, 0.0),
+        Manned(2, 3, 0.0, 0.0),
+        Manned(1, 3, 5.0, 0.0),
+        Manned(3, 3, 0.0, 0.0),
+        Manned(0, 3, 0.0, 0.0),
+        Manned(4, 4, 0.0, 0.0),
+    ]
 
 
 def test_a_study_whose_workers_cannot_be_begun_says_so(tmp_path, monkeypatch):
@@ -235,8 +275,9 @@ def test_an_outcome_that_was_lost_with_the_last_worker_is_not_waited_for_for_eve
         threads = _Threads(replace(one, patience=2.0), told.append)
         with pytest.raises(NoWorkers, match="no worker for"):
             _gathered(threads, [(None, lost)], pytest.fail)
-    assert told[0] == 0.0
-    assert told == sorted(told)
+    without = [each.without for each in told]
+    assert without[0] == 0.0
+    assert without == sorted(without)
 
 
 def test_a_design_that_hangs_is_ended_with_its_worker_and_the_rest_goes_on(tmp_path, on_two):
