@@ -288,6 +288,12 @@ def _set(data: dict[str, Any], setting: str) -> None:
         value = tomllib.loads(f"value = {text}")["value"]
     except ValueError:
         value = text  # a bare word stands for itself
+    except RecursionError as error:
+        raise InputError(
+            "its value is nested too deeply",
+            where=f"--set {key.strip()}",
+            remedy="Take its lists out of one another.",
+        ) from error
     set_entry(data, key.strip(), value, where="--set")
 
 

@@ -98,7 +98,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
         raise InputError(
             what[:1].lower() + what[1:], where=f"catalogue {path}: {place.strip('`$.') or 'top'}"
         ) from error
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+    except (msgspec.DecodeError, ValueError, RecursionError) as error:  # ValueError: a number of 5,000 digits
         raise InputError(
             f"isn't valid TOML: {error}",
             where=f"catalogue {path}",

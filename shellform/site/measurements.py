@@ -35,6 +35,22 @@ def text_of(path: str | Path, remedy: str) -> str:
         raise InputError(f"can't be read: {error}", where=str(path), remedy=remedy) from error
 
 
+def cells_of(file: Path, numbered: list[tuple[int, str]], delimiter: str) -> list[list[str]]:
+    """The cells of each of a file's lines, which come with their numbers. Raises InputError where a line is no row of
+    its own: a quotation mark that isn't closed runs on over the lines that follow."""
+    rows: list[list[str]] = []
+    for number, line in numbered:
+        try:
+            rows += csv.reader([line], delimiter=delimiter, skipinitialspace=True, strict=True)
+        except csv.Error as error:
+            raise InputError(
+                f"can't be parted into cells: {error}",
+                where=f"{file}, line {number}",
+                remedy="Close its quotation marks, or leave them out.",
+            ) from error
+    return rows
+
+
 def read_table(
     path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = (), *, empty: tuple[str, ...] = ()
 ) -> list[MeasuredRow]:
@@ -53,7 +69,7 @@ def read_table(
     if not kept:
         raise InputError("is empty", where=str(file), remedy=columns)
     delimiter = next((each for each in ";\t," if each in kept[0][1]), ",")
-    lines = list(csv.reader([line for _, line in kept], delimiter=delimiter, skipinitialspace=True))
+    lines = cells_of(file, kept, delimiter)
     names = [each.strip().lower() for each in lines[0]]
     for name in needed:
         if name not in names:

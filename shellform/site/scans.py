@@ -11,7 +11,6 @@ that fits nearly as well makes the match doubtful, which is said and not guessed
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
-from shellform.site.measurements import text_of
+from shellform.site.measurements import cells_of, text_of
 from shellform.structure.elements.state import State
 from shellform.surface.units import METRES
 
@@ -103,7 +102,7 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
         if line.strip() and not line.lstrip().startswith("#")
     ]
     delimiter = next((each for each in ";\t," if numbered and each in numbered[0][1]), ",")
-    rows = list(csv.reader([line for _, line in numbered], delimiter=delimiter, skipinitialspace=True))
+    rows = cells_of(file, numbered, delimiter)
     columns = [0, 1, 2]
     names = [each.strip().lower() for each in rows[0]] if rows else []
     if {"x", "y", "z"} <= set(names):

@@ -84,6 +84,10 @@ def test_missing_files_and_malformed_settings_are_refused(tmp_path):
         load_case(tmp_path / "none.toml")
     with pytest.raises(InputError, match="KEY=VALUE"):
         load_case(ROOT / "scripts/scale_model.toml", ["net.spacing"])
+    with pytest.raises(InputError, match=r"--set net\.spacing: its value is nested too deeply"):
+        load_case(ROOT / "scripts/scale_model.toml", [f"net.spacing={3000 * '['}"])
+    with pytest.raises(InputError, match=r"net\.spacing"):
+        load_case(ROOT / "scripts/scale_model.toml", [f"net.spacing={5000 * '9'}"])
 
 
 def test_scripts_from_elsewhere_are_not_run_unasked(tmp_path):

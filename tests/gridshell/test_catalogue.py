@@ -223,6 +223,7 @@ def test_a_catalogue_that_the_net_breaks_altogether_is_refused(net):
         ("[0.0024, 0.002, 0.0022, 0.004]", "[]", "has no sizes"),
         ("[material]", "[material", "isn't valid TOML"),
         ("[material]", f"x = {'[' * 3000}\n[material]", "isn't valid TOML"),
+        ("255e6", "9" * 5000, "isn't valid TOML.*digits"),
     ],
 )
 def test_wrong_catalogues_are_refused_with_their_entry(tmp_path, old, new, said):

@@ -244,6 +244,9 @@ def test_bad_tables_of_loads_groups_and_ways_are_refused(folder, run, tmp_path):
         measurements.read_table(tmp_path / "none.csv", ("x",))
     with pytest.raises(InputError, match="is empty"):
         measurements.read_table(written(tmp_path / "a.csv", "# nothing", []), ("x",))
+    (tmp_path / "a.csv").write_text('node,fz\n1,-5.0\n"2,-5.0\n3,-5.0\n', encoding="utf-8")
+    with pytest.raises(InputError, match=r"line 3: can't be parted into cells.*Close its quotation marks"):
+        measurements.read_loads(tmp_path / "a.csv", shell)
     with pytest.raises(InputError, match="line 2: cable"):
         measurements.read_groups(written(tmp_path / "a.csv", "cable,group", [(-1, 1)]), shell.design())
     with pytest.raises(InputError, match="is no support"):

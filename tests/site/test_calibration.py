@@ -178,6 +178,8 @@ def test_scans_are_read_in_their_unit_with_or_without_names(tmp_path):
         ("1,2\n", "line 1"),
         ("# none\n", "no points"),
         ("1,2,nan\n", "not finite"),
+        ('1,2,3\n"4,5,6\n7,8,9\n', "line 2: can't be parted into cells"),
+        (f'1,2,3\n4,5,"{200_000 * "6"}"\n', "line 2: can't be parted into cells.*field limit"),
     ]:
         file.write_text(text)
         with pytest.raises(InputError, match=message):

@@ -197,6 +197,10 @@ def test_a_damaged_compas_mesh_is_named(tmp_path):
     mesh["data"]["face"]["3"] = [0, 1, 9999]
     (tmp_path / "a.json").write_text(json.dumps(mesh))
     refused(tmp_path / "a.json", "its mesh Mesh is damaged")
+    mesh = compas_mesh(POINTS, QUADS)
+    mesh["data"]["vertex"]["0"]["x"] = 10**400
+    (tmp_path / "a.json").write_text(json.dumps(mesh))
+    refused(tmp_path / "a.json", "its mesh Mesh is damaged")
 
 
 def test_a_solid_is_refused_without_a_choice_of_face_and_read_with_one(tmp_path):

@@ -30,12 +30,22 @@ def test_step_s_length_unit_is_told_an_inch_before_the_millimetre_that_defines_i
 
 
 @pytest.mark.parametrize(
-    ("flag", "unit"), [("2,2HMM", "mm"), ("1,4HINCH", "in"), ("6,1HM", "m"), ("3,2HCM", "cm"), ("x", None)]
+    ("flag", "unit"),
+    [
+        ("2,2HMM", "mm"),
+        ("1,4HINCH", "in"),
+        ("6,1HM", "m"),
+        ("3,2HCM", "cm"),
+        ("x", None),
+        ("²,2HMM", None),
+        ("9" * 5000 + ",2HMM", None),
+        ("9" * 5000 + "HMM", None),
+    ],
 )
 def test_iges_global_section_says_the_unit(tmp_path, flag, unit):
     text = f"1H,,1H;,4Hmesh,7Ha;b.igs,4Hhere,3H1,0,32,38,6,308,15,4Hmesh,1.,{flag},1,0.01;"
     lines = [f"{text[k : k + 72]:<72}G{1 + k // 72:>7}" for k in range(0, len(text), 72)]
-    (tmp_path / "a.igs").write_text("\n".join(lines))
+    (tmp_path / "a.igs").write_text("\n".join(lines), encoding="latin-1")
     assert stated_unit(tmp_path / "a.igs", "iges") == unit
 
 

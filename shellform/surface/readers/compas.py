@@ -48,7 +48,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
     for name, table in found:
         try:
             part, left_out = _part(name, table)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(
                 f"its mesh {name} is damaged: {error!r}", where=str(file), remedy="Save it anew."
             ) from error

@@ -11,6 +11,7 @@ _STEP_OTHER = re.compile(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'")
 _PREFIXES = {"$": "m", ".MILLI.": "mm", ".CENTI.": "cm", ".DECI.": "dm", ".MICRO.": "µm", ".KILO.": "km"}
 _NAMES = {"INCH": "in", "INCHES": "in", "FOOT": "ft", "FEET": "ft", "MM": "mm", "M": "m", "CM": "cm", "IN": "in"}  # fmt: skip
 _IGES_FLAGS = {1: "in", 2: "mm", 4: "ft", 5: "mi", 6: "m", 7: "km", 8: "mil", 9: "µm", 10: "cm", 11: "µin"}
+_IGES_WORDS = {str(flag) for flag in (*_IGES_FLAGS, 3)}  # as they are written
 _FLAG = 13  # place of the unit's flag in IGES' global section; its name follows, for flag 3
 _GLOBAL, _TEXT = 72, 72  # of an IGES line: the section's letter, and where its text ends
 
@@ -40,7 +41,7 @@ def _of_step(text: str) -> str | None:
 def _of_iges(text: str) -> str | None:
     lines = [line for line in text.splitlines() if line[_GLOBAL : _GLOBAL + 1] == "G"]
     words = _words("".join(line[:_TEXT] for line in lines))
-    if len(words) <= _FLAG or not words[_FLAG].strip().isdigit():
+    if len(words) <= _FLAG or words[_FLAG].strip() not in _IGES_WORDS:
         return None
     flag = int(words[_FLAG])
     if flag == 3 and len(words) > _FLAG + 1:
@@ -52,7 +53,7 @@ def _words(text: str) -> list[str]:
     """The parameters of a section, of which strings say how long they are: 4Hmesh."""
     found, at = list[str](), 0
     while at < len(text):
-        string = re.match(r"\s*(\d+)H", text[at:])
+        string = re.match(r"\s*(\d{1,9})H", text[at:])
         if string:
             begin = at + string.end()
             word, at = text[begin : begin + int(string.group(1))], begin + int(string.group(1))
