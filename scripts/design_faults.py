@@ -1,10 +1,10 @@
-"""SIGKILL to a design at random moments of all its stages and phases, each resumed to the end; and the same design
-undisturbed.
+"""SIGKILL, Ctrl-C and SIGTERM to a design at random moments of all its stages and phases, each resumed to the end; and
+the same design undisturbed.
 
     scripts/design_faults.py [--kills 60] [--folder DIR] [--seed 1] [--set ENTRY=VALUE …]
 
 Passes when every disturbed run ends like the undisturbed one, with the same bytes but for seconds, and with no
-traceback, torn or further file. The case is the vault with wide cells, whose search is led by structures that fall
+traceback, torn or further file, and when what Ctrl-C stops ends with status 130. The case is the vault with wide cells, whose search is led by structures that fall
 before it thins.
 
 Each run is a process forked from this one, which has loaded the program: what a kill leaves is the same, and a run
@@ -48,6 +48,9 @@ NAME = "run"  # of each run's folder
 _UNLIKE = ("log.txt", "lock")  # times of day, and how often it was begun
 _TICK = 1.0 / os.sysconf("SC_CLK_TCK")
 _LOOK = 0.02  # s between two looks
+_SIGNALS = [signal.SIGKILL, signal.SIGKILL, signal.SIGINT, signal.SIGTERM]
+_STOPPED = 130  # the status after Ctrl-C
+_LONGEST = 120.0  # s from a signal to the end of what it stops
 
 
 def main() -> int:
@@ -69,7 +72,7 @@ def main() -> int:
     print(
         "undisturbed, s of processor time: " + ", ".join(f"{k} {v:.1f}" for k, v in times.items()), flush=True
     )
-    kills, runs, failed = Counter[str](), 0, 0
+    kills, ways, runs, failed = Counter[str](), Counter[str](), 0, 0
     while kills.total() < asked.kills:
         runs += 1
         out, places = place / f"out{runs}" / NAME, list(times)
@@ -80,18 +83,25 @@ def main() -> int:
                 ended = run(out, settings)
                 break
             moment = chance.uniform(0.0, 1.0) * times[places[at]]
-            ended, reached = disturbed(out, settings, set(places[at:]), moment)
+            how = chance.choice(_SIGNALS)
+            ended, reached = disturbed(out, settings, set(places[at:]), moment, how)
+            if (ended == _STOPPED and how is signal.SIGINT) or ended == -how:
+                ended = None
             if ended is None:
                 kills[reached] += 1
-                at = max(at, places.index(reached))
-                print(f"{kills.total()} kills, the last in {reached}", flush=True)
+                ways[how.name] += 1
+                at = max(at, places.index(reached)) if reached in places else at
+                print(f"{kills.total()} kills, the last by {how.name} in {reached}", flush=True)
         wrong = [] if ended == end else [f"status {ended} instead of {end}"]
         wrong += differences(out, whole)
+        if "Traceback" in out.with_suffix(".log").read_text(encoding="utf-8"):
+            wrong.append("a traceback")
         failed += bool(wrong)
         print(f"run {runs}: {'; '.join(wrong) or 'the same bytes'}", flush=True)
     print(", ".join(f"{count} in {name}" for name, count in sorted(kills.items())))
+    told = ", ".join(f"{count} {name}" for name, count in sorted(ways.items()))
     print(
-        f"{kills.total()} kills of {runs} runs, {failed} of which ended otherwise: {'FAIL' if failed else 'pass'}"
+        f"{kills.total()} kills ({told}) of {runs} runs, {failed} of which ended otherwise: {'FAIL' if failed else 'pass'}"
     )
     return 1 if failed else 0
 
@@ -111,9 +121,11 @@ def run(folder: Path, settings: list[str], *, times: Counter[str] | None = None)
         time.sleep(_LOOK)
 
 
-def disturbed(folder: Path, settings: list[str], places: set[str], moment: float) -> tuple[int | None, str]:
-    """Runs the design until it has been in one of the stages for so many seconds of processor time, and kills it:
-    None and the stage; or its status where it ended before."""
+def disturbed(
+    folder: Path, settings: list[str], places: set[str], moment: float, how: signal.Signals
+) -> tuple[int, str]:
+    """Runs the design until it has been in one of the stages for so many seconds of processor time, and sends it the
+    signal: how it ended (a signal as a negative number), and the stage."""
     job, since = begin(folder, settings), None
     while True:
         now = stage_of(folder)
@@ -124,10 +136,21 @@ def disturbed(folder: Path, settings: list[str], places: set[str], moment: float
         if since is None and now in places:
             since = spent
         if since is not None and spent - since >= moment:
-            os.kill(job, signal.SIGKILL)
-            os.waitpid(job, 0)
-            return None, stage_of(folder)
+            os.kill(job, how)
+            return ended_within(job, _LONGEST), stage_of(folder)
         time.sleep(_LOOK)
+
+
+def ended_within(job: int, longest: float) -> int:
+    """How a process ends; killed where that takes longer, which is told as status 1."""
+    for _ in range(round(longest / _LOOK)):
+        ended, status = os.waitpid(job, os.WNOHANG)
+        if ended:
+            return os.waitstatus_to_exitcode(status)
+        time.sleep(_LOOK)
+    os.kill(job, signal.SIGKILL)
+    os.waitpid(job, 0)
+    return 1
 
 
 def begin(folder: Path, settings: list[str]) -> int:
@@ -147,6 +170,7 @@ def begin(folder: Path, settings: list[str]) -> int:
     told = os.open(folder.with_suffix(".log"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     os.dup2(told, 1)
     os.dup2(told, 2)
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background job ignores
     sys.argv = ["shellform", "design", str(CASE), "--output", str(folder)]
     sys.argv += [word for each in settings for word in ("--set", each)]
     status: object = 1
@@ -189,7 +213,7 @@ def stage_of(folder: Path) -> str:
 
 
 def differences(out: Path, whole: Path) -> list[str]:
-    """What a folder has otherwise than another, but for seconds; and tracebacks."""
+    """What a folder has otherwise than another, but for seconds."""
     found = []
     one, two = (
         {file.relative_to(each) for file in each.rglob("*") if file.is_file()} for each in (out, whole)
@@ -201,8 +225,6 @@ def differences(out: Path, whole: Path) -> list[str]:
         for name in sorted(one & two)
         if str(name) not in _UNLIKE and timeless(out / name) != timeless(whole / name)
     ]
-    if "Traceback" in out.with_suffix(".log").read_text(encoding="utf-8"):
-        found.append("a traceback")
     return found
 
 

@@ -1,10 +1,10 @@
-"""SIGKILL to a study and to its workers at random moments, again and again, until it has ended; and the same
-study undisturbed.
+"""SIGKILL, Ctrl-C and SIGTERM to a study and SIGKILL to its workers at random moments, again and again, until it has
+ended; and the same study undisturbed.
 
     scripts/study_faults.py [--kills 30] [--folder DIR] [--seed 1] [--until STAGE]
 
-Passes when both tables are the same to the byte, no design has two rows, and every file of the folders can be
-read. The designs are real ones: a dome of about 1,200 degrees of freedom, from surface to optimised cables.
+Passes when both tables, the lists of designs and what the run folders hold are the same to the byte (but for seconds),
+no design has two rows, every file of the folders can be read, no traceback was told and Ctrl-C ended with status 130. The designs are real ones: a dome of about 1,200 degrees of freedom, from surface to optimised cables.
 """
 
 from __future__ import annotations
@@ -20,11 +20,14 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
+_STOPPED = 130  # the status after Ctrl-C
+_LONGEST = 120.0  # s from a signal to the end of what it stops
 STUDY = """
 case = "dome.toml"
 method = "latin"
@@ -59,9 +62,9 @@ def main() -> int:
         print(f"FAIL: the undisturbed study didn't end well, see {whole}.log")
         return 1
     longest = 3.0 * design_time(whole)
-    kills = {"study": 0, "worker": 0}
+    kills, unlike = Counter[str](), 0
     job: subprocess.Popen[bytes] | None = None
-    while sum(kills.values()) < asked.kills:
+    while kills.total() < asked.kills:
         if job is None or job.poll() is not None:
             if (
                 job is not None and job.returncode == 0
@@ -75,17 +78,27 @@ def main() -> int:
             os.kill(chance.choice(workers), signal.SIGKILL)
             kills["worker"] += 1
         elif job.poll() is None:
-            job.kill()
-            job.wait()
-            kills["study"] += 1
+            how = chance.choice([signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+            job.send_signal(how)
+            try:
+                ended = job.wait(_LONGEST)
+            except subprocess.TimeoutExpired:
+                job.kill()
+                ended = job.wait()
+            wanted = _STOPPED if how is signal.SIGINT else -how
+            if ended not in (wanted, 0):  # 0: it had just ended
+                unlike += 1
+                print(f"FAIL: status {ended} after {how.name}", flush=True)
+            kills[how.name] += 1
         rows = (out / "results.jsonl").read_bytes().count(b"\n") if (out / "results.jsonl").exists() else 0
-        print(f"{kills['study']} kills of the study, {kills['worker']} of workers; {rows} rows", flush=True)
+        told = ", ".join(f"{count} {name}" for name, count in sorted(kills.items()))
+        print(f"{kills.total()} kills ({told}); {rows} rows", flush=True)
     if job is not None and job.poll() is None:
         job.wait()
     if start(file, out).wait() != 0:
         print(f"FAIL: the study didn't end well, see {out}.log")
         return 1
-    return judge(out, whole)
+    return 1 if judge(out, whole) + unlike else 0
 
 
 def start(file: Path, folder: Path) -> subprocess.Popen[bytes]:
@@ -103,7 +116,13 @@ def start(file: Path, folder: Path) -> subprocess.Popen[bytes]:
     ]
     with open(folder.with_suffix(".log"), "ab") as log:
         return subprocess.Popen(
-            command, cwd=ROOT, stdout=log, stderr=log, env={**os.environ, "PYTHONPATH": str(ROOT)}
+            command,
+            cwd=ROOT,
+            stdout=log,
+            stderr=log,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            # A shell's background job ignores it.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
 
 
@@ -151,12 +170,13 @@ def forget(folder: Path, rows: int) -> None:
 
 
 def judge(out: Path, whole: Path) -> int:
-    """Tells whether the disturbed study has what the undisturbed one has."""
+    """Tells how the disturbed study differs from the undisturbed one, and how often."""
+    from scripts.design_faults import differences
     from shellform.run.folder import read_run
     from shellform.study.store import Log, read_table
 
     failed = 0
-    for name in ("table.parquet", "table.csv"):
+    for name in ("table.parquet", "table.csv", "designs.jsonl"):
         same = (out / name).read_bytes() == (whole / name).read_bytes()
         failed += not same
         print(f"{name}: {'the same bytes' if same else 'FAIL: other bytes'}")
@@ -186,8 +206,16 @@ def judge(out: Path, whole: Path) -> int:
     ]
     print(f"{len(runs)} runs read back, {damaged} damaged files")
     failed += damaged
+    if "Traceback" in out.with_suffix(".log").read_text(encoding="utf-8"):
+        failed += 1
+        print("a traceback")
+    for folder in sorted((whole / "runs").iterdir()):
+        unlike = differences(out / "runs" / folder.name, folder)
+        failed += bool(unlike)
+        if unlike:
+            print(f"{folder.name}: {'; '.join(unlike)}")
     print("FAIL" if failed else "pass")
-    return 1 if failed else 0
+    return failed
 
 
 if __name__ == "__main__":
