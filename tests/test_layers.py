@@ -39,7 +39,7 @@ FLOORS = {
     ],
     "shellform.surface": [
         ["units", "shape", "bounded"],
-        ["readers.draft", "readers.script", "readers.nurbs"],
+        ["readers.draft", "readers.script", "readers.nurbs", "readers.stated"],
         ["readers.seams", "readers.sides"],
         ["readers.mend"],
         ["occ"],

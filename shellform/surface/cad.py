@@ -29,6 +29,7 @@ from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, sessio
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
+from shellform.surface.readers.stated import line_without_number
 from shellform.surface.units import turned_up, unit_factor
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
@@ -115,6 +116,13 @@ def read_cad(
             where="surface.unit",
             value=unit,
             remedy="Leave the unit out.",
+        )
+    line = line_without_number(file, kind)
+    if line is not None:
+        raise InputError(
+            f"line {line} has nan for a number",
+            where=str(file),
+            remedy="Open it in the program that wrote it, check it, and export it anew.",
         )
     factor = 1.0 if kind != "brep" else unit_factor(unit or "m")
     with session(), errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):

@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 
+from shellform.errors import InputError
 from shellform.run.first_look import check_file
-from shellform.surface.readers.stated import stated_unit
+from shellform.surface.readers.reading import read_surface
+from shellform.surface.readers.stated import line_without_number, stated_unit
 
 DATA = Path(__file__).parent.parent / "data"
 MILLI = "#1 = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );"
@@ -47,6 +49,34 @@ def test_iges_global_section_says_the_unit(tmp_path, flag, unit):
     lines = [f"{text[k : k + 72]:<72}G{1 + k // 72:>7}" for k in range(0, len(text), 72)]
     (tmp_path / "a.igs").write_text("\n".join(lines), encoding="latin-1")
     assert stated_unit(tmp_path / "a.igs", "iges") == unit
+
+
+@pytest.mark.parametrize(
+    ("ending", "old", "new", "line"),
+    [
+        ("step", "4.188790204786,6.28318530718,", "4.188790204786,nan,", 57),
+        ("step", "4.188790204786,6.28318530718,", "4.188790204786, -NaN,", 57),
+        (
+            "step",
+            "ISO-10303-21;",
+            "ISO-10303-21;\n/* of Nan, nan */ #9000=PERSON('nan, nan','\n',.NAN.);",
+            None,
+        ),
+        ("brep", "\n8 0 6.2831853071795862", "\n8 0 nan", 8),
+        ("igs", "4Hmesh", "4Hnan,", None),
+        ("igs", "2.094395102,4.188790205,4.188790205,", "2.094395102,nan        ,4.188790205,", 30),
+    ],
+)
+def test_a_line_that_has_nan_for_a_number_is_found_and_refused(tmp_path, ending, old, new, line):
+    """OpenCASCADE didn't come to an end on such STEP and BREP files, and gave 0.65 m² instead of 0.62 of an IGES one."""
+    text = (DATA / f"dome_mm.{ending}").read_text(encoding="latin-1")
+    bad = tmp_path / f"dome.{ending}"
+    bad.write_text(text.replace(old, new, 1), encoding="latin-1")
+    kind = {"igs": "iges"}.get(ending, ending)
+    assert line_without_number(bad, kind) == line
+    if line:
+        with pytest.raises(InputError, match=f"line {line} has nan for a number"):
+            read_surface(bad)
 
 
 def test_check_names_the_unit_that_a_file_carries():

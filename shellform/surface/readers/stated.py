@@ -1,10 +1,17 @@
-"""The unit that a CAD file carries, as its text states it: STEP's length unit, IGES' global section."""
+"""What the text of a CAD file states by itself: its unit (STEP's length unit, IGES' global section), and whether it has
+"nan" for a number, on which OpenCASCADE doesn't come to an end (STEP, BREP) or makes another surface (IGES)."""
 
 from __future__ import annotations
 
 import re
 from pathlib import Path
 
+_NAN = {
+    "step": re.compile(r"(?<=[,(\s])[-+]?nan(?=[,)\s])", re.IGNORECASE),
+    "iges": re.compile(r"(?<![^,\s])[-+]?nan(?=\s*[,;])", re.IGNORECASE),
+    "brep": re.compile(r"(?<=\s)[-+]?nan(?=\s)", re.IGNORECASE),
+}
+_STEP_WORDS = re.compile(r"'[^']*'|/\*.*?\*/", re.DOTALL)  # strings and comments
 _STEP_LENGTH = re.compile(r"=\s*\(([^;]*?LENGTH_UNIT[^;]*?)\)\s*;", re.DOTALL)
 _STEP_UNIT = re.compile(r"SI_UNIT\s*\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.\s*\)")
 _STEP_OTHER = re.compile(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'")
@@ -22,6 +29,21 @@ def stated_unit(file: Path, kind: str) -> str | None:
     if kind == "step":
         return _of_step(text)
     return _of_iges(text) if kind == "iges" else None
+
+
+def line_without_number(file: Path, kind: str) -> int | None:
+    """The number of the first line of a "step", "iges" or "brep" file that has "nan" for a number; None where none
+    has."""
+    text = file.read_text(encoding="latin-1")
+    if "nan" not in text.lower():
+        return None
+    if kind == "step":
+        text = _STEP_WORDS.sub(lambda words: "\n" * words[0].count("\n"), text)
+    for number, line in enumerate(text.split("\n"), 1):
+        told = line[:_TEXT] if kind == "iges" and line[_GLOBAL : _GLOBAL + 1] == "P" else line
+        if (kind != "iges" or told is not line) and _NAN[kind].search(f" {told} "):
+            return number
+    return None
 
 
 def _of_step(text: str) -> str | None:
