@@ -343,8 +343,10 @@ def _initial(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -
 
 
 def _optimise(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
-    if keep:
+    if keep and summary.verdict is not None:
         return _Ended(parts, summary)
+    if keep:  # and what examined the design is to be done anew, or wasn't asked for
+        return _Ended(parts, replace(summary, verdict=judged(read_run(workspace.folder))))
     from shellform.run.optimising import optimise
 
     summary = optimise(workspace, _there(parts.shell), _there(parts.loads), summary)

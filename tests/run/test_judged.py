@@ -3,9 +3,11 @@
 from pathlib import Path
 
 from shellform.case.entries import LimitsEntry
+from shellform.records.summary import read_summary
 from shellform.run.folder import read_run
 from shellform.run.judged import run_checks
-from tests.run.small_run import begin
+from shellform.run.run import run_case
+from tests.run.small_run import begin, small_case
 
 ROOT = Path(__file__).parent.parent.parent
 LIMITS = {
@@ -24,3 +26,13 @@ def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
     found = {check.name: check.cells["initial"] for check in run_checks(run)}
     assert found[LIMITS["uplift"]].holds is not None  # all supports may press
     assert [name for name in LIMITS if name != "uplift" and found[LIMITS[name]].holds is not False] == []
+
+
+def test_a_run_up_to_its_optimum_keeps_its_verdict_when_it_is_run_again(tmp_path):
+    case = small_case(
+        ROOT, "net.spacing=0.14", "net.elements=2", "optimise.evaluations=3", "optimise.polish=0"
+    )
+    first = run_case(case, tmp_path / "run", until="optimise")
+    assert first.verdict is not None
+    assert run_case(case, tmp_path / "run", until="optimise").verdict == first.verdict
+    assert read_summary(tmp_path / "run").verdict == first.verdict
