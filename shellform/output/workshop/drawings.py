@@ -114,6 +114,10 @@ def _saved(target: Path, sheet: Sheet, built: Built | None) -> Path:
     space = document.modelspace()
     for mark in sheet.marks:
         _draw(space, mark)
+    for kind in sorted(
+        document.entitydb.dxf_types_in_use()
+    ):  # a set, which ezdxf would go through as it comes
+        document.classes.add_class(kind)
     with whole(target, ".dxf") as partial:
         document.saveas(partial)
     return target
