@@ -109,9 +109,30 @@ def _clear_one(file: Path) -> None:
 
 
 def write_text(path: str | Path, text: str, ending: str = "") -> None:
-    """Writes a text file in UTF-8. Raises InputError as `whole`."""
+    """Writes a text file in UTF-8. Raises InputError as `whole`, and where it names what isn't UTF-8."""
+    content = encoded(text, str(path))
     with whole(path, ending) as partial:
-        partial.write_text(text, encoding="utf-8")
+        partial.write_bytes(content)
+
+
+def encoded(text: str, where: str) -> bytes:
+    """Text in UTF-8. The bytes of a path or an option that Python couldn't read, for it was told that the system knows
+    fewer letters, come out as they were given. Raises InputError where they are no UTF-8.
+    """
+    try:
+        content = text.encode("utf-8", errors="surrogateescape")
+        content.decode("utf-8")
+    except UnicodeError as error:
+        strange = next(
+            part for part in text.split() if any("\ud800" <= letter <= "\udfff" for letter in part)
+        )
+        raise InputError(
+            "has letters that are no UTF-8",
+            where=where,
+            value=strange[:80].encode("ascii", errors="backslashreplace").decode(),
+            remedy="Rename the file or folder, or give the option in UTF-8.",
+        ) from error
+    return content
 
 
 def write_arrays(path: str | Path, **arrays: Any) -> None:
@@ -127,8 +148,10 @@ def refusal(path: Path, error: OSError) -> InputError:
 
 
 def folder(path: str | Path) -> Path:
-    """Makes a folder and those above it. Raises InputError where that can't be done."""
+    """Makes a folder and those above it. Raises InputError where that can't be done, and where its name is no UTF-8,
+    so that no page could name it."""
     place = Path(path)
+    encoded(str(place), "the folder")
     try:
         place.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -10,7 +10,7 @@ import pytest
 
 from shellform.arrays import read_arrays
 from shellform.errors import InputError
-from shellform.written import clear, is_partial, whole, write_arrays, write_text
+from shellform.written import clear, folder, is_partial, whole, write_arrays, write_text
 
 
 def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
@@ -25,6 +25,20 @@ def break_off(target, error):
     with whole(target) as partial:
         partial.write_text("half")
         raise error
+
+
+def test_names_that_python_could_not_read_are_written_as_they_were_given_or_refused(tmp_path):
+    """As they come from the command line where LC_ALL is C, and from anywhere where they are no UTF-8."""
+    write_text(tmp_path / "a.txt", "of Schüssel")
+    assert (tmp_path / "a.txt").read_bytes() == "of Schüssel".encode()
+    write_text(tmp_path / "a.txt", "of Sch\udcc3\udcbcssel")
+    assert (tmp_path / "a.txt").read_bytes() == "of Schüssel".encode()
+    with pytest.raises(InputError, match=r"a.txt: has letters that are no UTF-8.*udcff.*Rename the file"):
+        write_text(tmp_path / "a.txt", "the shell\udcff stands")
+    assert (tmp_path / "a.txt").read_bytes() == "of Schüssel".encode()
+    with pytest.raises(InputError, match="the folder: has letters that are no UTF-8"):
+        folder(tmp_path / "run\udcff")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
 
 
 def test_a_full_disk_is_said_and_leaves_what_was_there(tmp_path):

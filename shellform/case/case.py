@@ -52,6 +52,7 @@ from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalog
 from shellform.gridshell.gridshell import Rod
 from shellform.gridshell.joints import following
 from shellform.gridshell.tolerances import SOURCES, Tolerances
+from shellform.written import encoded
 
 _NAME = 255  # bytes, of a file or folder on the systems in use
 _RodEntry = Annotated[
@@ -284,6 +285,7 @@ def _set(data: dict[str, Any], setting: str) -> None:
         raise InputError(
             "must be KEY=VALUE", where="--set", value=setting, remedy="For example net.spacing=0.06."
         )
+    encoded(setting, "--set")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
     except ValueError:

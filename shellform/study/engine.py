@@ -30,6 +30,7 @@ from shellform.study.outcome import Outcome, Status
 
 Work = Callable[[Job, Outcome | None], Outcome]
 _DEATHS = 2  # that a job survives
+_MOST = 8  # workers for each core of this machine: they would take its memory
 _AHEAD = 2  # jobs handed out for each thread
 _ANSWERS = 5.0  # seconds in which a scheduler has to
 _RECOUNT = 1.0  # seconds after which the cluster's threads are counted anew
@@ -79,15 +80,18 @@ def engine(
     processes: bool = True,
     dashboard: bool = False,
 ) -> Iterator[Engine]:
-    """`workers` processes on this machine (default: one a core), or the cluster whose `scheduler` has that
-    address.
+    """`workers` processes on this machine (default: one a core), or the cluster at the address `scheduler`.
 
     Scheduler and workers of this machine listen on its loopback address alone and speak to nobody without the
     certificate that is made for each cluster. Its `dashboard` answers everybody on the machine, so that it has
-    to be asked for. With `processes` False the workers are
-    threads, to try out the engine. Raises InputError where a cluster doesn't answer, NoWorkers where processes
-    can't be begun.
+    to be asked for. With `processes` False the workers are threads, to try out the engine. Raises InputError where a
+    cluster doesn't answer and for more than 8 workers a core, NoWorkers where processes can't be begun.
     """
+    if workers is not None and workers > _MOST * _cores():
+        what = f"at most {_MOST} for each of the {_cores()} cores"
+        raise InputError(
+            what, where="--workers", value=workers, remedy="Leave it out: one a core is fastest."
+        )
     try:
         import dask
         from distributed import (  # before the settings: it adds its own, which would be forgotten with them

@@ -86,6 +86,8 @@ def test_missing_files_and_malformed_settings_are_refused(tmp_path):
         load_case(ROOT / "scripts/scale_model.toml", ["net.spacing"])
     with pytest.raises(InputError, match=r"--set net\.spacing: its value is nested too deeply"):
         load_case(ROOT / "scripts/scale_model.toml", [f"net.spacing={3000 * '['}"])
+    with pytest.raises(InputError, match=r"--set: has letters that are no UTF-8.*udcff"):
+        load_case(ROOT / "scripts/scale_model.toml", ["title=a\udcff"])
     with pytest.raises(InputError, match=r"net\.spacing"):
         load_case(ROOT / "scripts/scale_model.toml", [f"net.spacing={5000 * '9'}"])
 

@@ -257,6 +257,11 @@ def test_workers_that_come_back_are_no_longer_told_as_gone(monkeypatch):
     ]
 
 
+def test_workers_by_the_million_are_refused_before_they_take_the_memory(tmp_path):
+    with pytest.raises(InputError, match=r"--workers: at most 8 for each of the \d+ cores \(found 1000000\)"):
+        run_study(study_file(tmp_path, GRID), tmp_path / "out", workers=1_000_000, work=quick)
+
+
 def test_a_study_whose_workers_cannot_be_begun_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(WorkerProcess, "start", in_vain)
     with pytest.raises(NotConverged, match=r"can't be begun.*ask for fewer \(--workers\)"):
