@@ -97,9 +97,67 @@ _SHARES = {
     "scan": 6,
 }
 _SHARES |= {"analyse": 10, "report": 1}  # whole commands, on what their readers let pass
+_SHARES |= {
+    "table": 10,
+    "setting": 10,
+    "words": 10,
+    "check": 2,
+    "net": 0.5,
+}  # and what is given beside a file
 _SHARES |= {"catalogue": 4, "sections": 3, "run": 4, "log": 4, "design": 1} | dict.fromkeys(
     sorted(_FOREIGN), 0.25
 )
+
+
+_TABLES = {
+    "loads.csv": "node,fx,fy,fz\n3,0,0,-0.5\n7,0.1,0,-0.5\n11,0,0,-1e-1\n",
+    "groups.csv": "cable,group\n0,1\n1,1\n2,2\n",
+    "markers.csv": "crossing\n0\n3\n5\n8\n",
+    "way.csv": "stop,node,x,y,z\n1,0,0.1,0.2,0.0\n2,0,0.1,0.2,0.0\n",
+    "survey.csv": "crossing,x,y,z\n0,0.1,0.2,0.1\n3,0.2,0.2,0.1\n5,0.3,0.2,0.1\n8,0.3,0.3,0.1\n",
+}
+# Command lines; one word, marked "?", is replaced by another.
+_LINES = [
+    *(["analyse", "MODEL", "--load", "tip", option, "?"] for option in (
+        "--factor", "--increments", "--tolerance", "--lead", "--limit", "--modes", "--critical", "--sections",
+        "--method", "--output",
+    )),
+    ["analyse", "MODEL", "--load", "?"],
+    ["analyse", "?"],
+    *(["survey", "RUN", "survey.csv", option, "?"] for option in (
+        "--unit", "--noise", "--length-error", "--step", "--largest", "--cables", "--load", "--design", "--after",
+    )),
+    *(["survey", "RUN", "--replay", "1", option, "?"] for option in ("--seed", "--slip", "--markers", "--noise")),
+    *(["erect", "RUN", option, "?"] for option in ("--step", "--load", "--weight", "--lift", "--design", "--way")),
+    *(["calibrate", "RUN", "survey.csv=none", option, "?"] for option in (
+        "--unit", "--noise", "--free", "--design", "--markers", "--output",
+    )),
+    ["calibrate", "RUN", "survey.csv=?"],
+    *(["render", "RUN", option, "?"] for option in ("--load", "--design", "--quantity", "--view", "--film")),
+    *(["render", "RUN", "--load", "?", option, "?"] for option in ("--size", "--limit", "--dpi", "--format")),
+    *(["check", "SURFACE", option, "?"] for option in ("--unit", "--size", "--up", "--layer", "--object", "--face")),
+    *(["net", "SURFACE", "--output", "out", "--spacing", "?"] for _ in range(1)),
+    *(["net", "SURFACE", "--output", "out", "--spacing", "0.3", option, "?"] for option in ("--angle", "--gap")),
+    *(["new", "SURFACE", "--output", "new.toml", option, "?"] for option in ("--rod", "--edges", "--unit")),
+    ["new", "?", "--output", "new.toml"],
+    *(["design", "CASE", "--output", "out", "--until", "surface", "--set", entry + "=?"] for entry in (
+        "title", "surface.size", "surface.file", "net.spacing", "net.offset", "rod.radius", "load.force", "part.x.kind",
+    )),
+    ["design", "CASE", "--output", "out", "--until", "?"],
+    ["design", "CASE", "--until", "surface", "--output", "?"],
+    ["study", "STUDY", "--output", "out", "--scheduler", "?"],
+    ["study", "?", "--output", "out"],
+    ["report", "RUN", "--output", "?"],
+    ["report", "?"],
+    ["example", "?"],
+    ["?"],
+]  # fmt: skip
+_WORDS = [
+    *(number.decode() for number in _NUMBERS),
+    *("-", "--", "..", "/", "/none/x", ".", "ü\u202e𝄞", "\udcff", "a" * 5000, "0x10", "1_000", "١", "1,5", "1;2", "x=1", "="),
+    *("[" * 3000, "none", "design", "best", "png", " ", "\n", "1e-300", "-3", "0.02", "17:z:-0.05", "1:x:nan", "9x9", "0x0"),
+    *("[0.5, nan]", "{a = 1}", "{}", "[]", '"', "true", "1979-05-27", "-1e9x1e9", "case.toml", "../..", "survey.csv", "CON"),
+]  # fmt: skip
 
 
 def damaged(data: bytes, chance: random.Random, *, numbers: bool = False) -> bytes:
@@ -297,6 +355,12 @@ def sound(folder: Path) -> dict[str, list[Path]]:
         "# x y z\n" + "\n".join(f"{k},{0.5 * k},{0.1 * k * k}" for k in range(30))
     )
     files["scan"] = [folder / "scan.csv"]
+    for name, text in _TABLES.items():
+        (folder / name).write_text(text)
+    files["table"] = [folder / name for name in _TABLES]
+    files["setting"] = files["words"] = files["design"]
+    files["check"] = [*files["obj"], *files["gltf"], *files["json"], *files["design"]]
+    files["net"] = [*files["obj"], *files["off"]]
     (folder / "sections.toml").write_text(
         '[rod]\nshape = "tube"\nradius = 0.02\nwall = 0.003\nyoung = 4e10\npoisson = 0.3\nstrength = 2e8\n'
     )
@@ -326,15 +390,24 @@ def attempt(kind: str, number: int, files: dict[str, list[Path]], place: Path) -
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
     bad = place / good.name
+    if kind in ("table", "words"):
+        shutil.copytree(next(each for each in files["run"] if each.name == "case.toml").parent, place / "run")
+        for name, text in _TABLES.items():
+            (place / name).write_text(text)
     if kind in ("run", "report"):
         run = next(each for each in good.parents if (each / "case.toml").is_file())
         shutil.copytree(run, place / "run")
         bad = place / "run" / good.relative_to(run)
     elif kind in ("study", "design"):
         shutil.copy(files["design"][0], place)
-    bad.write_bytes(data)
+    bad.write_bytes(good.read_bytes() if kind in ("setting", "words") else data)
     try:
-        _read(kind, bad, place)
+        if kind == "words":
+            _line(chance, files, place)
+        elif kind == "setting":
+            _setting(chance, bad)
+        else:
+            _read(kind, bad, place)
     except (InputError, NotConverged) as error:
         said = str(error)
         return (
@@ -369,6 +442,19 @@ def _read(kind: str, bad: Path, place: Path) -> None:
         _command("analyse", bad, "--load", "tip", *way, "--output", place / "found.json")
     elif kind == "report":
         _command("report", place / "run", "--output", place / "page.html")
+    elif kind == "table":
+        way = {
+            "loads.csv": ["erect", place / "run", "--step", "1", "--load", bad],
+            "groups.csv": ["erect", place / "run", "--step", "1", "--groups", bad],
+            "way.csv": ["erect", place / "run", "--step", "1", "--way", bad],
+            "markers.csv": ["survey", place / "run", "--replay", "1", "--markers", bad],
+            "survey.csv": ["survey", place / "run", bad],
+        }[bad.name]
+        _command(*way, "--output", place / "out")
+    elif kind == "check":
+        _command("check", bad)
+    elif kind == "net":
+        _command("net", bad, "--spacing", "0.3", "--output", place / "out")
     elif kind == "model":
         from shellform.structure.model import read_model
 
@@ -410,6 +496,38 @@ def _read(kind: str, bad: Path, place: Path) -> None:
         read_surface(bad)
 
 
+def _setting(chance: random.Random, case: Path) -> None:
+    """An entry of a case, or one beside them, given another value by --set."""
+    import tomllib
+
+    from shellform.case.case import dump_case, load_case
+
+    sound = load_case(case)
+    tables = tomllib.loads(dump_case(sound))
+    entries = [
+        f"{table}.{name}" for table, entry in tables.items() if isinstance(entry, dict) for name in entry
+    ]
+    key = chance.choice(
+        [*entries, *tables, "x", "net.x", "net.spacing.x", "load.0.force", "..", "part.a.kind", "title"]
+    )
+    dump_case(load_case(case, [f"{key}={chance.choice(_WORDS)}"]))
+
+
+def _line(chance: random.Random, files: dict[str, list[Path]], place: Path) -> None:
+    """A command line with one of its words replaced."""
+    word = chance.choice(_WORDS)
+    known = {
+        "MODEL": files["model"][0],
+        "RUN": place / "run",
+        "SURFACE": files["obj"][0],
+        "CASE": files["design"][0],
+        "STUDY": files["study"][0],
+    }
+    line = chance.choice(_LINES)
+    with contextlib.chdir(place):
+        _command(*(known.get(each, each.replace("?", word)) for each in line))
+
+
 def _command(*words: str | Path) -> None:
     """A command line in this process. Raises InputError where it ends with the status of bad input or of no result,
     and what it raises itself."""
@@ -424,7 +542,7 @@ def _command(*words: str | Path) -> None:
         except SystemExit as end:
             status = end.code
     if status in (2, 3):
-        raise InputError(told.getvalue())
+        raise InputError(told.getvalue().rpartition("shellform: ")[2].strip())
     if status:
         raise RuntimeError(f"status {status}: {told.getvalue()[-300:]}")
 
