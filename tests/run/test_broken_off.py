@@ -43,6 +43,14 @@ def test_a_run_without_a_design_tells_cause_remedy_and_what_was_found(tmp_path, 
     assert not (tmp_path / "run/report.html").exists(), "without the page that tells of it"
 
 
+def test_the_page_of_an_early_end_goes_though_nothing_else_could_be_written_of_it(tmp_path):
+    """As on a full disk: the summary that says what failed is not there."""
+    run_case(small_case(ROOT), tmp_path / "run", until="surface")
+    (tmp_path / "run/report.html").write_text("ended early", encoding="utf-8")
+    run_case(small_case(ROOT), tmp_path / "run", until="net")
+    assert not (tmp_path / "run/report.html").exists()
+
+
 def test_a_run_with_a_design_that_deforms_too_much_shows_it_and_says_so_first(tmp_path):
     case = small_case(ROOT, "rod.radius=0.0003", "load.force=20.0")
     with pytest.raises(NotConverged, match="deforms excessively"):
