@@ -5,7 +5,7 @@ solved under its growing load, for the rods with which the estimate says to begi
 where it falls, two layers where the stiffest that equation (1) allows falls, finer spacings, and thinner
 concrete last.
 What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
-sixteen structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or stiffer steel tubes where
+forty structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or stiffer steel tubes where
 these are stressed too much or the shell nearly stands (first_edges.py).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
@@ -285,7 +285,7 @@ class _Search:
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design with these rods and this load, and the lightest edge beams with which it stands."""
-        for edge in edge_choices(choice)[self.lightest :]:
+        for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self._with_edges(placed, choice, edge, spacing, thickness)
             if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
                 break
