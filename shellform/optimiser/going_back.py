@@ -19,25 +19,25 @@ def last_confirmed(search: Search, it: Iterate) -> Iterate:
     search has chosen its designs by their luck with the structures it tried."""
     if search.asked is None or not it.accepted:
         return it
-    stood = _confirmed_among(search, it.accepted)
+    stood = _confirmed_among(search, it, it.accepted)
     if stood == len(it.accepted) - 1:
         return it
     while stood >= 0:
         found = last_sound(search, replace(it, accepted=it.accepted[: stood + 1]))
         if len(found.accepted) == stood + 1:
             return replace(found, status=f"{it.status}; the last design that a fresh sample confirms")
-        stood = _confirmed_among(search, found.accepted)  # its documented path led to another design
+        stood = _confirmed_among(search, it, found.accepted)  # its documented path led to another design
     return replace(it, status=f"{it.status}; a fresh sample doesn't confirm that it stands as built")
 
 
-def _confirmed_among(search: Search, accepted: Sequence[Accepted]) -> int:
+def _confirmed_among(search: Search, it: Iterate, accepted: Sequence[Accepted]) -> int:
     """The number of the last one that is found to be confirmed, -1 where none is: in steps of 1, 2, 4, ...
     from the end, and between the last two of them by bisection. Structures in which one fell come first in the next:
     what falls takes several times the work of what stands."""
     fallen: list[int] = []
 
     def holds(number: int) -> bool:
-        found = confirmed(search, accepted[number].built, fallen)
+        found = confirmed(search, it, accepted[number].built, fallen)
         own = [number for each in found.fallen.values() for number in each]
         fallen[:] = dict.fromkeys([*own, *fallen])
         return found.stands

@@ -11,7 +11,7 @@ is the sample: what structures in mind bear is an aim and no limit.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -33,7 +33,7 @@ from shellform.reliability.trial_structures import closer, to_bear
 
 _SHARE = 0.1  # of all evaluations, for one turn of a descent and a judgement at the most …
 _LED = 0.5  # … and for all turns
-_WORTH = 0.03  # of the objective, gained by a turn, for which another is made
+WORTH = 0.03  # of the objective, gained by a turn, for which another is made
 _WINDOW = 0.05  # mean tensions, of a turn's first step: what falls first changes within larger ones
 _SMALLEST = 0.004  # mean tensions
 _MOST = 12  # structures in mind
@@ -44,8 +44,8 @@ def ready_to_lead(search: Search, it: Iterate, fell: Design) -> Iterate | None:
     """The iterate, at a design that stands as built, ready to be led by the structures that fall in the design
     that `fell`; None where there are none to be followed."""
     search = looking_closer(search)
-    led = minding(search, it, it.accepted[-1].built, falling(search, fell))
-    return None if led.mind is None else _turned(search, replace(led, phase="lead", stood=len(it.accepted)))
+    led = led_by(search, it, it.accepted[-1].built, falling(search, it, fell))
+    return None if led.mind is None else turned(search, replace(led, phase="lead", stood=len(it.accepted)))
 
 
 def looking_closer(search: Search) -> Search:
@@ -56,23 +56,22 @@ def looking_closer(search: Search) -> Search:
 def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]) -> Iterate:
     """After turns of a descent and a judgement, as long as they lead to a better design that stands as built:
     at the last one that does, or where none does at the one that stood before."""
-    fine = replace(search.solver, window=_WINDOW, smallest=_SMALLEST)
     last = int(_LED * search.evaluations)
     while search.left() > 0:
-        it = descend(replace(search, solver=fine, evaluations=min(search.evaluations, it.until)), it)
+        it = descend(finely(search, it.until), it)
         found = sound(search, it.accepted[-1])
         if found is None:
             break
         it = replace(it, point=found, accepted=(*it.accepted[:-1], accepted_design(search, found)))
         holds, it = standing(search, it, it.accepted[-1].built)
         if holds:
-            gained = found.objective < (1.0 - _WORTH) * it.led_to
+            gained = found.objective < (1.0 - WORTH) * it.led_to
             it = replace(it, stood=len(it.accepted), led_to=min(found.objective, it.led_to))
             if not gained:
                 break
         if search.evaluator.evaluations >= last:
             break
-        it = _turned(search, remembering(search, it) if holds else joined(search, it, it.accepted[-1].built))
+        it = turned(search, remembering(search, it) if holds else joined(search, it, it.accepted[-1].built))
     back = last_sound(search, replace(it, accepted=it.accepted[: it.stood]))
     if it.led_to < np.inf:
         return remembering(search, back)
@@ -81,30 +80,43 @@ def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterat
 
 def joined(search: Search, it: Iterate, design: Design) -> Iterate:
     """With those structures in mind too that fall in the design."""
-    return minding(search, it, design, falling(search, design))
+    return led_by(search, it, design, falling(search, it, design))
 
 
-def _turned(search: Search, it: Iterate) -> Iterate:
+def finely(search: Search, until: int) -> Search:
+    """The search in steps as small as what falls first asks for, until so many evaluations are spent."""
+    fine = replace(search.solver, window=_WINDOW, smallest=_SMALLEST)
+    return replace(search, solver=fine, evaluations=min(search.evaluations, until))
+
+
+def turned(search: Search, it: Iterate) -> Iterate:
+    """At the begin of a turn."""
     until = search.evaluator.evaluations + max(1, int(_SHARE * search.evaluations))
     return replace(it, until=until, before=float("inf"), guarded=True, window=_WINDOW * search.tension)
 
 
-def falling(search: Search, design: Design) -> dict[int, float]:
+def falling(search: Search, it: Iterate, design: Design) -> dict[int, float]:
     """The numbers of structures that fall in the design and have to stand, and the factors of the largest
-    load that are aimed for; none where the design has no unloaded equilibrium."""
+    load that they are to bear; none where the design has no unloaded equilibrium."""
     assert search.asked is not None
     try:
-        least = to_bear(search.problem.shell, design, search.asked.trial, judging=search.judging)
+        return to_bear(
+            search.problem.shell, design, search.asked.trial, first=it.fallen, judging=search.judging
+        )
     except NotConverged:
         return {}
-    return {number: _OVER * factor for number, factor in least.items()}
 
 
-def minding(search: Search, it: Iterate, design: Design, least: dict[int, float]) -> Iterate:
+def led_by(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
+    """With these structures in mind too, and a little more than what they are to bear as the aim."""
+    return minding(search, it, design, {number: _OVER * factor for number, factor in least.items()})
+
+
+def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
     """With these structures in mind beside those that are, the latest first, all remembered in the `design`;
     the stiffness to keep goes down to the solver's own. As it was where one of them can't be followed."""
     known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
-    every = dict(itertools.islice((least | known | least).items(), _MOST))
+    every = dict(itertools.islice({**least, **known, **least}.items(), _MOST))
     if not every:
         return it
     try:

@@ -14,8 +14,8 @@ design (proposal.py), and the trial is then evaluated by its true equilibria (tr
   their branch;
 - a start that doesn't bear the further loads climbs first: steps along the gradient of that stiffness carry its stable branch up to them;
 - where no better design is found cables are kept taut under the further loads (guards.py), and free again in turns;
-- then, with half of the evaluations at least, cables that the shell can do without are taken away in batches, the others kept
-  taut.
+- then, with half of the evaluations at least, less what agreeing may need, cables that the shell can do without are
+  taken away in batches, the others kept taut.
 
 Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures,
 the same for each (trial_structures.py): after the descent, and each time cables have been taken away, before
@@ -25,8 +25,9 @@ until it stands; where one with less than was asked for stands, thinning goes on
 last design that stood is taken instead where that costs less; where the way to more stiffness leads to none, the
 structures that fall are kept in mind and lead it (minding.py). Where no design near one that falls stands, the
 search goes back to the last one that does, or takes fewer cables away. At the end a fresh sample judges, for the
-search has chosen its designs by their luck with the first one. The cables that are left keep a tension that errors
-don't use up.
+search has chosen its designs by their luck with the first one; what falls in it leads the search on until another
+one agrees (agreeing.py), and only where the evaluations end before it goes back. The cables that are left keep a
+tension that errors don't use up.
 
 A limit that the start breaks stops neither: no batch may break it more.
 

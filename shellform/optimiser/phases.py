@@ -2,7 +2,7 @@
 (trials.py) and judgement (search_state.py).
 
 Climbing, where the start doesn't bear the further loads; descending, by the objective; thinning, which takes
-cables away.
+cables away; agreeing, with fresh samples of structures as built (agreeing.py).
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices
+from shellform.optimiser.agreeing import agreed, leaving_some
 from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
 from shellform.optimiser.minding import (
     joined,
@@ -57,7 +58,7 @@ _SAME = 1e-6  # relative: stiffnesses that count as equal
 
 
 def run(search: Search, it: Iterate) -> Iterate:
-    """First the branch up to the further loads, then the objective alone, then thinning."""
+    """First the branch up to the further loads, then the objective alone, then thinning, then what fresh samples say."""
     if it.phase == "climb":
         it = replace(_climb(search, it), phase="descend")
     if it.phase == "descend":
@@ -67,7 +68,12 @@ def run(search: Search, it: Iterate) -> Iterate:
     if it.phase == "lead":
         it = _led(looking_closer(search), it)
     if it.phase == "thin":
-        it = _thin(search if it.mind is None else looking_closer(search), it)
+        it = _thin(leaving_some(search if it.mind is None else looking_closer(search)), it)
+        it = replace(_without_slack(search, it, 0.0), phase="agree", until=0, stood=0, led_to=np.inf)
+    if it.phase == "agree":
+        agrees, it = agreed(search, it, _descend)
+        if agrees:
+            return it
     return last_confirmed(search, it)
 
 
@@ -113,8 +119,9 @@ def _descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
             it = replace(it, status=status)
             worth = solver.settled if search.asked is None else _WORTH
             turned = it.guarded and it.point.objective > (1.0 - worth) * it.before
+            idle = not it.guarded and it.point.objective == it.before  # guarded it would try the same again
             # without further loads there are no guards
-            if search.always_guarded or turned or len(search.evaluator.problem.used()) == 1:
+            if search.always_guarded or turned or idle or len(search.evaluator.problem.used()) == 1:
                 return it
             before = it.point.objective if it.guarded else it.before
             it = replace(it, before=before, guarded=not it.guarded, window=search.first_window)
@@ -263,7 +270,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     solver = search.solver
     most = solver.most_cables
     while it.failures < solver.failures and search.left() > 0:
-        it = _without_slack(search, it)
+        it = _without_slack(search, it, solver.idle)
         tell(search, it)
         over = most is not None and taut_count(search, it.point) > most
         budget = np.inf if over else it.thrifty
@@ -301,21 +308,20 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     status = it.status + (
         ", and no further cable can be taken away"
         if it.failures >= solver.failures
-        else ", and thinning ended with the last evaluation"
+        else ", and thinning ended with its last evaluation"
     )
     if most is not None and taut_count(search, it.point) > most:
         status += f"; no design with {most} cables was found that keeps every limit"
     return replace(it, status=status)
 
 
-def _without_slack(search: Search, it: Iterate) -> Iterate:
-    """Leaves cables out of the search that are slack under all loads, once they are many: a model solves for
-    every cable in it.
-    """
+def _without_slack(search: Search, it: Iterate, idle: float) -> Iterate:
+    """Leaves cables out of the search that are slack under all loads, once they are more than a share, `idle`: a
+    model solves for every cable in it."""
     design, cables = it.point.design, search.problem.shell.cables(it.point.design)
     pulls = np.array([cables.tension(state) for state in it.point.states.values()])
     kept = (pulls > 0.0).any(axis=0)
-    if kept.mean() > 1.0 - search.solver.idle:
+    if kept.mean() >= 1.0 - idle:
         return it
     present = design.present.copy()
     present[np.flatnonzero(present)[~kept]] = False

@@ -24,7 +24,7 @@ from shellform.problem.paths import follow, in_tension, without_slack
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.reliability.scenarios import FactorsAsBuilt, scenarios
 from shellform.reliability.scenarios import remembered as remembered_in
-from shellform.reliability.trial_structures import SEED, Demand, Judging, enlarged, largest_on_path
+from shellform.reliability.trial_structures import SEED, Demand, Judging, largest_on_path
 from shellform.structure.solve.loading import Loaded
 
 Watch = Callable[[Step], None]
@@ -109,10 +109,10 @@ class Iterate:
     `status`. Descending: whether the last trial was `refused`; the objective `before` this turn. Thinning:
     the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables
     `needed` (c,). As built: structures that have `fallen`, the last ones first; whether the last design
-    judged `fell`; drawn structures that the search keeps in `mind`, which are to bear their loads, and the
+    judged `fell`; how many fresh `samples` were drawn; drawn structures that the search keeps in `mind`, which are to bear their loads, and the
     design in which they are `remembered`, None where nothing but stiffness leads it. Leading: how many
-    designs were accepted when the last one `stood`, the objective that it was `led_to`, and the design
-    evaluations `until` which a turn lasts.
+    designs were accepted when the last one `stood`, the objective that it was `led_to`, the design
+    evaluations `until` which a turn lasts, and how many designs were accepted when it had `begun`.
     """
 
     point: Evaluated
@@ -141,6 +141,8 @@ class Iterate:
     stood: int = 0
     led_to: float = float("inf")
     until: int = 0
+    begun: int = 0
+    samples: int = 0
 
 
 class Models:
@@ -231,7 +233,7 @@ def kept_in_mind(search: Search, design: Design, least: Mapping[int, float]) -> 
         problem.shell,
         design,
         LoadCase(largest, asked.loads[largest]),
-        enlarged(safety.tolerances, safety.enlarged),
+        asked.tolerances,
         seed=safety.seed + SEED,
         least=least,
         most=_FOLLOWED * max(least.values()),
@@ -358,7 +360,7 @@ def finish(search: Search, it: Iterate) -> Optimum:
         evaluator.factorisations,
         evaluator.wasted,
         it.stiffness,
-        search.asked,
+        None if search.asked is None else search.asked.after(it.samples + 1),
     )
 
 

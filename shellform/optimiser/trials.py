@@ -17,7 +17,7 @@ from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
-from shellform.reliability.trial_structures import JudgedTrial, confirm, stands
+from shellform.reliability.trial_structures import FRESH, JudgedTrial, confirm, stands
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 
@@ -104,11 +104,23 @@ def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]
     return found.stands, replace(it, fallen=tuple(fallen), fell=not found.stands)
 
 
-def confirmed(search: Search, built: Design, first: Sequence[int]) -> JudgedTrial:
-    """Whether a fresh sample agrees that the design stands as built, its structures of the numbers `first` before the
-    others."""
+def fresh(search: Search, it: Iterate) -> tuple[JudgedTrial, Iterate]:
+    """What a whole fresh sample says of the last accepted design, beside structures of earlier ones that fell; and the
+    iterate that knows those that fell under the design load, by which it is judged from now on."""
     assert search.asked is not None
-    asked = search.asked.confirmed
+    asked, built = search.asked.sample(it.samples), it.accepted[-1].built
+    earlier = [number for number in it.fallen if number >= FRESH]
+    found = confirm(search.problem.shell, built, asked, first=earlier, whole=True, judging=search.judging)
+    search.evaluator.factorisations += found.factorisations
+    under = found.fallen[asked.design_load]
+    return found, replace(it, samples=it.samples + 1, fallen=tuple(dict.fromkeys([*under, *it.fallen])))
+
+
+def confirmed(search: Search, it: Iterate, built: Design, first: Sequence[int]) -> JudgedTrial:
+    """Whether the next fresh sample agrees that the design stands as built, its structures of the numbers `first` before
+    the others."""
+    assert search.asked is not None
+    asked = search.asked.sample(it.samples)
     found = confirm(search.problem.shell, built, asked, first=first, judging=search.judging)
     search.evaluator.factorisations += found.factorisations
     return found

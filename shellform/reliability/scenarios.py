@@ -9,7 +9,7 @@ state not far from its end, where Newton's steps lead there with every tangent d
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -95,20 +95,20 @@ def scenarios(
     shell: Gridshell,
     design: Design,
     case: LoadCase,
-    tolerances: Tolerances,
+    tolerances: Callable[[int], Tolerances],
     *,
     seed: int,
     least: Mapping[int, float],
     most: float = 1.5,
     exact: float = EXACT,
 ) -> FactorsAsBuilt:
-    """The drawn structures of the numbers in `least` under the `seed` as scenarios of the load `case`, with the
-    factors of it that they are to bear; imperfections of shape follow the softest modes of this `design`.
+    """The drawn structures of the numbers in `least` under the `seed`, each with its number's `tolerances`, as
+    scenarios of the load `case`, with the factors of it that they are to bear; imperfections of shape follow the softest modes of this `design`.
     Raises NotConverged where it has no unloaded equilibrium."""
     nominal = perfect(shell, design, case.force)
     left = _STIFFNESS_LEFT * float(modes(assemble(nominal.network), nominal.unloaded, 1).stiffness[0])
     own = tuple(
-        Scenario(number, drawn(nominal.members, tolerances, seed, number), factor)
+        Scenario(number, drawn(nominal.members, tolerances(number), seed, number), factor)
         for number, factor in least.items()
     )
     return FactorsAsBuilt(case, own, nominal.imperfections, left, most, exact)

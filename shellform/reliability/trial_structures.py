@@ -29,10 +29,8 @@ from shellform.reliability.safety import Safety, allowed, critical_on_halved, pa
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.threads import side_by_side
 
-SEED, _CONFIRMED = (
-    1,
-    100,
-)  # added to the safety's: a search doesn't see the structures that a finished design is judged by
+SEED = 1  # added to the safety's: a search doesn't see the structures that a finished design is judged by
+FRESH = 100_000  # the number from which on structures are of fresh samples, whose errors are as they are
 MOST = 40  # structures by which a search tries designs without enlarged errors
 Judging = Callable[[int, int], None]
 """Called while a design is judged, with how many structures were loaded and how many there are at the most."""
@@ -47,20 +45,40 @@ _SAME = 1e-9  # relative
 @dataclass(frozen=True)
 class Required:
     """What a search asks of designs: the `safety`, the dead `loads` (n, 6) under which structures are drawn,
-    the `design_load` among them, and how many of the structures tried may have `fallen` under each."""
+    the `design_load` among them, how many of the structures tried may have `fallen` under each, and the number
+    of the `first` of them."""
 
     safety: Safety
     loads: Mapping[str, Reals]
     design_load: str
     fallen: Mapping[str, int]
+    first: int = 0
+
+    @property
+    def numbers(self) -> range:
+        """Of the structures tried."""
+        return range(self.first, self.first + self.safety.tried)
+
+    def tolerances(self, number: int) -> Tolerances:
+        """With which a structure is drawn: enlarged, but those of fresh samples."""
+        return enlarged(self.safety.tolerances, self.safety.enlarged if number < FRESH else 1.0)
 
 
 @dataclass(frozen=True)
 class Demand:
-    """What is required in each `trial` of a search, and of a fresh sample at its end, `confirmed`."""
+    """What is required in each `trial` of a search, and of a fresh sample, `confirmed`: each is fresh once."""
 
     trial: Required
     confirmed: Required
+
+    def sample(self, number: int) -> Required:
+        """What is required of the fresh sample of this number."""
+        fresh = self.confirmed
+        return replace(fresh, first=fresh.first + number * fresh.safety.tried)
+
+    def after(self, samples: int) -> Demand:
+        """The same for a search that comes after one that drew so many fresh samples."""
+        return replace(self, confirmed=self.sample(samples))
 
 
 @dataclass(frozen=True)
@@ -83,7 +101,7 @@ def demand(
     design_load: str = "design",
     judging: Judging | None = None,
 ) -> Demand:
-    """What is asked of designs that come after `start`, in trials and of a fresh sample under another seed.
+    """What is asked of designs that come after `start`, in trials and of fresh samples.
     Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
     at the edge of falling can't tell one design from another. Where it bears none enlarged, numbers make up
     for it: a search that tries hundreds of designs on a dozen structures with errors as they are finds one
@@ -102,12 +120,14 @@ def demand(
     if trial is None:
         many = replace(safety, enlarged=1.0, tried=max(MOST, safety.tried))
         trial = required(shell, start, loads, many, design_load=design_load, judging=judging)
-    fresh = replace(safety, enlarged=1.0, tried=safety.drawn, seed=safety.seed + _CONFIRMED)
+    fresh = replace(safety, enlarged=1.0, tried=safety.drawn)
     if any(trial.fallen[name] > _known(trial.safety, name, design_load) for name in trial.fallen):
-        confirmed = required(shell, start, loads, fresh, design_load=design_load, judging=judging)
+        confirmed = required(
+            shell, start, loads, fresh, design_load=design_load, first=FRESH, judging=judging
+        )
         return Demand(trial, confirmed)
     known = {name: max(_known(fresh, name, design_load) - _SPARE, 0) for name in trial.fallen}
-    return Demand(trial, Required(fresh, trial.loads, design_load, known))
+    return Demand(trial, Required(fresh, trial.loads, design_load, known, FRESH))
 
 
 def closer(asked: Demand) -> Demand:
@@ -129,6 +149,7 @@ def required(
     safety: Safety,
     *,
     design_load: str = "design",
+    first: int = 0,
     judging: Judging | None = None,
 ) -> Required:
     """What is asked of designs that come after `start`: under the design load what the probability says for
@@ -136,7 +157,7 @@ def required(
     under other loads likewise, by `Safety.required`. Raises NotConverged where it has no unloaded
     equilibrium."""
     own = {name: load for name, load in loads.items() if load.any()}
-    every = Required(safety, own, design_load, {name: safety.tried for name in own})
+    every = Required(safety, own, design_load, {name: safety.tried for name in own}, first)
     return _shown(every, tried(shell, start, every, critical=False, judging=judging))
 
 
@@ -161,12 +182,12 @@ def tried(
     judging: Judging | None = None,
 ) -> JudgedTrial:
     """The design judged by the search's structures, the numbers `first` before the others, and no more of
-    them than it takes to refuse it but where the `whole` sample is asked for. Raises NotConverged where it
-    has no unloaded equilibrium."""
+    them than it takes to refuse it but where the `whole` sample is asked for. Those of `first` that are of other
+    samples, where they fell under the design load, have to stand under it and count under no other. Raises
+    NotConverged where it has no unloaded equilibrium."""
     safety, spent = asked.safety, 0
     fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
-    order = [*first, *(number for number in range(safety.tried) if number not in set(first))]
-    larger = enlarged(safety.tolerances, safety.enlarged)
+    order = [*first, *(number for number in asked.numbers if number not in set(first))]
     kept = True
     for largest, shares in paths(asked.loads).items():
         nominal = perfect(shell, design, asked.loads[largest], step=TO_ITS_END)
@@ -184,7 +205,7 @@ def tried(
             most, begin = 1.0, None
             if number == PERFECT:  # whose path is known so far
                 most, begin = wanted, nominal.known_to(wanted)
-            errors = drawn(nominal.members, larger, safety.seed + SEED, number)
+            errors = drawn(nominal.members, asked.tolerances(number), safety.seed + SEED, number)
             bears = workshop.limit if number == PERFECT else workshop.fall
             found = bears(
                 errors,
@@ -197,7 +218,8 @@ def tried(
             )
             return found.factor, found.factorisations
 
-        queue = [PERFECT, *order] if wanted > 0.0 else order
+        judged = order if asked.design_load in shares else [each for each in order if each in asked.numbers]
+        queue = [PERFECT, *judged] if wanted > 0.0 else judged
         for begin in range(0, len(queue), _AT_ONCE):
             numbers = queue[begin : begin + _AT_ONCE]
             for number, (factor, work) in zip(numbers, side_by_side(one, numbers), strict=True):
@@ -206,7 +228,8 @@ def tried(
                     kept = factor >= wanted * (1.0 - _SAME)
                     continue
                 for name, share in shares.items():
-                    if factor < share * (1.0 - _SAME):
+                    counts = number in asked.numbers or name == asked.design_load
+                    if counts and factor < share * (1.0 - _SAME):
                         fallen[name].append(number)
             if judging is not None:
                 judging(begin + len(numbers), len(queue))
@@ -226,12 +249,22 @@ def largest_on_path(asked: Required) -> tuple[str, dict[str, float]]:
 
 
 def to_bear(
-    shell: Gridshell, design: Design, asked: Required, *, judging: Judging | None = None
+    shell: Gridshell,
+    design: Design,
+    asked: Required,
+    *,
+    first: Sequence[int] = (),
+    judging: Judging | None = None,
 ) -> dict[int, float]:
     """The numbers of structures that fall under loads on the design load's path more often than is allowed,
     and the factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its
     critical factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
-    found = tried(shell, design, asked, whole=True, judging=judging)
+    found = tried(shell, design, asked, first=first, whole=True, judging=judging)
+    return aims(asked, found)
+
+
+def aims(asked: Required, found: JudgedTrial) -> dict[int, float]:
+    """The same where the whole sample was judged already."""
     _, shares = largest_on_path(asked)
     least: dict[int, float] = {}
     if not found.critical:
@@ -256,11 +289,12 @@ def stands(
     asked: Required,
     *,
     first: Sequence[int] = (),
+    whole: bool = False,
     judging: Judging | None = None,
 ) -> JudgedTrial:
     """As `tried`; a design without unloaded equilibrium doesn't stand."""
     try:
-        return tried(shell, design, asked, first=first, judging=judging)
+        return tried(shell, design, asked, first=first, whole=whole, judging=judging)
     except NotConverged as error:
         return JudgedTrial({name: () for name in asked.loads}, False, False, error.iterations)
 
@@ -271,10 +305,11 @@ def confirm(
     asked: Required,
     *,
     first: Sequence[int] = (),
+    whole: bool = False,
     judging: Judging | None = None,
 ) -> JudgedTrial:
     """As `stands`, and with the critical factor kept on the mesh with rod elements halved."""
-    found = stands(shell, design, asked, first=first, judging=judging)
+    found = stands(shell, design, asked, first=first, whole=whole, judging=judging)
     factor = asked.safety.critical_factor
     if not found.stands or factor is None:
         return found

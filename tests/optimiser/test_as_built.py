@@ -7,7 +7,17 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser import trials
-from shellform.reliability.trial_structures import MOST, Required, confirm, demand, required, stands, tried
+from shellform.reliability.trial_structures import (
+    FRESH,
+    MOST,
+    Required,
+    confirm,
+    demand,
+    enlarged,
+    required,
+    stands,
+    tried,
+)
 from tests.problems import misfit_and_force
 
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
@@ -82,11 +92,11 @@ def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem)
 
 def test_a_search_tries_more_structures_where_its_start_bears_none_with_enlarged_errors(stout, problem):
     asked = replace(ASKED, enlarged=1.5, drawn=60)
-    for factor, enlarged, searched in ((1.0, 1.5, 6), (2.2, 1.0, MOST)):
+    for factor, larger, searched in ((1.0, 1.5, 6), (2.2, 1.0, MOST)):
         loads = {"wet": factor * problem.loads["wet"]}
         found = demand(stout, stout.design(), loads, asked, design_load="wet")
         trial, fresh = found.trial.safety, found.confirmed.safety
-        assert (trial.enlarged, trial.tried, fresh.enlarged, fresh.tried) == (enlarged, searched, 1.0, 60)
+        assert (trial.enlarged, trial.tried, fresh.enlarged, fresh.tried) == (larger, searched, 1.0, 60)
 
 
 def test_a_fresh_sample_as_large_as_the_final_one_confirms_and_lets_one_fall_less(stout, problem):
@@ -94,7 +104,27 @@ def test_a_fresh_sample_as_large_as_the_final_one_confirms_and_lets_one_fall_les
     found = demand(stout, stout.design(), {"wet": problem.loads["wet"]}, asked, design_load="wet")
     assert found.confirmed.safety.tried == 200
     assert found.confirmed.fallen == {"wet": 1}
-    assert found.confirmed.safety.seed != found.trial.safety.seed
+    every = [set(found.trial.numbers), *({*found.sample(number).numbers} for number in range(3))]
+    assert len(set.union(*every)) == sum(len(own) for own in every), "no sample has seen another's structures"
+    assert found.after(2).sample(1) == found.sample(3)
+
+
+def test_structures_of_fresh_samples_are_drawn_with_errors_as_they_are_and_count_under_the_design_load_alone(
+    stout, problem
+):
+    loads = {"wet": 2.2 * problem.loads["wet"], "wetter": 2.4 * problem.loads["wet"]}
+    asked = Required(ASKED, loads, "wet", {"wet": 0, "wetter": 0})
+    assert asked.tolerances(0) == enlarged(ROUGH, ASKED.enlarged)
+    assert asked.tolerances(FRESH) == ROUGH
+    numbers = range(FRESH, FRESH + 8)
+    of_one = replace(asked, safety=replace(ASKED, tried=8), first=FRESH)
+    fell = tried(stout, stout.design(), of_one, whole=True).fallen
+    assert fell["wet"]
+    assert fell["wetter"]
+    few = replace(asked, safety=replace(ASKED, tried=1))
+    own = tried(stout, stout.design(), few, whole=True).fallen
+    found = tried(stout, stout.design(), few, first=numbers, whole=True).fallen
+    assert found == {"wet": (*fell["wet"], *own["wet"]), "wetter": own["wetter"]}
 
 
 def test_no_more_is_asked_of_designs_than_the_start_shows(stout, problem):

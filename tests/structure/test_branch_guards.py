@@ -59,6 +59,16 @@ def test_a_step_uphill_is_refused_whatever_it_promises(toggle):
     assert walk._advance(direction, downhill)
 
 
+def test_a_step_that_is_no_number_is_refused(toggle):
+    walk = relaxing(toggle, 0.05)
+    direction, downhill = newton_step(walk)
+    before = walk.state
+    for none in (np.nan, np.inf):
+        assert not walk._advance(np.where(np.arange(len(direction)) == 1, none, direction), downhill)
+        assert walk.state is before
+    assert walk._advance(direction, downhill)
+
+
 def test_a_step_too_far_is_cut_until_the_potential_falls_by_enough(toggle):
     walk = relaxing(toggle, 0.05)
     direction, downhill = newton_step(walk)

@@ -323,6 +323,10 @@ class _Relaxation:
         whole[self.assembly.free] = direction
         step = whole.reshape(-1, 6)
         turn, shift = float(np.abs(step[:, 3:]).max()), float(np.abs(step[:, :3]).max())
+        if not np.isfinite(
+            turn + shift
+        ):  # of a tangent whose last pivots are next to nothing: more mass is needed
+            return False
         share = min(1.0, TURN / max(turn, TURN), self.reach / max(shift, 1e-300))
         if share < _SHORTEST:
             return False

@@ -1,0 +1,59 @@
+"""A search that goes on until a fresh sample agrees with it (scenario optimisation).
+
+A search chooses its designs by their luck with the structures that it tries them on. So what thinning ends with
+is drawn anew, as often as a finished design is. The structures of this sample that fall and have to stand are
+kept in mind (minding.py) and lead the search on; those under the design load are among what it is judged by
+from then on, and another sample, that no step has seen, judges what comes of it. Going back to earlier designs
+(going_back.py) gives away cables that a few lengths make up for: it is left for where the evaluations, of which
+thinning leaves a share, are spent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from shellform.optimiser.going_back import last_sound
+from shellform.optimiser.minding import WORTH, finely, led_by, turned
+from shellform.optimiser.search_state import Iterate, Search, accepted_design
+from shellform.optimiser.trials import fresh, sound
+from shellform.reliability.trial_structures import aims
+
+_LEFT = 0.2  # of all evaluations, that thinning leaves
+
+
+def leaving_some(search: Search) -> Search:
+    """The search with as many evaluations as thinning may take."""
+    if search.asked is None:
+        return search
+    return replace(search, evaluations=search.evaluations - int(_LEFT * search.evaluations))
+
+
+def agreed(
+    search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]
+) -> tuple[bool, Iterate]:
+    """Whether a fresh sample agrees that the last design stands, after turns of a sample and a descent led by
+    what falls in it; and the iterate. Where the search was led, turns follow as long as they lead to a better design
+    with which a sample agrees."""
+    if search.asked is None or not it.accepted:
+        return True, it
+    while True:
+        if it.until:  # in the middle of a turn
+            it = descend(finely(search, it.until), it)
+            found = sound(search, it.accepted[-1]) if len(it.accepted) > it.begun else None
+            if found is None:
+                break
+            it = replace(it, point=found, accepted=(*it.accepted[:-1], accepted_design(search, found)))
+        judged, it = fresh(search, it)
+        if judged.stands:
+            gained = it.point.objective < (1.0 - WORTH) * it.led_to
+            it = replace(it, stood=len(it.accepted), led_to=min(it.point.objective, it.led_to))
+            if it.mind is None or not gained:
+                break
+        least = {} if judged.stands else aims(search.asked.confirmed, judged)
+        it = led_by(search, it, it.accepted[-1].built, least)
+        if it.mind is None or search.left() <= 0:
+            break
+        it = turned(search, replace(it, begun=len(it.accepted)))
+    back = last_sound(search, replace(it, accepted=it.accepted[: it.stood])) if it.stood else it
+    return it.stood > 0 and len(back.accepted) == it.stood, back

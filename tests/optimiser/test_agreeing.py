@@ -1,0 +1,117 @@
+"""A search that is led on until a fresh sample agrees with it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.optimiser import agreeing, phases
+from shellform.optimiser.optimise import begin
+from shellform.optimiser.optimum import Checkpoint
+from shellform.optimiser.resuming import resumed
+from shellform.reliability.trial_structures import FRESH, Demand, JudgedTrial, Required
+from tests.problems import misfit_and_force
+
+ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
+ASKED = sf.Safety(ROUGH, critical_factor=None, drawn=4, tried=3, enlarged=1.5, seed=5)
+FALLS = JudgedTrial({"wet": (FRESH + 1,)}, True, False, 0)
+STANDS = JudgedTrial({"wet": ()}, True, True, 0)
+
+
+@pytest.fixture
+def searching(stout):
+    """A search of a problem, its start, ready to be drawn afresh, and all checkpoints that it handed out."""
+    one = Required(ASKED, {"wet": stout.point_load(4.5, every=2)}, "wet", {"wet": 0})
+    kept: list[Checkpoint] = []
+    search, it = begin(
+        misfit_and_force(stout, 4.5),
+        stout.design(),
+        sf.SequentialConvex(),
+        lambda softest: 0.08 * softest,
+        20,
+        keep=kept.append,
+        asked=Demand(one, replace(one, first=FRESH)),
+    )
+    return search, replace(it, phase="agree"), kept
+
+
+@pytest.fixture
+def samples(monkeypatch):
+    """What fresh samples say, one after the other; those whose design was judged are kept in `judged`."""
+    told: list[JudgedTrial] = []
+    judged: list[float] = []
+
+    def fresh(search, it):
+        judged.append(it.accepted[-1].objective)
+        found = told.pop(0)
+        fallen = tuple(dict.fromkeys([*found.fallen["wet"], *it.fallen]))
+        return found, replace(it, samples=it.samples + 1, fallen=fallen)
+
+    monkeypatch.setattr(agreeing, "fresh", fresh)
+    return told, judged
+
+
+def test_a_design_that_a_sample_agrees_with_is_left_as_it_is(searching, samples):
+    search, it, _ = searching
+    samples[0][:] = [STANDS]
+    agrees, after = agreeing.agreed(search, it, phases._descend)
+    assert agrees
+    assert after.samples == 1
+    np.testing.assert_array_equal(after.point.design.rest_length, it.point.design.rest_length)
+    assert search.evaluator.evaluations == 0
+
+
+def test_what_falls_in_a_sample_leads_the_search_on_until_another_one_agrees(searching, samples):
+    search, it, _ = searching
+    told, judged = samples
+    told[:] = [FALLS, *[STANDS] * 20]
+    agrees, after = agreeing.agreed(search, it, phases._descend)
+    assert agrees
+    assert [each.number for each in after.mind.scenarios] == [FRESH + 1]
+    assert after.fallen[0] == FRESH + 1, "it is among what trials have to bear"
+    assert after.led_to == min(judged[1:]) < judged[0]
+    assert after.point.objective == pytest.approx(after.led_to)
+    assert len(judged) == after.samples
+    assert search.evaluator.evaluations <= 20
+
+
+def test_a_better_design_with_which_no_sample_agrees_isnt_taken(searching, samples):
+    search, it, _ = searching
+    told, judged = samples
+    told[:] = [FALLS, STANDS, *[FALLS] * 20]
+    agrees, after = agreeing.agreed(search, it, phases._descend)
+    assert agrees
+    assert len(judged) > 2
+    assert after.point.objective == pytest.approx(judged[1])
+
+
+def test_a_search_without_an_evaluation_left_says_that_no_sample_agrees(searching, samples):
+    search, it, _ = searching
+    told, _ = samples
+    told[:] = [FALLS] * 2
+    assert not agreeing.agreed(replace(search, evaluations=0), it, phases._descend)[0]
+    assert not agreeing.agreed(search, it, lambda search, it: it)[0], "a turn that leads nowhere"
+    assert not told, "no design is drawn twice until it stands by luck"
+
+
+def test_a_turn_taken_up_in_its_middle_ends_as_if_nothing_had_been(searching, samples):
+    search, it, kept = searching
+    told, _ = samples
+    told[:] = [FALLS, *[STANDS] * 20]
+    _, whole = agreeing.agreed(search, it, phases._descend)
+    begun = kept[len(kept) // 2]
+    numbers = json.loads(json.dumps(begun.numbers))  # as a run folder keeps them
+    assert numbers["until"] > numbers["evaluations"] > 0
+    told[:] = [STANDS] * 20
+    search, again = resumed(search, Checkpoint(numbers, begun.arrays, begun.history))
+    _, again = agreeing.agreed(search, again, phases._descend)
+    np.testing.assert_array_equal(again.point.design.rest_length, whole.point.design.rest_length)
+    assert (again.samples, again.stood, again.led_to) == (whole.samples, whole.stood, whole.led_to)
+
+
+def test_thinning_leaves_evaluations_to_turns_where_designs_are_judged_as_built(searching):
+    search, _, _ = searching
+    assert agreeing.leaving_some(search).evaluations == 16
+    assert agreeing.leaving_some(replace(search, asked=None)).evaluations == 20
