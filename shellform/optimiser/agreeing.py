@@ -35,7 +35,7 @@ def agreed(
     """Whether a fresh sample agrees that the last design stands, after turns of a sample and a descent led by
     what falls in it; and the iterate. Where the search was led, turns follow as long as they lead to a better design
     with which a sample agrees."""
-    if search.asked is None or not it.accepted:
+    if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return True, it
     while True:
         if it.until:  # in the middle of a turn

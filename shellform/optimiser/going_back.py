@@ -17,7 +17,7 @@ from shellform.problem.evaluation import Evaluated
 def last_confirmed(search: Search, it: Iterate) -> Iterate:
     """Back to the last accepted design that is found of which a fresh sample agrees that it stands: the
     search has chosen its designs by their luck with the structures it tried."""
-    if search.asked is None or not it.accepted:
+    if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return it
     stood = _confirmed_among(search, it, it.accepted)
     if stood == len(it.accepted) - 1:

@@ -149,7 +149,8 @@ def polish(
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
     shape alone. The misfit never rises: where no better design is found, `best` comes back; and what was
-    asked of `best` as built is asked of the polished design. Only the cables' lengths are varied, where they
+    asked of `best` as built in trials is asked of the polished design: whether it stands as often is left to whoever
+    judges it. Only the cables' lengths are varied, where they
     are variables of their own.
 
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
@@ -174,7 +175,7 @@ def polish(
             lambda _: solver.stiffness * best.stiffness,
             evaluations,
             progress,
-            asked=best.asked,
+            asked=None if best.asked is None else replace(best.asked, confirmed=None),
             judging=judging,
         )
         models = Models(search.evaluator, solver, search.models.reach, whole=alike is not None)

@@ -66,19 +66,17 @@ class Required:
 
 @dataclass(frozen=True)
 class Demand:
-    """What is required in each `trial` of a search, and of a fresh sample, `confirmed`: each is fresh once."""
+    """What is required in each `trial` of a search, and of fresh samples at its end, `confirmed`: None where they
+    are left to whoever judges what it finds."""
 
     trial: Required
-    confirmed: Required
+    confirmed: Required | None
 
     def sample(self, number: int) -> Required:
         """What is required of the fresh sample of this number."""
         fresh = self.confirmed
+        assert fresh is not None
         return replace(fresh, first=fresh.first + number * fresh.safety.tried)
-
-    def after(self, samples: int) -> Demand:
-        """The same for a search that comes after one that drew so many fresh samples."""
-        return replace(self, confirmed=self.sample(samples))
 
 
 @dataclass(frozen=True)

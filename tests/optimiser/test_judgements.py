@@ -396,10 +396,15 @@ def test_a_search_ends_with_the_last_design_that_a_fresh_sample_confirms(
 
     monkeypatch.setattr(going_back, "confirmed", judged)
     sound_are(monkeypatch, sound)
-    found = going_back.last_confirmed(searching(asked=1), returning(7))
+    asking = SimpleNamespace(confirmed="a fresh sample")
+    found = going_back.last_confirmed(searching(asked=asking), returning(7))
     assert (found.accepted[-1].design.number, found.status) == (end, words)
     if 6 not in confirmed:
         assert told_first[1] == [16, 7], "those that fell come first"
+    told_first.clear()
+    begun = returning(7)
+    assert going_back.last_confirmed(searching(asked=SimpleNamespace(confirmed=None)), begun) is begun
+    assert not told_first, "it is left to whoever judges"
 
 
 @pytest.mark.parametrize(
