@@ -41,7 +41,11 @@ def reals(name: str, value: ArrayLike, shape: Shape, *, positive: bool = False) 
         )
     if positive and not (raw > 0).all():
         where = _first(raw <= 0)
-        raise InputError(f"{name}{where} must be above zero", value=float(raw[where]))
+        raise InputError(
+            f"{name}{where} must be above zero",
+            value=float(raw[where]),
+            remedy="Give numbers above zero, in SI units.",
+        )
     return _frozen(raw)
 
 
@@ -51,7 +55,11 @@ def indices(name: str, value: ArrayLike, shape: Shape, *, below: int) -> Indices
     if raw.size == 0:
         raw = raw.astype(np.int64).reshape([0 if n is None else n for n in shape])
     if raw.dtype.kind not in "iu":
-        raise InputError(f"{name} must be whole numbers", value=_short(value))
+        raise InputError(
+            f"{name} must be whole numbers",
+            value=_short(value),
+            remedy="Give integers, not floats.",
+        )
     raw = _shaped(name, raw.astype(np.int64), shape)
     outside = (raw < 0) | (raw >= below)
     if outside.any():
@@ -65,7 +73,11 @@ def flags(name: str, value: ArrayLike, shape: Shape) -> Flags:
     """A read-only boolean copy of `value` with the given shape."""
     raw = np.asarray(value)
     if raw.dtype.kind != "b":
-        raise InputError(f"{name} must be true or false", value=_short(value))
+        raise InputError(
+            f"{name} must be true or false",
+            value=_short(value),
+            remedy="Give booleans: a comparison, or an array of dtype bool.",
+        )
     return _frozen(_shaped(name, raw, shape))
 
 

@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import math
+import operator
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +33,11 @@ class InputError(ShellformError, ValueError):
         tail = f". {remedy}" if remedy else ""
         super().__init__(f"{head}{found}{tail}")
 
+    def within(self, place: str) -> InputError:
+        """The same, found in a part of `place`."""
+        where = f"{place}: {self.where}" if self.where else place
+        return InputError(self.what, where=where, value=self.value, remedy=self.remedy)
+
 
 def require_file(file: Path, *, where: str = "") -> None:
     """Raises InputError where there is no such file; `where` it is named, unless by itself."""
@@ -40,6 +47,57 @@ def require_file(file: Path, *, where: str = "") -> None:
             where=where or str(file),
             remedy="Check the path; one in a case file is relative to it.",
         )
+
+
+def require_number(
+    value: float,
+    *,
+    where: str,
+    give: str,
+    above: float = -math.inf,
+    least: float = -math.inf,
+    below: float = math.inf,
+    most: float = math.inf,
+) -> None:
+    """Raises InputError for what is no finite number above or from its lower bound and below or up to its
+    upper one; `give` is what to give instead, with unit and example.
+    """
+    try:
+        fits = math.isfinite(value) and above < value < below and least <= value <= most
+    except (TypeError, ValueError) as error:
+        raise InputError("must be a number", where=where, value=value, remedy=f"Give {give}.") from error
+    if not fits:
+        what = f"must be {_between(above, least, below, most)}"
+        raise InputError(what, where=where, value=value, remedy=f"Give {give}.")
+
+
+def require_count(value: int, *, where: str, give: str, least: int = 1, most: float = math.inf) -> None:
+    """Raises InputError for what is no whole number from `least` to `most`; `give` is what to give instead."""
+    try:
+        fits = least <= operator.index(value) <= most
+    except TypeError as error:
+        raise InputError(
+            "must be a whole number", where=where, value=value, remedy=f"Give {give}."
+        ) from error
+    if not fits:
+        what = f"must be at least {least}" if most == math.inf else f"must be between {least} and {most}"
+        raise InputError(what, where=where, value=value, remedy=f"Give {give}.")
+
+
+def _between(above: float, least: float, below: float, most: float) -> str:
+    """The bounds in words."""
+    if math.isfinite(least) and math.isfinite(most):
+        return f"between {least:g} and {most:g}"
+    words = []
+    if math.isfinite(above):
+        words.append("positive" if above == 0.0 else f"above {above:g}")
+    if math.isfinite(least):
+        words.append("0 or more" if least == 0.0 else f"at least {least:g}")
+    if math.isfinite(below):
+        words.append(f"below {below:g}")
+    if math.isfinite(most):
+        words.append(f"at most {most:g}")
+    return " and ".join(words if math.isfinite(min(below, most)) else [*words, "finite"])
 
 
 def not_installed(what: str, extra: str, error: ImportError) -> InputError:

@@ -71,7 +71,12 @@ def from_arrays(
     forces = {name: _numbers(f"loads[{name!r}]", force, 3) for name, force in (loads or {}).items()}
     for name, force in forces.items():
         if len(force) != len(places):
-            raise InputError("needs a row for each node", where=f"loads[{name!r}]", value=force.shape)
+            raise InputError(
+                "needs a row for each node",
+                where=f"loads[{name!r}]",
+                value=force.shape,
+                remedy=f"Give {len(places)} rows of a force, N; zeros where nothing pulls.",
+            )
     return _built(
         range(len(places)),
         places.tolist(),
@@ -185,7 +190,12 @@ def _built(
     if rod is not None:
         values = [float(each) for each in (rod if isinstance(rod, Sequence) else stiffness(rod))]
     if rod is not None and len(values) != 4:
-        raise InputError("needs four stiffnesses: EA, GJ, EI_y, EI_z", where="rod", value=len(values))
+        raise InputError(
+            "needs four stiffnesses",
+            where="rod",
+            value=len(values),
+            remedy="Give EA in N and GJ, EI_y, EI_z in N·m², or a section such as sf.Round.",
+        )
     of_rods = dict(zip(("EA", "GJ", "EIy", "EIz"), values, strict=False))
     for node, how in held.items():
         if how not in _HELD:
@@ -232,9 +242,14 @@ def _numbers(name: str, given: ArrayLike, width: int) -> np.ndarray:
     try:
         values = np.asarray(given, dtype=float)
     except (TypeError, ValueError) as error:
-        raise InputError("must be numbers", where=name) from error
+        raise InputError("must be numbers", where=name, remedy=f"Give rows of {width} numbers.") from error
     if values.ndim != 2 or values.shape[1] != width:
-        raise InputError(f"needs rows of {width} numbers", where=name, value=values.shape)
+        raise InputError(
+            f"needs rows of {width} numbers",
+            where=name,
+            value=values.shape,
+            remedy=f"Give an array of shape (any, {width}).",
+        )
     return values
 
 
@@ -243,7 +258,12 @@ def _pairs(name: str, given: ArrayLike, count: int) -> list[tuple[int, int]]:
     if values.size == 0:
         return []
     if values.ndim != 2 or values.shape[1] != 2 or not np.issubdtype(values.dtype, np.integer):
-        raise InputError("needs pairs of node numbers", where=name, value=values.shape)
+        raise InputError(
+            "needs pairs of node numbers",
+            where=name,
+            value=values.shape,
+            remedy="Give integers of shape (any, 2), nodes counted from 0.",
+        )
     if values.min() < 0 or values.max() >= count:
         raise InputError(
             f"names a node that isn't there: there are {count}",

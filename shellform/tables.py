@@ -42,7 +42,10 @@ class Table:
         for number, row in enumerate(self.rows):
             if len(row) != len(self.columns):
                 raise InputError(
-                    f"row {number} has another length than the heads", where=self.name, value=len(row)
+                    f"row {number} has another length than the heads",
+                    where=self.name,
+                    value=len(row),
+                    remedy=f"Give {len(self.columns)} values, None where one is missing.",
                 )
 
     def records(self) -> list[dict[str, Value]]:

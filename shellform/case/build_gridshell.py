@@ -171,9 +171,7 @@ def _named(name: str, entry: Any, shell: Gridshell, surface: Surface) -> Reals:
     try:
         return _part(entry, shell, surface)
     except InputError as error:
-        raise InputError(
-            error.what, where=f"part.{name}: {error.where}", value=error.value, remedy=error.remedy
-        ) from error
+        raise error.within(f"part.{name}") from error
 
 
 def _part(entry: Any, shell: Gridshell, surface: Surface) -> Reals:

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal
 
 import tomli_w
 from pydantic import (
-    BaseModel,
     Discriminator,
     Field,
     Tag,
@@ -47,6 +44,7 @@ from shellform.case.entries import (
 )
 from shellform.case.older_names import with_present_names
 from shellform.case.safety_entries import SafetyEntry, TolerancesEntry
+from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError
 from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.gridshell.gridshell import Rod
@@ -95,7 +93,8 @@ class Case(Entry):
     def _fitting(self) -> Case:
         if self.joint.gap >= 0.5 * self.net.spacing:
             raise ValueError(
-                f"joint.gap ({self.joint.gap:g} m) must be well below net.spacing ({self.net.spacing:g} m)"
+                f"joint.gap ({self.joint.gap:g} m) must be well below net.spacing "
+                f"({self.net.spacing:g} m); twice the rod's radius is usual"
             )
         return self
 
@@ -116,12 +115,16 @@ class Case(Entry):
         names = [each.name for each in self.load]
         for needed in ("design", "additional"):
             if names.count(needed) != 1:
-                raise ValueError(f"there must be one [[load]] with the name {needed!r}")
+                raise ValueError(
+                    f"there must be one [[load]] with the name {needed!r}; add it, or rename another"
+                )
         for each in self.load:
             if names.count(each.name) > 1 or each.name == "none" or each.name.startswith("critical "):
-                raise ValueError(f"the load's name {each.name!r} is taken")
+                raise ValueError(f"the load's name {each.name!r} is taken; choose another")
             if each.stages and each.name in ("design", "additional"):
-                raise ValueError(f"the load {each.name!r} is one case and can't have stages")
+                raise ValueError(
+                    f"the load {each.name!r} is one case and can't have stages; give them to a [[load]] of another name"
+                )
             for part in [*each.factors, *each.stages]:
                 if part not in self.part:
                     known = ", ".join(self.part) or "none: add tables [part.NAME]"
@@ -172,7 +175,7 @@ def make_case(data: Mapping[str, Any], file: Path) -> Case:
     try:
         case = Case.model_validate(_with_joint(with_present_names(data), file))
     except ValidationError as error:
-        raise refusal(error, Case, file) from error
+        raise refusal(error, Case, str(file)) from error
     name = case.surface.file
     if "\0" in name or max(len(part.encode()) for part in ("", *Path(name).parts)) > _NAME:
         raise InputError(
@@ -314,69 +317,6 @@ def set_entry(data: dict[str, Any], key: str, value: Any, *, where: str) -> None
                 remedy="Name an entry of a table, as net.spacing.",
             )
     data[last] = value
-
-
-def refusal(error: ValidationError, root: type[BaseModel], file: Path) -> InputError:
-    """What to say of a file of `root`'s kind with wrong entries."""
-    return InputError("; ".join(_in_words(each, root) for each in error.errors()), where=str(file))
-
-
-def _in_words(error: Any, root: type[BaseModel]) -> str:
-    """One validation error in words: the entry of the file of `root`'s kind, what is wrong, the value, and
-    the nearest known name.
-    """
-    kind = error["type"]
-    entry, model = _entry(error["loc"], root)
-    if kind == "extra_forbidden":
-        near = difflib.get_close_matches(str(error["loc"][-1]), model.model_fields, n=1, cutoff=0.5)
-        hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(model.model_fields)}"
-        return f"{entry} is no known entry; {hint}"
-    if kind == "union_tag_invalid":
-        return f"{entry}.kind: must be one of {error['ctx']['expected_tags']} (found {error['ctx']['tag']!r})"
-    if kind == "union_tag_not_found":
-        return f"{entry}.kind is missing"
-    if kind == "missing":
-        return f"{entry} is missing"
-    message = str(error["msg"]).removeprefix("Value error, ")
-    message = message[:1].lower() + message[1:]
-    value = "" if kind == "value_error" else f" (found {error['input']!r})"
-    return f"{entry}: {message}{value}"
-
-
-def _entry(place: Sequence[int | str], root: type[BaseModel]) -> tuple[str, Any]:
-    """The name of an entry as the file has it, and the table in which it stands; where an entry may be of
-    several kinds, the place that pydantic gives names the kind too."""
-    names: list[str] = []
-    kind: Any = root
-    table: Any = root
-    for part in place:
-        plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
-        if (
-            get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain)
-        ):  # a table that may be left out
-            plain = next(each for each in get_args(plain) if each is not NoneType)
-        choices = {tag: each for each in get_args(plain) for tag in _tags(each)}
-        if part in choices:
-            kind = choices[part]
-            continue
-        names.append(str(part))
-        if get_origin(plain) in (list, dict):
-            kind = get_args(plain)[-1]
-        elif isinstance(plain, type) and issubclass(plain, BaseModel):
-            table = plain
-            field = plain.model_fields.get(str(part))
-            kind = Any if field is None else field.annotation
-        else:
-            kind = Any
-    return ".".join(names) or root.__name__.lower(), table
-
-
-def _tags(choice: Any) -> list[str]:
-    """The names by which pydantic tells a choice of a union apart."""
-    own = [each.tag for each in get_args(choice)[1:] if isinstance(each, Tag)]
-    if isinstance(choice, type) and issubclass(choice, BaseModel) and "kind" in choice.model_fields:
-        own += get_args(choice.model_fields["kind"].annotation)
-    return own
 
 
 def _has(entry: Any, name: str) -> bool:

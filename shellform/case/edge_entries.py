@@ -34,14 +34,14 @@ class EdgeBeamEntry(Entry):
     @model_validator(mode="after")
     def _one_shape(self) -> EdgeBeamEntry:
         if (self.width is None) != (self.height is None):
-            raise ValueError("a lath needs both width and height")
+            raise ValueError("a lath needs both width and height; add the other")
         if (self.catalogue is None) != (self.section is None):
-            raise ValueError("a section from a catalogue needs both catalogue and section")
+            raise ValueError("a section from a catalogue needs both catalogue and section; add the other")
         given = [name for name in ("rods", "radius", "width", "catalogue") if getattr(self, name) is not None]
         if len(given) > 1:
-            raise ValueError(f"an edge beam has one of {', '.join(given)}")
+            raise ValueError(f"an edge beam has only one of {', '.join(given)}; leave the others out")
         if self.wall is not None and (self.radius is None or self.wall >= self.radius):
-            raise ValueError("a tube's wall needs a radius larger than it")
+            raise ValueError("a tube's wall needs a radius larger than it, m; leave wall out for a round rod")
         return self
 
 

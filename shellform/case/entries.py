@@ -92,9 +92,9 @@ class NetEntry(Entry):
     @model_validator(mode="after")
     def _guided(self) -> NetEntry:
         if self.guides is not None and (len(self.guides) != 2 or min(len(each) for each in self.guides) < 2):
-            raise ValueError("guides must be two curves of at least two points each")
+            raise ValueError("guides must be two curves, each a list of at least two points [x, y]")
         if self.guides is not None and self.angle == "auto":
-            raise ValueError("guides leave no angle to search for")
+            raise ValueError("guides leave no angle to search for; leave one of the two out")
         return self
 
 
@@ -129,11 +129,11 @@ class OwnRodEntry(_BoughtEntry):
     @model_validator(mode="after")
     def _one_shape(self) -> OwnRodEntry:
         if self.wall is not None and (self.radius is None or self.wall >= self.radius):
-            raise ValueError("a tube's wall needs a radius larger than it")
+            raise ValueError("a tube's wall needs a radius larger than it, m; leave wall out for round rods")
         if (self.width is None) != (self.height is None):
-            raise ValueError("a lath needs both width and height")
+            raise ValueError("a lath needs both width and height; add the other, or give a radius")
         if self.width is not None and self.radius is not None:
-            raise ValueError("a rod has either a radius or a width and a height")
+            raise ValueError("a rod has either a radius or a width and a height; leave one out")
         return self
 
 

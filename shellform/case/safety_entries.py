@@ -7,7 +7,9 @@ from typing import Annotated, Any
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveInt, model_validator
 
 from shellform.case.entries import Entry
-from shellform.gridshell.tolerances import SOURCES
+from shellform.gridshell.tolerances import LARGEST_SHARE, SOURCES
+
+_Share = Annotated[float, Field(ge=0.0, le=LARGEST_SHARE)]
 
 
 def _deviation(unit: str, name: str) -> Any:
@@ -22,20 +24,20 @@ class TolerancesEntry(Entry):
     """
 
     cable_length: NonNegativeFloat | None = _deviation("m", "cable_length")
-    cable_stiffness: NonNegativeFloat | None = _deviation("share", "cable_stiffness")
+    cable_stiffness: _Share | None = _deviation("share", "cable_stiffness")
     supports: NonNegativeFloat | None = _deviation("m, each coordinate", "supports")
     marks: NonNegativeFloat | None = _deviation("m, of crossings along rods", "marks")
-    rod_stiffness: NonNegativeFloat | None = _deviation("share, of each rod", "rod_stiffness")
-    rod_bow: NonNegativeFloat | None = _deviation("rise over length of each rod", "rod_bow")
-    connectors: NonNegativeFloat | None = _deviation("share", "connectors")
-    load_each: NonNegativeFloat | None = _deviation("share, of each crossing's load", "load_each")
-    load_all: NonNegativeFloat | None = _deviation("share, of the whole load", "load_all")
-    load_uneven: NonNegativeFloat | None = _deviation("share, of one half's load", "load_uneven")
-    shape: NonNegativeFloat | None = _deviation("amplitude of each soft mode over the span", "shape")
-    cable_stiffness_all: NonNegativeFloat | None = Field(
+    rod_stiffness: _Share | None = _deviation("share, of each rod", "rod_stiffness")
+    rod_bow: _Share | None = _deviation("rise over length of each rod", "rod_bow")
+    connectors: _Share | None = _deviation("share", "connectors")
+    load_each: _Share | None = _deviation("share, of each crossing's load", "load_each")
+    load_all: _Share | None = _deviation("share, of the whole load", "load_all")
+    load_uneven: _Share | None = _deviation("share, of one half's load", "load_uneven")
+    shape: _Share | None = _deviation("amplitude of each soft mode over the span", "shape")
+    cable_stiffness_all: _Share | None = Field(
         None, description=f"share, of all cables together; left out: 0, {SOURCES['cable_stiffness_all']}"
     )
-    connectors_all: NonNegativeFloat | None = Field(
+    connectors_all: _Share | None = Field(
         None, description=f"share, of all connectors together; left out: 0, {SOURCES['connectors_all']}"
     )
 
@@ -75,9 +77,9 @@ class SafetyEntry(Entry):
     @model_validator(mode="after")
     def _enough(self) -> SafetyEntry:
         if self.compared > self.drawn:
-            raise ValueError("compared must not exceed drawn")
+            raise ValueError("compared must not exceed drawn; lower it, or raise drawn")
         if 0.0 < self.critical_factor < 1.0:
             raise ValueError("critical_factor must be 0 (not asked) or at least 1")
         if 0 < self.rare < 20:
-            raise ValueError("rare must be 0 or at least 20")
+            raise ValueError("rare must be 0 (not asked) or at least 20")
         return self

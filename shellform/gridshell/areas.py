@@ -104,7 +104,12 @@ def _ears(polygon: Reals) -> list[tuple[Reals, Reals, Reals]]:
     x, y = np.transpose(corners) if corners else (np.zeros(0), np.zeros(0))
     area = 0.5 * float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())
     if len(corners) < 3 or area == 0.0:
-        raise InputError("needs at least three corners round an area", where="polygon", value=len(corners))
+        raise InputError(
+            "needs at least three corners round an area",
+            where="polygon",
+            value=len(corners),
+            remedy="Give the corners' x and y in order, m, as [[0, 0], [1, 0], [0, 1]].",
+        )
     if area < 0.0:
         corners.reverse()
     found, crossed = [], _crosses_itself(corners)

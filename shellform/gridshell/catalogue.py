@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from shellform.errors import InputError
+from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.gridshell import Design, Gridshell, Rod, TooCurved, erection_stress
 from shellform.gridshell.layers import TwoLayers
@@ -35,6 +35,7 @@ from shellform.structure.elements.sections import (
     sizes_of,
     stiffness,
 )
+from shellform.structure.refusals import refusal
 
 _SHIPPED = Path(__file__).resolve().parent.parent / "catalogues"
 _EQUAL = 1e-9  # relative: stiffnesses that count as equal
@@ -60,6 +61,9 @@ class _CatalogueFile(msgspec.Struct, forbid_unknown_fields=True):
     sizes: _Sizes
     title: str = ""
     stock_length: float | None = None
+
+
+_PARTS = {"material": _Material, "sizes": _Sizes, "": _CatalogueFile}
 
 
 @dataclass(frozen=True)
@@ -94,10 +98,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
         remedy = f"Shipped are {', '.join(shipped_catalogues())}."
         raise InputError(f"can't be read: {error}", where=f"catalogue {path}", remedy=remedy) from error
     except msgspec.ValidationError as error:
-        what, _, place = str(error).partition(" - at ")
-        raise InputError(
-            what[:1].lower() + what[1:], where=f"catalogue {path}: {place.strip('`$.') or 'top'}"
-        ) from error
+        raise refusal(error, _PARTS).within(f"catalogue {path}") from error
     except (msgspec.DecodeError, ValueError, RecursionError) as error:  # ValueError: a number of 5,000 digits
         raise InputError(
             f"isn't valid TOML: {error}",
@@ -115,16 +116,30 @@ def read_catalogue(source: str | Path) -> Catalogue:
             "has no sizes", where=f"catalogue {path}: sizes", remedy="List round, tube or rectangle."
         )
     stock = document.stock_length
-    if stock is not None and not 0.0 < stock < np.inf:
-        raise InputError("must be positive", where=f"catalogue {path}: stock_length", value=stock)
+    if stock is not None:
+        require_number(
+            stock,
+            above=0.0,
+            where=f"catalogue {path}: stock_length",
+            give="metres, such as 6.0, or leave it out",
+        )
     return Catalogue(document.title or path.stem, material, tuple(sorted(sections, key=_order)), stock)
 
 
 def _material(given: _Material) -> Material:
     if (given.shear is None) == (given.poisson is None):
-        raise InputError("needs either shear or poisson", where="material")
-    if not 0.0 < given.lasting <= 1.0:
-        raise InputError("must lie between 0 and 1", where="material.lasting", value=given.lasting)
+        raise InputError(
+            "needs either shear or poisson",
+            where="material",
+            remedy="Keep one: each follows from young and the other.",
+        )
+    require_number(
+        given.lasting,
+        above=0.0,
+        most=1.0,
+        where="material.lasting",
+        give="a share of the strength, such as 0.4",
+    )
     strength = given.strength * given.lasting
     if given.shear is None:
         return isotropic(
@@ -145,9 +160,7 @@ def _checked(where: str, make: Callable[[], Any]) -> Any:
     try:
         return make()
     except InputError as error:
-        raise InputError(
-            error.what, where=f"{where}: {error.where}", value=error.value, remedy=error.remedy
-        ) from error
+        raise error.within(where) from error
 
 
 def label(section: Section, places: int = 6) -> str:
@@ -261,8 +274,9 @@ def neighbours(
     """The gridshell and design with each of `count` sections below the rounded-up one, that one, and `count`
     above it, by rising stiffness, as far as the catalogue goes and the net allows. Raises InputError for a
     count below 0."""
-    if count < 0:
-        raise InputError("must not be negative", where="neighbours.count", value=count)
+    require_count(
+        count, least=0, where="neighbours.count", give="how many sections to either side, such as 1"
+    )
     sections = allowed(catalogue, shell.net)
     at = _stiff_enough(sections, shell.rod.resized(design.radius).section)
     return [with_section(shell, design, section) for section in sections[max(at - count, 0) : at + count + 1]]

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.loads import GRAVITY
 from shellform.net.net import Net
 from shellform.structure.elements.beam import Beams, built_in, joined
@@ -47,12 +47,18 @@ class Bundle:
     material: Material
 
     def __post_init__(self) -> None:
-        if not (self.radius > 0.0 and math.isfinite(self.radius)):
-            raise InputError("must be positive and finite", where="edges.beam.radius", value=self.radius)
-        if not 1 <= self.count <= 1 + 3 * _RINGS * (_RINGS + 1):
-            raise InputError("must be between 1 and 469", where="edges.beam.rods", value=self.count)
-        if not 0.0 <= self.composite <= 1.0:
-            raise InputError("must be between 0 and 1", where="edges.beam.composite", value=self.composite)
+        require_number(self.radius, above=0.0, where="edges.beam.radius", give="metres, such as 0.004")
+        most = 1 + 3 * _RINGS * (_RINGS + 1)
+        require_count(
+            self.count, most=most, where="edges.beam.rods", give=f"a number of rods up to {most}, such as 7"
+        )
+        require_number(
+            self.composite,
+            least=0.0,
+            most=1.0,
+            where="edges.beam.composite",
+            give="0 for loose rods to 1 for glued ones, such as 0.5",
+        )
 
     @property
     def _places(self) -> Reals:

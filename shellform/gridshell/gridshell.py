@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Flags, Indices, Reals, indices, reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_stress
 from shellform.gridshell.loads import points
@@ -93,6 +93,14 @@ class Rod:
         return Rod(self.section.with_sizes([size / self.radius * radius for size in self.section.sizes]))
 
 
+_JOINT_UNITS = {
+    "axial": "EA in newtons, such as 7.15e4",
+    "torsion": "GJ in N·m², such as 7.38e-4",
+    "bending": "EI in N·m², such as 7.85e-4",
+    "gap": "metres between the rods' axes, at least a rod's diameter, such as 0.0024",
+}
+
+
 @dataclass(frozen=True)
 class Joint:
     """The connection of two crossing rods, a short beam between their axes: EA, N; GJ and EI, N·m²; length
@@ -105,10 +113,8 @@ class Joint:
     gap: float
 
     def __post_init__(self) -> None:
-        for name in ("axial", "torsion", "bending", "gap"):
-            value = getattr(self, name)
-            if not (value > 0.0 and math.isfinite(value)):
-                raise InputError("must be positive and finite", where=f"joint.{name}", value=value)
+        for name, unit in _JOINT_UNITS.items():
+            require_number(getattr(self, name), above=0.0, where=f"joint.{name}", give=unit)
 
     @property
     def stiffness(self) -> tuple[float, float, float, float]:
@@ -123,8 +129,9 @@ class Cable:
     stiffness: float
 
     def __post_init__(self) -> None:
-        if not (self.stiffness > 0.0 and math.isfinite(self.stiffness)):
-            raise InputError("must be positive and finite", where="cable.stiffness", value=self.stiffness)
+        require_number(
+            self.stiffness, above=0.0, where="cable.stiffness", give="EA in newtons, such as 187.0"
+        )
 
 
 @dataclass(frozen=True)
@@ -194,8 +201,13 @@ class Gridshell:
 
     def design(self, *, rest_ratio: float = 0.99) -> Design:
         """The initial design: every candidate cable at `rest_ratio` of its length in the target."""
-        if not 0.0 < rest_ratio < 1.0:
-            raise InputError("must lie between 0 and 1", where="cable.rest_ratio", value=rest_ratio)
+        require_number(
+            rest_ratio,
+            above=0.0,
+            below=1.0,
+            where="cable.rest_ratio",
+            give="a share of the length, such as 0.99",
+        )
         every = np.ones(len(self.cable_ends), dtype=bool)
         return Design(rest_ratio * self.cable_lengths, every, self.rod.radius)
 

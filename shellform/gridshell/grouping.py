@@ -17,7 +17,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Gridshell
 
 _SYMMETRIES = ((-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0))  # signs of x and y in two mirrors and the half turn
@@ -65,8 +65,9 @@ def cut_lengths(rest_lengths: Reals, adjustment: float) -> Reals:
     """For each of the rest lengths (k,), m, the length (k,), m, to cut its cable to with the turnbuckle
     closed; as few different ones as an `adjustment`, m, of the turnbuckles allows, each at most that much
     shorter than the rest length."""
-    if not adjustment >= 0.0:
-        raise InputError("must be 0 or positive", where="cable.adjustment", value=adjustment)
+    require_number(
+        adjustment, least=0.0, where="cable.adjustment", give="metres, such as 0.01, or 0 for none"
+    )
     order = np.argsort(rest_lengths, kind="stable")
     result = np.empty_like(rest_lengths)
     shortest = -np.inf

@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError
+from shellform.errors import require_number
 from shellform.net.grid import ROD
 from shellform.net.net import Net
 from shellform.structure.answers.results import end_stress
@@ -51,8 +51,13 @@ class TwoLayers:
     composite: float = TOGETHER
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.composite <= 1.0:
-            raise InputError("must be between 0 and 1", where="rod.composite", value=self.composite)
+        require_number(
+            self.composite,
+            least=0.0,
+            most=1.0,
+            where="rod.composite",
+            give="0 for loose laths to 1 for glued ones, such as 0.5",
+        )
 
     @property
     def material(self) -> Material:

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.areas import areas, between, facets, tributary, within
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length
@@ -47,7 +47,10 @@ class Region:
         for name, limits in [("strip", self.strip and self.strip[1:]), ("ring", self.ring)]:
             if limits and not limits[0] < limits[1]:
                 raise InputError(
-                    "the first limit must lie below the second", where=f"load.{name}", value=list(limits)
+                    "the first limit must lie below the second",
+                    where=f"load.{name}",
+                    value=list(limits),
+                    remedy="Change places of the two, m.",
                 )
 
 
@@ -102,14 +105,14 @@ def _coordinates(point: Reals) -> str:
 
 def pressure(thickness: float, density: float) -> float:
     """Weight, N/m², of a layer of `thickness`, m, across the surface, and `density`, kg/m³."""
-    return GRAVITY * _positive("load.thickness", thickness) * _positive("load.density", density)
+    return GRAVITY * _positive("thickness", thickness) * _positive("density", density)
 
 
 def area_load(net: Net, surface: Surface, weight: float, region: Region = EVERYWHERE) -> Reals:
     """Load (n, 6) of a `weight`, N/m² of the surface, in the region. It adds up to the weight times the
     region's area.
     """
-    return _down(_positive("load.weight", weight) * tributary(net, lying(surface, region)))
+    return _down(_positive("weight", weight) * tributary(net, lying(surface, region)))
 
 
 def concrete(
@@ -123,7 +126,7 @@ def concrete(
 
 def sheet(net: Net, surface: Surface, mass: float, region: Region = EVERYWHERE) -> Reals:
     """Load (n, 6) of a membrane or of reinforcement of `mass`, kg/m²."""
-    return area_load(net, surface, GRAVITY * _positive("load.mass", mass), region)
+    return area_load(net, surface, GRAVITY * _positive("mass", mass), region)
 
 
 def rods(net: Net, section: Section) -> Reals:
@@ -143,7 +146,7 @@ def rods(net: Net, section: Section) -> Reals:
 def joints(net: Net, mass: float) -> Reals:
     """Load (n, 6) of joints of `mass`, kg, each, half on either rod."""
     weight = np.zeros(net.node_count)
-    weight[net.grid.crossing_nodes] = 0.5 * GRAVITY * _positive("load.mass", mass)
+    weight[net.grid.crossing_nodes] = 0.5 * GRAVITY * _positive("mass", mass)
     return _down(weight)
 
 
@@ -160,8 +163,7 @@ def points(
     of `inside`."""
     loaded = crossings_to_load(net, every, openings, inside)
     weight = np.zeros(net.node_count)
-    if not math.isfinite(force):
-        raise InputError("must be finite", where="load.force", value=force)
+    require_number(force, where="load.force", give="newtons a crossing, such as 6.9")
     weight[net.grid.crossing_nodes[loaded, 1]] = force
     return _down(weight)
 
@@ -182,8 +184,7 @@ def combined(
                 value=name,
                 remedy=f"Known: {', '.join(parts)}.",
             )
-        if not math.isfinite(factor):
-            raise InputError("must be finite", where=f"{where}.{name}", value=factor)
+        require_number(factor, where=f"{where}.{name}", give="a factor of that part, such as 1.2")
     return np.asarray(sum(factor * parts[name] for name, factor in factors.items()))
 
 
@@ -216,8 +217,7 @@ def crossings_to_load(
 
     Raises InputError where none is left.
     """
-    if every < 1:
-        raise InputError("must be at least 1", where="load.every", value=every)
+    require_count(every, where="load.every", give="1 for all crossings, 2 for the checkerboard")
     loaded = net.grid.lattice.sum(axis=1) % every == 0
     plan = net.crossings[:, :2]
     for polygon in _polygons("load.openings", openings):
@@ -238,7 +238,12 @@ def _polygons(where: str, given: Sequence[ArrayLike]) -> list[Reals]:
     for number, polygon in enumerate(given):
         corners = reals(f"{where}[{number}]", polygon, (None, 2))
         if len(corners) < 3:
-            raise InputError("needs at least three corners", where=f"{where}[{number}]", value=len(corners))
+            raise InputError(
+                "needs at least three corners",
+                where=f"{where}[{number}]",
+                value=len(corners),
+                remedy="Give the corners' x and y in order, m, as [[0, 0], [1, 0], [0, 1]].",
+            )
         result.append(corners)
     return result
 
@@ -261,7 +266,14 @@ def _down(weight: Reals) -> Reals:
     return load
 
 
-def _positive(where: str, value: float) -> float:
-    if not (value > 0.0 and math.isfinite(value)):
-        raise InputError("must be positive and finite", where=where, value=value)
+_UNITS = {
+    "thickness": "metres of concrete, such as 0.005",
+    "density": "kg/m³, such as 2400",
+    "weight": "N/m², such as 120",
+    "mass": "kilograms, such as 0.05",
+}
+
+
+def _positive(name: str, value: float) -> float:
+    require_number(value, above=0.0, where=f"load.{name}", give=_UNITS[name])
     return value

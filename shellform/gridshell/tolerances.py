@@ -15,11 +15,11 @@ from typing import Final
 
 import numpy as np
 
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Gridshell
 
 SCALE_MODEL_BELOW: Final = 2.0  # m of span
-_LARGEST_SHARE: Final = 0.5  # relative deviations beyond this are no tolerances
+LARGEST_SHARE: Final = 0.5  # relative deviations beyond this are no tolerances
 
 SOURCES: Final[Mapping[str, str]] = {
     "cable_length": "cut length and turnbuckle: EN 1090-2 annex B, length of a cut member, 2 mm + L/5000; "
@@ -82,11 +82,12 @@ class Tolerances:
     def __post_init__(self) -> None:
         for each in fields(self):
             value, where = getattr(self, each.name), f"tolerances.{each.name}"
-            if not (value >= 0.0 and np.isfinite(value)):
-                raise InputError("must be finite and not negative", where=where, value=value)
-            if each.name not in ("cable_length", "supports", "marks") and value > _LARGEST_SHARE:
+            length = each.name in ("cable_length", "supports", "marks")
+            give = "metres, such as 0.0001" if length else "a share, such as 0.03 for 3 %"
+            require_number(value, least=0.0, where=where, give=f"{give}, or 0 for none")
+            if not length and value > LARGEST_SHARE:
                 raise InputError(
-                    f"is a share and must not exceed {_LARGEST_SHARE:g}",
+                    f"is a share and must not exceed {LARGEST_SHARE:g}",
                     where=where,
                     value=value,
                     remedy="Write 0.1 for 10 %.",
@@ -109,8 +110,7 @@ class Tolerances:
 def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float) -> Tolerances:
     """The defaults for a shell of that `span`, its longest rod and cable, m (SOURCES)."""
     for name, value in (("span", span), ("longest_rod", longest_rod)):
-        if not (value > 0.0 and np.isfinite(value)):
-            raise InputError("must be positive and finite", where=name, value=value)
+        require_number(value, above=0.0, where=name, give="metres, such as 0.9")
     model = span < SCALE_MODEL_BELOW
     return Tolerances(
         cable_length=1e-4 if model else 2e-3 + longest_cable / 5000.0,

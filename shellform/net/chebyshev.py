@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Reals, reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_count, require_number
 from shellform.net.compass import Finder, Guide, covering_lattice, raised
 from shellform.net.grid import Grid, lattice_grid
 from shellform.net.net import Net
@@ -148,8 +148,9 @@ def check_settings(
     extent = float(max(surface.size[:2]))
     narrow = float(min(surface.size[:2]))
     for name, spacing in zip(("net.spacing", "net.spacing_v"), steps, strict=True):
-        if not 0.0 < spacing < np.inf:
-            raise InputError("must be a positive length", where=name, value=spacing)
+        require_number(
+            spacing, above=0.0, where=name, give=f"metres, such as {narrow / 10.0:.2g} on this surface"
+        )
         if spacing > 0.5 * narrow:
             raise InputError(
                 f"is too large for a surface of {surface.size[0]:.3g} × {surface.size[1]:.3g} m in plan",
@@ -166,12 +167,13 @@ def check_settings(
             )
     if not 0.0 < gap < 0.5 * min(steps):
         raise InputError(
-            "must be positive and well below the spacing", where="joint.gap", value=gap, remedy="Give metres."
+            "must be positive and well below the spacing",
+            where="joint.gap",
+            value=gap,
+            remedy=f"Give metres below {0.5 * min(steps):.3g}, at least a rod's diameter.",
         )
-    if elements < 1:
-        raise InputError("must be at least 1", where="net.elements", value=elements)
-    if not 0.0 < merge < 0.5:
-        raise InputError("must lie between 0 and 0.5", where="net.merge", value=merge)
+    require_count(elements, where="net.elements", give="beam elements a segment, such as 4")
+    require_number(merge, above=0.0, below=0.5, where="net.merge", give="a share of the spacing, such as 0.2")
 
 
 def _short(bare: int, angle: float) -> NoNet:

@@ -35,7 +35,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import NotConverged, require_number
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
 from shellform.optimiser.optimum import Checkpoint, Optimum, Step
@@ -75,8 +75,8 @@ class MovingAsymptotes:
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise InputError("must be finite and positive", where=f"solver.{each.name}", value=value)
+            give = f"a positive number, or leave it out for {each.default}"
+            require_number(value, above=0.0, where=f"solver.{each.name}", give=give)
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-import numpy as np
-
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 
 
 @dataclass(frozen=True)
@@ -111,18 +109,19 @@ class SequentialConvex:
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
-            least = 0.0 if each.name in _MAY_BE_ZERO else np.nextafter(0.0, 1.0)
-            if value is not None and not (np.isfinite(value) and value >= least):
-                raise InputError(
-                    "must be finite and positive" if least else "must be finite and not negative",
-                    where=f"solver.{each.name}",
-                    value=value,
-                )
+            if value is None:
+                continue
+            where, otherwise = f"solver.{each.name}", f"or leave it out for {each.default}"
+            if each.name in _MAY_BE_ZERO:
+                require_number(value, least=0.0, where=where, give=f"0 or a positive number, {otherwise}")
+            else:
+                require_number(value, above=0.0, where=where, give=f"a positive number, {otherwise}")
         if not self.shrink < 1.0 <= self.grow:
             raise InputError(
                 "windows must shrink by less than 1 and grow by more",
                 where="solver.shrink",
                 value=(self.shrink, self.grow),
+                remedy="Give shrink below 1 and grow of 1 or more, such as 0.4 and 1.6.",
             )
 
 

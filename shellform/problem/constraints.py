@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Gridshell
 from shellform.problem.terms import Term
 
@@ -101,6 +101,7 @@ class Between:
                 "the lower limit must lie below the upper one, both finite",
                 where="constraints",
                 value=(self.least, self.most),
+                remedy="Change places of the two, or take AtLeast or AtMost for one side only.",
             )
 
     @property
@@ -145,8 +146,7 @@ def residual_rows(constraint: Constraint, rows: Reals) -> Reals:
 
 
 def _check(limit: float, of: float | None) -> None:
-    if not np.isfinite(limit):
-        raise InputError("a limit must be finite", where="constraints", value=limit)
+    require_number(limit, where="constraints", give="a limit in the term's unit, or leave the constraint out")
     if of is None and not limit > 0.0:
         raise InputError(
             "a limit must be positive",
@@ -154,5 +154,7 @@ def _check(limit: float, of: float | None) -> None:
             value=limit,
             remedy="Or say of what size its violations are a share, with `of`.",
         )
-    if of is not None and not (of > 0.0 and np.isfinite(of)):
-        raise InputError("must be positive and finite", where="constraints.of", value=of)
+    if of is not None:
+        require_number(
+            of, above=0.0, where="constraints.of", give="the size of values that matter, in the term's unit"
+        )

@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.layers import LOCK, TwoLayers, rod_stress
 from shellform.net.grid import CONNECTOR, ROD
@@ -123,8 +123,9 @@ class LargestCableForce(Term):
     scale: float
 
     def __post_init__(self) -> None:
-        if not self.scale > 0.0:
-            raise InputError("must be positive", where="largest_cable_force.scale", value=self.scale)
+        require_number(
+            self.scale, above=0.0, where="largest_cable_force.scale", give="newtons, such as their limit"
+        )
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; slack cables count with the push that they would give."""
@@ -146,8 +147,9 @@ class LeastTension(Term):
     let_out: float = np.inf
 
     def __post_init__(self) -> None:
-        if not self.scale > 0.0:
-            raise InputError("must be positive", where="least_tension.scale", value=self.scale)
+        require_number(
+            self.scale, above=0.0, where="least_tension.scale", give="newtons, such as the least asked for"
+        )
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N, twice `scale` where there are no cables. A slack cable counts with the tension that
@@ -178,8 +180,9 @@ class ModalStiffness(Term):
     scale: float
 
     def __post_init__(self) -> None:
-        if not self.scale > 0.0:
-            raise InputError("must be positive", where="modal_stiffness.scale", value=self.scale)
+        require_number(
+            self.scale, above=0.0, where="modal_stiffness.scale", give="N/m, such as the least asked for"
+        )
 
     def at_limit(self, limit: float) -> float:
         """Its square."""
@@ -224,8 +227,7 @@ class Uplift(Term):
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.scale > 0.0:
-            raise InputError("must be positive", where="uplift.scale", value=self.scale)
+        require_number(self.scale, above=0.0, where="uplift.scale", give="newtons, such as their limit")
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; supports may bear a part of the load at once."""
@@ -244,8 +246,7 @@ class Thrust(Term):
     scale: float = 1.0
 
     def __post_init__(self) -> None:
-        if not self.scale > 0.0:
-            raise InputError("must be positive", where="thrust.scale", value=self.scale)
+        require_number(self.scale, above=0.0, where="thrust.scale", give="newtons, such as their limit")
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, N; supports may bear a part of the load at once."""

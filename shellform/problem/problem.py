@@ -28,7 +28,9 @@ class LoadCase:
 
     def __post_init__(self) -> None:
         if not self.name:
-            raise InputError("a load case needs a name", where="problem")
+            raise InputError(
+                "a load case needs a name", where="problem", remedy='Give one, as in LoadCase("wet", force).'
+            )
 
 
 @dataclass(frozen=True)

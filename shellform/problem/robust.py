@@ -30,7 +30,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Group, Realisation, groups_of, unpacked
 from shellform.gridshell.tolerances import Tolerances
@@ -147,8 +147,7 @@ def measure(
     """d'd + tr(X'X) + `deviations` times the Gauss-Newton deviation of the misfit, and its exact derivative
     by the rest lengths. Raises NotConverged.
     """
-    if not (deviations >= 0.0 and np.isfinite(deviations)):
-        raise InputError("must be finite and not negative", where="deviations", value=deviations)
+    require_number(deviations, least=0.0, where="deviations", give=_DEVIATIONS)
     line = _Line(shell, design, state, load, tolerances)
     part = line.partial(deviations)
     adjoint = line.solved(part.by_state)
@@ -156,6 +155,9 @@ def measure(
     result = np.zeros(len(design.present))
     result[design.present] = part.by_rest_length - columns.T @ adjoint[line.assembly.free]
     return RobustValue(part.value, result)
+
+
+_DEVIATIONS = "how many standard deviations are added, such as 1"
 
 
 @dataclass(frozen=True)
@@ -170,10 +172,7 @@ class RobustMisfit(Term):
     deviations: float = 1.0
 
     def __post_init__(self) -> None:
-        if not (self.deviations >= 0.0 and np.isfinite(self.deviations)):
-            raise InputError(
-                "must be finite and not negative", where="robust.deviations", value=self.deviations
-            )
+        require_number(self.deviations, least=0.0, where="robust.deviations", give=_DEVIATIONS)
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m². Raises NotConverged where the state isn't stable."""
@@ -203,8 +202,7 @@ def sample(
     """Misfits of `count` drawn structures, every equilibrium solved anew on the stable branch from where the
     linear one lies.
     """
-    if count < 1:
-        raise InputError("must be at least 1", where="sample.count", value=count)
+    require_count(count, where="sample.count", give="a number of structures to draw, such as 100")
     line = _Line(shell, design, state, load, tolerances)
     rng = np.random.default_rng(seed)
     found: list[float] = []

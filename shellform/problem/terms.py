@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -248,8 +248,7 @@ class Share:
     term: Term
 
     def __post_init__(self) -> None:
-        if not self.share > 0.0:
-            raise InputError("a share must be positive", where="minimise", value=self.share)
+        require_number(self.share, above=0.0, where="minimise", give="a share of the objective, such as 0.7")
 
 
 def distance_squares(at: LoadedDesign) -> Squares:

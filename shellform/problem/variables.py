@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 
 
@@ -84,10 +84,12 @@ class RestLengths(Variable):
     of_each_cable = True
 
     def __post_init__(self) -> None:
-        if not (self.least > 0.0 and self.most > 0.0):
-            raise InputError(
-                "must be positive", where="variables.rest_lengths", value=(self.least, self.most)
+        for name, usual in (("least", 0.01), ("most", 1.1)):
+            where, give = (
+                f"variables.rest_lengths.{name}",
+                f"a share of the length at the start, such as {usual}",
             )
+            require_number(getattr(self, name), above=0.0, where=where, give=give)
 
     def size(self, shell: Gridshell) -> int:
         """As many as candidate cables."""
@@ -143,6 +145,7 @@ class FreeRadius(Variable):
                 "the bounds must be positive, the lower below the upper one",
                 where="variables.radius",
                 value=(least, most),
+                remedy=f"Give metres, such as {0.25 * start.radius:.3g} and {start.radius:.3g}.",
             )
         return np.array([least]), np.array([most])
 
@@ -169,7 +172,11 @@ class Blocks:
         self.size = int(ends[-1])
         self.unit: Reals = np.concatenate([each.unit(shell, start) for each in self.variables])
         if len(self.unit) != self.size or not (np.isfinite(self.unit) & (self.unit > 0.0)).all():
-            raise InputError("each needs a positive unit for each of its values", where="variables")
+            raise InputError(
+                "each needs a positive unit for each of its values",
+                where="variables",
+                remedy="Let unit return as many positive numbers as size says.",
+            )
         owners = np.zeros(len(shell.cable_ends) + 1, dtype=int)
         for each in self.variables:
             owners += np.diff(_stacked(each.rates(shell, start), shell, each.size(shell)).tocsr().indptr) > 0
@@ -238,5 +245,6 @@ def _stacked(rates: Rates, shell: Gridshell, size: int) -> sp.csc_array:
             f"rates must have the shapes {(cables, size)} and {(size,)}",
             where="variables",
             value=(length.shape, radius.shape),
+            remedy="Let rates return derivatives by each of the block's values, as size counts them.",
         )
     return sp.csc_array(sp.vstack([length, sp.csc_array(radius[None])], format="csc"))

@@ -31,7 +31,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from shellform.arrays import Reals, reals
-from shellform.errors import InputError
+from shellform.errors import require_count
 from shellform.gridshell.scatter import halves
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.members import Members
@@ -100,8 +100,7 @@ def variables(members: Members, seed: int, number: int) -> dict[str, Reals]:
     numbers.
     """
     for name, value in (("seed", seed), ("number", number)):
-        if not 0 <= value < 2**63:
-            raise InputError("must be a whole number from 0 on", where=name, value=value)
+        require_count(value, least=0, most=2**63 - 1, where=name, give="a whole number, such as 1")
     return {
         name: np.random.Generator(
             np.random.Philox(key=np.array([seed, 0], np.uint64), counter=[0, 0, cause, number])

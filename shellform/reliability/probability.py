@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from scipy.special import betaincinv  # scipy.stats would take a seventh of every start to load
 
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 
 CONFIDENCE = 0.95
 
@@ -35,9 +35,13 @@ class Standing:
 def counted(drawn: int, standing: int, *, seed: int, confidence: float = CONFIDENCE) -> Standing:
     """The bounds. Raises InputError for impossible counts."""
     if not 0 <= standing <= drawn or drawn < 1:
-        raise InputError("more stand than were drawn, or none was", where="drawn", value=(drawn, standing))
-    if not 0.0 < confidence < 1.0:
-        raise InputError("must lie between 0 and 1", where="confidence", value=confidence)
+        raise InputError(
+            "more stand than were drawn, or none was",
+            where="drawn",
+            value=(drawn, standing),
+            remedy="Give how many were drawn, then how many of them stand.",
+        )
+    require_number(confidence, above=0.0, below=1.0, where="confidence", give="a share, such as 0.95")
     least = 0.0 if standing == 0 else float(betaincinv(standing, drawn - standing + 1, 1.0 - confidence))
     most = 1.0 if standing == drawn else float(betaincinv(standing + 1, drawn - standing, confidence))
     return Standing(drawn, standing, least, most, confidence, seed)

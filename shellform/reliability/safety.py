@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import PERFECT, drawn
@@ -61,17 +61,19 @@ class Safety:
     def __post_init__(self) -> None:
         for name in ("probability_design", "probability_additional"):
             value = getattr(self, name)
-            if value is not None and not 0.0 <= value < 1.0:
-                raise InputError("must be at least 0 and below 1", where=f"safety.{name}", value=value)
-        if self.critical_factor is not None and not self.critical_factor >= 1.0:
-            raise InputError("must be at least 1", where="safety.critical_factor", value=self.critical_factor)
-        for name in ("drawn", "tried"):
-            if getattr(self, name) < 1:
-                raise InputError("must be at least 1", where=f"safety.{name}", value=getattr(self, name))
-        if not (self.stiffness > 0.0 and np.isfinite(self.stiffness)):
-            raise InputError("must be positive and finite", where="safety.stiffness", value=self.stiffness)
-        if not (1.0 <= self.enlarged <= 3.0):
-            raise InputError("must lie between 1 and 3", where="safety.enlarged", value=self.enlarged)
+            if value is not None:
+                give = "a share of structures, such as 0.99"
+                require_number(value, least=0.0, below=1.0, where=f"safety.{name}", give=give)
+        if self.critical_factor is not None:
+            give = "a factor of the load, such as 1.25, or None for any"
+            require_number(self.critical_factor, least=1.0, where="safety.critical_factor", give=give)
+        for name, usual in (("drawn", 60), ("tried", 12)):
+            give = f"a number of structures, such as {usual}"
+            require_count(getattr(self, name), where=f"safety.{name}", give=give)
+        give = "a share of the start's stiffness, such as 0.5"
+        require_number(self.stiffness, above=0.0, where="safety.stiffness", give=give)
+        give = "a factor of the errors, such as 1.5"
+        require_number(self.enlarged, least=1.0, most=3.0, where="safety.enlarged", give=give)
 
     def required(self, load: str, design_load: str, initial: float | None) -> float:
         """The share of structures asked for under a load, the initial design's share under it being `initial`

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.errors import InputError
+from shellform.errors import require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.problem import LoadCase
@@ -66,10 +66,12 @@ class FactorsAsBuilt(Term):
     load: str = ""
 
     def __post_init__(self) -> None:
-        for name in ("left", "most", "exact"):
-            value = getattr(self, name)
-            if not (value > 0.0 and np.isfinite(value)):
-                raise InputError("must be positive and finite", where=f"factors_as_built.{name}", value=value)
+        for name, give in [
+            ("left", "N/m, a share of what the softest mode has, such as 1"),
+            ("most", "a factor of the load, such as 1.5"),
+            ("exact", f"a resolution of the factor, such as {EXACT:g}"),
+        ]:
+            require_number(getattr(self, name), above=0.0, where=f"factors_as_built.{name}", give=give)
 
     def size(self, shell: Gridshell) -> int:
         """One value a scenario."""

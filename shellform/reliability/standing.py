@@ -21,7 +21,7 @@ from queue import Empty, SimpleQueue
 from typing import TypeVar
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.branch import Here
@@ -75,8 +75,7 @@ def sample(
     The same seed gives the same structures whatever the count. Raises InputError for a count below 1,
     NotConverged where the perfect structure has no unloaded equilibrium.
     """
-    if count < 1:
-        raise InputError("must be at least 1", where="count", value=count)
+    require_count(count, where="count", give="a number of structures to draw, such as 200")
     made = Workshop(perfect(shell, design, load)).drawn(tolerances, seed=seed, numbers=range(count))
     stand = sum(each.stands for each in made)
     return DrawnSample(tuple(made), counted(count, stand, seed=seed, confidence=confidence))

@@ -62,7 +62,12 @@ def subset_simulation(limit_state: LimitState, size: int, *, count: int, seed: i
     """P(g < 0) for `size` standard normal variables with `count` samples a level. Raises InputError for a
     count that isn't a multiple of ten of at least 20."""
     if count < 20 or count % 10:
-        raise InputError("must be a multiple of 10, at least 20", where="count", value=count)
+        raise InputError(
+            "must be a multiple of 10, at least 20",
+            where="count",
+            value=count,
+            remedy=f"Give samples a level, such as {max(20, round(count / 10) * 10)}.",
+        )
     seeds, length = round(_SHARE * count), round(1.0 / _SHARE)
     rng = np.random.Generator(np.random.Philox(seed))
     z = rng.standard_normal((count, size))

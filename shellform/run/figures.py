@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import read_arrays
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_number
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
@@ -91,8 +91,8 @@ def wish(
     InputError for bad options.
     """
     paper = _paper(width_mm, dpi, font_size, film)
-    if force_limit is not None and not 0.0 < force_limit < float("inf"):
-        raise InputError("must be positive", where="--force-limit", value=force_limit)
+    if force_limit is not None:
+        require_number(force_limit, above=0.0, where="--force-limit", give="newtons, such as 20")
     if film is not None and film not in FILMS:
         raise InputError("is no film", where="--film", value=film, remedy=f"Known: {', '.join(FILMS)}.")
     if film is not None and (transparent or quantity in _STILL):
@@ -138,9 +138,13 @@ def _paper(
 ) -> Paper | None:
     """The paper that the options name. Raises InputError for what can't be printed."""
     given = {"--width-mm": width_mm, "--dpi": dpi, "--font-size": font_size}
-    for name, value in given.items():
-        if value is not None and not 0.0 < value < float("inf"):
-            raise InputError("must be positive", where=name, value=value)
+    for (name, value), give in zip(
+        given.items(),
+        ("millimetres, such as 180", "dots an inch, such as 300", "points, such as 8"),
+        strict=True,
+    ):
+        if value is not None:
+            require_number(value, above=0.0, where=name, give=give)
     if width_mm is None:
         for name in ("--dpi", "--font-size"):
             if given[name] is not None:

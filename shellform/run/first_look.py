@@ -16,6 +16,8 @@ import shellform
 from shellform.case.build_net import net_record, refuse_distant, size_text, surface_of, surface_record
 from shellform.case.build_rod import rod_material
 from shellform.case.case import SurfaceEntry, load_case
+from shellform.case.entries import Entry
+from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError, require_file
 from shellform.gridshell.joints import usual_gap
 from shellform.net.edges import stand
@@ -128,17 +130,21 @@ def labelled(found: FirstLook) -> dict[str, str]:
     return lines
 
 
+class _Asked(Entry):
+    """The part of a case that a file and options say."""
+
+    surface: SurfaceEntry
+
+
 def surface_entry(file: Path | None, options: Mapping[str, Any]) -> SurfaceEntry:
     """The [surface] entry of a file with options as a case has them. Raises InputError naming the option that
     is wrong.
     """
     given = {**({} if file is None else {"file": str(file)}), **options}
     try:
-        entry = SurfaceEntry.model_validate(given)
+        entry = _Asked.model_validate({"surface": given}).surface
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(["surface", *(str(part) for part in first["loc"])])
-        raise InputError(str(first["msg"]).lower(), where=where, value=first["input"]) from error
+        raise refusal(error, _Asked) from error
     require_file(Path(entry.file), where=entry.file)
     return entry
 

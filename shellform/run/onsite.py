@@ -18,7 +18,7 @@ from shellform.arrays import Indices, Reals, read_arrays
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import InputError
+from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run
 from shellform.site import calibration, erection, measurements, retensioning
@@ -28,6 +28,8 @@ from shellform.surface.units import METRES
 from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
+
+_NOISE = "metres, one standard deviation of a measured coordinate, such as 0.0005"
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,7 @@ def calibrate(
     """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design` or, unbraced, as
     a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
     Raises InputError, NotConverged."""
-    if not (noise > 0.0 and np.isfinite(noise)):
-        raise InputError("must be positive", where="--noise", value=noise)
+    require_number(noise, above=0.0, where="--noise", give=_NOISE)
     shell, built, loads, folder = _built(source, design, output, allow_scripts=allow_scripts)
     pairs = [_scan(each, shell, loads, unit, None if placed else 0) for each in scans]
     nodes = (
@@ -190,10 +191,8 @@ def replay(
     """The loop of survey and turning played with random length errors, `options.noise` and the crew's `slip`.
     Writes replay.csv. Raises InputError, NotConverged.
     """
-    if rounds < 1:
-        raise InputError("must be at least 1", where="--replay", value=rounds)
-    if not (slip >= 0.0 and np.isfinite(slip)):
-        raise InputError("must not be negative", where="--slip", value=slip)
+    require_count(rounds, where="--replay", give="a number of rounds, such as 3")
+    require_number(slip, least=0.0, where="--slip", give="metres, such as 0.00005, or 0 for none")
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
     nodes = (
@@ -286,9 +285,10 @@ def erect(
 
 def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.Belief]:
     """The design's name, its shell, and what is believed of it: as drawn, or after the round before."""
-    for label, value in (("--noise", options.noise), ("--length-error", options.length_error)):
-        if not (value > 0.0 and np.isfinite(value)):
-            raise InputError("must be positive", where=label, value=value)
+    require_number(options.noise, above=0.0, where="--noise", give=_NOISE)
+    require_number(
+        options.length_error, above=0.0, where="--length-error", give="metres a cable, such as 0.0001"
+    )
     name = _design(run, options.design, run.best)
     if options.load not in run.loads:
         raise InputError(

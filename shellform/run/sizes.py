@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.gridshell.catalogue import Catalogue, label, named, read_catalogue
 from shellform.gridshell.gridshell import erection_stress
 from shellform.gridshell.layers import TwoLayers, layers_of, locked_bending
@@ -113,16 +113,28 @@ class DesignWish:
     def __post_init__(self) -> None:
         for name in ("spacing", "thickness"):
             value = getattr(self, name)
-            if value is not None and not (value > 0.0 and math.isfinite(value)):
-                raise InputError("must be positive and finite", where=f"--{name}", value=value)
+            if value is not None:
+                require_number(
+                    value, above=0.0, where=f"--{name}", give="metres, such as 0.05, or leave it out"
+                )
         if self.angle is not None and not math.isfinite(self.angle):
             raise InputError(
                 "must be degrees or auto", where="--angle", value=self.angle, remedy="For example --angle 45."
             )
         if self.layers not in (None, 1, 2):
-            raise InputError("must be 1 or 2", where="--layers", value=self.layers)
+            raise InputError(
+                "must be 1 or 2",
+                where="--layers",
+                value=self.layers,
+                remedy="Give 1 for single rods, 2 for laths on one another.",
+            )
         if self.edges not in EDGES:
-            raise InputError(f"must be {' or '.join(EDGES)}", where="--edges", value=self.edges)
+            raise InputError(
+                "is no way to stand",
+                where="--edges",
+                value=self.edges,
+                remedy=f"Give {' or '.join(EDGES)}, or leave it out.",
+            )
         wished(self.rod)
 
 

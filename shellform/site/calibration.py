@@ -26,7 +26,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from shellform.arrays import Indices, Reals, indices
+from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
@@ -161,7 +161,8 @@ def calibrate(
                 remedy=f"Known: {', '.join(PARAMETERS)}.",
             )
     if not scans:
-        raise InputError("needs at least one scan", where="calibrate")
+        remedy = "Give a scan with the load it was taken under."
+        raise InputError("needs at least one scan", where="calibrate", remedy=remedy)
     beside = 0.5 * shell.net.spacing if reach is None else reach
     first = tuple(name for name in PARAMETERS if name in free)
     model = _Model(shell, design, [scan.load for scan in scans])
@@ -253,8 +254,7 @@ class _Model:
         self.shell, self.design, self.loads = shell, design, list(loads)
         nodes = shell.node_count
         for number, load in enumerate(self.loads):
-            if np.shape(load) != (nodes, 6):
-                raise InputError("must be a load (nodes, 6)", where=f"loads[{number}]", value=np.shape(load))
+            reals(f"loads[{number}]", load, (nodes, 6))
         self.base = assemble(shell.network(design))
         self.evaluations = self.rejected = 0
 

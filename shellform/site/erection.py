@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_number
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.gridshell.layers import TwoLayers, locks, rod_stress
 from shellform.structure.elements import rotation
@@ -122,8 +122,7 @@ def erect(
     6), N: `lift` while the supports move, `weight` all the time, `load` in the end. Raises NotConverged where
     no stable path leads from the flat grid to the erected one, or tightening or the load ends it.
     """
-    if not 0.0 < step <= 1.0:
-        raise InputError("must lie between 0 and 1", where="erect.step", value=step)
+    require_number(step, above=0.0, most=1.0, where="erect.step", give="a share of the way, such as 0.1")
     if shell.net.edges:
         raise InputError(
             "is worked out for shells that stand on the ground all round: edge beams are clamped to the grid "

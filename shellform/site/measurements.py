@@ -227,13 +227,25 @@ def _number(cell: str, where: str, may_be_empty: bool) -> float:
     try:
         value = float(cell)
     except ValueError as error:
-        raise InputError("must be a number", where=where, value=cell) from error
+        raise InputError(
+            "must be a number", where=where, value=cell, remedy="Write it with a decimal point: 0.0125."
+        ) from error
     if not math.isfinite(value):
-        raise InputError("must be finite", where=where, value=cell)
+        raise InputError(
+            "must be finite",
+            where=where,
+            value=cell,
+            remedy="Write what was measured, or leave that row out.",
+        )
     return value
 
 
 def _index(value: float, where: str, count: int) -> int:
     if value != int(value) or not 0 <= value < count:
-        raise InputError(f"must be a whole number from 0 to {count - 1}", where=where, value=value)
+        raise InputError(
+            f"must be a whole number from 0 to {count - 1}",
+            where=where,
+            value=value,
+            remedy="Take it from the run's own tables, which number from 0.",
+        )
     return int(value)

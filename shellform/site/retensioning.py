@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.answers.sensitivity import by_rest_length, predicted, respond, state_by_design
 from shellform.structure.elements.state import State
@@ -57,13 +57,13 @@ class Crew:
     cables: int
 
     def __post_init__(self) -> None:
-        for name in ("step", "largest"):
-            if not (getattr(self, name) > 0.0 and np.isfinite(getattr(self, name))):
-                raise InputError("must be positive", where=f"crew.{name}", value=getattr(self, name))
+        for name, usual in (("step", 0.0001), ("largest", 0.002)):
+            give = f"metres of rest length, such as {usual}"
+            require_number(getattr(self, name), above=0.0, where=f"crew.{name}", give=give)
         if self.step > self.largest:
-            raise InputError("must not be more than the largest change", where="crew.step", value=self.step)
-        if self.cables < 1:
-            raise InputError("must be at least 1", where="crew.cables", value=self.cables)
+            what, remedy = "must not be more than the largest change", f"Give metres up to {self.largest:g}."
+            raise InputError(what, where="crew.step", value=self.step, remedy=remedy)
+        require_count(self.cables, where="crew.cables", give="a number of cables a round, such as 10")
 
 
 @dataclass(frozen=True)
@@ -131,8 +131,7 @@ class Replay:
 def drawn(shell: Gridshell, design: Design, state: State, load: Reals, *, length_error: float) -> Belief:
     """What is believed before the first survey: lengths as drawn with the usual error `length_error`, m (one
     standard deviation), of a cable; `state` is the design's equilibrium under the `load`."""
-    if not (length_error > 0.0 and np.isfinite(length_error)):
-        raise InputError("must be positive", where="length_error", value=length_error)
+    require_number(length_error, above=0.0, where="length_error", give="metres a cable, such as 0.0001")
     count = int(design.present.sum())
     if count == 0:
         raise InputError("has no cables to turn", where="design", remedy="Name a design that has cables.")
@@ -149,14 +148,14 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
     marked = indices("nodes", nodes, (None,), below=shell.node_count)
     measured = np.asarray(survey, dtype=float)
     if measured.shape != (len(marked), 3):
-        raise InputError("must be a point for each node", where="survey", value=measured.shape)
+        remedy = f"Give {len(marked)} rows of x, y, z, m, nan where a node wasn't seen."
+        raise InputError("must be a point for each node", where="survey", value=measured.shape, remedy=remedy)
     seen = np.isfinite(measured).all(axis=1)
     if not seen.any():
         raise InputError(
             "no node was seen", where="survey", remedy="Give at least one node a measured place."
         )
-    if not (noise > 0.0 and np.isfinite(noise)):
-        raise InputError("must be positive", where="noise", value=noise)
+    require_number(noise, above=0.0, where="noise", give="metres a coordinate, such as 0.0002")
     goal, marked = measured[seen].ravel(), marked[seen]
     assembly = assemble(shell.network(belief.design))
     present = belief.design.present

@@ -149,6 +149,7 @@ def match(points: Reals, markers: Reals, *, reach: float, placed: bool = False) 
             f"needs at least {_PAIRS} points and as many markers",
             where="scan",
             value=(len(cloud), len(markers)),
+            remedy="Mark and scan more crossings.",
         )
     spread = np.linalg.svd(markers - markers.mean(axis=0), compute_uv=False)
     if spread[1] < _THIN * spread[0]:

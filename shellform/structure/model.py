@@ -21,11 +21,10 @@ from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.state import State, from_vectors
 from shellform.structure.network import Network
-from shellform.structure.refusals import check_node, refuse
+from shellform.structure.refusals import check_node, components, node_pairs, positive, refusal
 from shellform.written import whole
 
 _SKEW, _EXACT = 1e-6, 1e-14  # of axes that are refused, and that are made square
-_HUGE = 1e30  # squares and ratios of such numbers are still finite
 _Three = tuple[float, float, float]
 _Axes = tuple[_Three, _Three, _Three]
 _Six = tuple[float, float, float, float, float, float]
@@ -114,7 +113,7 @@ def read_model(path: str | Path) -> Model:
         try:
             document = msgspec.json.decode(content, type=_ModelFile)
         except msgspec.ValidationError as error:
-            refuse(error, _PARTS)
+            raise refusal(error, _PARTS) from error
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             raise InputError(
                 f"isn't JSON: {error}", remedy="Mend that place; json.dump writes what is valid."
@@ -122,8 +121,7 @@ def read_model(path: str | Path) -> Model:
         del content
         return _model(document)
     except InputError as error:
-        where = f"{file}: {error.where}" if error.where else str(file)
-        raise InputError(error.what, where=where, value=error.value, remedy=error.remedy) from error
+        raise error.within(str(file)) from error
 
 
 def parse_model(data: object) -> Model:
@@ -131,7 +129,7 @@ def parse_model(data: object) -> Model:
     try:
         return _model(msgspec.convert(data, _ModelFile))
     except msgspec.ValidationError as error:
-        refuse(error, _PARTS)
+        raise refusal(error, _PARTS) from error
 
 
 def write_model(path: str | Path, model: Model) -> None:
@@ -206,12 +204,17 @@ def _document(model: Model) -> dict[str, Any]:
 
 def _model(document: _ModelFile) -> Model:
     if document.format != "shellform-model":
-        raise InputError("must be 'shellform-model'", where="format", value=document.format)
+        raise InputError(
+            "must be 'shellform-model'",
+            where="format",
+            value=document.format,
+            remedy='Write "format": "shellform-model" if it is a model, or give another file.',
+        )
     if document.version != 1:
         raise InputError(
             "is not known here", where="version", value=document.version, remedy="This reads version 1."
         )
-    nodes = _array(document.nodes, "nodes", 3)
+    nodes = components(document.nodes, "nodes", 3)
     count = len(nodes)
     if count == 0:
         raise InputError("there are none", where="nodes", remedy="Give at least one node: [x, y, z] in m.")
@@ -229,20 +232,20 @@ def _model(document: _ModelFile) -> Model:
                     value=len(rows),
                     remedy=f"One row a node: {count}.",
                 )
-            parts.append(_array(rows, f"start.{name}", 3))
+            parts.append(components(rows, f"start.{name}", 3))
         start = from_vectors(*parts)
     return Model(Network(nodes, beams, cables, fixed, imposed), loads, start, tuple(supported))
 
 
 def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
     names = ("EA", "GJ", "EIy", "EIz")
-    ends = _pairs([each.nodes for each in entries], "beams", len(nodes))
+    ends = node_pairs([each.nodes for each in entries], "beams", len(nodes))
     own = np.array([each.axes is not None for each in entries], dtype=bool)
     given = [np.array([getattr(each, name) for each in entries], dtype=float) for name in names]
     # A beam built into a bent state may add to another one in part only.
     none = own & (np.array(given).reshape(4, -1) == 0.0)
     stiffness = [
-        _positive(np.where(without & ~none.all(axis=0), 1.0, values), "beams", name)
+        positive(np.where(without & ~none.all(axis=0), 1.0, values), "beams", name)
         for name, values, without in zip(names, given, none, strict=True)
     ]
     undefined = (np.nan, np.nan, np.nan)
@@ -252,7 +255,7 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
     rest = np.array(
         [np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float
     )
-    _positive(rest, "beams", "rest_length")
+    positive(rest, "beams", "rest_length")
     words: dict[str, int] = {"rod": 0}
     kind = np.array([words.setdefault(each.kind, len(words)) for each in entries], dtype=np.int64)
     made = make_beams(
@@ -299,6 +302,7 @@ def _axes(entries: list[_Beam], own: Flags) -> Reals:
             "must be three unit vectors at each end, square to one another and right-handed",
             where=f"beams[{int(np.flatnonzero(own)[k])}].axes",
             value=axes[k].tolist(),
+            remedy="Give rows x, y and z = x × y at each end, or leave axes out.",
         )
     rough = (off > _EXACT).any(axis=1)
     left, _, right = np.linalg.svd(axes[rough])
@@ -307,18 +311,21 @@ def _axes(entries: list[_Beam], own: Flags) -> Reals:
 
 
 def _cables(entries: list[_Cable], nodes: Reals) -> Cables:
-    ends = _pairs([each.nodes for each in entries], "cables", len(nodes))
-    stiffness = _positive(np.array([each.EA for each in entries], dtype=float), "cables", "EA")
+    ends = node_pairs([each.nodes for each in entries], "cables", len(nodes))
+    stiffness = positive(np.array([each.EA for each in entries], dtype=float), "cables", "EA")
     rest = np.array(
         [np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float
     )
-    _positive(rest, "cables", "rest_length")
+    positive(rest, "cables", "rest_length")
     length = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
     meeting = np.isnan(rest) & (length == 0.0) & (ends[:, 0] != ends[:, 1])
     if meeting.any():
         cable = int(np.argmax(meeting))
         raise InputError(
-            "the cable's nodes must not coincide", where=f"cables[{cable}]", value=ends[cable].tolist()
+            "the cable's nodes must not coincide",
+            where=f"cables[{cable}]",
+            value=ends[cable].tolist(),
+            remedy="Move one of them, or give the cable's rest_length, m.",
         )
     return make_cables(ends, rest_length=np.where(np.isnan(rest), length, rest), stiffness=stiffness)
 
@@ -336,7 +343,7 @@ def _supports(entries: list[_Support], count: int) -> tuple[Flags, Reals, list[i
         nodes[entry.node] = k
         fixed[entry.node] = entry.fixed
         if entry.displacement is not None:
-            imposed[entry.node] = _array([entry.displacement], f"{where}.displacement", 6)[0]
+            imposed[entry.node] = components([entry.displacement], f"{where}.displacement", 6)[0]
     return fixed, imposed, list(nodes)
 
 
@@ -349,52 +356,10 @@ def _load(entries: list[_Load], where: str, count: int) -> Reals:
         check_node(entries[entry].node, f"{where}[{entry}].node", count)
     values = np.hstack(
         [
-            _array([each.force or none for each in entries], f"{where}.force", 3),
-            _array([each.moment or none for each in entries], f"{where}.moment", 3),
+            components([each.force or none for each in entries], f"{where}.force", 3),
+            components([each.moment or none for each in entries], f"{where}.moment", 3),
         ]
     )
     load = np.zeros((count, 6))
     np.add.at(load, nodes.astype(np.int64), values)
     return load
-
-
-def _array(rows: Any, where: str, width: int) -> Reals:
-    array = np.array(rows, dtype=float).reshape(-1, width)
-    wrong = ~(np.abs(array) <= _HUGE).all(axis=1)
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise InputError(
-            f"must be below {_HUGE:g}, in SI units", where=f"{where}[{row}]", value=array[row].tolist()
-        )
-    return array
-
-
-def _pairs(pairs: list[tuple[int, int]], name: str, count: int) -> np.ndarray:
-    try:
-        ends = np.array(pairs, dtype=np.int64).reshape(-1, 2)
-    except OverflowError as error:
-        raise InputError("must be numbers of nodes, counted from 0", where=name) from error
-    outside = ((ends < 0) | (ends >= count)).any(axis=1)
-    if outside.any():
-        element = int(np.argmax(outside))
-        raise InputError(
-            "is out of range",
-            where=f"{name}[{element}].nodes",
-            value=ends[element].tolist(),
-            remedy=f"Nodes run from 0 to {count - 1}.",
-        )
-    return ends
-
-
-def _positive(values: Reals, part: str, name: str) -> Reals:
-    """The values, NaN standing for those left out."""
-    wrong = (values <= 0.0) | np.isinf(values)
-    absurd = (values > _HUGE) | (values < 1.0 / _HUGE)
-    for which, what in (
-        (wrong, "must be a positive number"),
-        (absurd, f"is beyond what can be calculated with ({1 / _HUGE:g} to {_HUGE:g})"),
-    ):
-        if which.any():
-            element = int(np.argmax(which))
-            raise InputError(what, where=f"{part}[{element}].{name}", value=float(values[element]))
-    return values

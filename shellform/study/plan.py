@@ -40,7 +40,8 @@ from pydantic import (
     model_validator,
 )
 
-from shellform.case.case import Case, make_case, read_toml, refusal, set_entry
+from shellform.case.case import Case, make_case, read_toml, set_entry
+from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError
 from shellform.study.expressions import evaluate
 from shellform.study.outcome import Value
@@ -79,14 +80,14 @@ class VaryEntry(_Entry):
     @model_validator(mode="after")
     def _one_way(self) -> VaryEntry:
         if (self.low is None) != (self.high is None):
-            raise ValueError("a range needs both low and high")
+            raise ValueError("a range needs both low and high; add the other")
         if [self.values, self.low, self.files].count(None) != 2:
             raise ValueError("give one of: a list of values, low and high, files")
         if self.low is not None and self.high is not None:
             if not self.low < self.high:
-                raise ValueError("low must be below high")
+                raise ValueError("low must be below high; change places of the two")
             if self.scale == "log" and self.low <= 0.0:
-                raise ValueError("equal ratios need a low above zero")
+                raise ValueError("equal ratios need a low above zero; raise it, or leave scale out")
         return self
 
 
@@ -149,17 +150,19 @@ class Study(_Entry):
     @model_validator(mode="after")
     def _whole(self) -> Study:
         if self.method != "grid" and self.count is None:
-            raise ValueError(f"method {self.method!r} needs a count")
+            raise ValueError(f"method {self.method!r} needs a count; add count = 200, say")
         if self.method != "grid" and not self.vary:
-            raise ValueError(f"method {self.method!r} needs entries under [vary]")
+            raise ValueError(
+                f"method {self.method!r} needs entries under [vary], such as net.spacing = {{ low = 0.05, high = 0.06 }}"
+            )
         if self.method == "search" and self.designs:
-            raise ValueError("a search makes its own designs")
+            raise ValueError("a search makes its own designs; leave [[designs]] out, or take another method")
         if self.method == "search" and not self.objective:
-            raise ValueError("a search needs an [objective]")
+            raise ValueError('a search needs an [objective], such as misfit = "min"')
         taken = [*self.set, *self.vary, *self.function]
         for name in taken:
             if taken.count(name) > 1:
-                raise ValueError(f"{name} stands in more than one of [set], [vary] and [function]")
+                raise ValueError(f"{name} stands in more than one of [set], [vary] and [function]; keep one")
         for name in [*self.objective, *self.limit]:
             if name not in self.column:
                 raise ValueError(f"{name!r} is no column; known are {', '.join(self.column)}")
@@ -186,7 +189,7 @@ def read_study(path: str | Path) -> Plan:
     try:
         study = Study.model_validate(read_toml(file))
     except ValidationError as error:
-        raise refusal(error, Study, file) from error
+        raise refusal(error, Study, str(file)) from error
     return make_plan(study, file)
 
 

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from scipy.sparse.linalg import SuperLU, splu
 
 from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_number
 from shellform.surface.bounded import bounded_minimum
 
 if TYPE_CHECKING:  # which load gmsh and numba
@@ -99,10 +99,14 @@ def _raised(
     """Heights (v,), m, over a plan in equilibrium with these force densities, for any scale of them: the rise
     sets it.
     """
-    if not (np.isfinite(rise) and rise > 0.0):
-        raise InputError("must be positive", where="rise", value=rise)
+    require_number(rise, above=0.0, where="rise", give="metres, such as 0.2")
     if load not in ("surface", "plan"):
-        raise InputError("must be surface or plan", where="load", value=load)
+        raise InputError(
+            "must be surface or plan",
+            where="load",
+            value=load,
+            remedy='Give "surface" for a layer of even thickness, "plan" for what weighs evenly in plan.',
+        )
     from shellform.surface.shape.target import vertex_areas
 
     free = ~held
@@ -151,12 +155,14 @@ def thrust_shell(
     corners = reals("outline", outline, (None, 2))
     if len(corners) < 3 or _turning(corners) <= 0.0:
         raise InputError(
-            "must be at least three corners, counterclockwise", where="outline", value=corners.tolist()
+            "must be at least three corners, counterclockwise",
+            where="outline",
+            value=corners.tolist(),
+            remedy="Reverse their order." if len(corners) > 2 else "Give x and y of each corner, m.",
         )
     if not 0.0 < sag < 0.5:
         raise InputError("must be above 0 and below 0.5", where="sag", value=sag, remedy="0.1 is usual.")
-    if not (np.isfinite(size) and size > 0.0):
-        raise InputError("must be a positive length", where="size", value=size)
+    require_number(size, above=0.0, where="size", give="metres, such as a fortieth of the span")
     line, corner = _divided(corners, size)
     stands = np.ones(len(line), dtype=bool) if supports is None else _standing(supports, corner, len(line))
     rings = [_divided(reals("openings", each, (None, 2)), size)[0] for each in openings]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import math
 import os
 import re
 import signal
@@ -17,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, ShellformError
+from shellform.errors import InputError, ShellformError, require_number
 from shellform.surface.readers.draft import MOST_TRIANGLES
 from shellform.surface.units import turned_up
 
@@ -174,10 +173,18 @@ def mesh_faces(
 
     Of a solid, only the triangles of its upper or lower `side`.
     """
-    if not (size > 0.0 and math.isfinite(size)):
-        raise InputError("must be a positive length", where="surface.size", value=size)
+    require_number(
+        size,
+        above=0.0,
+        where="surface.size",
+        give="the triangles' size in metres, such as 0.01, or leave it out",
+    )
     if not gmsh.model.getEntities(2):
-        raise InputError("makes no surface", where=str(where), remedy="See surfaces/dome.py.")
+        raise InputError(
+            "makes no surface",
+            where=str(where),
+            remedy="Give a file with at least one face, or let build make one, as surfaces/dome.py does.",
+        )
     spans = np.sort(extent())
     if 2.5 * spans[2] * spans[1] / size**2 > MOST_TRIANGLES:
         raise InputError(

@@ -22,5 +22,10 @@ def unit_factor(unit: str) -> float:
 def turned_up(points: Reals, up: str) -> Reals:
     """Points (k, 3) with the axis `up`, "z" or "y", turned to z."""
     if up not in ("y", "z"):
-        raise InputError("must be y or z", where="surface.up", value=up)
+        raise InputError(
+            "must be y or z",
+            where="surface.up",
+            value=up,
+            remedy="Give z for CAD files, y for most viewers'.",
+        )
     return points if up == "z" else np.column_stack([points[:, 0], -points[:, 2], points[:, 1]])

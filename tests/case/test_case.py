@@ -61,11 +61,15 @@ def test_settings_take_the_place_of_entries():
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("spacing = 0.055", "spacin = 0.055", "did you mean 'spacing'"),
-        ("[cable]", "[cabel]", "did you mean 'cable'"),
-        ("stiffness = 187.0", "stiffness = -187.0", "cable.stiffness.*greater than 0.*-187"),
+        ("spacing = 0.055", "spacin = 0.055", "Did you mean 'net.spacing'"),
+        ("[cable]", "[cabel]", "Did you mean 'cable'"),
+        (
+            "stiffness = 187.0",
+            "stiffness = -187.0",
+            r"cable.stiffness.*greater than 0.*-187.*Give cable.stiffness \(EA",
+        ),
         ("stiffness = 187.0", "stiffness = nan", "cable.stiffness.*finite"),
-        ("young = 40e9", "", "rod.young is missing"),
+        ("young = 40e9", "", r"rod.young is missing.*Add rod.young \(Young's modulus, Pa\)"),
         ("misfit = 0.7", "misfit = 0.8", "add up to 1"),
         ("gap = 0.002", "gap = 0.0275", "well below net.spacing"),
         ("spacing = 0.055", 'spacing = "wide"', "net.spacing.*'wide'"),

@@ -138,12 +138,12 @@ def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        (["limits.utilisaton=0.9"], "did you mean 'utilisation'"),
+        (["limits.utilisaton=0.9"], "Did you mean 'limits.utilisation'"),
         (["limits.utilisation=0"], "limits.utilisation.*greater than 0"),
         (["limits.uplift=-1"], "limits.uplift"),
         (["safety.critical_further={ half = 0.9 }"], "safety.critical_further.half.*greater than 1"),
-        (["robust.limits=0.1"], "did you mean 'limit'"),
-        (["tolerances.suports=0.1"], "did you mean 'supports'"),
+        (["robust.limits=0.1"], "Did you mean 'robust.limit'"),
+        (["tolerances.suports=0.1"], "Did you mean 'tolerances.supports'"),
         (["optimise.robust=0.3", "optimise.misfit=0.4"], "needs a table"),
         (["optimise.catalogue=gfrp_rods"], "catalogue is for a free radius"),
         (["optimise.catalogue=none", "optimise.misfit=0.5", "optimise.rod_radius=0.2"], "can't be read"),

@@ -102,7 +102,7 @@ def test_bad_surfaces_and_cases_are_refused_without_a_traceback(tmp_path):
         .replace("../surfaces", str(ROOT / "surfaces"))
     )
     case.write_text(text.replace("spacing = 0.055", "spacin = 0.055"), encoding="utf-8")
-    refused(shellform("design", case, "--output", tmp_path / "run"), "did you mean 'spacing'")
+    refused(shellform("design", case, "--output", tmp_path / "run"), "Did you mean 'net.spacing'")
     case.write_text(text.replace("vault.py", "none.py"), encoding="utf-8")
     refused(shellform("design", case, "--output", tmp_path / "run"), "no such file")
     case.write_text(text, encoding="utf-8")

@@ -88,5 +88,5 @@ def test_cut_lengths_are_the_fewest_that_the_turnbuckles_allow():
     rest = np.array([1.0, 1.004, 1.009, 1.012, 1.03])
     np.testing.assert_array_equal(cut_lengths(rest[::-1], 0.01)[::-1], [1.0, 1.0, 1.0, 1.012, 1.03])
     np.testing.assert_array_equal(cut_lengths(rest, 0.0), rest)
-    with pytest.raises(InputError, match="0 or positive"):
+    with pytest.raises(InputError, match="0 or more"):
         cut_lengths(rest, -1.0)

@@ -148,7 +148,7 @@ def test_what_can_t_scatter_is_refused(shell, loaded):
     ):
         with pytest.raises(InputError, match="nothing is off"):
             spread(shell, design, state, under, tolerances)
-    with pytest.raises(InputError, match="not negative"):
+    with pytest.raises(InputError, match="0 or more"):
         measure(shell, design, state, load, ALL, deviations=-1.0)
     with pytest.raises(InputError, match="at least 1"):
         sample(shell, design, state, load, ALL, count=0, seed=0)

@@ -199,7 +199,7 @@ def test_calibrations_that_can_t_be_done_are_refused(shell, loads, markers):
         calibrate(shell, plain, [scan], markers, free=["gap"])
     with pytest.raises(InputError, match="at least one scan"):
         calibrate(shell, plain, [], markers)
-    with pytest.raises(InputError, match="must be a load"):
+    with pytest.raises(InputError, match="loads\\[0\\] has the wrong shape"):
         foresee(shell, plain, [np.zeros((3, 6))], markers)
     with pytest.raises(NotConverged, match="bears 0"):
         foresee(shell, plain, [9.0 * loads[1]], markers)

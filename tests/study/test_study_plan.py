@@ -135,8 +135,8 @@ def test_designs_can_be_listed_and_surfaces_taken_from_a_folder(tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("cas = 1", "did you mean 'case'"),
-        ("[vary]\nnet.spacin = [0.1]", "did you mean 'spacing'"),
+        ("cas = 1", "Did you mean 'case'"),
+        ("[vary]\nnet.spacin = [0.1]", "Did you mean 'net.spacing'"),
         ("[vary]\nnet.spacing = { low = 0.1 }", "both low and high"),
         ("[vary]\nnet.spacing = { low = 0.2, high = 0.1, count = 3 }", "low must be below high"),
         ("[vary]\nnet.spacing = { low = 0, high = 0.1, count = 3, scale = 'log' }", "above zero"),

@@ -48,10 +48,17 @@ def read_history(table: Mapping[str, Sequence[object]] | Iterable[Mapping[str, o
         try:
             numbers[name] = [float(value) for value in columns[name]]  # type: ignore[arg-type]
         except (TypeError, ValueError) as error:
-            raise InputError(f"column {name} must be numbers: {error}", where="history") from error
+            raise InputError(
+                f"column {name} must be numbers: {error}",
+                where="history",
+                remedy="Leave that column out, or write nan where a number is missing.",
+            ) from error
         if len(numbers[name]) != len(columns[step]):
             raise InputError(
-                f"column {name} and {step} differ in length", where="history", value=len(numbers[name])
+                f"column {name} and {step} differ in length",
+                where="history",
+                value=len(numbers[name]),
+                remedy=f"Give {len(columns[step])} values, nan where one is missing.",
             )
     keep = [bool(flag) for flag in numbers.pop("accepted", [1.0] * len(columns[step]))]
     kept = {
@@ -69,6 +76,9 @@ def _turned(rows: Sequence[Mapping[str, object]]) -> dict[str, Sequence[object]]
     for number, row in enumerate(rows):
         if list(row) != names:
             raise InputError(
-                f"row {number} has other columns than the first", where="history", value=sorted(row)
+                f"row {number} has other columns than the first",
+                where="history",
+                value=sorted(row),
+                remedy=f"Give every row {', '.join(map(str, names))}, in that order.",
             )
     return {name: [row[name] for row in rows] for name in names}

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 
 LIMIT = 0.010  # m, end of the colour scale in figures 12 to 14
 EDGE_BEAM = 1.8  # times as thick as rods edge beams are drawn
@@ -52,11 +52,18 @@ class Panel:
         put("positions", reals("positions", self.positions, (None, 3)))
         count = len(self.positions)
         if count == 0:
-            raise InputError("positions has no nodes", where=f"panel {self.title!r}")
+            raise InputError(
+                "positions has no nodes",
+                where=f"panel {self.title!r}",
+                remedy="Give a state's positions, a row of x, y, z a node, m.",
+            )
         put("deviation", reals("deviation", self.deviation, (count,)))
         if self.deviation.min() < 0.0:
             raise InputError(
-                "deviation is a distance and can't be negative", value=float(self.deviation.min())
+                "deviation is a distance and can't be negative",
+                where=f"panel {self.title!r}",
+                value=float(self.deviation.min()),
+                remedy="Give its absolute value.",
             )
         for name, width in [("beams", 2), ("cables", 2), ("edges", 2), ("supports", 0), ("load_points", 0)]:
             shape = (None, width) if width else (None,)
@@ -108,13 +115,16 @@ class Look:
             raise InputError(
                 "is no view", where="view", value=self.view, remedy=f"Known: {', '.join(VIEWS)}."
             )
-        if not 0.0 < self.limit < np.inf:
-            raise InputError("must be positive", where="figures.limit", value=self.limit)
-        if not 0.0 < self.dots < np.inf:
-            raise InputError("must be positive", where="dots", value=self.dots)
-        for name in ("thickness", "force", "letters"):
-            if not 0.0 <= getattr(self, name) < np.inf:
-                raise InputError("must be 0 or more", where=name, value=getattr(self, name))
+        require_number(
+            self.limit, above=0.0, where="figures.limit", give="metres at the scale's end, such as 0.010"
+        )
+        require_number(self.dots, above=0.0, where="dots", give="pixels an inch, such as 160")
+        for name, unit in [
+            ("thickness", "times the rods' own, such as 2"),
+            ("force", "newtons at the cables' scale's end, such as 20"),
+            ("letters", "points, such as 8"),
+        ]:
+            require_number(getattr(self, name), least=0.0, where=name, give=f"{unit}, or 0 to have it chosen")
         if self.size[0] < SMALLEST[0] or self.size[1] < SMALLEST[1]:
             raise InputError(
                 "is too small", where="size", value=self.size, remedy=f"Give {SMALLEST} pixels or more."

@@ -216,7 +216,10 @@ def _columns(
         line = np.asarray(values, dtype=np.float64)
         if line.shape != at.shape:
             raise InputError(
-                f"column {name} and evaluation differ in length", where="history", value=line.shape
+                f"column {name} and evaluation differ in length",
+                where="history",
+                value=line.shape,
+                remedy=f"Give {len(at)} values, nan where one is missing.",
             )
         lines[name] = np.where(np.isfinite(line), line, np.nan)
     return at, lines

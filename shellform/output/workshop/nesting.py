@@ -21,7 +21,7 @@ from itertools import pairwise
 import binpacking
 import numpy as np
 
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 from shellform.net.grid import Grid, GridRod
 
 STOCK = 6.0  # m
@@ -78,10 +78,10 @@ def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1)
     """The grid's rods, each of as many `laths`, nested into bars of the length `stock`, m. Raises InputError
     where the stock is too short to splice rods from.
     """
-    if not (stock > 0.0 and math.isfinite(stock)):
-        raise InputError("must be positive", where="rod.stock_length", value=stock)
-    if not 0.0 <= kerf < stock:
-        raise InputError("must lie between 0 and the stock length", where="rod.kerf", value=kerf)
+    require_number(stock, above=0.0, where="rod.stock_length", give="metres as they are sold, such as 6.0")
+    require_number(
+        kerf, least=0.0, below=stock, where="rod.kerf", give="a saw cut's width in metres, such as 0.003"
+    )
     pieces: list[Piece] = []
     spliced = 0
     for number, rod in [each for each in enumerate(grid.rods) for _ in range(laths)]:

@@ -81,7 +81,7 @@ class Built:
 
     def __post_init__(self) -> None:
         if "none" not in self.states:
-            raise InputError("needs the state without load", where="states", value=list(self.states))
+            raise InputError("no state without load", value=list(self.states), remedy="Add it as 'none'.")
 
     @property
     def grid(self) -> Grid:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_count
 from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
@@ -24,8 +24,7 @@ def check_request(
     count: int,
 ) -> None:
     """Raises InputError for numbers, methods and leads that make no sense on `count` nodes."""
-    if increments < 1:
-        raise InputError("must be at least 1", where="--increments", value=increments)
+    require_count(increments, where="--increments", give="a number of load steps, such as 10")
     if not (np.isfinite(factor) and 0.0 < tolerance < 1.0):
         raise InputError(
             "--factor must be finite and --tolerance between 0 and 1",
@@ -36,13 +35,15 @@ def check_request(
         raise InputError(
             "unknown method", where="--method", value=method, remedy=f"Known: {', '.join(METHODS)}."
         )
-    if limit < 1:
-        raise InputError("must be at least 1", where="--limit", value=limit)
+    require_count(limit, where="--limit", give="a number of iterations, such as 100")
     if lead is not None and not (
         0 <= lead[0] < count and lead[1] in (0, 1, 2) and np.isfinite(lead[2]) and lead[2] != 0.0
     ):
         raise InputError(
-            "must be a node, an axis 0 to 2 and a displacement other than 0", where="--lead", value=lead
+            "must be a node, an axis 0 to 2 and a displacement other than 0",
+            where="--lead",
+            value=lead,
+            remedy=f"For example {count // 2}:z:-0.05, of nodes from 0 to {count - 1}.",
         )
 
 

@@ -119,7 +119,9 @@ def read_sections(path: str | Path) -> dict[str, Section]:
 
 def _section(table: object, where: str) -> Section:
     if not isinstance(table, dict):
-        raise InputError("must be a table", where=where, value=table)
+        raise InputError(
+            "must be a table", where=where, value=table, remedy='Write [rod], and below it shape = "round" …'
+        )
     shape = table.get("shape")
     if shape not in SHAPES:
         raise InputError("unknown shape", where=where, value=shape, remedy=f"Known: {', '.join(SHAPES)}.")
@@ -134,9 +136,18 @@ def _section(table: object, where: str) -> Section:
             raise InputError(f"the entry {name!r} is missing", where=where, remedy="Add it.")
     for name, value in table.items():
         if name != "shape" and (isinstance(value, bool) or not isinstance(value, int | float)):
-            raise InputError("must be a number", where=f"{where}.{name}", value=value)
+            raise InputError(
+                "must be a number",
+                where=f"{where}.{name}",
+                value=value,
+                remedy="Write it without quotation marks, in SI units: 0.005, 40e9.",
+            )
     if ("shear" in table) == ("poisson" in table):
-        raise InputError("needs either shear or poisson", where=where)
+        raise InputError(
+            "needs either shear or poisson",
+            where=where,
+            remedy="Keep one: each follows from young and the other.",
+        )
     known = {name: float(table[name]) for name in ("density", "strength") if name in table}
     if "shear" in table:
         material = Material(float(table["young"]), float(table["shear"]), **known)

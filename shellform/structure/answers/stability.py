@@ -73,7 +73,12 @@ def modes(assembly: Assembly, state: State, count: int) -> Modes:
     """
     size = len(assembly.free)
     if not 1 <= count < size:
-        raise InputError(f"must be between 1 and {size - 1}", where="modes", value=count)
+        raise InputError(
+            f"must be between 1 and {size - 1}",
+            where="modes",
+            value=count,
+            remedy=f"Ask for {min(3, size - 1)}, say." if size > 1 else "Leave out some supports.",
+        )
     balance = assembly.evaluate(state)
     values = held(assembly, balance)
     try:

@@ -22,7 +22,7 @@ from typing import Protocol
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_number
 
 _ODD = np.arange(1.0, 40.0, 2.0)  # terms of the series; the rest is below 1e-9 of the sum
 
@@ -37,19 +37,24 @@ class Material:
     strength: float = math.inf
 
     def __post_init__(self) -> None:
-        for name, value in [("young", self.young), ("shear", self.shear), ("strength", self.strength)]:
-            if not value > 0.0 or (name != "strength" and not math.isfinite(value)):
-                raise InputError("must be positive", where=f"material.{name}", value=value)
-        if not (self.density >= 0.0 and math.isfinite(self.density)):
-            raise InputError("must not be negative", where="material.density", value=self.density)
+        for name, value, give in [
+            ("young", self.young, "pascals, such as 40e9"),
+            ("shear", self.shear, "pascals, such as 15e9"),
+            ("strength", self.strength, "pascals, such as 255e6, or leave it out where it isn't known"),
+        ]:
+            if name != "strength" or value != math.inf:
+                require_number(value, above=0.0, where=f"material.{name}", give=give)
+        give = "kg/m³, such as 2000, or 0 for weightless rods"
+        require_number(self.density, least=0.0, where="material.density", give=give)
 
 
 def isotropic(
     *, young: float, poisson: float = 0.3, density: float = 0.0, strength: float = math.inf
 ) -> Material:
     """A material with G = E / (2 (1 + ν))."""
-    if not -1.0 < poisson < 0.5:
-        raise InputError("must lie between -1 and 0.5", where="material.poisson", value=poisson)
+    require_number(
+        poisson, above=-1.0, below=0.5, where="material.poisson", give="Poisson's ratio, such as 0.3"
+    )
     return Material(young, young / (2.0 * (1.0 + poisson)), density, strength)
 
 
@@ -203,7 +208,12 @@ class Tube(_Circular):
     def __post_init__(self) -> None:
         _positive(self)
         if not self.thickness < self.radius:
-            raise InputError("must be less than the radius", where="section.thickness", value=self.thickness)
+            raise InputError(
+                "must be less than the radius",
+                where="section.thickness",
+                value=self.thickness,
+                remedy=f"Give the wall in metres, below {self.radius:g}; without a wall it is a round rod.",
+            )
 
     @property
     def sizes(self) -> tuple[float, ...]:
@@ -351,7 +361,9 @@ def _positive(section: Round | Tube | Rectangle) -> None:
     for each in fields(section):
         if each.name != "material":
             value = getattr(section, each.name)
-            if not (value > 0.0 and math.isfinite(value)):
-                raise InputError("must be positive and finite", where=f"section.{each.name}", value=value)
+            where, give = f"section.{each.name}", "metres, such as 0.0012"
+            require_number(value, above=0.0, where=where, give=give)
             if value > _LARGEST:
-                raise InputError(f"must be below {_LARGEST:g} m", where=f"section.{each.name}", value=value)
+                raise InputError(
+                    f"must be below {_LARGEST:g} m", where=where, value=value, remedy=f"Give {give}."
+                )

@@ -96,7 +96,10 @@ def follow(
         size = first * abs(goal) * float(np.linalg.norm(here.tangent[walk.moving]))
     if size == 0.0 or not np.isfinite(size):
         raise InputError(
-            "the goal of a path must not be zero", where="path", value=goal if lead is None else lead
+            "the goal of a path must not be zero",
+            where="path",
+            value=goal if lead is None else lead,
+            remedy="Give a load factor other than 0, and a load that moves a free node.",
         )
     yield here.point()
     smallest = _SMALLEST * abs(size)

@@ -40,7 +40,12 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
     nothing to close or no smooth way to.
     """
     if what not in ("holes", "edges", "all"):
-        raise InputError("must be holes, edges or all", where="surface.fill", value=what)
+        raise InputError(
+            "must be holes, edges or all",
+            where="surface.fill",
+            value=what,
+            remedy="Leave it out to close nothing.",
+        )
     draft = _upwards(draft)
     normals = make_surface(draft.points, draft.triangles, normals=draft.normals, source=where).normals
     loops = closed_loops(open_edges(draft.triangles))

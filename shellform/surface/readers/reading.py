@@ -79,7 +79,12 @@ def read_surface(
         unit_factor(unit)
     turned_up(np.zeros((0, 3)), up or "z")  # refuses an unknown axis before the work
     if face not in (None, "upper", "lower"):
-        raise InputError("must be upper or lower", where="surface.face", value=face)
+        raise InputError(
+            "must be upper or lower",
+            where="surface.face",
+            value=face,
+            remedy="Leave it out for a file that holds a surface and no solid.",
+        )
     if kind in _OWN:
         draft = _OWN[kind](file, Choice(layer, name))
     else:

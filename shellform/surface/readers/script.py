@@ -62,7 +62,12 @@ def named_dimensions(build: Callable[..., Any], given: dict[str, float], path: P
                 remedy=f"{hint}Known: {', '.join(known)}.",
             )
         if not _is_length(value):
-            raise InputError("must be a positive number", where=f"surface.dimensions.{name}", value=value)
+            raise InputError(
+                "must be a positive number",
+                where=f"surface.dimensions.{name}",
+                value=value,
+                remedy=f"Give metres, such as {known[name]:g}, or leave it out.",
+            )
     return {name: float(value) for name, value in {**known, **given}.items()}
 
 

@@ -33,7 +33,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_number
 from shellform.structure.solve.factorisation import Factor, Symmetric
 from shellform.surface.shape.target import Surface, make_surface, rough_normals, vertex_areas
 
@@ -64,8 +64,9 @@ def faired(surface: Surface, radius: float) -> Faired:
     Raises InputError for a radius that isn't positive, larger than the surface or too small for a mesh of
     reasonable size, and NotConverged where no near surface keeps it.
     """
-    if not (radius > 0.0 and np.isfinite(radius)):
-        raise InputError("must be positive and finite", where="fair", value=radius)
+    require_number(
+        radius, above=0.0, where="fair", give="the tightest curvature's radius in metres, such as 0.2"
+    )
     side = float(surface.size[:2].max())
     if radius > side:
         raise InputError(

@@ -1,0 +1,105 @@
+"""What pydantic finds wrong with a case file, or another of its kind, in words: the entry, what is wrong with it,
+the value, and the remedy that the schema knows.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Sequence
+from dataclasses import dataclass
+from types import NoneType, UnionType
+from typing import Annotated, Any, get_args, get_origin
+
+from pydantic import BaseModel, Tag, ValidationError
+
+from shellform.errors import InputError
+
+
+def refusal(error: ValidationError, root: type[BaseModel], where: str = "") -> InputError:
+    """What to say of wrong entries of what is of `root`'s kind, in the file that `where` names."""
+    found = [_in_words(each, root) for each in error.errors()]
+    remedies = dict.fromkeys(remedy for _, remedy in found if remedy)
+    return InputError("; ".join(what for what, _ in found), where=where, remedy=" ".join(remedies))
+
+
+def _in_words(error: Any, root: type[BaseModel]) -> tuple[str, str]:
+    """One validation error in words: the entry of the file of `root`'s kind, what is wrong and the value; and
+    the remedy, the nearest known name or what the entry is. What a table's own check says has its remedy in it.
+    """
+    kind = error["type"]
+    place = _place(error["loc"], root)
+    entry, names = place.name, place.table.model_fields
+    if kind == "extra_forbidden":
+        near = difflib.get_close_matches(str(error["loc"][-1]), names, n=1, cutoff=0.5)
+        nearest = ".".join([*entry.split(".")[:-1], *near])
+        known = f"Leave it out, or write one of {', '.join(names)}."
+        return f"{entry} is no known entry", f"Did you mean {nearest!r}?" if near else known
+    if kind == "union_tag_invalid":
+        return (
+            f"{entry}.kind is no known kind (found {error['ctx']['tag']!r})",
+            f"Write one of {error['ctx']['expected_tags']}.",
+        )
+    if kind == "union_tag_not_found":
+        return f"{entry}.kind is missing", f"Write one of {', '.join(map(repr, place.kinds))}."
+    meaning = f" ({place.meaning})" if place.meaning else ""
+    if kind == "missing":
+        return f"{entry} is missing", f"Add {entry}{meaning}."
+    message = str(error["msg"]).removeprefix("Value error, ")
+    message = message[:1].lower() + message[1:]
+    if kind == "value_error":
+        return f"{entry}: {message}", ""
+    return f"{entry}: {message} (found {error['input']!r})", f"Give {entry}{meaning}."
+
+
+@dataclass(frozen=True)
+class _Place:
+    """An entry: its `name` as the file has it, the `table` in which it stands, the schema's `meaning` of it, and
+    the `kinds` of which it may be."""
+
+    name: str
+    table: Any
+    meaning: str
+    kinds: Sequence[str]
+
+
+def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
+    """Where pydantic's `parts` lead; where an entry may be of several kinds, they name the kind too."""
+    names: list[str] = []
+    kind: Any = root
+    table: Any = root
+    meaning = ""
+    for part in parts:
+        plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
+        if (
+            get_origin(plain) is UnionType and len(get_args(plain)) == 2 and NoneType in get_args(plain)
+        ):  # a table that may be left out
+            plain = next(each for each in get_args(plain) if each is not NoneType)
+        choices = {tag: each for each in get_args(plain) for tag in _tags(each)}
+        if part in choices:
+            kind = choices[part]
+            continue
+        names.append(str(part))
+        if get_origin(plain) in (list, dict):
+            kind = get_args(plain)[-1]
+        elif isinstance(plain, type) and issubclass(plain, BaseModel):
+            table = plain
+            field = plain.model_fields.get(str(part))
+            kind = Any if field is None else field.annotation
+            meaning = "" if field is None else field.description or ""
+        else:
+            kind = Any
+    kinds = [tag for each in _choices(kind) for tag in _tags(each)]
+    return _Place(".".join(names) or root.__name__.lower(), table, meaning, kinds)
+
+
+def _choices(kind: Any) -> tuple[Any, ...]:
+    """What a union is one of, bare or annotated."""
+    return get_args(get_args(kind)[0] if get_origin(kind) is Annotated else kind)
+
+
+def _tags(choice: Any) -> list[str]:
+    """The names by which pydantic tells a choice of a union apart."""
+    own = [each.tag for each in get_args(choice)[1:] if isinstance(each, Tag)]
+    if isinstance(choice, type) and issubclass(choice, BaseModel) and "kind" in choice.model_fields:
+        own += get_args(choice.model_fields["kind"].annotation)
+    return own
