@@ -1,8 +1,8 @@
 """The documentation: what it shows runs, what it links to is there, and what is public is in it.
 
 A page is followed from top to bottom in a folder of its own: shell blocks by bash, Python blocks in one
-namespace. A comment before a block says where that differs: `status 3`, with which its last command ends; `after
-the commands` and `with the names of start.md`; `with your files`, which stand_ins.py makes; `in the background`,
+namespace, where the commands above have led. A comment before a block says where that differs: `status 3`, with which
+its last command ends; `with the names of start.md`; `with your files`, which stand_ins.py makes; `in the background`,
 until the page ends. Blocks of `console` are only read: ALONE says why. To take seconds instead of minutes,
 `design` gets small settings, and a study of 200 designs is cut to four.
 """
@@ -250,7 +250,6 @@ def test_a_page_works_when_it_is_followed(name, tmp_path, start, monkeypatch):
     shim.chmod(0o755)
     place = tmp_path / "work"
     place.mkdir()
-    (place / "surfaces").symlink_to(ROOT / "surfaces")
     monkeypatch.setenv("PATH", f"{shim.parent}:{Path(sys.executable).parent}:/usr/bin:/bin")
     monkeypatch.setenv("ROOT", str(ROOT))
     monkeypatch.setenv("PYTHONPATH", str(ROOT))
@@ -263,7 +262,7 @@ def test_a_page_works_when_it_is_followed(name, tmp_path, start, monkeypatch):
                 file.parent.mkdir(exist_ok=True)
                 file.write_text(cut_short(block.text), encoding="utf-8")
             if block.language == "python":
-                monkeypatch.chdir(place)
+                monkeypatch.chdir(here)
                 names |= start if "names of start.md" in block.note else {"__name__": "page"}
                 exec(compile(block.text, name, "exec"), names)
             if block.language == "sh":
