@@ -327,7 +327,10 @@ class OptimiseEntry(Entry):
 class FiguresEntry(Entry):
     """Pictures."""
 
-    limit: PositiveFloat = Field(0.010, description="end of the colour scale, m")
+    limit: PositiveFloat | None = Field(
+        None,
+        description="end of the colour scale, m; left out: one that the design to build fills under the design load",
+    )
 
 
 class LimitsEntry(Entry):

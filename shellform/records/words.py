@@ -65,7 +65,7 @@ def constraint_title(name: str) -> str:
     """A constraint of the optimiser in words: its quantity, and its load case if it has one."""
     kind, _, load = name.partition(".")
     words = _CONSTRAINTS.get(kind, kind.replace("_", " "))
-    return f"{words}, {load} load" if load else words
+    return f"{words}, {'no' if load == 'none' else load} load" if load else words
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -20,6 +20,7 @@ from shellform.gridshell.layers import rod_forces
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.folder import Run, read_run
+from shellform.run.scales import colour_limit, force_limit
 from shellform.structure.elements.state import State
 from shellform.written import folder as made
 
@@ -335,20 +336,15 @@ def look_of(run: Run, wish: Wish, panels: Sequence[Any]) -> Any:
     largest = max(max(float(panel.deviation.max()) for panel in panels), 1e-9 * panels[0].unit[1])
     rod = run.shell.rod
     borne = rod.strength / (rod.young * max(design.radius for design in run.designs.values()))
-    usual = {"deviation": run.case.figures.limit, "utilisation": 1.0, "mode": 1.0}
+    usual = {"deviation": colour_limit(run), "utilisation": 1.0, "mode": 1.0}
     if math.isfinite(borne):
         usual["curvature"] = borne
-    force = max(  # of the whole run, as on its page: a picture of one state is read beside the others
-        float(run.shell_of(name).cables(design).tension(state).max(initial=0.0))
-        for name, design in run.designs.items()
-        for state in run.states[name].values()
-    )
     look = Look(
         limit=wish.limit or usual.get(wish.quantity, largest),
         size=wish.size or _USUAL,
         view=wish.view,
         thickness=wish.thickness,
-        force=wish.force_limit or force,
+        force=wish.force_limit or force_limit(run),
         surface=Skin(run.surface.vertices, run.surface.triangles),
         transparent=wish.transparent,
     )

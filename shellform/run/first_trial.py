@@ -91,14 +91,12 @@ class FirstParts:
 class Followed:
     """What a design came to: the `factor` of its load up to which it stands; under the additional load the
     stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge beams
-    (`edge`), and the cables' largest force over its limit (`pull`); the largest `deviation`, m, at the last state, and
-    `where` that is (3,), m."""
+    (`edge`), and the cables' largest force over its limit (`pull`); `where` (3,), m, the last state is farthest off."""
 
     factor: float
     stress: float
     edge: float
     pull: float
-    deviation: float
     where: Reals
     most_stressed: Reals
 
@@ -133,7 +131,6 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
         float(stress.max()),
         edge_utilisation(shell, beams, beams.local_forces(stressed)),
         float(shell.cables(design).tension(stressed).max(initial=0.0)) / parts.rope.force_max,
-        float(away.max()),
         shell.target.positions[int(np.argmax(away))],
         shell.target.positions[breaks].mean(axis=0),
     )

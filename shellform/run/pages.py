@@ -25,6 +25,7 @@ from shellform.records.verdict import verdict
 from shellform.run.folder import DESIGNS, LOCK, Run, read_run
 from shellform.run.judged import broken_off, run_checks
 from shellform.run.keys import stage_keys
+from shellform.run.scales import colour_limit
 from shellform.written import is_partial, write_text
 
 FILE = "report.html"
@@ -81,7 +82,7 @@ def shown_run(run: Run, budget: int = _BUDGET, *, page: Path | None = None) -> S
         history=read_history(run.folder),
         settings=(run.folder / "case.toml").read_text(encoding="utf-8"),
         pictures=pictures,
-        limit=run.case.figures.limit,
+        limit=colour_limit(run),
         force_max=run.case.cable.force_max,
         notes=[*_notes(run, bool(pictures)), *left],
         files=sorted(

@@ -171,8 +171,10 @@ evaluations = {_EVALUATIONS}     # a first answer in minutes; 100 leave fewer ca
 polish = {_POLISHED}
 unloaded = false     # true: make the design without regard to the loads too, to compare with
 
-[figures]
-limit = {_short(design.tried.deviation)!r}      # m, end of the colour scale: how far the initial design goes under {NEEDED:g} × its load
+# [title_block]      # on the drawings, where it is filled in
+# date = ""
+# revision = ""
+# author = ""
 """
 
 

@@ -18,7 +18,7 @@ from shellform.output.page.first_answers import answers
 from shellform.output.page.shown_run import ShownRun
 from shellform.records.check import Cell
 from shellform.records.summary import StandingRecord, VerdictRecord
-from shellform.records.words import number
+from shellform.records.words import constraint_title, number
 from shellform.structure.elements.state import State
 from tests.records.made import summary
 
@@ -120,6 +120,20 @@ def test_a_curve_leaves_gaps_where_there_is_no_number_and_is_cut_at_the_axis():
     assert "refused" in chart.svg
     assert "a &amp; b" in chart.svg
     assert line_chart("flat", [0], {"x": [0.0]}).svg.count("<polyline") == 1
+
+
+def test_no_two_curves_of_a_chart_look_alike():
+    chart = line_chart("x", [0, 1], {str(k): [0.0, 1.0] for k in range(9)}, main=False)
+    assert len({kind for kind, _ in chart.legend}) == 9
+    assert chart.svg.count('again"') == 3
+
+
+def test_a_constraint_of_the_unloaded_state_is_told_in_words():
+    assert [constraint_title(f"utilisation{each}") for each in ("", ".none", ".additional")] == [
+        "rods' stress",
+        "rods' stress, no load",
+        "rods' stress, additional load",
+    ]
 
 
 @pytest.mark.parametrize(("first", "last", "largest"), [(0, 60, 0.37), (200, 263, 410.0), (3, 9, 2.2e-4)])

@@ -19,7 +19,7 @@ PARTS = SimpleNamespace(easier=lambda tried, most: None, choice=None)
 
 
 def came_to(factor, stress, edge, pull):
-    return Followed(factor, stress, edge, pull, 0.01, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
+    return Followed(factor, stress, edge, pull, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
 
 
 STANDS = "stands"

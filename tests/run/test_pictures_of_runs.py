@@ -10,10 +10,13 @@ from PIL import Image
 
 from shellform.case.case import load_case
 from shellform.errors import InputError
+from shellform.output.pictures.panel import scale_end
+from shellform.problem.paths import deviations
 from shellform.run import films
 from shellform.run.figures import Wish, draw_designs, draw_run, look_of, panel_of, wish
 from shellform.run.films import draw_film
 from shellform.run.folder import read_run
+from shellform.run.scales import colour_limit
 
 ROOT = Path(__file__).parent.parent.parent
 NOTHING = {
@@ -69,10 +72,28 @@ def test_histories_are_drawn_from_the_run_s_file_and_missed_where_nothing_was_op
     (run.folder / "history.csv").unlink()
 
 
+def test_scales_end_at_one_two_or_five_times_a_power_of_ten():
+    assert [scale_end(x) for x in (0.00131, 0.002, 0.0021, 0.5, 0.7, 29.0)] == [
+        0.002,
+        0.002,
+        0.005,
+        0.5,
+        1.0,
+        50.0,
+    ]
+
+
+def test_the_design_to_build_fills_the_colours_unless_the_case_says_where_they_end(run):
+    largest = deviations(run.shell_of(run.best), run.states[run.best]["design"]).max()
+    assert largest <= colour_limit(run) <= 2.5 * largest
+    figures = run.case.figures.model_copy(update={"limit": 0.01})
+    assert colour_limit(replace(run, case=run.case.model_copy(update={"figures": figures}))) == 0.01
+
+
 def test_one_scale_of_colours_and_one_of_forces_hold_for_all_panels(run):
     panels = [panel_of(run, "initial", load) for load in run.loads]
     look = look_of(run, Wish(), panels)
-    assert look.limit == run.case.figures.limit
+    assert look.limit == colour_limit(run)
     assert look.force == max(panel.cable_forces.max() for panel in panels)
     assert look_of(run, Wish(limit=0.02), panels).limit == 0.02
     bent = [panel_of(run, "initial", "design", "curvature")]

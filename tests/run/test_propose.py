@@ -336,7 +336,7 @@ def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_bef
         rope_for(1.0),
         swivels=True,
     )
-    breaks = Followed(NEEDED, 1.4, 0.5, 2.0, 0.01, np.zeros(3), np.zeros(3))
+    breaks = Followed(NEEDED, 1.4, 0.5, 2.0, np.zeros(3), np.zeros(3))
     assert parts.easier(breaks, PULLED).rest_ratio == pytest.approx(0.998)
     assert parts.easier(breaks, PULLED).easier(breaks, PULLED).rest_ratio == 1.0 - LEAST_PRESTRAIN
     assert replace(parts, rest_ratio=1.0 - LEAST_PRESTRAIN).easier(breaks, PULLED) is None
@@ -353,7 +353,7 @@ def test_joints_turn_where_cables_are_made_slacker_for_rods_that_are_stressed_to
         rope_for(1.0),
         swivels=False,
     )
-    breaks = Followed(NEEDED, 1.4, 0.5, 0.5, 0.01, np.zeros(3), np.zeros(3))
+    breaks = Followed(NEEDED, 1.4, 0.5, 0.5, np.zeros(3), np.zeros(3))
     eased = parts.easier(breaks, PULLED)
     assert eased == replace(parts, rest_ratio=0.998, swivels=True)
     assert eased.joint.torsion == pytest.approx(0.1 * parts.joint.torsion)

@@ -88,6 +88,7 @@ def line_chart(
     legend = []
     for k in reversed(range(len(curves))):
         kind = f"series-{(k if main else k + 1) % _COLOURS + 1}{' main' if main and k == 0 else ''}"
+        kind += " again" if k >= _COLOURS else ""
         for run in _runs(np.isfinite(values[k])):
             line = " ".join(f"{x(at[i])},{y(values[k, i])}" for i in run)
             parts.append(f'<polyline class="{kind}" points="{line}"/>')

@@ -9,7 +9,6 @@ lines, and says so.
 from __future__ import annotations
 
 import base64
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +18,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.net import Net
+from shellform.output.pictures.panel import scale_end
 from shellform.problem.paths import deviations
 from shellform.records import words
 from shellform.structure.elements.state import State
@@ -57,14 +57,9 @@ class ViewedShell:
 
 
 def fitting(viewed: ViewedShell) -> float:
-    """The end of a scale, mm, that the design to build fills under the load that is shown first: 1, 2 or 5 times
-    a power of ten."""
+    """The end of a scale, mm, that the design to build fills under the load that is shown first."""
     state = viewed.states[viewed.best].get(viewed.first_load)
-    largest = 1e3 * (viewed.limit if state is None else float(deviations(viewed.shell, state).max()))
-    power = 10.0 ** math.floor(math.log10(max(largest, 1e-6)))
-    return float(
-        next(step * power for step in (1.0, 2.0, 5.0, 10.0) if largest <= step * power * (1.0 + 1e-9))
-    )
+    return scale_end(1e3 * (viewed.limit if state is None else float(deviations(viewed.shell, state).max())))
 
 
 def controls(viewed: ViewedShell, gradient: str) -> dict[str, Any]:

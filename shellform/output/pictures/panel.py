@@ -7,6 +7,7 @@ Nothing here knows a drawing library: `scene.py` draws panels as pixels, `vector
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -22,6 +23,13 @@ VIEWS = ("best", "top", "front", "side")
 SMALLEST = (160, 120)  # pixels; below it the title leaves no room for the shell
 LARGEST = 8000  # pixels a side: drawn at twice that, near which drivers end
 _THIN = 0.0024  # half the width at which a rod is drawn at least, over the width of the picture
+
+
+def scale_end(largest: float) -> float:
+    """The end of a scale that is filled by values up to the `largest`: 1, 2 or 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(max(largest, 1e-9)))
+    ends = (round(step * power, 12) for step in (1.0, 2.0, 5.0, 10.0))
+    return next(end for end in ends if largest <= end * (1.0 + 1e-9))
 
 
 @dataclass(frozen=True)
