@@ -87,7 +87,7 @@ class Case(Entry):
     tolerances: TolerancesEntry = Field(default_factory=lambda: TolerancesEntry.model_validate({}))
     safety: SafetyEntry = Field(default_factory=lambda: SafetyEntry.model_validate({}))
     title_block: TitleBlockEntry = Field(default_factory=lambda: TitleBlockEntry.model_validate({}))
-    figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=0.010))
+    figures: FiguresEntry = Field(default_factory=lambda: FiguresEntry(limit=None))
 
     @model_validator(mode="after")
     def _fitting(self) -> Case:

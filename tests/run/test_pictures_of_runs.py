@@ -85,6 +85,7 @@ def test_scales_end_at_one_two_or_five_times_a_power_of_ten():
 
 def test_the_design_to_build_fills_the_colours_unless_the_case_says_where_they_end(run):
     largest = deviations(run.shell_of(run.best), run.states[run.best]["design"]).max()
+    assert run.case.figures.limit is None
     assert largest <= colour_limit(run) <= 2.5 * largest
     figures = run.case.figures.model_copy(update={"limit": 0.01})
     assert colour_limit(replace(run, case=run.case.model_copy(update={"figures": figures}))) == 0.01
