@@ -136,11 +136,11 @@ def _notes(run: Run, has_pictures: bool) -> list[str]:
         notes.append(
             "The optimised designs were computed before the last change of the case: run shellform design again."
         )
-    if run.summary.optimisation is None:
+    if run.summary.optimisation is None and "optimise" not in run.summary.failed:
         notes.append(
             "The run is not optimised (yet): run shellform design without --until, and the optimised design is added."
         )
-    if not has_pictures:
+    if not has_pictures and not run.summary.failed:
         notes.append(
             "There are no pictures: the stage “figures” has not run, or found no OpenGL. shellform render makes them."
         )

@@ -3,11 +3,13 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from shellform.errors import InputError
+from shellform.records.summary import read_summary, write_summary
 from shellform.run.folder import read_run
 from shellform.run.pages import shown_run, write_report
 from tests.run.small_run import begin, finish
@@ -61,6 +63,15 @@ def test_a_run_that_is_not_optimised_says_so_and_has_no_histories(begun, tmp_pat
     assert "There are no pictures" in page
     assert "<h2>Histories</h2>" not in page
     assert re.search("initial design (is not examined|does not hold)", page)
+
+
+def test_a_run_whose_search_failed_is_not_told_to_leave_until_out(begun, tmp_path):
+    run = Path(shutil.copytree(begun, tmp_path / "run"))
+    write_summary(run, replace(read_summary(run), failed={"optimise": "no window left"}))
+    page = text_of(write_report([run]))
+    assert "no window left" in page
+    assert "--until" not in page
+    assert "There are no pictures" not in page
 
 
 def test_a_design_whose_stage_was_broken_off_is_named_and_left_out(copy):
