@@ -154,7 +154,7 @@ def read_toml(file: Path) -> dict[str, Any]:
         raise InputError(
             f"can't be read: {error}",
             where=str(file),
-            remedy="Name a case file that is there, or lay one with: shellform example vault.",
+            remedy="Name a file that is there, or lay one with: shellform example vault (of a study: study).",
         ) from error
     except ValueError as error:  # TOMLDecodeError, and Python's for a number of thousands of digits
         raise InputError(

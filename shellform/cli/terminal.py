@@ -54,7 +54,9 @@ def refusal_words(error: Exception) -> tuple[str, int] | None:
     if getattr(error, "exit_code", None) is None:
         return None
     told = getattr(error, "format_message", None)  # click's usage errors
-    return f"refused: {told() if told else error}", 2
+    context = getattr(error, "ctx", None)
+    remedy = f". {context.command_path} --help lists what it takes." if context else ""
+    return f"refused: {str(told() if told else error).rstrip('.')}{remedy or '.'}", 2
 
 
 def tell_designs(summary: Summary) -> None:

@@ -119,6 +119,12 @@ def test_bad_surfaces_and_cases_are_refused_without_a_traceback(tmp_path):
     refused(shellform("net", own, "--spacing", 0.1, "--output", tmp_path / "net"), "--allow-scripts")
 
 
+def test_what_no_command_takes_is_refused_with_where_to_read_what_it_does():
+    refused(shellform("frobnicate"), "No such command 'frobnicate'. ", "--help lists what it takes.")
+    refused(shellform("design"), "Missing argument 'case'. ", "design --help lists")
+    refused(shellform("render", "run", "--limit", "wide"), "'--limit'", "render --help lists")
+
+
 def test_check_takes_what_a_file_leaves_open_and_tells_what_was_mended(tmp_path):
     standing = shellform("check", "surfaces/hypar.obj", "--unit", "cm", "--up", "y")
     assert standing.returncode == 0, standing.stderr
