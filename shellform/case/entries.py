@@ -275,7 +275,10 @@ class OptimiseEntry(Entry):
     misfit_rms_additional: PositiveFloat = Field(
         description="constraint (6) as root mean square distance a node, m"
     )
-    evaluations: PositiveInt = Field(100, description="design evaluations at the most")
+    evaluations: PositiveInt = Field(
+        100,
+        description="design evaluations at the most, and up to a fifth more where the result falls as built",
+    )
     stiffness_min: float = Field(
         0.08,
         ge=0.0,

@@ -4,8 +4,8 @@ A search chooses its designs by their luck with the structures that it tries the
 is drawn anew, as often as a finished design is. The structures of this sample that fall and have to stand are
 kept in mind (minding.py) and lead the search on; those under the design load are among what it is judged by
 from then on, and another sample, that no step has seen, judges what comes of it. Going back to earlier designs
-(going_back.py) gives away cables that a few lengths make up for: it is left for where the evaluations, of which
-thinning leaves a share, are spent.
+(going_back.py) gives away cables that a few lengths make up for: it is left for where the evaluations that are
+granted for this are spent.
 """
 
 from __future__ import annotations
@@ -19,14 +19,7 @@ from shellform.optimiser.search_state import Iterate, Search, accepted_design
 from shellform.optimiser.trials import fresh, sound
 from shellform.reliability.trial_structures import aims
 
-_LEFT = 0.2  # of all evaluations, that thinning leaves
-
-
-def leaving_some(search: Search) -> Search:
-    """The search with as many evaluations as thinning may take."""
-    if search.asked is None:
-        return search
-    return replace(search, evaluations=search.evaluations - int(_LEFT * search.evaluations))
+_MORE = 0.2  # of all evaluations, that come on top where a sample disagrees
 
 
 def agreed(
@@ -35,8 +28,10 @@ def agreed(
     """Whether a fresh sample agrees that the last design stands, after turns of a sample and a descent led by
     what falls in it; and the iterate. Where the search was led, turns follow as long as they lead to a better design
     with which a sample agrees."""
-    if search.asked is None or search.asked.confirmed is None or not it.accepted:
+    confirmed = None if search.asked is None else search.asked.confirmed
+    if confirmed is None or not it.accepted:
         return True, it
+    search = replace(search, evaluations=search.evaluations + int(_MORE * search.evaluations))
     while True:
         if it.until:  # in the middle of a turn
             it = descend(finely(search, it.until), it)
@@ -50,7 +45,7 @@ def agreed(
             it = replace(it, stood=len(it.accepted), led_to=min(it.point.objective, it.led_to))
             if it.mind is None or not gained:
                 break
-        least = {} if judged.stands else aims(search.asked.confirmed, judged)
+        least = {} if judged.stands else aims(confirmed, judged)
         it = led_by(search, it, it.accepted[-1].built, least)
         if it.mind is None or search.left() <= 0:
             break

@@ -14,8 +14,8 @@ design (proposal.py), and the trial is then evaluated by its true equilibria (tr
   their branch;
 - a start that doesn't bear the further loads climbs first: steps along the gradient of that stiffness carry its stable branch up to them;
 - where no better design is found cables are kept taut under the further loads (guards.py), and free again in turns;
-- then, with half of the evaluations at least, less what agreeing may need, cables that the shell can do without are
-  taken away in batches, the others kept taut.
+- then, with half of the evaluations at least, cables that the shell can do without are taken away in batches, the others kept
+  taut.
 
 Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures,
 the same for each (trial_structures.py): after the descent, and each time cables have been taken away, before
@@ -92,8 +92,8 @@ def optimise(
     judging: Judging | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
-    """The best design found from `start` within a number of design `evaluations`; with `safety` one that
-    stands as built under the problem's loads, no less likely than `initial` (None: the start); with
+    """The best design found from `start` within a number of design `evaluations`, and up to a fifth more where
+    a fresh sample of structures as built disagrees with it; with `safety` one that stands as built under the problem's loads, no less likely than `initial` (None: the start); with
     MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever stands.
 
     `progress(step)` is called at each trial, `judging(done, most)` while structures of a design are drawn, and

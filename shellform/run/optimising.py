@@ -116,9 +116,9 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
         workspace.report(
             Event(
                 "optimise",
-                f"evaluation {step.evaluation}/{entry.evaluations}: objective {step.objective:.4f}, "
+                f"evaluation {step.evaluation}/{max(entry.evaluations, step.evaluation)}: objective {step.objective:.4f}, "
                 f"{step.cables} cables, {100 * step.stage:.0f} % of the additional load{rejected}{still}",
-                fraction=step.evaluation / entry.evaluations,
+                fraction=min(step.evaluation / entry.evaluations, 1.0),
                 seconds_left=left,
             )
         )

@@ -34,7 +34,7 @@ from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
-_EVALUATIONS, _POLISHED = 40, 10
+_EVALUATIONS, _POLISHED = 30, 10
 _SEARCH, _WAYS_OUT = 60.0, 90.0  # s of a processor after which no design, and no way out, is begun any more
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
