@@ -19,7 +19,7 @@ PACKAGE = Path(__file__).parent.parent / "shellform"
 # the same drafts, mended alike, and some readers ask gmsh to mesh what they found.
 FLOORS = {
     "shellform": [
-        ["errors", "work_clock", "lazy"],
+        ["errors", "work_clock", "lazy", "processes"],
         ["compiled"],
         ["arrays", "written"],
         ["tables"],
@@ -39,7 +39,7 @@ FLOORS = {
     ],
     "shellform.surface": [
         ["units", "shape", "bounded"],
-        ["readers.draft", "readers.script", "readers.nurbs", "readers.stated"],
+        ["readers.draft", "readers.script", "readers.nurbs", "readers.stated", "readers.allowance"],
         ["readers.seams", "readers.sides"],
         ["readers.mend"],
         ["occ"],

@@ -10,6 +10,7 @@ apart.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from shellform.net.chebyshev import Method, NetTuning, pull_net
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.pull import SHEAR_STIFFNESS
+from shellform.processes import end_with
 from shellform.surface.shape.target import Surface
 
 _ANGLES = 12  # compass nets, over a quarter turn: u and v are alike
@@ -150,7 +152,10 @@ def _runner(
         return
     # Not forked: numba's threads don't survive that.
     pool = ProcessPoolExecutor(
-        workers, mp_context=get_context("spawn"), initializer=_begin, initargs=(surface, settings)
+        workers,
+        mp_context=get_context("spawn"),
+        initializer=_begin,
+        initargs=(os.getpid(), surface, settings),
     )
     try:
         yield lambda jobs: pool.map(_run, jobs)
@@ -161,7 +166,8 @@ def _runner(
 _work: dict[str, Any] = {}
 
 
-def _begin(surface: Surface, settings: dict[str, Any]) -> None:
+def _begin(parent: int, surface: Surface, settings: dict[str, Any]) -> None:
+    end_with(parent)
     set_num_threads(1)
     _work.update(surface=surface, settings=settings)
 

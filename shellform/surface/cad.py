@@ -17,7 +17,7 @@ its bisector.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -102,13 +102,14 @@ def read_cad(
     size: float | None = None,
     up: str = "z",
     face: str | None = None,
+    before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> Draft:
     """The faces of a "step", "iges" or "brep" file, in m, meshed at about `size`, m (a sixtieth of its plan
     if left out).
 
     The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis,
-    and stays so; of a solid its "upper" or "lower" `face` is taken. Raises InputError for unreadable files,
-    and for solids without a `face`.
+    and stays so; of a solid its "upper" or "lower" `face` is taken; `before_mesh` is told about how many triangles
+    there will be. Raises InputError for unreadable files, and for solids without a `face`.
     """
     if kind != "brep" and unit is not None:
         raise InputError(
@@ -131,11 +132,17 @@ def read_cad(
         if factor != 1.0:
             gmsh.model.occ.dilate(gmsh.model.occ.getEntities(), 0.0, 0.0, 0.0, factor, factor, factor)
         gmsh.model.occ.synchronize()
-        return _draft(file, size, up, face)
+        return _draft(file, size, up, face, before_mesh)
 
 
 def mesh_patches(
-    patches: Sequence[Patch], *, size: float | None, up: str, face: str | None, where: Path
+    patches: Sequence[Patch],
+    *,
+    size: float | None,
+    up: str,
+    face: str | None,
+    where: Path,
+    before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> Draft:
     """NURBS patches, m, trimmed and sewn where they touch, meshed as CAD files are."""
     with session(), errors(where, "gmsh can't build its surfaces", "Export it as STEP, or as a mesh."):
@@ -147,7 +154,7 @@ def mesh_patches(
             # Of all shapes at once, which an empty list means: named ones are sewn each by itself, to nothing.
             gmsh.model.occ.healShapes([], tolerance, False, False, False, True, False)
             gmsh.model.occ.synchronize()
-        return _draft(where, size, up, face)
+        return _draft(where, size, up, face, before_mesh)
 
 
 def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[Reals, Indices]:
@@ -224,11 +231,12 @@ def _knots(knots: Reals) -> tuple[Reals, Indices]:
     return values, times
 
 
-def _draft(where: Path, size: float | None, up: str, face: str | None) -> Draft:
+def _draft(
+    where: Path, size: float | None, up: str, face: str | None, before_mesh: Callable[[float], None]
+) -> Draft:
     plan = np.delete(extent(), 1 if up == "y" else 2)
-    points, triangles, normals = mesh_faces(
-        float(plan.max()) / _DEFAULT_EDGES if size is None else size, where, face, up
-    )
+    mesh = float(plan.max()) / _DEFAULT_EDGES if size is None else size
+    points, triangles, normals = mesh_faces(mesh, where, face, up, before_mesh=before_mesh)
     notes = (
         () if face is None or not gmsh.model.getEntities(3) else (f"the {face} face of a solid was taken",)
     )

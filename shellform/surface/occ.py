@@ -9,7 +9,7 @@ import re
 import signal
 import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -166,12 +166,18 @@ def extent() -> Reals:
 
 
 def mesh_faces(
-    size: float, where: Path, side: str | None = None, up: str = "z"
+    size: float,
+    where: Path,
+    side: str | None = None,
+    up: str = "z",
+    *,
+    before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> tuple[Reals, Indices, Reals | None]:
     """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's
     faces.
 
-    Of a solid, only the triangles of its upper or lower `side`.
+    Of a solid, only the triangles of its upper or lower `side`. `before_mesh` is told about how many triangles the mesh
+    will have.
     """
     require_number(
         size,
@@ -186,7 +192,8 @@ def mesh_faces(
             remedy="Give a file with at least one face, or let build make one, as surfaces/dome.py does.",
         )
     spans = np.sort(extent())
-    if 2.5 * spans[2] * spans[1] / size**2 > MOST_TRIANGLES:
+    expected = 2.5 * spans[2] * spans[1] / size**2
+    if expected > MOST_TRIANGLES:
         raise InputError(
             f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × "
             f"{spans[1]:.3g} m",
@@ -194,6 +201,7 @@ def mesh_faces(
             value=size,
             remedy="Choose a larger mesh size, or check the surface's unit.",
         )
+    before_mesh(expected)
     gmsh.option.setNumber("Mesh.MeshSizeMin", size)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)
     gmsh.model.mesh.generate(2)

@@ -1,6 +1,11 @@
 """The search for the net's orientation."""
 
 import math
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
@@ -43,3 +48,26 @@ def test_a_given_angle_is_kept(cylinder):
 def test_where_no_angle_gives_a_net_it_is_said_why():
     with pytest.raises(InputError, match=r"no angle gives a net: .*curved too much"):
         best_orientation(ball(30), {"spacing": 0.3, "gap": 0.005})
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="where no other system ends them with their run")
+def test_processes_that_try_nets_end_with_the_one_that_is_killed():
+    """They waited for work for ever."""
+    code = (
+        "import multiprocessing, os, signal\n"
+        "from shellform.net.orientation import best_orientation\n"
+        "from tests.net.test_closed_forms import roof\n"
+        "def told(text):\n"
+        "    print(*(each.pid for each in multiprocessing.active_children()), flush=True)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+        "if __name__ == '__main__':\n"
+        "    best_orientation(roof(1.0, 0.8, 2.0, n=20), {'spacing': 0.25, 'gap': 0.005}, workers=2, progress=told)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGKILL, done.stderr
+    workers = [Path("/proc", number) for number in done.stdout.split()]
+    assert workers
+    end = time.monotonic() + 10.0
+    while any(each.exists() and "Z" not in (each / "stat").read_text().rsplit(")", 1)[1] for each in workers):
+        assert time.monotonic() < end
+        time.sleep(0.05)

@@ -6,8 +6,10 @@ import json
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import meshio
@@ -261,6 +263,10 @@ def test_files_beyond_the_stated_limits_are_refused_before_they_are_read(tmp_pat
         ),
         ("raise MemoryError", ["needs more memory"]),
         ("import time; time.sleep(60)", ["meshio hadn't come to an end after 2 s"]),
+        (
+            "import os, signal; os.kill(os.getpid(), signal.SIGXCPU)",
+            ["meshio took more time of a processor than files of its size do"],
+        ),
     ],
 )
 def test_a_reader_that_crashes_hangs_or_floods_the_memory_becomes_a_message(
@@ -294,6 +300,74 @@ def test_a_stranger_s_builder_script_hangs_or_crashes_in_a_process_of_its_own(tm
         foreign.read_foreign(
             tmp_path / "own.py", "script", {"size": None, "dimensions": {"width": 1.0}}, longest=longest
         )
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="where no other system ends a reader with its run")
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+def test_no_reader_is_left_behind_where_a_command_is_ended(tmp_path, how):
+    """The reader went on for up to 600 s after SIGKILL and SIGTERM."""
+    began = tmp_path / "began"
+    (tmp_path / "own.py").write_text(
+        f"import os, time\nopen({str(began)!r} + '~', 'w').write(str(os.getpid()))\n"
+        f"os.rename({str(began)!r} + '~', {str(began)!r})\n"
+        "time.sleep(300)\ndef build(gmsh, *, width=1.0): pass\n"
+    )
+    code = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from pathlib import Path\nfrom shellform.surface.readers.foreign import read_foreign\n"
+        f"read_foreign(Path({str(tmp_path / 'own.py')!r}), 'script', {{'size': None, 'dimensions': {{'width': 1.0}}}})"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stderr=subprocess.DEVNULL) as command:
+        until(began.is_file, 60.0)
+        reader = Path("/proc") / began.read_text()
+        assert reader.exists()
+        command.send_signal(how)
+        command.wait(30.0)
+    until(lambda: not reader.exists() or "Z" in (reader / "stat").read_text().rsplit(")", 1)[1], 10.0)
+
+
+def until(true, longest):
+    end = time.monotonic() + longest
+    while not true():
+        assert time.monotonic() < end
+        time.sleep(0.05)
+
+
+def test_a_damaged_file_that_asks_for_all_memory_is_refused_within_two_gigabytes(tmp_path):
+    """One such BREP file took 12 GB in 3 minutes."""
+    text = (DATA / "dome_mm.brep").read_text().replace("Polygon3D 0", "Polygon3D 2147483647")
+    (tmp_path / "a.brep").write_text(text)
+    code = (
+        "import resource\nfrom shellform.surface.readers.reading import read_surface\n"
+        "from shellform.errors import InputError\n"
+        f"try: read_surface({str(tmp_path / 'a.brep')!r}, unit='mm')\n"
+        "except InputError as error: print(error)\n"
+        "used = resource.getrusage(resource.RUSAGE_CHILDREN)\n"
+        "print(used.ru_maxrss / 1e6, used.ru_utime + used.ru_stime)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    said, used = done.stdout.strip().splitlines()
+    assert "a.brep: gmsh " in said
+    memory, seconds = map(float, used.split())
+    assert memory < 2.0
+    assert seconds < 30.0
+
+
+def test_a_reader_may_take_what_its_file_and_its_mesh_need_and_no_more(tmp_path):
+    (tmp_path / "small").write_bytes(b"x")
+    (tmp_path / "large").write_bytes(bytes(10**6))
+    code = (
+        "import resource, sys\nfrom pathlib import Path\n"
+        "from shellform.surface.readers.allowance import allow_file, allow_mesh\n"
+        "def told(): print(*(resource.getrlimit(kind)[0] for kind in (resource.RLIMIT_DATA, resource.RLIMIT_CPU)))\n"
+        "resource.setrlimit(resource.RLIMIT_DATA, (5 * 10**9, 5 * 10**9))\n"
+        f"for name in ('small', 'large'): allow_file(Path({str(tmp_path)!r}, name)); told()\n"
+        "allow_mesh(1e6); told(); allow_mesh(1e6); told()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    found = [tuple(map(int, line.split())) for line in done.stdout.splitlines()]
+    # bytes and seconds; the process's own limit holds in the end
+    assert found == [(1500000030, 13), (1530000000, 22), (3530000000, 522), (5000000000, 1022)]
 
 
 def test_a_file_is_read_without_room_for_temporary_ones_and_within_limits_of_memory_and_file_size():

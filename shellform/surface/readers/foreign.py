@@ -20,10 +20,20 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError, NotConverged, ShellformError
+from shellform.processes import end_with
+from shellform.surface.readers.allowance import allow_file, allow_mesh
 from shellform.surface.readers.draft import Choice, Draft
 
 _LONGEST = 600.0  # seconds for one file
 _MEMORY = 0.8  # of the machine's, for the reader
+_OUT_OF_TIME = (
+    -signal.SIGXCPU if hasattr(signal, "SIGXCPU") else None
+)  # how the system ends what took too long
+_ONE_THREAD = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+}  # whose stacks are memory
 _ANEW = "Open it in the program that wrote it, check it, and export it anew or in another format."
 _LIBRARIES = {
     "step": "gmsh", "iges": "gmsh", "brep": "gmsh", "3dm": "rhino3dm", "ply": "plyfile", "msh": "meshio",
@@ -38,7 +48,7 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
     `settings` are `unit`, `size`, `up`, `layer`, `name` and `face`, as `read_surface` has them; of a builder
     script `size` and `dimensions`. Raises NotConverged where a script finds no form.
     """
-    request = json.dumps({"file": str(file), "kind": kind, "settings": dict(settings)})
+    request = json.dumps({"file": str(file), "kind": kind, "settings": dict(settings), "parent": os.getpid()})
     package = str(Path(__file__).parents[3])
     path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
     try:
@@ -47,7 +57,7 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
             input=request.encode(),
             capture_output=True,
             timeout=longest,
-            env={**os.environ, "PYTHONPATH": path},
+            env={**os.environ, "PYTHONPATH": path, **_ONE_THREAD},
             check=False,
         )
     except subprocess.TimeoutExpired as error:
@@ -56,6 +66,12 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
             where=str(file),
             remedy=_remedy(kind),
         ) from error
+    if child.returncode == _OUT_OF_TIME:
+        raise InputError(
+            f"{_LIBRARIES[kind]} took more time of a processor than files of its size do, and was ended",
+            where=str(file),
+            remedy=_remedy(kind),
+        )
     if child.returncode < 0:
         name = signal.Signals(-child.returncode).name
         raise InputError(f"{_LIBRARIES[kind]} crashed on it ({name})", where=str(file), remedy=_remedy(kind))
@@ -93,10 +109,14 @@ def _serve() -> None:
     pipe = os.dup(1)
     with open(os.devnull, "wb") as nowhere:  # libraries write to standard output past Python
         os.dup2(nowhere.fileno(), 1)
+    end_with(request["parent"])
     _limit_memory()
+    file = Path(request["file"])
+    if request["kind"] != "script":  # whose work isn't told by its size
+        allow_file(file)
     arrays: dict[str, Any] = {}
     try:
-        draft = _read(Path(request["file"]), request["kind"], request["settings"])
+        draft = _read(file, request["kind"], request["settings"])
         answer: dict[str, Any] = {"metres": draft.metres, "up": draft.up, "notes": list(draft.notes)}
         arrays = {"points": draft.points, "triangles": draft.triangles}
         if draft.normals is not None:
@@ -115,7 +135,7 @@ def _serve() -> None:
     except NotConverged as error:  # a script that looks for a form
         answer = {"no result": {"what": error.what, "remedy": error.remedy}}
     except MemoryError:
-        what = "needs more memory to read than this machine has, or than is allowed (ulimit -v)"
+        what = "needs more memory to read than files of its size do, or than this machine has or allows (ulimit -v)"
         answer = {"refused": {"what": what, "where": request["file"], "remedy": "Export a coarser mesh."}}
     content = io.BytesIO()
     np.savez(content, answer=np.array(json.dumps(answer)), **arrays)
@@ -133,7 +153,13 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
         from shellform.surface import cad
 
         return cad.read_cad(
-            file, kind, unit=settings["unit"], size=settings["size"], up=settings["up"], face=settings["face"]
+            file,
+            kind,
+            unit=settings["unit"],
+            size=settings["size"],
+            up=settings["up"],
+            face=settings["face"],
+            before_mesh=allow_mesh,
         )
     if kind == "3dm":
         from shellform.surface.readers import rhino
@@ -145,6 +171,7 @@ def _read(file: Path, kind: str, settings: Mapping[str, Any]) -> Draft:
             size=settings["size"],
             up=settings["up"],
             face=settings["face"],
+            before_mesh=allow_mesh,
         )
     if kind == "ply":
         from shellform.surface.readers import ply

@@ -12,7 +12,7 @@ are homogeneous.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -105,7 +105,14 @@ def _through(points: Reals) -> Any:
 
 
 def read_rhino(
-    file: Path, choice: Choice, *, unit: str | None, size: float | None, up: str, face: str | None
+    file: Path,
+    choice: Choice,
+    *,
+    unit: str | None,
+    size: float | None,
+    up: str,
+    face: str | None,
+    before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> Draft:
     """The surfaces and meshes of a 3DM file that `choice` means, in m.
 
@@ -150,7 +157,7 @@ def read_rhino(
         return replace(joined(parts, Choice(), str(file)), metres=1.0, up=up)
     from shellform.surface import cad
 
-    return cad.mesh_patches(patches, size=size, up=up, face=face, where=file)
+    return cad.mesh_patches(patches, size=size, up=up, face=face, where=file, before_mesh=before_mesh)
 
 
 def _numbered(found: list[tuple[str, str, Any]]) -> list[tuple[str, str, Any]]:
