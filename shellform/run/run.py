@@ -2,8 +2,8 @@
 
 surface -> net -> initial -> optimise -> safety -> figures -> documents -> report. Each stage leaves its
 result in the folder and a key in `stages.json`: a hash of the entries it depends on, the surface file's
-bytes, the package's version and the stage before. Run again, a stage whose key is unchanged is loaded instead
-of computed. Stages hand on what they made, and the summary with what they add to it.
+bytes, the package's version and the stage before. Run again, a stage whose key is unchanged and whose files are
+there is loaded instead of computed. Stages hand on what they made, and the summary with what they add to it.
 """
 
 from __future__ import annotations
@@ -39,6 +39,7 @@ from shellform.run.figures import draw_everything
 from shellform.run.folder import alone, load_surface, read_run, refuse_links, refuse_overwriting, save_surface
 from shellform.run.judged import judged
 from shellform.run.keys import stage_keys
+from shellform.run.lasting import lasting
 from shellform.run.log import logged
 from shellform.run.pages import FILE, write_page
 from shellform.run.profiling import Profiler
@@ -138,12 +139,13 @@ def _run(
 
 
 def _done(folder: Path, fresh: bool) -> StagesDone:
-    """What is done in a folder, and may be kept."""
+    """What is done in a folder, and may be kept: what of it is still there."""
     if fresh:
         refuse_links(folder)
         return StagesDone()
     refuse_overwriting(folder)
-    return read_stages(folder)
+    done = read_stages(folder)
+    return lasting(folder, done, read_summary(folder)) if done.keys else done
 
 
 def _run_alone(workspace: Workspace, until: str, fresh: bool, parts: Parts, began: float) -> Summary:

@@ -372,6 +372,10 @@ def test_the_main_job_runs_resumes_and_can_be_re_analysed(tmp_path):
     again = shellform(*arguments)
     assert again.returncode == 0
     assert again.stderr.count("kept") == len(STAGES)
+    (run / "report.html").unlink()
+    restored = shellform(*arguments)
+    assert restored.stderr.count("kept") == len(STAGES) - 1
+    assert (run / "report.html").is_file()
     page = shellform("report", run, "--output", tmp_path / "page.html")
     assert page.stdout.strip() == str(tmp_path / "page.html"), page.stderr
     assert (run / "report.html").stat().st_size < 15e6

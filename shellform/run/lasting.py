@@ -1,0 +1,59 @@
+"""Whether what a stage left in the run folder is still there: what somebody has deleted is made again.
+
+Files that a stage leaves only now and then aren't asked for: models that some designs have none of, maps of what wasn't
+found.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from shellform.records import history
+from shellform.records.stages import StagesDone
+from shellform.records.summary import Summary
+from shellform.run.pages import FILE as PAGE
+from shellform.run.sketch import PICTURE
+
+_BEFORE = ("unbraced", "initial")  # designs of the stage "initial"
+_SHEETS = ("grid", "cables", "supports", "elevations", "rods")
+_TABLES = ("rods", "bars", "splices", "marks", "cables", "supports", "survey")
+_MAPS = ("net-distance", "net-curvature", "net-skew", "net-springs", "deviations", "objective", "constraints")
+_DOCUMENTS = (
+    *(f"drawings/{name}{ending}" for name in _SHEETS for ending in (".dxf", ".pdf")),
+    *(f"schedules/{name}.csv" for name in _TABLES),
+    "schedules/schedules.xlsx",
+    *(
+        f"models/{name}"
+        for name in ("gridshell.vtu", "gridshell.3dm", "gridshell.glb", "blender.py", "grasshopper.py")
+    ),
+)
+
+
+def lasting(folder: Path, done: StagesDone, summary: Summary) -> StagesDone:
+    """The stages that are done, up to the first of which a file is missing."""
+    for stage in done.keys:
+        if not all((folder / name).is_file() for name in _files(stage, summary)):
+            return done.before(stage)
+    return done
+
+
+def _files(stage: str, summary: Summary) -> tuple[str, ...]:
+    """What a stage leaves in any case."""
+    designs = [f"designs/{name}.npz" for name in summary.designs if (name in _BEFORE) == (stage == "initial")]
+    named = {
+        "surface": ("surface.npz",),
+        "net": ("net.npz", "net.json"),
+        "initial": tuple(designs),
+        "optimise": (history.FILE, *designs),
+        "safety": (),
+        "figures": (PICTURE,) if summary.sketch else _pictures(summary),
+        "documents": _DOCUMENTS,
+        "report": (PAGE,),
+    }
+    return named[stage]
+
+
+def _pictures(summary: Summary) -> tuple[str, ...]:
+    maps = [f"{name}-{load}" for name, design in summary.designs.items() for load in design.loads]
+    states = (f"states/{name}.vtp" for name in maps)
+    return (*(f"figures/{name}.png" for name in (*_MAPS, *maps)), *states)

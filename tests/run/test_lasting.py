@@ -1,0 +1,92 @@
+"""What somebody has deleted from a run folder is made again, and nothing else."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from shellform.records.stages import STAGES, StagesDone, read_stages
+from shellform.records.summary import Summary, read_summary
+from shellform.run.lasting import lasting
+from shellform.run.run import run_case
+from tests.command import ROOT
+from tests.run.small_run import begin, finish, small_case
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A run in whose place every stage left something."""
+    folder = finish(begin(ROOT, tmp_path_factory.mktemp("whole") / "run"))
+    names = [f"figures/net-{each}.png" for each in ("distance", "curvature", "skew", "springs")]
+    names += [f"figures/{each}.png" for each in ("deviations", "objective", "constraints")]
+    for design in ("unbraced", "initial", "optimised"):
+        for load in ("none", "design", "additional"):
+            names += [f"figures/{design}-{load}.png", f"states/{design}-{load}.vtp"]
+    names += [
+        f"drawings/{each}{ending}"
+        for each in ("grid", "cables", "supports", "elevations", "rods")
+        for ending in (".dxf", ".pdf")
+    ]
+    names += [
+        f"schedules/{each}.csv"
+        for each in ("rods", "bars", "splices", "marks", "cables", "supports", "survey")
+    ]
+    names += ["schedules/schedules.xlsx", *(f"models/gridshell{each}" for each in (".vtu", ".3dm", ".glb"))]
+    names += ["models/blender.py", "models/grasshopper.py", "report.html"]
+    for name in names:
+        (folder / name).parent.mkdir(exist_ok=True)
+        (folder / name).touch()
+    return folder
+
+
+def done_in(folder):
+    return list(lasting(folder, read_stages(folder), read_summary(folder)).keys)
+
+
+@pytest.mark.parametrize(
+    ("name", "stage"),
+    [
+        ("surface.npz", "surface"),
+        ("net.npz", "net"),
+        ("net.json", "net"),
+        ("designs/unbraced.npz", "initial"),
+        ("designs/initial.npz", "initial"),
+        ("designs/optimised.npz", "optimise"),
+        ("history.csv", "optimise"),
+        ("figures/deviations.png", "figures"),
+        ("figures/net-skew.png", "figures"),
+        ("figures/optimised-additional.png", "figures"),
+        ("states/unbraced-none.vtp", "figures"),
+        ("drawings/cables.dxf", "documents"),
+        ("schedules/marks.csv", "documents"),
+        ("models/gridshell.3dm", "documents"),
+        ("report.html", "report"),
+    ],
+)
+def test_a_stage_of_which_a_file_was_deleted_is_not_done_nor_are_those_after_it(whole, tmp_path, name, stage):
+    copy = Path(shutil.copytree(whole, tmp_path / "run"))
+    assert done_in(copy) == list(STAGES)
+    (copy / name).unlink()
+    assert done_in(copy) == list(STAGES[: STAGES.index(stage)])
+
+
+def test_where_nothing_was_done_nothing_is_missing(tmp_path):
+    assert lasting(tmp_path, StagesDone(), Summary()) == StagesDone()
+
+
+@pytest.mark.parametrize("name", ["surface.npz", "net.npz", "designs/initial.npz"])
+def test_run_again_the_deleted_file_is_there_with_the_same_bytes(begun_small, tmp_path, name):
+    """It was told "kept", or that the run is unfinished and goes on by the very command that said so."""
+    copy = Path(shutil.copytree(begun_small, tmp_path / "run"))
+    (copy / name).unlink()
+    told = []
+    run_case(small_case(ROOT), copy, until="initial", report=told.append)
+    assert (copy / name).read_bytes() == (begun_small / name).read_bytes()
+    stage = {"surface.npz": "surface", "net.npz": "net", "designs/initial.npz": "initial"}[name]
+    kept = [event.stage for event in told if event.kind.value == "kept"]
+    assert kept == list(STAGES[: STAGES.index(stage)])
+
+
+@pytest.fixture(scope="module")
+def begun_small(tmp_path_factory):
+    return begin(ROOT, tmp_path_factory.mktemp("small") / "run")
