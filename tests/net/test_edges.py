@@ -5,7 +5,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError
-from shellform.net.edges import Edges, Place, stand
+from shellform.net.edges import Edges, Place, _near, stand
 from shellform.net.saved import load_net, net_document, save_net
 from tests.net.edge_shells import barrel, oculus, sail, undulating
 
@@ -166,6 +166,31 @@ def test_the_ground_s_level_can_be_given():
     with pytest.raises(InputError, match="nothing holds the shell") as caught:
         stand(net, surface, Edges(ground=0.0))
     assert "edges.ground" in str(caught.value)
+
+
+def test_an_edge_stands_on_the_ground_whose_level_is_given_wherever_that_is():
+    surface = barrel(raised=0.5)
+    net = pulled(surface)
+    found = stand(net, surface, Edges(ground=0.5))
+    np.testing.assert_array_equal(found.supports, stand(net, surface).supports)
+    assert kinds(stand(net, surface, Edges(ground=0.9))) == ["ground"], "what lies under it stands on it too"
+
+
+def test_where_two_places_hold_the_first_decides(vault_of_two_arches):
+    surface, net = vault_of_two_arches
+    right = [[0.3, -9, -9], [9, 9, 9]]
+    for one, other in (("wall", "free"), ("free", "wall")):
+        found = stand(
+            net, surface, Edges((Place(one, "first", box=right), Place(other, "second", box=right)))
+        )
+        assert {each.kind for each in found.stretches} - {"ground", "beam"} == {one}
+        assert "second" not in {each.name for each in found.stretches}
+
+
+def test_ends_nearer_than_a_fifth_of_the_spacing_share_a_node_and_groups_grow_no_longer():
+    ends = [(at, None) for at in (0.0, 0.12, 0.19, 0.21, 0.3, 0.7)]
+    groups = [[at for at, _ in group] for group in _near(ends, 0.2)]
+    assert groups == [[0.0, 0.12, 0.19], [0.21, 0.3], [0.7]]
 
 
 def test_a_net_cut_off_by_an_outline_has_its_edge_along_it():

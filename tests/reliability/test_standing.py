@@ -204,10 +204,17 @@ def test_a_structure_of_which_one_spot_snaps_goes_on_and_ends_as_the_analysis_of
     snapped = [each for each in made if each.stands and each.snaps]
     assert len(snapped) >= 2
     assert any(not each.stands for each in made)
+    assert all(own.far <= STRAY * nominal.members.span for each in made for own in each.snaps), (
+        "else it falls"
+    )
     for each in snapped:
         assert all(0.0 < own.factor < 1.0 and own.far < STRAY * nominal.members.span for own in each.snaps)
         errors = drawn(nominal, coarse, each.number, seed=1)
-        assert workshop.limit(errors, most=1.0).factor < 1.0, "without going on after snaps it ends there"
+        end = workshop.limit(errors, most=1.0)
+        assert end.factor < 1.0, "without going on after snaps it ends there"
+        assert each.snaps[0].factor == pytest.approx(end.factor, abs=1e-9)
+        gone = np.linalg.norm(each.state.positions - end.state.positions, axis=1).max()
+        assert 0.4 * gone < each.snaps[0].far < gone, "the rest of the load moves nodes too"
         assert workshop.fall(errors, most=1.0).factor == 1.0
         told = analyse(as_model(nominal, errors))
         assert told.converged

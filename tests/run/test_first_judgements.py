@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.run import next_trial
+from shellform.run import first_trial, next_trial
 from shellform.run.first_design import _Search
 from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
@@ -157,3 +157,68 @@ def test_no_less_is_poured_than_three_tenths_of_a_layer_and_nothing_is_tried_onc
     assert tried == []
     assert next_trial.thinned(failure, failure, (), 0.01, stands, lambda: False) == (failure, STANDS)
     assert tried == [0.003]
+
+
+@pytest.mark.parametrize(("falls", "standing", "drawn"), [(None, 40, 40), (7, 7, 8), (0, 1, 2)])
+def test_structures_are_drawn_under_the_additional_load_with_larger_errors_until_one_falls(
+    monkeypatch, falls, standing, drawn
+):
+    found = []
+
+    class Bench:
+        def __init__(self, nominal):
+            assert nominal == (0.997, 12.0), "1.2 times the load"
+
+        def drawn(self, tolerances, *, seed, numbers):
+            assert tolerances == ("usual", 1.25)
+            found.extend(numbers)
+            return [SimpleNamespace(stands=number != falls) for number in numbers]
+
+    shell = SimpleNamespace(design=lambda rest_ratio: rest_ratio)
+    monkeypatch.setattr(first_trial, "_shell", lambda *_: (shell, 10.0))
+    monkeypatch.setattr(first_trial, "perfect", lambda shell, design, load: (design, load))
+    monkeypatch.setattr(first_trial, "default_tolerances", lambda shell: "usual")
+    monkeypatch.setattr(first_trial, "enlarged", lambda usual, times: (usual, times))
+    monkeypatch.setattr(first_trial, "Workshop", Bench)
+    assert first_trial.drawn_standing(None, None, SimpleNamespace(rest_ratio=0.997), 0.05) == standing
+    assert found == list(range(drawn))
+
+
+@pytest.mark.parametrize(("share", "factor"), [(1.0, 1.5), (0.5, 1.35)])
+def test_rods_edge_beams_and_cables_are_judged_under_the_additional_load_and_the_deviation_at_the_end(
+    monkeypatch, share, factor
+):
+    """States stand for the load factors that they are reached under."""
+
+    def loaded(assembly, state, borne, more, **_):
+        before = float(np.max(borne))
+        assert before == state, "it goes on from where it is"
+        reached = share if more > 1.3 else 1.0
+        end = SimpleNamespace(state=before + reached * (more - before))
+        return SimpleNamespace(share=reached, equilibrium=end, on_branch=reached == 1.0)
+
+    shell = SimpleNamespace(
+        node_count=1,
+        target=SimpleNamespace(positions=np.eye(3)),
+        design=lambda rest_ratio: SimpleNamespace(radius=0.01),
+        network=lambda design: None,
+        beams=lambda radius: SimpleNamespace(local_forces=lambda state: state),
+        utilisation=lambda design, state: np.array([0.1, 0.4 * state]),
+        cables=lambda design: SimpleNamespace(tension=lambda state: np.array([100.0 * state])),
+    )
+    monkeypatch.setattr(first_trial, "_shell", lambda *_: (shell, 1.0))
+    monkeypatch.setattr(first_trial, "assemble", lambda network: None)
+    monkeypatch.setattr(first_trial, "find_equilibrium", lambda *_, **__: SimpleNamespace(state=0.0))
+    monkeypatch.setattr(first_trial, "apply_load", loaded)
+    monkeypatch.setattr(first_trial, "edge_utilisation", lambda shell, beams, forces: 0.5 * forces)
+    monkeypatch.setattr(first_trial, "deviations", lambda shell, state: np.array([0.0, state, 0.0]))
+    net = SimpleNamespace(grid=SimpleNamespace(rod_ends=np.array([[0, 1], [1, 2]])))
+    parts = SimpleNamespace(rest_ratio=0.997, rope=SimpleNamespace(force_max=200.0))
+    found = first_trial.followed(net, None, parts, 0.05)
+    assert found.factor == pytest.approx(factor)
+    assert found.stress == pytest.approx(0.4 * 1.2)
+    assert found.edge == pytest.approx(0.5 * 1.2)
+    assert found.pull == pytest.approx(1.2 / 2.0)
+    assert found.deviation == pytest.approx(factor)
+    np.testing.assert_array_equal(found.where, [0.0, 1.0, 0.0])
+    np.testing.assert_array_equal(found.most_stressed, [0.0, 0.5, 0.5])

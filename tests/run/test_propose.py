@@ -343,6 +343,7 @@ def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_bef
     assert parts.easier(replace(breaks, factor=1.2), PULLED) is None, "slacker cables bear no more"
     assert parts.easier(replace(breaks, stress=0.5, pull=0.8), PULLED) is None
     assert parts.easier(replace(breaks, stress=0.5), PULLED) == parts.eased(2.0)
+    assert parts.easier(replace(breaks, stress=0.5, edge=0.96), PULLED) is None, "edge beams come first"
 
 
 def test_joints_turn_where_cables_are_made_slacker_for_rods_that_are_stressed_too_much():
