@@ -18,7 +18,7 @@ _MEMORY = 1.5e9  # bytes, of any file: libraries and threads' stacks too
 _MEMORY_A_BYTE = 30.0  # of the file
 _MEMORY_A_TRIANGLE = 2000.0  # bytes
 _SECONDS = 12.0  # of a processor, for any file
-_SECONDS_A_BYTE = 1e-5  # of the file
+_SECONDS_A_BYTE = 3e-5  # of the file
 _SECONDS_A_TRIANGLE = 5e-4
 
 
