@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.run import first_trial, next_trial
+from shellform.run import first_design, first_trial, next_trial
 from shellform.run.first_design import _Search
 from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
@@ -222,3 +222,89 @@ def test_rods_edge_beams_and_cables_are_judged_under_the_additional_load_and_the
     assert found.deviation == pytest.approx(factor)
     np.testing.assert_array_equal(found.where, [0.0, 1.0, 0.0])
     np.testing.assert_array_equal(found.most_stressed, [0.0, 0.5, 0.5])
+
+
+@pytest.mark.parametrize(
+    ("why", "factor", "may"),
+    [
+        (Why.EDGES, 0.3, True),
+        (Why.STABILITY, 1.21, True),
+        (Why.STABILITY, 1.19, False),
+        (Why.SCATTER, 1.5, True),
+        (Why.STRENGTH, 1.5, False),
+        (Why.CABLES, 1.5, False),
+        (Why.NET, 0.0, False),
+    ],
+)
+def test_stronger_edge_beams_are_tried_where_edges_give_way_or_the_shell_nearly_stands(why, factor, may):
+    assert next_trial.edges_may_help(Obstacle(why, 0.5, 0.05, factor)) is may
+
+
+GIVES_WAY = Obstacle(Why.EDGES, 0.5, 0.05, 1.5, stress=1.2)
+BREAKS = Obstacle(Why.STRENGTH, 0.5, 0.05, 1.5, stress=1.2)
+
+
+@pytest.mark.parametrize(
+    ("lightest", "lines", "found", "tried"),
+    [
+        (0, ("line",), [GIVES_WAY, GIVES_WAY], [0, 1]),  # two a stage
+        (2, ("line",), [GIVES_WAY, GIVES_WAY], [2, 3]),
+        (0, ("line",), [BREAKS], [0]),
+        (0, ("line",), [STANDS], [0]),
+        (0, (), [GIVES_WAY], [0]),  # there are none
+    ],
+)
+def test_edge_beams_are_tried_from_the_lightest_of_their_stage_on(monkeypatch, lightest, lines, found, tried):
+    asked = []
+
+    def with_edges(placed, choice, edge, spacing, thickness):
+        asked.append(edge)
+        return found[len(asked) - 1]
+
+    monkeypatch.setattr(first_design, "edge_choices", lambda choice: (0, 1, 2, 3))
+    monkeypatch.setattr(first_design, "FirstDesign", str)
+    search = SimpleNamespace(lightest=lightest, _with_edges=with_edges)
+    placed = SimpleNamespace(net=SimpleNamespace(edges=lines))
+    assert _Search._stands(search, placed, None, 0.5, 0.05) is found[-1]
+    assert asked == tried
+
+
+@pytest.mark.parametrize(
+    ("best", "vain"),
+    [
+        (Obstacle(Why.STABILITY, 0.5, 0.05, 0.5), False),  # 0.89 with the finer spacing, of 1.5
+        (Obstacle(Why.STABILITY, 0.5, 0.05, 0.4), True),  # 0.71: less than half of what is needed
+        (Obstacle(Why.STRENGTH, 0.5, 0.05, 0.4), False),
+        (Obstacle(Why.STRENGTH, 0.5, 0.05, 0.0), True),  # broken at once
+        (Obstacle(Why.SCATTER, 0.5, 0.05, 1.5), False),
+        (Obstacle(Why.STABILITY, 0.7, 0.05, 1.4), True),  # a coarser net came nearer
+    ],
+)
+def test_a_finer_spacing_is_in_vain_where_it_can_not_bear_half_of_what_is_needed(best, vain):
+    allowance = SimpleNamespace(over=False, thorough=True)
+    search = SimpleNamespace(best=best, allowance=allowance, surface=SimpleNamespace(area=100.0))
+    assert _Search._vain(search, 0.5, 0.375) is vain
+    for changed in (
+        {"allowance": SimpleNamespace(over=True, thorough=True)},
+        {"allowance": SimpleNamespace(over=False, thorough=False)},
+        {"surface": SimpleNamespace(area=1101 * 0.375**2)},
+    ):
+        assert _Search._vain(SimpleNamespace(**{**vars(search), **changed}), 0.5, 0.375) is True
+
+
+def test_for_the_sake_of_curvature_no_spacing_is_tried_of_more_than_six_hundred_crossings():
+    allowance, area = SimpleNamespace(over=False, thorough=True), 700 * 0.375**2
+    for why, vain in ((Why.NET, True), (Why.SCATTER, False)):
+        search = SimpleNamespace(
+            best=Obstacle(why, 0.5, 0.05, 1.0), allowance=allowance, surface=SimpleNamespace(area=area)
+        )
+        assert _Search._vain(search, 0.5, 0.375) is vain
+
+
+def test_of_two_failures_that_came_as_near_the_later_is_kept():
+    search = SimpleNamespace(failures=[], best=None)
+    first, nearer, as_near, farther = (Obstacle(Why.STABILITY, 0.5, 0.05, f) for f in (0.5, 0.8, 0.8, 0.6))
+    for failure, best in ((first, first), (nearer, nearer), (as_near, as_near), (farther, as_near)):
+        assert _Search._keep(search, failure) is failure
+        assert search.best is best
+    assert search.failures == [first, nearer, as_near, farther]
