@@ -1,9 +1,11 @@
 """What a case asks for is checked on every design of its run."""
 
+import math
 from pathlib import Path
 
 from shellform.case.entries import LimitsEntry
 from shellform.records.summary import read_summary
+from shellform.records.words import number
 from shellform.run.folder import read_run
 from shellform.run.judged import run_checks
 from shellform.run.run import run_case
@@ -21,9 +23,28 @@ LIMITS = {
 
 def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
     assert set(LIMITS) == set(LimitsEntry.model_fields) - {"slack_loads"}
-    tight = [f"limits.{name}={1e3 if name == 'slack_min' else 1e-6}" for name in LIMITS]
+    amounts = {
+        "utilisation": 1e-6,
+        "connector_turn": 2e-6,
+        "uplift": 3e-6,
+        "thrust": 4e-6,
+        "slack_min": 1e3,
+    }
+    tight = [f"limits.{name}={amount}" for name, amount in amounts.items()]
     run = read_run(begin(ROOT, tmp_path / "run", "net.elements=2", *tight))
-    found = {check.name: check.cells["initial"] for check in run_checks(run)}
+    made = run_checks(run)
+    found = {check.name: check.cells["initial"] for check in made}
+    limits = {check.name: check.limit for check in made}
+    assert [limits[LIMITS[name]] for name in LIMITS] == [
+        f"{number(1e-4)} % of the strength",
+        f"{number(math.degrees(2e-6))} °",
+        f"{number(3e-6)} N",
+        f"{number(4e-6)} N",
+        f"at least {number(1e3)} N",
+    ]
+    told = run.summary.designs["initial"].loads.values()
+    assert found[LIMITS["thrust"]].found == f"{number(max(each.thrust_max for each in told))} N"
+    assert found[LIMITS["uplift"]].found == f"{number(max(each.uplift_max for each in told))} N"
     assert found[LIMITS["uplift"]].holds is not None  # all supports may press
     assert [name for name in LIMITS if name != "uplift" and found[LIMITS[name]].holds is not False] == []
 
