@@ -17,7 +17,7 @@ except ImportError:  # not on Windows, where the clock alone ends a reader
 _MEMORY = 1.5e9  # bytes, of any file: libraries and threads' stacks too
 _MEMORY_A_BYTE = 30.0  # of the file
 _MEMORY_A_TRIANGLE = 2000.0  # bytes
-_SECONDS = 12.0  # of a processor, for any file
+_SECONDS = 30.0  # of a processor, for any file: sound ones take a few, on slow machines a few times that
 _SECONDS_A_BYTE = 3e-5  # of the file
 _SECONDS_A_TRIANGLE = 5e-4
 
