@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices
-from shellform.optimiser.agreeing import agreed
+from shellform.optimiser.agreeing import agreed, leaving_some
 from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
 from shellform.optimiser.minding import (
     joined,
@@ -68,7 +68,7 @@ def run(search: Search, it: Iterate) -> Iterate:
     if it.phase == "lead":
         it = _led(looking_closer(search), it)
     if it.phase == "thin":
-        it = _thin(search if it.mind is None else looking_closer(search), it)
+        it = _thin(leaving_some(search if it.mind is None else looking_closer(search)), it)
         it = replace(_without_slack(search, it, 0.0), phase="agree", until=0, stood=0, led_to=np.inf)
     if it.phase == "agree":
         agrees, it = agreed(search, it, _descend)

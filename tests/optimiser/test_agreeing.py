@@ -109,3 +109,12 @@ def test_a_turn_taken_up_in_its_middle_ends_as_if_nothing_had_been(searching, sa
     _, again = agreeing.agreed(search, again, phases._descend)
     np.testing.assert_array_equal(again.point.design.rest_length, whole.point.design.rest_length)
     assert (again.samples, again.stood, again.led_to) == (whole.samples, whole.stood, whole.led_to)
+
+
+def test_thinning_leaves_evaluations_to_turns_where_trials_know_no_enlarged_errors(searching):
+    search, _, _ = searching
+    assert agreeing.leaving_some(search).evaluations == 20
+    plain = replace(search.asked.trial, safety=replace(ASKED, enlarged=1.0))
+    known = replace(search, asked=replace(search.asked, trial=plain))
+    assert agreeing.leaving_some(known).evaluations == 16
+    assert agreeing.leaving_some(replace(known, asked=None)).evaluations == 20
