@@ -26,7 +26,7 @@ _LEFT = 0.2  # of all evaluations, that thinning leaves where trials know no enl
 def leaving_some(search: Search) -> Search:
     """The search with as many evaluations as thinning may take. What few structures with errors as they are have
     confirmed falls in a fresh sample as a rule, and the fewer cables are left, the less can be led."""
-    if search.asked is None or search.asked.trial.safety.enlarged > 1.0:
+    if search.asked is None or search.asked.trusted:
         return search
     return replace(search, evaluations=search.evaluations - int(_LEFT * search.evaluations))
 

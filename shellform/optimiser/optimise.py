@@ -149,8 +149,8 @@ def polish(
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
     shape alone. The misfit never rises: where no better design is found, `best` comes back; and what was
-    asked of `best` as built in trials is asked of the polished design: whether it stands as often is left to whoever
-    judges it. Only the cables' lengths are varied, where they
+    asked of `best` as built in trials is asked of the polished design; whether it stands as often is left to whoever
+    judges it, but where trials know no enlarged errors. Only the cables' lengths are varied, where they
     are variables of their own.
 
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
@@ -166,6 +166,9 @@ def polish(
         minimise=[Share(1.0, Misfit(best.problem.design_load.name))],
         variables=cables or best.problem.variables,
     )
+    asked = best.asked
+    if asked is not None and asked.trusted:
+        asked = replace(asked, confirmed=None)
     alike = None if groups is None else np.unique(groups[best.design.present], return_inverse=True)[1]
     with dense_on_one():
         search, it = begin(
@@ -175,7 +178,7 @@ def polish(
             lambda _: solver.stiffness * best.stiffness,
             evaluations,
             progress,
-            asked=None if best.asked is None else replace(best.asked, confirmed=None),
+            asked=asked,
             judging=judging,
         )
         models = Models(search.evaluator, solver, search.models.reach, whole=alike is not None)

@@ -48,7 +48,7 @@ class Optimum:
     """The solution: what the optimisation found: the `design` without its slack cables, how it carries each
     load on the documented path (`loaded`, with "none" first), the `history`, a `status` sentence, the work it
     took, of which factorisations in rejected trials were `wasted`, and the `stiffness`, N/m, that the softest
-    mode had to keep under the additional loads; what was `asked` of it as built, None: nothing."""
+    mode had to keep under the additional loads; what is `asked` as built of what is made of it, None: nothing."""
 
     problem: Problem
     design: Design

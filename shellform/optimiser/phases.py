@@ -69,7 +69,7 @@ def run(search: Search, it: Iterate) -> Iterate:
         it = _led(looking_closer(search), it)
     if it.phase == "thin":
         it = _thin(leaving_some(search if it.mind is None else looking_closer(search)), it)
-        it = replace(_without_slack(search, it, 0.0), phase="agree", until=0, stood=0, led_to=np.inf)
+        it = replace(it, phase="agree", until=0, stood=0, led_to=np.inf)
     if it.phase == "agree":
         agrees, it = agreed(search, it, _descend)
         if agrees:
@@ -270,7 +270,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     solver = search.solver
     most = solver.most_cables
     while it.failures < solver.failures and search.left() > 0:
-        it = _without_slack(search, it, solver.idle)
+        it = _without_slack(search, it)
         tell(search, it)
         over = most is not None and taut_count(search, it.point) > most
         budget = np.inf if over else it.thrifty
@@ -315,13 +315,14 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     return replace(it, status=status)
 
 
-def _without_slack(search: Search, it: Iterate, idle: float) -> Iterate:
-    """Leaves cables out of the search that are slack under all loads, once they are more than a share, `idle`: a
-    model solves for every cable in it."""
+def _without_slack(search: Search, it: Iterate) -> Iterate:
+    """Leaves cables out of the search that are slack under all loads, once they are many: a model solves for
+    every cable in it.
+    """
     design, cables = it.point.design, search.problem.shell.cables(it.point.design)
     pulls = np.array([cables.tension(state) for state in it.point.states.values()])
     kept = (pulls > 0.0).any(axis=0)
-    if kept.mean() >= 1.0 - idle:
+    if kept.mean() > 1.0 - search.solver.idle:
         return it
     present = design.present.copy()
     present[np.flatnonzero(present)[~kept]] = False

@@ -360,7 +360,7 @@ def finish(search: Search, it: Iterate) -> Optimum:
         evaluator.factorisations,
         evaluator.wasted,
         it.stiffness,
-        search.asked,
+        None if search.asked is None else search.asked.after(it.samples + 1),
     )
 
 

@@ -78,6 +78,15 @@ class Demand:
         assert fresh is not None
         return replace(fresh, first=fresh.first + number * fresh.safety.tried)
 
+    def after(self, samples: int) -> Demand:
+        """The same for a search that comes after one that drew so many fresh samples."""
+        return self if self.confirmed is None else replace(self, confirmed=self.sample(samples))
+
+    @property
+    def trusted(self) -> bool:
+        """Whether what trials confirm seldom falls in a fresh sample: their errors are enlarged."""
+        return self.trial.safety.enlarged > 1.0
+
 
 @dataclass(frozen=True)
 class JudgedTrial:

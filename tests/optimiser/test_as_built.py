@@ -106,6 +106,9 @@ def test_a_fresh_sample_as_large_as_the_final_one_confirms_and_lets_one_fall_les
     assert found.confirmed.fallen == {"wet": 1}
     every = [set(found.trial.numbers), *({*found.sample(number).numbers} for number in range(3))]
     assert len(set.union(*every)) == sum(len(own) for own in every), "no sample has seen another's structures"
+    assert found.after(2).sample(1) == found.sample(3)
+    assert replace(found, confirmed=None).after(2).confirmed is None
+    assert found.trusted
 
 
 def test_structures_of_fresh_samples_are_drawn_with_errors_as_they_are_and_count_under_the_design_load_alone(

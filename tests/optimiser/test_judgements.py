@@ -284,7 +284,7 @@ def test_while_cables_are_taken_away_only_those_that_pull_and_stay_are_kept_taut
         kept_taut.append(it.tensioned.tolist())
         return trial, it
 
-    monkeypatch.setattr(phases, "_without_slack", lambda search, it, idle: it)
+    monkeypatch.setattr(phases, "_without_slack", lambda search, it: it)
     monkeypatch.setattr(phases, "_leaving", lambda *_: leaving.pop(0))
     monkeypatch.setattr(phases, "attempt_without", lambda *_: without.pop(0))
     monkeypatch.setattr(phases, "_repaired", repaired)
