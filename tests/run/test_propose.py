@@ -311,6 +311,8 @@ def test_edge_beams_that_are_tried_are_each_much_stiffer_than_the_one_before_and
         stiff = [stiffness(each)[2] for each in found]
         assert all(after > 2.0 * before for before, after in pairwise(stiff))
         assert isinstance(found[0], Bundle) == isinstance(own, Round), "laths and tubes don't pack"
+        assert all(each.composite == 0.5 for each in found if isinstance(each, Bundle))
+        assert rods == "gfrp_rods/1.5 mm" or not any(isinstance(each, Bundle) for each in found[1:])
         for section, count in zip(found, (19, 37, 61, 91), strict=True):
             radius = np.sqrt(own.constants[0] / np.pi)
             bundle = Bundle(radius, count, 0.5, own.material)
