@@ -59,5 +59,7 @@ def agreed(
         if it.mind is None or search.left() <= 0:
             break
         it = turned(search, replace(it, begun=len(it.accepted)))
-    back = last_sound(search, replace(it, accepted=it.accepted[: it.stood])) if it.stood else it
-    return it.stood > 0 and len(back.accepted) == it.stood, back
+    if it.stood in (0, len(it.accepted)):
+        return it.stood > 0, it
+    back = last_sound(search, replace(it, accepted=it.accepted[: it.stood]))
+    return (True, back) if len(back.accepted) == it.stood else (False, it)

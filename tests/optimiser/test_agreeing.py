@@ -63,6 +63,20 @@ def test_a_design_that_a_sample_agrees_with_is_left_as_it_is(searching, samples)
     assert search.evaluator.evaluations == 0
 
 
+def test_a_search_keeps_its_designs_whatever_is_found_of_their_paths_afterwards(
+    searching, samples, monkeypatch
+):
+    search, it, _ = searching
+    told, _ = samples
+    monkeypatch.setattr(agreeing, "last_sound", lambda search, it: replace(it, accepted=()))
+    told[:] = [STANDS]
+    assert agreeing.agreed(search, it, phases._descend)[1].accepted
+    told[:] = [FALLS, STANDS, *[FALLS] * 20]
+    agrees, after = agreeing.agreed(search, it, phases._descend)
+    assert not agrees
+    assert after.accepted
+
+
 def test_what_falls_in_a_sample_leads_the_search_on_until_another_one_agrees(searching, samples):
     search, it, _ = searching
     told, judged = samples
