@@ -24,6 +24,7 @@ from shellform.optimiser.search_state import (
     Iterate,
     Search,
     accepted_design,
+    aimed,
     kept_in_mind,
     restiffened,
 )
@@ -32,12 +33,14 @@ from shellform.optimiser.trials import sound, standing
 from shellform.reliability.trial_structures import closer, to_bear
 
 _SHARE = 0.1  # of all evaluations, for one turn of a descent and a judgement at the most …
+_FEWEST = 4  # … but so many at least
 _LED = 0.5  # … and for all turns
 WORTH = 0.03  # of the objective, gained by a turn, for which another is made
 _WINDOW = 0.05  # mean tensions, of a turn's first step: what falls first changes within larger ones
 _SMALLEST = 0.004  # mean tensions
 _MOST = 12  # structures in mind
 _OVER = 1.03  # of what they are to bear is aimed for: an aim may be missed by a little
+_LESS = 0.01  # of what they bear may be lost where they are to bear what they do
 
 
 def ready_to_lead(search: Search, it: Iterate, fell: Design) -> Iterate | None:
@@ -91,7 +94,7 @@ def finely(search: Search, until: int) -> Search:
 
 def turned(search: Search, it: Iterate) -> Iterate:
     """At the begin of a turn."""
-    until = search.evaluator.evaluations + max(1, int(_SHARE * search.evaluations))
+    until = search.evaluator.evaluations + max(_FEWEST, int(_SHARE * search.evaluations))
     return replace(it, until=until, before=float("inf"), guarded=True, window=_WINDOW * search.tension)
 
 
@@ -123,8 +126,29 @@ def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, flo
         mind = kept_in_mind(search, design, every)
     except NotConverged:
         return it
-    aim = search.solver.stiffness * search.softest if it.stiffness > 0.0 else 0.0
+    aim = min(search.solver.stiffness * search.softest, it.stiffness)
     return restiffened(search, replace(it, mind=mind, remembered=design), aim)
+
+
+def as_borne(search: Search, it: Iterate, least: Mapping[int, float]) -> Iterate:
+    """With the structures of the numbers in `least` in mind that are to bear what they bear in the present design, as
+    far as they have to: an aim that is missed to begin with would lead the search to it instead of
+    where the objective does. As it was where one of them can't be followed."""
+    if not least:
+        return it
+    design, point = it.point.design, it.point
+    try:
+        mind = kept_in_mind(search, design, least)
+    except NotConverged:
+        return it
+    search.evaluator.problem = aimed(search.inner, it.stiffness, mind)
+    found = search.evaluator.seed(design, point.states, it.stage).constraints[-len(mind.scenarios) :]
+    own = [
+        replace(each, least=min(1.0 / _OVER, (1.0 - _LESS) * (1.0 - by)) * each.least)
+        for each, by in zip(mind.scenarios, found, strict=True)
+    ]
+    mind = replace(mind, scenarios=tuple(own))
+    return restiffened(search, replace(it, mind=mind, remembered=design), it.stiffness)
 
 
 def remembering(search: Search, it: Iterate) -> Iterate:

@@ -49,6 +49,7 @@ import numpy as np
 from shellform.arrays import Indices
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
+from shellform.optimiser.minding import as_borne
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes, minimise_directly
 from shellform.optimiser.optimum import Checkpoint, Optimum
 from shellform.optimiser.phases import run
@@ -148,10 +149,11 @@ def polish(
     constraints kept; the solver's `stiffness` is a share of what `best` had to keep.
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
-    shape alone. The misfit never rises: where no better design is found, `best` comes back; and what was
-    asked of `best` as built in trials is asked of the polished design; whether it stands as often is left to whoever
-    judges it, but where trials know no enlarged errors. Only the cables' lengths are varied, where they
-    are variables of their own.
+    shape alone. The misfit never rises: where no better design is found, `best` comes back. Drawn structures that
+    the search for `best` kept in mind bear what they did, as far as they have to, and a fresh sample judges; else
+    what was asked of `best` as built in trials is asked of the polished design, and whether it stands as often is
+    left to whoever judges it, but where trials know no enlarged errors. Only the cables' lengths are varied, where
+    they are variables of their own.
 
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
     the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
@@ -183,7 +185,10 @@ def polish(
         )
         models = Models(search.evaluator, solver, search.models.reach, whole=alike is not None)
         search = replace(search, always_guarded=True, groups=alike, models=models)
-        it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned))
+        it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned), fallen=best.fallen)
+        it = as_borne(search, it, best.mind)
+        if best.asked is not None and it.mind is not None:
+            search = replace(search, asked=best.asked.unseen())
         polished = finish(search, run(search, it))
     better = (
         polished.objective < polished.objective_start

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -48,7 +48,9 @@ class Optimum:
     """The solution: what the optimisation found: the `design` without its slack cables, how it carries each
     load on the documented path (`loaded`, with "none" first), the `history`, a `status` sentence, the work it
     took, of which factorisations in rejected trials were `wasted`, and the `stiffness`, N/m, that the softest
-    mode had to keep under the additional loads; what is `asked` as built of what is made of it, None: nothing."""
+    mode had to keep under the additional loads; what is `asked` as built of what is made of it, None: nothing;
+    numbers of drawn structures that have `fallen` in the search, and those that it kept in `mind`, with the
+    factor of the largest load that each is to bear."""
 
     problem: Problem
     design: Design
@@ -65,6 +67,8 @@ class Optimum:
     wasted: int
     stiffness: float
     asked: Demand | None = None
+    fallen: tuple[int, ...] = ()
+    mind: Mapping[int, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (

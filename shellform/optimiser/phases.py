@@ -64,7 +64,12 @@ def run(search: Search, it: Iterate) -> Iterate:
     if it.phase == "descend":
         thins = search.solver.thin and search.evaluator.blocks.each_cable is not None
         it = last_sound(search, _descend(search, it, least=search.evaluations // 2 if thins else 0))
-        it = _stiffened(search, it) if it.accepted and thins else last_standing(search, it)
+        if thins:
+            it = _stiffened(search, it) if it.accepted else last_standing(search, it)
+        elif it.mind is not None:  # judged by what it was led by, trials would say nothing new
+            it = replace(it, phase="agree")
+        else:
+            it = last_standing(search, it)
     if it.phase == "lead":
         it = _led(looking_closer(search), it)
     if it.phase == "thin":

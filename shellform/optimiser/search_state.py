@@ -361,6 +361,8 @@ def finish(search: Search, it: Iterate) -> Optimum:
         evaluator.wasted,
         it.stiffness,
         None if search.asked is None else search.asked.after(it.samples + 1),
+        it.fallen,
+        {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios},
     )
 
 

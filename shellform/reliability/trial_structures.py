@@ -78,6 +78,16 @@ class Demand:
         assert fresh is not None
         return replace(fresh, first=fresh.first + number * fresh.safety.tried)
 
+    def unseen(self) -> Demand:
+        """The same for a design made of one that fresh samples were asked about: as many may fall as where a finished
+        design is judged, none spared, since few designs are chosen from."""
+        if self.confirmed is None:
+            return self
+        safety, fallen = self.confirmed.safety, self.confirmed.fallen
+        base = self.confirmed.design_load
+        least = {name: max(own, _known(safety, name, base)) for name, own in fallen.items()}
+        return replace(self, confirmed=replace(self.confirmed, fallen=least))
+
     def after(self, samples: int) -> Demand:
         """The same for a search that comes after one that drew so many fresh samples."""
         return self if self.confirmed is None else replace(self, confirmed=self.sample(samples))

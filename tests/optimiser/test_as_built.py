@@ -7,9 +7,13 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser import trials
+from shellform.problem.terms import LoadedDesign
+from shellform.reliability.scenarios import scenarios
 from shellform.reliability.trial_structures import (
     FRESH,
     MOST,
+    SEED,
+    Demand,
     Required,
     confirm,
     demand,
@@ -79,6 +83,38 @@ def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(
     assert polished.status == "no design with less misfit was found"
 
 
+def test_a_design_that_structures_led_to_is_polished_with_these_in_mind_and_judged_afresh(
+    stout, found, monkeypatch
+):
+    best, _ = found
+    trial = best.asked.trial
+    one = replace(trial, loads={"wet": trial.loads["wet"]}, fallen={"wet": 0})
+    asked = Demand(
+        one, replace(one, safety=replace(one.safety, enlarged=1.0, drawn=20, tried=20), first=FRESH)
+    )
+    judged = []
+
+    def fresh(shell, design, asked, **how):
+        judged.append(asked)
+        return confirm(shell, design, asked, **how)
+
+    monkeypatch.setattr(trials, "confirm", fresh)
+    free = sf.polish(replace(best, asked=replace(asked, confirmed=None)), evaluations=4)
+    aims = {0: 20.0, 1: 20.0}  # more than they bear: what they bear is kept
+    held = sf.polish(replace(best, asked=asked, mind=aims), evaluations=4)
+    assert held.objective < held.objective_start
+    assert held.mind.keys() == aims.keys()
+    assert [each.first for each in judged] == [FRESH]
+    case, seed = sf.LoadCase("wet", one.loads["wet"]), one.safety.seed + SEED
+    mind = scenarios(stout, best.design, case, one.tolerances, seed=seed, least=held.mind, most=20.0)
+    bear = [
+        mind.measure(LoadedDesign(stout, each.design, each.states["wet"], None)).value
+        for each in (held, free)
+    ]
+    assert (bear[0] > 0.99).all(), "an aim may be missed by a little"
+    assert bear[0].min() > bear[1].min(), "what the objective alone leads to bears less"
+
+
 def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem):
     heavy = {"wet": 2.2 * problem.loads["wet"]}
     asked = Required(ASKED, heavy, "wet", {"wet": 6})
@@ -104,6 +140,9 @@ def test_a_fresh_sample_as_large_as_the_final_one_confirms_and_lets_one_fall_les
     found = demand(stout, stout.design(), {"wet": problem.loads["wet"]}, asked, design_load="wet")
     assert found.confirmed.safety.tried == 200
     assert found.confirmed.fallen == {"wet": 1}
+    assert found.unseen().confirmed.fallen == {"wet": 2}, "as many as where a finished design is judged"
+    assert found.unseen().confirmed.first == found.confirmed.first
+    assert replace(found, confirmed=None).unseen().confirmed is None
     every = [set(found.trial.numbers), *({*found.sample(number).numbers} for number in range(3))]
     assert len(set.union(*every)) == sum(len(own) for own in every), "no sample has seen another's structures"
     assert found.after(2).sample(1) == found.sample(3)

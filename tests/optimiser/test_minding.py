@@ -78,6 +78,20 @@ def test_without_a_structure_that_falls_there_is_nothing_to_be_led_by(searching,
     assert ready_to_lead(search, it, it.point.design) is None
 
 
+def test_structures_kept_as_they_bear_ask_for_nothing_that_the_design_misses(searching):
+    search, it, _ = searching
+    aims = {0: 1.03, 1: 1.03 * 50.0}  # one bears more than it has to, the other can't
+    kept = minding.as_borne(search, it, aims)
+    missed = kept.point.constraints[-2:]
+    assert (missed < 0.0).all()
+    assert missed[1] == pytest.approx(-1.0 / 99.0, rel=1e-3), "of what it bears a hundredth may be lost"
+    least = {each.number: each.least for each in kept.mind.scenarios}
+    assert least[0] == pytest.approx(1.0)
+    assert least[1] < 50.0
+    assert kept.stiffness == it.stiffness
+    assert minding.as_borne(search, it, {}) is it
+
+
 def test_a_search_resumed_while_it_is_led_knows_the_same_structures_and_point(searching, monkeypatch):
     search, it, kept = searching
     monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 2.0, 2: 2.5})
