@@ -150,9 +150,10 @@ def _between(low: _Point, above: float, high: _Point | None, left: float) -> flo
 
 
 def _stiff(loading: Loading, point: _Point, left: float) -> _Point:
-    """A point before the given one with at least the stiffness `left`."""
+    """A point before the given one with at least the stiffness `left`. Raises NotConverged where none is reached
+    from there, however near it is."""
     back = _RESOLUTION
-    while point.factor > 0.0:
+    while point.factor > 0.0 and back > _AT_ONCE:
         before = _moved(loading, point, max(0.0, point.factor - back))
         if before is not None and before.stiffness >= left:
             return before

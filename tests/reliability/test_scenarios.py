@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.errors import InputError
+from shellform.errors import InputError, NotConverged
 from shellform.gridshell.tolerances import Tolerances
 from shellform.net.grid import CONNECTOR
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.problem import LoadCase
 from shellform.problem.terms import LoadedDesign
+from shellform.reliability import borne
 from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.perfect import perfect
 from shellform.reliability.scenarios import borne_factors, remembered, scenarios
@@ -142,6 +143,20 @@ def test_scenarios_are_terms_of_a_problem(dome, case, asked):
     found = evaluator.linearised(evaluator.seed(design, states, 1.0))
     assert found.constraints == pytest.approx(1.0 - factors(dome, design, asked))
     assert found.constraints_by_variables.any(axis=1).all()
+
+
+def test_a_structure_that_leads_nowhere_from_its_end_is_given_up_and_said(dome, asked, monkeypatch):
+    tried = []
+
+    def nowhere(loading, point, goal):
+        tried.append(goal)
+        assert len(tried) < 100, "the search for a stiffer state goes on for ever"
+
+    monkeypatch.setattr(borne, "_moved", nowhere)
+    soft = replace(asked, left=1e3 * asked.left)  # more than is left anywhere near the end
+    with pytest.raises(NotConverged, match=r"structure 0 as built bears was not found\. Leave it out"):
+        factors(dome, dome.design(), soft)
+    assert tried[-1] > 0.0
 
 
 def test_without_a_stiffness_that_is_left_there_is_no_end_of_the_branch(asked):
