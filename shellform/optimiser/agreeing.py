@@ -44,15 +44,16 @@ def agreed(
     while True:
         if it.until:  # in the middle of a turn
             it = descend(finely(search, it.until), it)
-            found = sound(search, it.accepted[-1]) if len(it.accepted) > it.begun else None
-            if found is None:
+            there = sound(search, it.accepted[-1]) if len(it.accepted) > it.begun else None
+            if there is None:
                 break
-            it = replace(it, point=found, accepted=(*it.accepted[:-1], accepted_design(search, found)))
+            it = replace(it, point=there, accepted=(*it.accepted[:-1], accepted_design(search, there)))
         judged, it = fresh(search, it)
         if judged.stands:
-            gained = it.point.objective < (1.0 - WORTH) * it.led_to
-            it = replace(it, stood=len(it.accepted), led_to=min(it.point.objective, it.led_to))
-            if it.mind is None or not gained:
+            found, before = it.point.objective, it.led_to
+            if found < before:
+                it = replace(it, stood=len(it.accepted), led_to=found)
+            if it.mind is None or not found < (1.0 - WORTH) * before:
                 break
         least = {} if judged.stands else aims(confirmed, judged)
         it = led_by(search, it, it.accepted[-1].built, least)

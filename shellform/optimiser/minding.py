@@ -68,9 +68,10 @@ def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterat
         it = replace(it, point=found, accepted=(*it.accepted[:-1], accepted_design(search, found)))
         holds, it = standing(search, it, it.accepted[-1].built)
         if holds:
-            gained = found.objective < (1.0 - WORTH) * it.led_to
-            it = replace(it, stood=len(it.accepted), led_to=min(found.objective, it.led_to))
-            if not gained:
+            before = it.led_to
+            if found.objective < before:
+                it = replace(it, stood=len(it.accepted), led_to=found.objective)
+            if not found.objective < (1.0 - WORTH) * before:
                 break
         if search.evaluator.evaluations >= last:
             break

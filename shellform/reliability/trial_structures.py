@@ -67,10 +67,12 @@ class Required:
 @dataclass(frozen=True)
 class Demand:
     """What is required in each `trial` of a search, and of fresh samples at its end, `confirmed`: None where they
-    are left to whoever judges what it finds."""
+    are left to whoever judges what it finds; whether trials are `trusted`: what they confirm seldom falls in a fresh
+    sample, since their errors are enlarged as far as they can be."""
 
     trial: Required
     confirmed: Required | None
+    trusted: bool = True
 
     def sample(self, number: int) -> Required:
         """What is required of the fresh sample of this number."""
@@ -91,11 +93,6 @@ class Demand:
     def after(self, samples: int) -> Demand:
         """The same for a search that comes after one that drew so many fresh samples."""
         return self if self.confirmed is None else replace(self, confirmed=self.sample(samples))
-
-    @property
-    def trusted(self) -> bool:
-        """Whether what trials confirm seldom falls in a fresh sample: their errors are enlarged."""
-        return self.trial.safety.enlarged > 1.0
 
 
 @dataclass(frozen=True)
@@ -120,13 +117,13 @@ def demand(
 ) -> Demand:
     """What is asked of designs that come after `start`, in trials and of fresh samples.
     Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
-    at the edge of falling can't tell one design from another. Where it bears none enlarged, numbers make up
-    for it: a search that tries hundreds of designs on a dozen structures with errors as they are finds one
+    at the edge of falling can't tell one design from another. Where it doesn't bear them as large as they are asked
+    for, numbers make up for it: a search that tries hundreds of designs on a dozen structures with errors as they are finds one
     for that dozen. The fresh sample is as large as the one by which a finished design is judged, and spares one fall
     more: what forty confirmed fell in three of two hundred. Raises NotConverged where the start has no unloaded equilibrium."""
-    trial = None
-    for factor in (safety.enlarged, 0.5 * (1.0 + safety.enlarged)):
-        own = replace(safety, enlarged=factor)
+    trial, many = None, max(MOST, safety.tried)
+    for factor, tries in ((safety.enlarged, safety.tried), (0.5 * (1.0 + safety.enlarged), many)):
+        own = replace(safety, enlarged=factor, tried=tries)
         most = {name: own.tried for name, load in loads.items() if load.any()}
         most[design_load] = _known(own, design_load, design_load)
         asked = Required(own, {name: loads[name] for name in most}, design_load, most)
@@ -135,16 +132,17 @@ def demand(
             trial = _shown(asked, shown)
             break
     if trial is None:
-        many = replace(safety, enlarged=1.0, tried=max(MOST, safety.tried))
-        trial = required(shell, start, loads, many, design_load=design_load, judging=judging)
+        own = replace(safety, enlarged=1.0, tried=many)
+        trial = required(shell, start, loads, own, design_load=design_load, judging=judging)
+    trusted = trial.safety.enlarged == safety.enlarged > 1.0
     fresh = replace(safety, enlarged=1.0, tried=safety.drawn)
     if any(trial.fallen[name] > _known(trial.safety, name, design_load) for name in trial.fallen):
         confirmed = required(
             shell, start, loads, fresh, design_load=design_load, first=FRESH, judging=judging
         )
-        return Demand(trial, confirmed)
+        return Demand(trial, confirmed, trusted)
     known = {name: max(_known(fresh, name, design_load) - _SPARE, 0) for name in trial.fallen}
-    return Demand(trial, Required(fresh, trial.loads, design_load, known, FRESH))
+    return Demand(trial, Required(fresh, trial.loads, design_load, known, FRESH), trusted)
 
 
 def closer(asked: Demand) -> Demand:

@@ -11,6 +11,7 @@ from shellform.optimiser import agreeing, phases
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.optimum import Checkpoint
 from shellform.optimiser.resuming import resumed
+from shellform.optimiser.search_state import accepted_design
 from shellform.reliability.trial_structures import FRESH, Demand, JudgedTrial, Required
 from tests.problems import misfit_and_force
 
@@ -101,6 +102,27 @@ def test_a_better_design_with_which_no_sample_agrees_isnt_taken(searching, sampl
     assert after.point.objective == pytest.approx(judged[1])
 
 
+def test_of_designs_with_which_samples_agree_the_better_one_is_taken(searching, samples):
+    search, it, _ = searching
+    told, judged = samples
+    told[:] = [FALLS, *[STANDS] * 20]
+    start = it.point
+    turns = []
+
+    def descend(search, it):
+        turns.append(it)
+        if len(turns) == 1:
+            return phases._descend(search, it)
+        point = search.evaluator.seed(start.design, start.states, 1.0)
+        return replace(it, point=point, accepted=(*it.accepted, accepted_design(search, point)))
+
+    agrees, after = agreeing.agreed(search, it, descend)
+    assert agrees
+    assert len(judged) == 3
+    assert judged[2] > judged[1]
+    assert after.point.objective == pytest.approx(judged[1])
+
+
 def test_a_search_without_an_evaluation_left_says_that_no_sample_agrees(searching, samples):
     search, it, _ = searching
     told, _ = samples
@@ -125,10 +147,9 @@ def test_a_turn_taken_up_in_its_middle_ends_as_if_nothing_had_been(searching, sa
     assert (again.samples, again.stood, again.led_to) == (whole.samples, whole.stood, whole.led_to)
 
 
-def test_thinning_leaves_evaluations_to_turns_where_trials_know_no_enlarged_errors(searching):
+def test_thinning_leaves_evaluations_to_turns_where_trials_arent_trusted(searching):
     search, _, _ = searching
     assert agreeing.leaving_some(search).evaluations == 20
-    plain = replace(search.asked.trial, safety=replace(ASKED, enlarged=1.0))
-    known = replace(search, asked=replace(search.asked, trial=plain))
-    assert agreeing.leaving_some(known).evaluations == 16
-    assert agreeing.leaving_some(replace(known, asked=None)).evaluations == 20
+    fragile = replace(search, asked=replace(search.asked, trusted=False))
+    assert agreeing.leaving_some(fragile).evaluations == 16
+    assert agreeing.leaving_some(replace(fragile, asked=None)).evaluations == 20

@@ -8,12 +8,14 @@ import pytest
 import shellform as sf
 from shellform.optimiser import trials
 from shellform.problem.terms import LoadedDesign
+from shellform.reliability import trial_structures
 from shellform.reliability.scenarios import scenarios
 from shellform.reliability.trial_structures import (
     FRESH,
     MOST,
     SEED,
     Demand,
+    JudgedTrial,
     Required,
     confirm,
     demand,
@@ -133,6 +135,19 @@ def test_a_search_tries_more_structures_where_its_start_bears_none_with_enlarged
         found = demand(stout, stout.design(), loads, asked, design_load="wet")
         trial, fresh = found.trial.safety, found.confirmed.safety
         assert (trial.enlarged, trial.tried, fresh.enlarged, fresh.tried) == (larger, searched, 1.0, 60)
+
+
+def test_numbers_make_up_for_errors_that_the_start_doesnt_bear_as_large_as_asked_for(
+    stout, problem, monkeypatch
+):
+    def bears_half(shell, start, asked, **_):
+        return JudgedTrial(dict.fromkeys(asked.loads, ()), True, asked.safety.enlarged <= 1.25, 0)
+
+    monkeypatch.setattr(trial_structures, "tried", bears_half)
+    asked = replace(ASKED, enlarged=1.5)
+    found = demand(stout, stout.design(), {"wet": problem.loads["wet"]}, asked, design_load="wet")
+    assert (found.trial.safety.enlarged, found.trial.safety.tried) == (1.25, MOST)
+    assert not found.trusted
 
 
 def test_a_fresh_sample_as_large_as_the_final_one_confirms_and_lets_one_fall_less(stout, problem):

@@ -12,7 +12,7 @@ from shellform.optimiser.minding import joined, ready_to_lead
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.optimum import Checkpoint
 from shellform.optimiser.resuming import resumed, tell
-from shellform.optimiser.search_state import merit, missed, violation
+from shellform.optimiser.search_state import accepted_design, merit, missed, violation
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability.drawing import PERFECT
 from shellform.reliability.scenarios import FactorsAsBuilt
@@ -118,6 +118,30 @@ def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_
     assert len(after.accepted) == led.stood
     assert not any(isinstance(part.term, FactorsAsBuilt) for part in search.evaluator.problem.constraints)
     np.testing.assert_array_equal(after.point.design.rest_length, it.point.design.rest_length)
+
+
+def test_where_another_turn_leads_to_a_worse_design_the_search_goes_back_to_the_better_one(
+    searching, monkeypatch
+):
+    search, it, _ = searching
+    monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 1.0})
+    led = ready_to_lead(search, it, it.point.design)
+    monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": ()}, True, True, 0))
+    start, found = it.point, []
+
+    def descend(search, it):
+        if found:
+            point = search.evaluator.seed(start.design, start.states, 1.0)
+            it = replace(it, point=point, accepted=(*it.accepted, accepted_design(search, point)))
+        else:
+            it = phases._descend(search, it)
+        found.append(it.accepted[-1].objective)
+        return it
+
+    after = minding.led(search, led, descend)
+    assert len(found) == 2
+    assert found[1] > found[0]
+    assert after.accepted[-1].objective == pytest.approx(found[0])
 
 
 def test_where_structures_lead_to_a_better_design_that_stands_thinning_begins_there(searching, monkeypatch):
