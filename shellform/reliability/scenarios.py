@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.errors import require_number
+from shellform.errors import NotConverged, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.problem import LoadCase
@@ -117,12 +117,15 @@ def scenarios(
 
 
 def remembered(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> FactorsAsBuilt:
-    """The same with a factor and a state of each scenario in this design, not far from its end. Raises
-    NotConverged."""
+    """The same with a factor and a state of each scenario in this design, not far from its end; without those
+    whose end isn't found. Raises NotConverged where none is."""
     workshop = _workshop(shell, design, asked)
 
-    def one(scenario: Scenario) -> Scenario:
-        end = _end(workshop, asked, scenario)
+    def one(scenario: Scenario) -> Scenario | NotConverged:
+        try:
+            end = _end(workshop, asked, scenario)
+        except NotConverged as error:
+            return error
 
         def followed(loading: Loading) -> tuple[float, State] | None:
             here, factor = loading.followed(_BEFORE * end.factor, CAREFUL, _BEFORE_RESOLUTION)
@@ -131,7 +134,12 @@ def remembered(shell: Gridshell, design: Design, asked: FactorsAsBuilt) -> Facto
         near = workshop.with_structure(scenario.errors, followed, number=scenario.number)
         return replace(scenario, near=near)
 
-    return replace(asked, scenarios=tuple(side_by_side(one, list(asked.scenarios))))
+    found = side_by_side(one, list(asked.scenarios))
+    known = tuple(each for each in found if isinstance(each, Scenario))
+    lost = [each for each in found if isinstance(each, NotConverged)]
+    if lost and not known:
+        raise lost[0]
+    return replace(asked, scenarios=known)
 
 
 def borne_factors(

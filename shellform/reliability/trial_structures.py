@@ -13,7 +13,7 @@ The perfect structure's critical factor is asked for beside them, with an allowa
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -38,6 +38,7 @@ Judging = Callable[[int, int], None]
 _AT_ONCE = 4  # structures between two looks at how many have fallen
 _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a structure falls
 _MESH = 1.01  # over the critical factor asked for: what elements of usual length tell too much, twice over
+_BESIDE = 3  # structures that are to stand beside as many as have to: what is aimed for isn't met by all
 _SPARE = 1  # of the structures that may fall, none of a fresh sample: what thinning ends with is at the edge of falling
 _SAME = 1e-9  # relative
 
@@ -98,12 +99,14 @@ class Demand:
 @dataclass(frozen=True)
 class JudgedTrial:
     """Numbers of the structures that have `fallen` under each load as far as it took to say whether the
-    design `stands`, whether the perfect one keeps its `critical` factor, and the `factorisations` spent."""
+    design `stands`, whether the perfect one keeps its `critical` factor, the `factorisations` spent, and the
+    `factors` of the largest load on the design load's path that structures bear."""
 
     fallen: Mapping[str, tuple[int, ...]]
     critical: bool
     stands: bool
     factorisations: int
+    factors: Mapping[int, float] = field(default_factory=dict)
 
 
 def demand(
@@ -202,6 +205,7 @@ def tried(
     NotConverged where it has no unloaded equilibrium."""
     safety, spent = asked.safety, 0
     fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
+    factors: dict[int, float] = {}
     order = [*first, *(number for number in asked.numbers if number not in set(first))]
     kept = True
     for largest, shares in paths(asked.loads).items():
@@ -242,6 +246,8 @@ def tried(
                 if number == PERFECT:
                     kept = factor >= wanted * (1.0 - _SAME)
                     continue
+                if asked.design_load in shares:
+                    factors[number] = factor
                 for name, share in shares.items():
                     counts = number in asked.numbers or name == asked.design_load
                     if counts and factor < share * (1.0 - _SAME):
@@ -250,9 +256,13 @@ def tried(
                 judging(begin + len(numbers), len(queue))
             refused = not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares)
             if refused and not whole:
-                return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, False, spent)
+                return JudgedTrial(_numbers(fallen), kept, False, spent, factors)
     enough = all(len(own) <= asked.fallen[name] for name, own in fallen.items())
-    return JudgedTrial({name: tuple(own) for name, own in fallen.items()}, kept, kept and enough, spent)
+    return JudgedTrial(_numbers(fallen), kept, kept and enough, spent, factors)
+
+
+def _numbers(fallen: Mapping[str, list[int]]) -> dict[str, tuple[int, ...]]:
+    return {name: tuple(own) for name, own in fallen.items()}
 
 
 def largest_on_path(asked: Required) -> tuple[str, dict[str, float]]:
@@ -271,9 +281,10 @@ def to_bear(
     first: Sequence[int] = (),
     judging: Judging | None = None,
 ) -> dict[int, float]:
-    """The numbers of structures that fall under loads on the design load's path more often than is allowed,
-    and the factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its
-    critical factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
+    """The numbers of structures that fall under loads on the design load's path where more do than may, and the
+    factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its critical
+    factor, under PERFECT. Of those that fall as many are named as have to stand, and a few more: those that bear
+    most, from the one that bears least on. Raises NotConverged where the design has no unloaded equilibrium."""
     found = tried(shell, design, asked, first=first, whole=True, judging=judging)
     return aims(asked, found)
 
@@ -285,8 +296,10 @@ def aims(asked: Required, found: JudgedTrial) -> dict[int, float]:
     if not found.critical:
         least[PERFECT] = _critical(asked, shares)
     for name in sorted(shares, key=lambda each: -shares[each]):
-        if len(found.fallen[name]) > asked.fallen[name]:
-            for number in found.fallen[name]:
+        over = len(found.fallen[name]) - asked.fallen[name]
+        if over > 0:
+            nearest = sorted(found.fallen[name], key=lambda each: -found.factors.get(each, 0.0))
+            for number in reversed(nearest[: over + _BESIDE]):
                 least.setdefault(number, shares[name])
     return least
 

@@ -13,6 +13,7 @@ from shellform.problem.evaluation import Evaluator
 from shellform.problem.problem import LoadCase
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability import borne
+from shellform.reliability import scenarios as scenarios_module
 from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.perfect import perfect
 from shellform.reliability.scenarios import borne_factors, remembered, scenarios
@@ -143,6 +144,19 @@ def test_scenarios_are_terms_of_a_problem(dome, case, asked):
     found = evaluator.linearised(evaluator.seed(design, states, 1.0))
     assert found.constraints == pytest.approx(1.0 - factors(dome, design, asked))
     assert found.constraints_by_variables.any(axis=1).all()
+
+
+def test_a_structure_whose_end_isnt_found_is_left_out_of_those_that_are_remembered(dome, asked, monkeypatch):
+    def of_the_second(loading, **how):
+        if loading.number == asked.scenarios[0].number:
+            raise NotConverged("not found", state=None, remedy="Leave it out.")
+        return borne.borne(loading, **how)
+
+    monkeypatch.setattr(scenarios_module, "borne", of_the_second)
+    kept = remembered(dome, dome.design(), asked)
+    assert [each.number for each in kept.scenarios] == [asked.scenarios[1].number]
+    with pytest.raises(NotConverged, match="not found"):
+        remembered(dome, dome.design(), replace(asked, scenarios=asked.scenarios[:1]))
 
 
 def test_a_structure_that_leads_nowhere_from_its_end_is_given_up_and_said(dome, asked, monkeypatch):

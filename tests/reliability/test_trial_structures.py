@@ -5,7 +5,7 @@ import pytest
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability import trial_structures
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import SEED, Required, enlarged, tried
+from shellform.reliability.trial_structures import SEED, JudgedTrial, Required, aims, enlarged, tried
 
 ROUGH = Tolerances(supports=1e-4, load_each=0.1, load_all=0.4)
 
@@ -37,6 +37,35 @@ def test_a_judgement_tells_how_many_structures_were_loaded_and_how_many_there_ar
     asked = Required(safety, {"design": nominal.load}, "design", {"design": 6})
     tried(dome, dome.design(), asked, judging=lambda done, most: heard.append((done, most)))
     assert heard == [(4, 6), (6, 6)]
+
+
+def test_as_many_are_aimed_for_as_have_to_stand_and_three_beside_those_that_bear_most(nominal):
+    asked = Required(
+        Safety(ROUGH, critical_factor=None, drawn=10, tried=10),
+        {"design": nominal.load, "additional": 1.25 * nominal.load},
+        "design",
+        {"design": 0, "additional": 4},
+    )
+    factors = {number: 0.1 + 0.1 * number for number in range(10)}
+    fallen = {"design": (1, 0), "additional": (8, 0, 7, 1, 6, 2, 5, 3, 4)}
+    found = JudgedTrial(fallen, True, False, 0, factors)
+    assert aims(asked, found) == pytest.approx({**dict.fromkeys(range(1, 9), 1.0), 0: 0.8})
+    assert next(iter(aims(asked, found))) == 1, "the one of them that bears least comes first"
+    enough = JudgedTrial({"design": (), "additional": (1, 2, 3, 4)}, True, True, 0, factors)
+    assert aims(asked, enough) == {}
+
+
+def test_a_judgement_knows_what_each_structure_bears(dome, nominal):
+    loads = {"design": nominal.load, "additional": 1.25 * nominal.load}
+    asked = Required(
+        Safety(ROUGH, critical_factor=None, drawn=10, tried=3), loads, "design", dict.fromkeys(loads, 3)
+    )
+    found = tried(dome, dome.design(), asked)
+    assert set(found.factors) == {0, 1, 2}
+    for name, share in (("design", 0.8), ("additional", 1.0)):
+        assert set(found.fallen[name]) == {
+            number for number, factor in found.factors.items() if factor < share - 1e-9
+        }
 
 
 def test_enlarged_errors_are_larger_by_the_factor_as_far_as_shares_go():
