@@ -37,9 +37,9 @@ def agreed(
     """Whether a fresh sample agrees that the last design stands, after turns of a sample and a descent led by
     what falls in it; and the iterate. Where the search was led, turns follow as long as they lead to a better design
     with which a sample agrees."""
-    confirmed = None if search.asked is None else search.asked.confirmed
-    if confirmed is None or not it.accepted:
+    if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return True, it
+    asked = search.asked
     search = replace(search, evaluations=search.evaluations + int(_MORE * search.evaluations))
     while True:
         if it.until:  # in the middle of a turn
@@ -55,7 +55,7 @@ def agreed(
                 it = replace(it, stood=len(it.accepted), led_to=found)
             if it.mind is None or not found < (1.0 - WORTH) * before:
                 break
-        least = {} if judged.stands else aims(confirmed, judged)
+        least = {} if judged.stands else aims(asked.sample(it.samples), judged)
         it = led_by(search, it, it.accepted[-1].built, least)
         if it.mind is None or search.left() <= 0:
             break

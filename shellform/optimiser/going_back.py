@@ -12,32 +12,44 @@ import numpy as np
 from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted_design
 from shellform.optimiser.trials import confirmed, sound, standing
 from shellform.problem.evaluation import Evaluated
+from shellform.reliability.trial_structures import Required
 
 
 def last_confirmed(search: Search, it: Iterate) -> Iterate:
     """Back to the last accepted design that is found of which a fresh sample agrees that it stands: the
-    search has chosen its designs by their luck with the structures it tried."""
+    search has chosen its designs by their luck with the structures it tried. Where none is, to the last one of which
+    it does with none spared."""
     if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return it
-    stood = _confirmed_among(search, it, it.accepted)
+    for asked in (search.asked, search.asked.unspared()):
+        found = _last_confirmed(search, it, asked.sample(it.samples))
+        if found is not None:
+            return replace(found, fell=False)
+    return replace(
+        it, fell=True, status=f"{it.status}; a fresh sample doesn't confirm that it stands as built"
+    )
+
+
+def _last_confirmed(search: Search, it: Iterate, asked: Required) -> Iterate | None:
+    stood = _confirmed_among(search, asked, it.accepted)
     if stood == len(it.accepted) - 1:
         return it
     while stood >= 0:
         found = last_sound(search, replace(it, accepted=it.accepted[: stood + 1]))
         if len(found.accepted) == stood + 1:
             return replace(found, status=f"{it.status}; the last design that a fresh sample confirms")
-        stood = _confirmed_among(search, it, found.accepted)  # its documented path led to another design
-    return replace(it, status=f"{it.status}; a fresh sample doesn't confirm that it stands as built")
+        stood = _confirmed_among(search, asked, found.accepted)  # its documented path led to another design
+    return None
 
 
-def _confirmed_among(search: Search, it: Iterate, accepted: Sequence[Accepted]) -> int:
+def _confirmed_among(search: Search, asked: Required, accepted: Sequence[Accepted]) -> int:
     """The number of the last one that is found to be confirmed, -1 where none is: in steps of 1, 2, 4, ...
     from the end, and between the last two of them by bisection. Structures in which one fell come first in the next:
     what falls takes several times the work of what stands."""
     fallen: list[int] = []
 
     def holds(number: int) -> bool:
-        found = confirmed(search, it, accepted[number].built, fallen)
+        found = confirmed(search, asked, accepted[number].built, fallen)
         own = [number for each in found.fallen.values() for number in each]
         fallen[:] = dict.fromkeys([*own, *fallen])
         return found.stands
@@ -66,8 +78,8 @@ def last_standing(search: Search, it: Iterate) -> Iterate:
     back = replace(it, accepted=it.accepted[: stood + 1])
     found = last_sound(search, back) if back.accepted else back
     if not found.accepted:  # none stands: the search goes on with what it has, and whoever judges says so
-        return replace(it, status=f"{it.status}; no design was found that stands as built")
-    return found
+        return replace(it, fell=True, status=f"{it.status}; no design was found that stands as built")
+    return replace(found, fell=False)
 
 
 def last_sound(search: Search, it: Iterate) -> Iterate:

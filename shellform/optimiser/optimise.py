@@ -188,10 +188,12 @@ def polish(
         it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned), fallen=best.fallen)
         it = as_borne(search, it, best.mind)
         if best.asked is not None and it.mind is not None:
-            search = replace(search, asked=best.asked.unseen())
-        polished = finish(search, run(search, it))
+            search = replace(search, asked=best.asked.unspared())
+        it = run(search, it)
+        polished = finish(search, it)
     better = (
-        polished.objective < polished.objective_start
+        not it.fell
+        and polished.objective < polished.objective_start
         and polished.design.present.sum() == best.design.present.sum()
     )
     # of averaged lengths the polished design is at least that one, in its own states

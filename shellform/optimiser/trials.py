@@ -17,7 +17,7 @@ from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
-from shellform.reliability.trial_structures import FRESH, JudgedTrial, confirm, stands
+from shellform.reliability.trial_structures import FRESH, JudgedTrial, Required, confirm, stands
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 
@@ -116,11 +116,9 @@ def fresh(search: Search, it: Iterate) -> tuple[JudgedTrial, Iterate]:
     return found, replace(it, samples=it.samples + 1, fallen=tuple(dict.fromkeys([*under, *it.fallen])))
 
 
-def confirmed(search: Search, it: Iterate, built: Design, first: Sequence[int]) -> JudgedTrial:
-    """Whether the next fresh sample agrees that the design stands as built, its structures of the numbers `first` before
-    the others."""
-    assert search.asked is not None
-    asked = search.asked.sample(it.samples)
+def confirmed(search: Search, asked: Required, built: Design, first: Sequence[int]) -> JudgedTrial:
+    """Whether a fresh sample agrees that the design stands as built, as it is `asked`, its structures of the numbers
+    `first` before the others."""
     found = confirm(search.problem.shell, built, asked, first=first, judging=search.judging)
     search.evaluator.factorisations += found.factorisations
     return found

@@ -69,31 +69,31 @@ class Required:
 class Demand:
     """What is required in each `trial` of a search, and of fresh samples at its end, `confirmed`: None where they
     are left to whoever judges what it finds; whether trials are `trusted`: what they confirm seldom falls in a fresh
-    sample, since their errors are enlarged as far as they can be."""
+    sample, since their errors are enlarged as far as they can be; and whether fresh samples `spare` some of those that
+    may fall, since what a search has chosen among many is at the edge of falling."""
 
     trial: Required
     confirmed: Required | None
     trusted: bool = True
+    spare: bool = True
 
     def sample(self, number: int) -> Required:
         """What is required of the fresh sample of this number."""
         fresh = self.confirmed
         assert fresh is not None
-        return replace(fresh, first=fresh.first + number * fresh.safety.tried)
+        fresh = replace(fresh, first=fresh.first + number * fresh.safety.tried)
+        return _sparing(fresh) if self.spare else fresh
 
-    def unseen(self) -> Demand:
-        """The same for a design made of one that fresh samples were asked about: as many may fall as where a finished
-        design is judged, none spared, since few designs are chosen from."""
-        if self.confirmed is None:
-            return self
-        safety, fallen = self.confirmed.safety, self.confirmed.fallen
-        base = self.confirmed.design_load
-        least = {name: max(own, _known(safety, name, base)) for name, own in fallen.items()}
-        return replace(self, confirmed=replace(self.confirmed, fallen=least))
+    def unspared(self) -> Demand:
+        """The same where as many may fall in fresh samples as where a finished design is judged."""
+        return replace(self, spare=False)
 
     def after(self, samples: int) -> Demand:
         """The same for a search that comes after one that drew so many fresh samples."""
-        return self if self.confirmed is None else replace(self, confirmed=self.sample(samples))
+        fresh = self.confirmed
+        if fresh is None:
+            return self
+        return replace(self, confirmed=replace(fresh, first=fresh.first + samples * fresh.safety.tried))
 
 
 @dataclass(frozen=True)
@@ -122,17 +122,17 @@ def demand(
     Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
     at the edge of falling can't tell one design from another. Where it doesn't bear them as large as they are asked
     for, numbers make up for it: a search that tries hundreds of designs on a dozen structures with errors as they are finds one
-    for that dozen. The fresh sample is as large as the one by which a finished design is judged, and spares one fall
-    more: what forty confirmed fell in three of two hundred. Raises NotConverged where the start has no unloaded equilibrium."""
+    for that dozen. The fresh sample is as large as the one by which a finished design is judged: what forty confirmed fell in three
+    of two hundred. Raises NotConverged where the start has no unloaded equilibrium."""
     trial, many = None, max(MOST, safety.tried)
     for factor, tries in ((safety.enlarged, safety.tried), (0.5 * (1.0 + safety.enlarged), many)):
         own = replace(safety, enlarged=factor, tried=tries)
         most = {name: own.tried for name, load in loads.items() if load.any()}
         most[design_load] = _known(own, design_load, design_load)
         asked = Required(own, {name: loads[name] for name in most}, design_load, most)
-        shown = tried(shell, start, asked, critical=False, judging=judging)
-        if shown.stands:
-            trial = _shown(asked, shown)
+        bears = tried(shell, start, asked, critical=False, judging=judging)
+        if bears.stands:
+            trial = _shown(asked, bears)
             break
     if trial is None:
         own = replace(safety, enlarged=1.0, tried=many)
@@ -140,11 +140,9 @@ def demand(
     trusted = trial.safety.enlarged == safety.enlarged > 1.0
     fresh = replace(safety, enlarged=1.0, tried=safety.drawn)
     if any(trial.fallen[name] > _known(trial.safety, name, design_load) for name in trial.fallen):
-        confirmed = required(
-            shell, start, loads, fresh, design_load=design_load, first=FRESH, judging=judging
-        )
-        return Demand(trial, confirmed, trusted)
-    known = {name: max(_known(fresh, name, design_load) - _SPARE, 0) for name in trial.fallen}
+        shown = required(shell, start, loads, fresh, design_load=design_load, first=FRESH, judging=judging)
+        return Demand(trial, shown, trusted)
+    known = {name: _known(fresh, name, design_load) for name in trial.fallen}
     return Demand(trial, Required(fresh, trial.loads, design_load, known, FRESH), trusted)
 
 
@@ -346,6 +344,20 @@ def confirm(
     return replace(
         found, critical=kept, stands=kept, factorisations=found.factorisations + end.factorisations
     )
+
+
+def _sparing(asked: Required) -> Required:
+    """The same with one less that may fall than the probability allows; where under a further load as many may as
+    of the start, what its number and another's differ by in one sample is spared, one deviation of the difference."""
+    fallen = {}
+    for name, count in asked.fallen.items():
+        known = _known(asked.safety, name, asked.design_load)
+        chance = np.sqrt(2.0 * count * (1.0 - count / asked.safety.tried))
+        if count <= known:
+            fallen[name] = max(count - _SPARE, 0)
+        else:
+            fallen[name] = count if name == asked.design_load else max(int(count - chance), known)
+    return replace(asked, fallen=fallen)
 
 
 def _known(safety: Safety, name: str, design_load: str) -> int:

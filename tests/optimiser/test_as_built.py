@@ -85,6 +85,19 @@ def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(
     assert polished.status == "no design with less misfit was found"
 
 
+def test_where_no_polished_design_stands_the_design_before_it_comes_back(found, monkeypatch):
+    best, _ = found
+
+    def falls(shell, design, asked, **how):
+        return replace(stands(shell, design, asked, **how), stands=False)
+
+    monkeypatch.setattr(trials, "stands", falls)
+    monkeypatch.setattr(trials, "confirm", falls)
+    for one in (best, replace(best, mind={0: 1.0})):
+        polished = sf.polish(one, evaluations=3)
+        np.testing.assert_array_equal(polished.design.rest_length, best.design.rest_length)
+
+
 def test_a_design_that_structures_led_to_is_polished_with_these_in_mind_and_judged_afresh(
     stout, found, monkeypatch
 ):
@@ -154,10 +167,8 @@ def test_a_fresh_sample_as_large_as_the_final_one_confirms_and_lets_one_fall_les
     asked = replace(ASKED, enlarged=1.5, drawn=200, probability_design=0.99)
     found = demand(stout, stout.design(), {"wet": problem.loads["wet"]}, asked, design_load="wet")
     assert found.confirmed.safety.tried == 200
-    assert found.confirmed.fallen == {"wet": 1}
-    assert found.unseen().confirmed.fallen == {"wet": 2}, "as many as where a finished design is judged"
-    assert found.unseen().confirmed.first == found.confirmed.first
-    assert replace(found, confirmed=None).unseen().confirmed is None
+    assert found.sample(0).fallen == {"wet": 1}
+    assert found.unspared().sample(0).fallen == {"wet": 2}, "as many as where a finished design is judged"
     every = [set(found.trial.numbers), *({*found.sample(number).numbers} for number in range(3))]
     assert len(set.union(*every)) == sum(len(own) for own in every), "no sample has seen another's structures"
     assert found.after(2).sample(1) == found.sample(3)

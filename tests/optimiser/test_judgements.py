@@ -384,27 +384,48 @@ def test_a_search_ends_with_the_last_design_that_a_fresh_sample_confirms(
 ):
     known, told_first = [], []
 
-    def judged(search, it, built, first):
+    def judged(search, asked, built, first):
         told_first.append(list(first))
-        if not first:  # begun anew, from a design that the documented path led to
+        if not first:  # begun anew, from a design that the documented path led to or with none spared
             known.clear()
         assert list(first) == known
-        stands = built.number in confirmed
+        stands = built.number in confirmed and asked == ("some spared", 3)
         fallen = () if stands else (10 + built.number, 7)
         known[:] = dict.fromkeys([*fallen, *known])
         return SimpleNamespace(stands=stands, fallen={"wet": fallen, "wetter": fallen})
 
     monkeypatch.setattr(going_back, "confirmed", judged)
     sound_are(monkeypatch, sound)
-    asking = SimpleNamespace(confirmed="a fresh sample")
-    found = going_back.last_confirmed(searching(asked=asking), returning(7))
+    found = going_back.last_confirmed(searching(asked=asking()), replace(returning(7), samples=3))
     assert (found.accepted[-1].design.number, found.status) == (end, words)
+    assert found.fell == ("doesn't" in words)
     if 6 not in confirmed:
         assert told_first[1] == [16, 7], "those that fell come first"
     told_first.clear()
     begun = returning(7)
     assert going_back.last_confirmed(searching(asked=SimpleNamespace(confirmed=None)), begun) is begun
     assert not told_first, "it is left to whoever judges"
+
+
+def asking():
+    """What is asked of fresh samples, with some that may fall spared or none."""
+    unspared = SimpleNamespace(sample=lambda number: ("none spared", number))
+    return SimpleNamespace(
+        confirmed="a fresh sample", sample=lambda number: ("some spared", number), unspared=lambda: unspared
+    )
+
+
+def test_a_search_none_of_whose_designs_is_confirmed_ends_with_the_last_one_that_is_with_none_spared(
+    returning, monkeypatch
+):
+    def judged(search, asked, built, first):
+        stands = asked[0] == "none spared" and built.number <= 4
+        return SimpleNamespace(stands=stands, fallen={"wet": () if stands else (1,)})
+
+    monkeypatch.setattr(going_back, "confirmed", judged)
+    sound_are(monkeypatch, set(range(7)))
+    found = going_back.last_confirmed(searching(asked=asking()), returning(7))
+    assert (found.accepted[-1].design.number, found.fell) == (4, False)
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability import trial_structures
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import SEED, JudgedTrial, Required, aims, enlarged, tried
+from shellform.reliability.trial_structures import SEED, Demand, JudgedTrial, Required, aims, enlarged, tried
 
 ROUGH = Tolerances(supports=1e-4, load_each=0.1, load_all=0.4)
 
@@ -53,6 +53,20 @@ def test_as_many_are_aimed_for_as_have_to_stand_and_three_beside_those_that_bear
     assert next(iter(aims(asked, found))) == 1, "the one of them that bears least comes first"
     enough = JudgedTrial({"design": (), "additional": (1, 2, 3, 4)}, True, True, 0, factors)
     assert aims(asked, enough) == {}
+
+
+def test_fresh_samples_spare_one_fall_or_what_two_designs_that_fall_as_often_differ_by(nominal):
+    loads = {"design": nominal.load, "additional": 1.2 * nominal.load}
+    safety = Safety(ROUGH, critical_factor=None, drawn=200, tried=200, probability_design=0.99)
+    for may, spared in (
+        ({"design": 2, "additional": 100}, (1, 90)),
+        ({"design": 5, "additional": 2}, (5, 1)),
+    ):
+        asked = Required(safety, loads, "design", may)
+        demand = Demand(asked, asked)
+        assert tuple(demand.sample(3).fallen.values()) == spared
+        assert demand.sample(3).first == 600
+        assert demand.unspared().sample(3).fallen == may
 
 
 def test_a_judgement_knows_what_each_structure_bears(dome, nominal):
