@@ -57,7 +57,7 @@ def test_as_many_are_aimed_for_as_have_to_stand_and_three_beside_those_that_bear
 
 def test_fresh_samples_spare_one_fall_or_what_two_designs_that_fall_as_often_differ_by(nominal):
     loads = {"design": nominal.load, "additional": 1.2 * nominal.load}
-    safety = Safety(ROUGH, critical_factor=None, drawn=200, tried=200, probability_design=0.99)
+    safety = Safety(ROUGH, critical_factor=None, drawn=200, tried=200, enlarged=1.0, probability_design=0.99)
     for may, spared in (
         ({"design": 2, "additional": 100}, (1, 90)),
         ({"design": 5, "additional": 2}, (5, 1)),
