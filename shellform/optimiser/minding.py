@@ -118,7 +118,7 @@ def led_by(search: Search, it: Iterate, design: Design, least: Mapping[int, floa
 
 def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
     """With these structures in mind beside those that are, the latest first, all remembered in the `design`;
-    the stiffness to keep goes down to the solver's own. As it was where one of them can't be followed."""
+    those that can be followed; the stiffness to keep goes down to the solver's own. As it was where none can."""
     known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
     every = dict(itertools.islice({**least, **known, **least}.items(), _MOST))
     if not every:
@@ -134,7 +134,7 @@ def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, flo
 def as_borne(search: Search, it: Iterate, least: Mapping[int, float]) -> Iterate:
     """With the structures of the numbers in `least` in mind that are to bear what they bear in the present design, as
     far as they have to: an aim that is missed to begin with would lead the search to it instead of
-    where the objective does. As it was where one of them can't be followed."""
+    where the objective does. As it was where none of them can be followed."""
     if not least:
         return it
     design, point = it.point.design, it.point
