@@ -117,8 +117,8 @@ def led_by(search: Search, it: Iterate, design: Design, least: Mapping[int, floa
 
 
 def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
-    """With these structures in mind beside those that are, the latest first, all remembered in the `design`;
-    those that can be followed; the stiffness to keep goes down to the solver's own. As it was where none can."""
+    """With these structures in mind beside those that are, the latest first, all remembered in the `design`,
+    as far as they can be followed; the stiffness to keep goes down to the solver's own. As it was where none can."""
     known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
     every = dict(itertools.islice({**least, **known, **least}.items(), _MOST))
     if not every:
