@@ -46,8 +46,8 @@ _DEAD = 1e-6  # of the cables' stiffness: a tension below it counts as none
 class StepModel:
     """The model at a `point`, in y = (tensions (c,), N, of the present cables; values of the other blocks).
 
-    `tensions`: how many of y are tensions, c or none; `state` under the design load; `longest` (c,), m, upper
-    bounds of the rest lengths. `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,) the
+    `tensions`: how many of y are tensions, c or none; `state` under the design load; `shortest`, `longest` (c,),
+    m, bounds of the rest lengths. `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,) the
     largest changes of the other values. `length` (c,), m; `answers` to changes of y; `constraints_by_y` (k,
     y). `quadratics`: of each term of the objective, None where it has none.
     """
@@ -57,6 +57,7 @@ class StepModel:
     point: Linearisation
     state: State
     tensions: int
+    shortest: Reals
     longest: Reals
     origin: Reals
     lower: Reals
@@ -68,13 +69,14 @@ class StepModel:
     quadratics: tuple[Quadratic | None, ...]
 
     def design(self, y: Reals) -> Design:
-        """The design of y."""
+        """The design of y. Its rest lengths keep their bounds, whatever the lengths are that a model leads to which
+        is linear: of a soft shell they may come below zero."""
         blocks, made = self.evaluator.blocks, self.point.design
         first = self.tensions
         for block, own in zip(blocks.variables, blocks.slices, strict=True):
             if block.of_each_cable and self.tensions:
                 rest = made.rest_length.copy()
-                rest[made.present] = np.minimum(self._rest_lengths(y), self.longest)
+                rest[made.present] = np.clip(self._rest_lengths(y), self.shortest, self.longest)
                 values = rest
             else:
                 last = first + own.stop - own.start
@@ -118,6 +120,7 @@ def step_model(evaluator: Evaluator, point: Linearisation, *, whole: bool) -> St
         point,
         at.state,
         count,
+        shortest,
         longest,
         np.append(at.tension, values[at.other]),
         np.append(np.zeros(count), lower[at.other]),

@@ -49,6 +49,17 @@ def test_dead_cables_stay_at_their_longest_and_taut_ones_as_they_are(dome, dead)
     assert rest[1] < model.longest[taut[1]] - 1e-4
 
 
+def test_rest_lengths_keep_their_bounds_where_the_linear_model_leads_beyond(dead):
+    search, it, _ = dead
+    model = search.models.at(it.point)
+    pulled = np.arange(len(model.origin)) % 2 == 0
+    y = np.where(pulled, 1e3, 1.0)  # N: lengths change by decimetres
+    assert (model._rest_lengths(y) < 0.0).any()
+    rest = model.design(y).rest_length[it.point.design.present]
+    assert rest.min() == 0.01
+    assert (rest <= model.longest).all()
+
+
 def test_the_model_tells_what_a_dead_cable_s_first_tension_does_to_second_order(dome, dead):
     search, it, wet = dead
     model = search.models.at(it.point)
