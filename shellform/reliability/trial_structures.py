@@ -12,7 +12,7 @@ The perfect structure's critical factor is asked for beside them, with an allowa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -281,23 +281,33 @@ def to_bear(
 ) -> dict[int, float]:
     """The numbers of structures that fall under loads on the design load's path where more do than may, and the
     factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its critical
-    factor, under PERFECT. Of those that fall as many are named as have to stand, and a few more: those that bear
-    most, from the one that bears least on. Raises NotConverged where the design has no unloaded equilibrium."""
+    factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
     found = tried(shell, design, asked, first=first, whole=True, judging=judging)
-    return aims(asked, found)
+    return _aims(asked, found, found.fallen)
 
 
 def aims(asked: Required, found: JudgedTrial) -> dict[int, float]:
-    """The same where the whole sample was judged already."""
+    """The same where the whole sample was judged already, and a search is at its end: of those that fall as many as
+    have to stand, and a few more. Those that bear most are named, from the one that bears least on. (Before
+    thinning all of them are aimed for: it spends what reserve that gives.)"""
+    return _aims(asked, found, {name: _nearest(found, name, asked.fallen[name]) for name in found.fallen})
+
+
+def _nearest(found: JudgedTrial, name: str, allowed: int) -> tuple[int, ...]:
+    """Of the structures that fall under the load `name` those that bear most of it, as many as have to stand and a
+    few more, from the one that bears least on."""
+    fell = sorted(found.fallen[name], key=lambda number: found.factors.get(number, 0.0))
+    return tuple(fell[max(0, allowed - _BESIDE) :])
+
+
+def _aims(asked: Required, found: JudgedTrial, named: Mapping[str, Collection[int]]) -> dict[int, float]:
     _, shares = largest_on_path(asked)
     least: dict[int, float] = {}
     if not found.critical:
         least[PERFECT] = _critical(asked, shares)
     for name in sorted(shares, key=lambda each: -shares[each]):
-        over = len(found.fallen[name]) - asked.fallen[name]
-        if over > 0:
-            nearest = sorted(found.fallen[name], key=lambda each: -found.factors.get(each, 0.0))
-            for number in reversed(nearest[: over + _BESIDE]):
+        if len(found.fallen[name]) > asked.fallen[name]:
+            for number in named[name]:
                 least.setdefault(number, shares[name])
     return least
 

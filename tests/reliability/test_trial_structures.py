@@ -5,7 +5,16 @@ import pytest
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability import trial_structures
 from shellform.reliability.safety import Safety
-from shellform.reliability.trial_structures import SEED, Demand, JudgedTrial, Required, aims, enlarged, tried
+from shellform.reliability.trial_structures import (
+    SEED,
+    Demand,
+    JudgedTrial,
+    Required,
+    aims,
+    enlarged,
+    to_bear,
+    tried,
+)
 
 ROUGH = Tolerances(supports=1e-4, load_each=0.1, load_all=0.4)
 
@@ -53,6 +62,22 @@ def test_as_many_are_aimed_for_as_have_to_stand_and_three_beside_those_that_bear
     assert next(iter(aims(asked, found))) == 1, "the one of them that bears least comes first"
     enough = JudgedTrial({"design": (), "additional": (1, 2, 3, 4)}, True, True, 0, factors)
     assert aims(asked, enough) == {}
+
+
+def test_before_thinning_all_that_fall_are_aimed_for_where_more_do_than_may(dome, nominal, monkeypatch):
+    asked = Required(
+        Safety(ROUGH, critical_factor=None, drawn=10, tried=10),
+        {"design": nominal.load, "additional": 1.25 * nominal.load},
+        "design",
+        {"design": 0, "additional": 4},
+    )
+    factors = {number: 0.1 + 0.1 * number for number in range(10)}
+    found = JudgedTrial({"design": (), "additional": tuple(range(9))}, True, False, 0, factors)
+    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: found)
+    assert to_bear(dome, dome.design(), asked) == dict.fromkeys(range(9), 1.0)
+    may = JudgedTrial({"design": (), "additional": (1, 2, 3, 4)}, True, True, 0, factors)
+    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: may)
+    assert to_bear(dome, dome.design(), asked) == {}
 
 
 def test_fresh_samples_spare_one_fall_or_what_two_designs_that_fall_as_often_differ_by(nominal):
