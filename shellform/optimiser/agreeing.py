@@ -20,7 +20,8 @@ from shellform.optimiser.trials import fresh, sound
 from shellform.reliability.trial_structures import aims
 
 _MORE = 0.2  # of all evaluations, that come on top where a sample disagrees
-_LEFT = 0.2  # of all evaluations, that thinning leaves where trials know no enlarged errors
+_MOST = 12  # samples, after which a turn without a step is the last
+_LEFT = 0.4  # of all evaluations, that thinning leaves where trials know no enlarged errors
 
 
 def leaving_some(search: Search) -> Search:
@@ -36,19 +37,30 @@ def agreed(
 ) -> tuple[bool, Iterate]:
     """Whether a fresh sample agrees that the last design stands, after turns of a sample and a descent led by
     what falls in it; and the iterate. Where the search was led, turns follow as long as they lead to a better design
-    with which a sample agrees."""
+    with which a sample agrees. After a turn without a step another sample leads on, and can't agree: drawn often
+    enough, a design stands by luck."""
     if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return True, it
     asked = search.asked
     search = replace(search, evaluations=search.evaluations + int(_MORE * search.evaluations))
     while True:
+        refused = False
         if it.until:  # in the middle of a turn
+            spent = search.evaluator.evaluations
             it = descend(finely(search, it.until), it)
-            there = sound(search, it.accepted[-1]) if len(it.accepted) > it.begun else None
-            if there is None:
+            refused = len(it.accepted) == it.begun  # by the sample that led the turn, which found no step
+            if refused and (
+                it.begun == it.stood or it.samples >= _MOST or search.evaluator.evaluations == spent
+            ):
                 break
-            it = replace(it, point=there, accepted=(*it.accepted[:-1], accepted_design(search, there)))
+            if not refused:
+                there = sound(search, it.accepted[-1])
+                if there is None:
+                    break
+                it = replace(it, point=there, accepted=(*it.accepted[:-1], accepted_design(search, there)))
         judged, it = fresh(search, it)
+        if judged.stands and refused:
+            break
         if judged.stands:
             found, before = it.point.objective, it.led_to
             if found < before:

@@ -18,6 +18,7 @@ from tests.problems import misfit_and_force
 ROUGH = sf.Tolerances(cable_length=2e-4, supports=1e-4, marks=2e-4, load_each=0.1, load_all=0.05)
 ASKED = sf.Safety(ROUGH, critical_factor=None, drawn=4, tried=3, enlarged=1.5, seed=5)
 FALLS = JudgedTrial({"wet": (FRESH + 1,)}, True, False, 0)
+OTHER = JudgedTrial({"wet": (FRESH + 2,)}, True, False, 0)
 STANDS = JudgedTrial({"wet": ()}, True, True, 0)
 
 
@@ -132,6 +133,30 @@ def test_a_search_without_an_evaluation_left_says_that_no_sample_agrees(searchin
     assert not told, "no design is drawn twice until it stands by luck"
 
 
+def test_after_a_turn_without_a_step_another_sample_leads_on_and_cant_agree(searching, samples):
+    search, it, _ = searching
+    told, judged = samples
+    turns = []
+
+    def stuck_once(search, it):
+        turns.append(it)
+        if len(turns) > 1:
+            return phases._descend(search, it)
+        search.evaluator.evaluations += 3  # trials, none of which is accepted
+        return it
+
+    told[:] = [FALLS, OTHER, *[STANDS] * 20]
+    agrees, after = agreeing.agreed(search, it, stuck_once)
+    assert agrees
+    assert judged[0] == judged[1] > after.led_to
+    assert {each.number for each in turns[1].mind.scenarios} == {FRESH + 1, FRESH + 2}
+
+    turns.clear()
+    told[:] = [FALLS, STANDS]
+    assert not agreeing.agreed(search, it, stuck_once)[0]
+    assert not told
+
+
 def test_a_turn_taken_up_in_its_middle_ends_as_if_nothing_had_been(searching, samples):
     search, it, kept = searching
     told, _ = samples
@@ -151,5 +176,5 @@ def test_thinning_leaves_evaluations_to_turns_where_trials_arent_trusted(searchi
     search, _, _ = searching
     assert agreeing.leaving_some(search).evaluations == 20
     fragile = replace(search, asked=replace(search.asked, trusted=False))
-    assert agreeing.leaving_some(fragile).evaluations == 16
+    assert agreeing.leaving_some(fragile).evaluations == 12
     assert agreeing.leaving_some(replace(fragile, asked=None)).evaluations == 20
