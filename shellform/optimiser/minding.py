@@ -89,7 +89,7 @@ def joined(search: Search, it: Iterate, design: Design) -> Iterate:
 
 def finely(search: Search, until: int) -> Search:
     """The search in steps as small as what falls first asks for, until so many evaluations are spent."""
-    fine = replace(search.solver, window=_WINDOW, smallest=_SMALLEST)
+    fine = replace(search.solver, window=_WINDOW, smallest=min(_SMALLEST, search.solver.smallest))
     return replace(search, solver=fine, evaluations=min(search.evaluations, until))
 
 

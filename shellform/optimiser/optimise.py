@@ -49,7 +49,7 @@ import numpy as np
 from shellform.arrays import Indices
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
-from shellform.optimiser.minding import as_borne
+from shellform.optimiser.minding import as_borne, finely
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes, minimise_directly
 from shellform.optimiser.optimum import Checkpoint, Optimum
 from shellform.optimiser.phases import run
@@ -188,7 +188,8 @@ def polish(
         it = replace(it, guarded=True, tensioned=np.ones_like(it.tensioned), fallen=best.fallen)
         it = as_borne(search, it, best.mind)
         if best.asked is not None and it.mind is not None:
-            search = replace(search, asked=best.asked.unspared())
+            search = replace(finely(search, evaluations), asked=best.asked)
+            it = replace(it, window=search.first_window)
         it = run(search, it)
         polished = finish(search, it)
     better = (

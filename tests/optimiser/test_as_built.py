@@ -119,6 +119,7 @@ def test_a_design_that_structures_led_to_is_polished_with_these_in_mind_and_judg
     held = sf.polish(replace(best, asked=asked, mind=aims), evaluations=4)
     assert held.objective < held.objective_start
     assert held.mind.keys() == aims.keys()
+    assert 1.0 > held.history[1].objective > free.history[1].objective, "in smaller steps"
     assert [each.first for each in judged] == [FRESH]
     case, seed = sf.LoadCase("wet", one.loads["wet"]), one.safety.seed + SEED
     mind = scenarios(stout, best.design, case, one.tolerances, seed=seed, least=held.mind, most=20.0)
