@@ -23,8 +23,8 @@ def case_tolerances(case: Case, shell: Gridshell) -> Tolerances:
 
 
 def case_safety(case: Case, shell: Gridshell) -> Safety | None:
-    """What a search has to keep; None where nothing is required. It draws under a seed of its own, so that
-    the sample that is told is a fresh one."""
+    """What a search has to keep; None where nothing is required. Its seed is the one by which a finished design is
+    judged; a search draws under another (reliability/trial_structures.py), so that the sample that is told is a fresh one."""
     entry = case.safety
     if not is_required(case):
         return None
@@ -34,7 +34,7 @@ def case_safety(case: Case, shell: Gridshell) -> Safety | None:
         probability_additional=entry.probability_additional,
         critical_factor=critical_factors_asked(case).get("design"),
         drawn=min(entry.drawn, SEARCHED),
-        seed=entry.seed + 1,
+        seed=entry.seed,
     )
 
 

@@ -64,7 +64,10 @@ class SafetyEntry(Entry):
         {}, description="the same of further load cases, by name: { half = 1.2 }"
     )
     drawn: PositiveInt = Field(200, description="structures of the design to build")
-    compared: PositiveInt = Field(20, description="structures of the designs to compare with")
+    compared: PositiveInt = Field(
+        20,
+        description="structures of the designs to compare with; of the initial one all where no fewer than of it are to stand",
+    )
     rare: NonNegativeInt = Field(
         0,
         multiple_of=10,

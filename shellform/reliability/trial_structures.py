@@ -29,7 +29,7 @@ from shellform.reliability.safety import Safety, allowed, critical_on_halved, pa
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.threads import side_by_side
 
-SEED = 1  # added to the safety's: a search doesn't see the structures that a finished design is judged by
+SEED = 2  # added to the safety's: a search doesn't see the structures that a finished design is judged by
 FRESH = 100_000  # the number from which on structures are of fresh samples, whose errors are as they are
 MOST = 40  # structures by which a search tries designs without enlarged errors
 Judging = Callable[[int, int], None]
@@ -123,7 +123,9 @@ def demand(
     at the edge of falling can't tell one design from another. Where it doesn't bear them as large as they are asked
     for, numbers make up for it: a search that tries hundreds of designs on a dozen structures with errors as they are finds one
     for that dozen. The fresh sample is as large as the one by which a finished design is judged: what forty confirmed fell in three
-    of two hundred. Raises NotConverged where the start has no unloaded equilibrium."""
+    of two hundred. Where as many may fall as of the start, those of the start are counted that a finished design is
+    judged by: that is what is asked for, and another sample has a tenth more of them or less. Raises NotConverged where the start
+    has no unloaded equilibrium."""
     trial, many = None, max(MOST, safety.tried)
     for factor, tries in ((safety.enlarged, safety.tried), (0.5 * (1.0 + safety.enlarged), many)):
         own = replace(safety, enlarged=factor, tried=tries)
@@ -140,8 +142,9 @@ def demand(
     trusted = trial.safety.enlarged == safety.enlarged > 1.0
     fresh = replace(safety, enlarged=1.0, tried=safety.drawn)
     if any(trial.fallen[name] > _known(trial.safety, name, design_load) for name in trial.fallen):
-        shown = required(shell, start, loads, fresh, design_load=design_load, first=FRESH, judging=judging)
-        return Demand(trial, shown, trusted)
+        judged = replace(fresh, seed=fresh.seed - SEED)
+        shown = required(shell, start, loads, judged, design_load=design_load, judging=judging)
+        return Demand(trial, replace(shown, safety=fresh, first=FRESH), trusted)
     known = {name: _known(fresh, name, design_load) for name in trial.fallen}
     return Demand(trial, Required(fresh, trial.loads, design_load, known, FRESH), trusted)
 

@@ -10,6 +10,7 @@ from shellform.optimiser import trials
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability import trial_structures
 from shellform.reliability.scenarios import scenarios
+from shellform.reliability.standing import sample
 from shellform.reliability.trial_structures import (
     FRESH,
     MOST,
@@ -118,8 +119,8 @@ def test_a_design_that_structures_led_to_is_polished_with_these_in_mind_and_judg
     aims = {0: 20.0, 1: 20.0}  # more than they bear: what they bear is kept
     held = sf.polish(replace(best, asked=asked, mind=aims), evaluations=4)
     assert held.objective < held.objective_start
-    assert held.mind.keys() == aims.keys()
     assert 1.0 > held.history[1].objective > free.history[1].objective, "in smaller steps"
+    assert held.mind.keys() == aims.keys()
     assert [each.first for each in judged] == [FRESH]
     case, seed = sf.LoadCase("wet", one.loads["wet"]), one.safety.seed + SEED
     mind = scenarios(stout, best.design, case, one.tolerances, seed=seed, least=held.mind, most=20.0)
@@ -204,6 +205,17 @@ def test_no_more_is_asked_of_designs_than_the_start_shows(stout, problem):
         stout, stout.design(), heavy, replace(ASKED, probability_additional=0.99), design_load="wet"
     )
     assert named.fallen["wetter"] == 0
+
+
+def test_as_many_may_fall_in_fresh_samples_as_of_those_structures_of_the_start_that_judge_the_end(
+    stout, problem
+):
+    heavy = {"wet": 1.4 * problem.loads["wet"], "wetter": 2.2 * problem.loads["wet"]}
+    found = demand(stout, stout.design(), heavy, replace(ASKED, drawn=30), design_load="wet")
+    last = sample(stout, stout.design(), heavy["wetter"], ROUGH, count=30, seed=ASKED.seed).standing
+    assert 0 < found.confirmed.fallen["wetter"] == last.drawn - last.standing < 30
+    assert found.confirmed.numbers == range(FRESH, FRESH + 30)
+    assert found.confirmed.safety.seed == ASKED.seed, "but drawn they are apart"
 
 
 def test_a_design_is_confirmed_only_with_its_critical_factor_on_the_halved_mesh(stout, problem):

@@ -18,6 +18,7 @@ from shellform.reliability.standing import sample
 from shellform.run import examination, optimising
 from shellform.run.examination import _standing
 from shellform.run.folder import read_run
+from shellform.run.judged import run_checks
 from shellform.run.run import run_case
 from tests.stubs import CASE
 
@@ -206,7 +207,7 @@ def test_tolerances_of_the_case_take_the_place_of_the_defaults(file, whole):
     found = case_tolerances(load_case(file, ["tolerances.marks=0.001", "tolerances.shape=0"]), shell)
     assert found == replace(default_tolerances(shell), marks=0.001, shape=0.0)
     safety = case_safety(load_case(file, ["safety.drawn=500", "safety.seed=7"]), shell)
-    assert (safety.drawn, safety.seed) == (200, 8)
+    assert (safety.drawn, safety.seed) == (200, 7)
     assert case_safety(load_case(file, ["safety.required=false"]), shell) is None
 
 
@@ -267,3 +268,23 @@ def test_a_design_without_unloaded_equilibrium_is_told_as_not_found(file, whole,
     assert row.critical_kind == "not found: there is none"
     assert row.critical_factor is None
     assert "Critical factor of the design load" in summary.verdict.not_examined
+
+
+def test_the_initial_design_is_drawn_in_full_where_no_fewer_are_to_stand_than_of_it(
+    file, tmp_path, monkeypatch
+):
+    def drawn_of(folder, name, made, under, *, count, **_):
+        load, _ = under
+        stand = tuple(not (load == "additional" and number in (2, 7)) for number in range(count))
+        return DrawnPath(tuple(1.0 if each else 0.9 for each in stand), stand)
+
+    monkeypatch.setattr(examination, "drawn_of", drawn_of)
+    monkeypatch.setattr(examination, "_failure", lambda *_: None)
+    run_case(load_case(file, FEW), tmp_path, until="safety")
+    told = read_summary(tmp_path).designs
+    row = told["initial"].loads["additional"].stands
+    assert (row.standing, row.drawn) == (10, 12)
+    assert told["optimised"].loads["additional"].stands.standing == 10
+    checks = {each.name: each for each in run_checks(read_run(tmp_path))}
+    (asked,) = [each for name, each in checks.items() if name.startswith("As built under 1.2")]
+    assert asked.limit == "at least 10 of 12", "and not 9, as three of the first four say"
