@@ -10,7 +10,6 @@ is the sample: what structures in mind bear is an aim and no limit.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
@@ -30,6 +29,7 @@ from shellform.optimiser.search_state import (
 )
 from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.trials import sound, standing
+from shellform.reliability.drawing import PERFECT
 from shellform.reliability.trial_structures import closer, to_bear
 
 _SHARE = 0.1  # of all evaluations, for one turn of a descent and a judgement at the most …
@@ -120,7 +120,10 @@ def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, flo
     """With these structures in mind beside those that are, the latest first, all remembered in the `design`,
     as far as they can be followed; the stiffness to keep goes down to the solver's own. As it was where none can."""
     known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
-    every = dict(itertools.islice({**least, **known, **least}.items(), _MOST))
+    latest = list({**least, **known, **least}.items())
+    if it.phase == "agree":  # fewest may fall under the smallest load
+        latest.sort(key=lambda each: (each[0] != PERFECT, each[1]))
+    every = dict(latest[:_MOST])
     if not every:
         return it
     try:

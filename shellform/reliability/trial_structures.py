@@ -286,14 +286,19 @@ def to_bear(
     factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its critical
     factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
     found = tried(shell, design, asked, first=first, whole=True, judging=judging)
-    return _aims(asked, found, found.fallen)
+    _, shares = largest_on_path(asked)
+    return _aims(
+        asked, found, {name: found.fallen[name] for name in sorted(shares, key=lambda each: -shares[each])}
+    )
 
 
 def aims(asked: Required, found: JudgedTrial) -> dict[int, float]:
     """The same where the whole sample was judged already, and a search is at its end: of those that fall as many as
-    have to stand, and a few more. Those that bear most are named, from the one that bears least on. (Before
-    thinning all of them are aimed for: it spends what reserve that gives.)"""
-    return _aims(asked, found, {name: _nearest(found, name, asked.fallen[name]) for name in found.fallen})
+    have to stand, and a few more, under the smaller load first, where fewer may. Those that bear most are named, from the
+    one that bears least on. (Before thinning all of them are aimed for: it spends what reserve that gives.)"""
+    _, shares = largest_on_path(asked)
+    names = sorted(shares, key=lambda each: shares[each])
+    return _aims(asked, found, {name: _nearest(found, name, asked.fallen[name]) for name in names})
 
 
 def _nearest(found: JudgedTrial, name: str, allowed: int) -> tuple[int, ...]:
@@ -304,13 +309,15 @@ def _nearest(found: JudgedTrial, name: str, allowed: int) -> tuple[int, ...]:
 
 
 def _aims(asked: Required, found: JudgedTrial, named: Mapping[str, Collection[int]]) -> dict[int, float]:
+    """The perfect structure's, and those of the numbers `named` under each load where more fall than may; one that is
+    under several keeps the first."""
     _, shares = largest_on_path(asked)
     least: dict[int, float] = {}
     if not found.critical:
         least[PERFECT] = _critical(asked, shares)
-    for name in sorted(shares, key=lambda each: -shares[each]):
+    for name, numbers in named.items():
         if len(found.fallen[name]) > asked.fallen[name]:
-            for number in named[name]:
+            for number in numbers:
                 least.setdefault(number, shares[name])
     return least
 

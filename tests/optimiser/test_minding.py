@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from shellform.optimiser.resuming import resumed, tell
 from shellform.optimiser.search_state import accepted_design, merit, missed, violation
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability.drawing import PERFECT
-from shellform.reliability.scenarios import FactorsAsBuilt
+from shellform.reliability.scenarios import FactorsAsBuilt, Scenario
 from shellform.reliability.trial_structures import Demand, JudgedTrial, Required, closer, to_bear
 from tests.problems import misfit_and_force
 
@@ -70,6 +71,22 @@ def test_what_structures_in_mind_bear_is_an_aim_and_no_limit(searching, monkeypa
     # those that fall later come first
     monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {2: 1.0})
     assert [each.number for each in joined(search, led, led.accepted[-1].built).mind.scenarios] == [2, 0, 1]
+
+
+def test_led_by_fresh_samples_those_that_fall_under_the_smallest_load_are_kept_in_mind(
+    searching, monkeypatch
+):
+    search, it, _ = searching
+    kept = []
+    monkeypatch.setattr(minding, "kept_in_mind", lambda _, __, least: kept.append(least))
+    monkeypatch.setattr(minding, "restiffened", lambda _, it, __: it)
+    known = [Scenario(number, None, 0.8) for number in (1, 2)]
+    it = replace(it, mind=SimpleNamespace(scenarios=tuple(known)))
+    least = {3: 0.8, PERFECT: 1.1, **dict.fromkeys(range(10, 30), 1.0)}
+    minding.minding(search, it, it.point.design, least)
+    assert [*kept.pop()][:3] == [3, PERFECT, 10], "the latest first"
+    minding.minding(search, replace(it, phase="agree"), it.point.design, least)
+    assert [*kept.pop()] == [PERFECT, 3, 1, 2, *range(10, 18)]
 
 
 def test_without_a_structure_that_falls_there_is_nothing_to_be_led_by(searching, monkeypatch):
