@@ -51,28 +51,27 @@ def analyse(
     from shellform.structure.answers.result_document import result
     from shellform.structure.answers.results import read_sections
     from shellform.structure.model import read_model
-    from shellform.structure.solve.memory import limit_to_free_memory
+    from shellform.structure.solve.memory import limited_to_free_memory
 
     report = Spinner()
     try:
-        if figures is None:  # pictures ask the graphics driver for memory on terms of its own
-            limit_to_free_memory()
         known = read_sections(sections) if sections is not None else None
-        analysis = solve(
-            read_model(model),
-            load=load,
-            factor=factor,
-            increments=increments,
-            tolerance=tolerance,
-            method="path" if path or lead else method,
-            lead=_lead(lead) if lead else None,
-            limit=limit,
-            mode_count=modes,
-            critical_to=critical,
-            progress=lambda reached, spent: report(
-                Event("analysis", f"load factor {reached:.4g}, {spent} factorisations")
-            ),
-        )
+        with limited_to_free_memory():
+            analysis = solve(
+                read_model(model),
+                load=load,
+                factor=factor,
+                increments=increments,
+                tolerance=tolerance,
+                method="path" if path or lead else method,
+                lead=_lead(lead) if lead else None,
+                limit=limit,
+                mode_count=modes,
+                critical_to=critical,
+                progress=lambda reached, spent: report(
+                    Event("analysis", f"load factor {reached:.4g}, {spent} factorisations")
+                ),
+            )
         document = result(analysis, sections=known)
     finally:
         report.close()

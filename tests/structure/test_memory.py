@@ -10,6 +10,7 @@ import pytest
 
 from shellform.structure.solve import addresses, pardiso
 from shellform.structure.solve.addresses import has_room
+from shellform.structure.solve.memory import limited_to_free_memory
 
 resource = pytest.importorskip("resource")
 ROOT = Path(__file__).parent.parent.parent
@@ -33,6 +34,18 @@ def test_work_areas_are_taken_only_where_there_is_room_for_them(monkeypatch):
     monkeypatch.setattr(addresses, "has_room", lambda size: False)
     with pytest.raises(MemoryError, match="no room for BLAS"):
         addresses.take_work_areas()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux refuses memory under a limit")
+def test_the_limit_to_what_is_free_ends_with_what_it_was_set_for():
+    """A limit that was left to the process kept the next one from being set, and pictures from their memory."""
+    before = resource.getrlimit(resource.RLIMIT_DATA)
+    with limited_to_free_memory():
+        within = resource.getrlimit(resource.RLIMIT_DATA)[0]
+        assert 0 < within != before[0]
+    with pytest.raises(MemoryError), limited_to_free_memory():
+        raise MemoryError
+    assert resource.getrlimit(resource.RLIMIT_DATA) == before
 
 
 @pytest.mark.parametrize("megabytes", [650, 700, 800])

@@ -9,6 +9,8 @@ part is left to them in any case.
 from __future__ import annotations
 
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 _SHARE = 0.95  # of what is free when the work begins
@@ -16,19 +18,26 @@ _SHARE = 0.95  # of what is free when the work begins
 _LOADING = 400_000_000
 
 
-def limit_to_free_memory() -> None:
-    """Limits the data of this process to what is free now, or to what loading takes if that is more, where
-    the system can (Linux).
+@contextmanager
+def limited_to_free_memory() -> Iterator[None]:
+    """Limits the data of this process, within, to what is free now, or to what loading takes if that is more, where
+    the system can (Linux) and nobody has set a limit already.
     """
-    if sys.platform != "linux":
+    free = free_memory()
+    if sys.platform != "linux" or free is None:
+        yield
         return
     import resource
 
-    free = free_memory()
-    soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    if free is None or soft != resource.RLIM_INFINITY:
-        return  # somebody has set a limit already
+    before, hard = resource.getrlimit(resource.RLIMIT_DATA)
+    if before != resource.RLIM_INFINITY:
+        yield
+        return
     resource.setrlimit(resource.RLIMIT_DATA, (_data_size() + max(int(_SHARE * free), _LOADING), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (before, hard))
 
 
 def free_memory() -> int | None:
