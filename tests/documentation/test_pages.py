@@ -164,6 +164,13 @@ def test_every_link_leads_somewhere_within_two_steps_of_the_start():
                 assert anchor in anchors(target.read_text(encoding="utf-8")), f"{page.name}: {link}#{anchor}"
 
 
+def test_every_column_of_a_table_has_a_name_that_can_be_read_aloud():
+    for page in sorted(PAGES.rglob("*.md")):
+        heads = re.findall(r"^\|(.*)\|\n\|[ :|-]+\|$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        for head in heads:
+            assert all(name.strip() for name in head.split("|")), f"{page.name}: {head}"
+
+
 def test_every_page_stands_in_the_site_s_contents():
     contents = set(
         re.findall(
