@@ -1,6 +1,6 @@
 """From a case to its design problem, the engineer's limits included, and what each design shows of them.
 
-Every limit holds under every load case, and those that matter before concrete comes also without load. The
+Every limit but the deviation's holds under every load case, and those that matter before concrete comes also without load. The
 critical load factor F is kept by a load case "critical NAME", F times the load case, that every accepted
 design bears on its stable branch, its softest mode keeping a share of the initial design's stiffness under
 the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is followed by stable
@@ -114,7 +114,7 @@ def robust_misfit(case: Case, shell: Gridshell) -> RobustMisfit | None:
 
 
 def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[Constraint]:
-    """The limits on rods, connectors, supports and slack cables."""
+    """The limits on rods, connectors, supports and slack cables; those on the shape are thinning's (solver.py)."""
     entry = case.limits
     found: list[Constraint] = []
     for name in loads:

@@ -297,6 +297,10 @@ class OptimiseEntry(Entry):
     cables_max: PositiveInt | None = Field(
         None, description="cables are taken away down to this number, if limits allow"
     )
+    deviation: PositiveFloat | None = Field(
+        None,
+        description="distance of a node from its place under the design load, m, beyond which no cable is taken away for it",
+    )
     symmetric: bool = Field(
         False, description="cables that a symmetry of the net joins are polished to one length"
     )
@@ -318,9 +322,10 @@ class OptimiseEntry(Entry):
             )
         if self.symmetric and not self.polish:
             raise ValueError("symmetric lengths are found in polishing: give polish some evaluations")
-        if self.method == "paper" and (self.symmetric or self.cables_max is not None):
+        thins = self.cables_max is not None or self.deviation is not None
+        if self.method == "paper" and (self.symmetric or thins):
             raise ValueError(
-                "the paper's method neither polishes nor takes cables away: symmetric and cables_max need method convex"
+                "the paper's method neither polishes nor takes cables away: symmetric, cables_max and deviation need method convex"
             )
         if self.catalogue is not None and not self.rod_radius:
             raise ValueError("catalogue is for a free radius: give rod_radius a share")
@@ -337,10 +342,13 @@ class FiguresEntry(Entry):
 
 
 class LimitsEntry(Entry):
-    """What an engineer limits besides constraints (5) and (6), each under every load case and without load;
-    left out: not limited.
+    """What an engineer limits besides constraints (5) and (6), each under every load case and without load, but the
+    deviation, which counts where the concrete hardens; left out: not limited.
     """
 
+    deviation: PositiveFloat | None = Field(
+        None, description="largest distance of a node from its place under the design load, m"
+    )
     utilisation: PositiveFloat | None = Field(
         None, description="largest fibre stress of the rods over their strength, erection stress included"
     )

@@ -37,7 +37,7 @@ from shellform.optimiser.search_state import (
     violation,
 )
 from shellform.optimiser.step_model import StepModel
-from shellform.optimiser.thinning import kept_stiffness, removable
+from shellform.optimiser.thinning import Budget, allowed, kept_stiffness, removable
 from shellform.optimiser.trials import (
     accepted,
     attempt,
@@ -168,7 +168,7 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
     if search.asked is None:
         return begun
     tensioned = replace(begun, tensioned=_tensioned(search, it))
-    found, other = _made_to_stand(search, tensioned, it.point, budget=np.inf)
+    found, other = _made_to_stand(search, tensioned, it.point, Budget())
     if found is not None and found.objective <= it.point.objective:
         return _ready_to_thin(search, accepted(search, other, found))
     fell = it.accepted[-1].built
@@ -195,18 +195,18 @@ def _ready_as_it_is(search: Search, it: Iterate) -> Iterate:
 
 
 def _made_to_stand(
-    search: Search, it: Iterate, trial: Evaluated, budget: float
+    search: Search, it: Iterate, trial: Evaluated, budget: Budget
 ) -> tuple[Evaluated | None, Iterate]:
     """The trial where it breaks no limit more than the iterate does and stands as built; where it only
     falls, one near it, for which more stiffness is asked, and repaired for, until it stands. None, and the
-    iterate with the stiffness that it kept, where it comes to nothing within the `budget` of the objective.
+    iterate with the stiffness that it kept, where it comes to nothing within the `budget`.
 
     Where designs are judged as built, the stiffness to keep is no limit but what repairs aim for: it comes
     down to what a trial that stands has, and not below the solver's own.
     """
     solver, begun = search.solver, it
     for more in reversed(range(solver.stiffenings + 1)):
-        if trial.objective > budget:
+        if not budget.covers(search, trial):
             break
         trial, it = _aiming_lower(search, it, trial)
         if violation(search, trial) > max(violation(search, begun.point), 0.0):
@@ -278,7 +278,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         it = _without_slack(search, it)
         tell(search, it)
         over = most is not None and taut_count(search, it.point) > most
-        budget = np.inf if over else it.thrifty
+        budget = Budget(np.inf if over else it.thrifty, allowed(search, it))
         model = search.models.at(it.point)
         leaving = _leaving(search, it, model)
         if not len(leaving):
@@ -292,7 +292,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         # constraints that it breaks are the repair's business; but repairs serve the objective too, with what
         # made a design stand
         if found is None and not it.fell and trial is not None:
-            if trial.objective < 2.0 * budget:
+            if trial.objective < 2.0 * budget.objective:
                 trial, it = _repaired(search, it, trial)
             found, it = _made_to_stand(search, it, trial, budget)
         if found is None:

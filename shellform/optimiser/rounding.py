@@ -10,7 +10,7 @@ problem, its weights those of the initial design.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
@@ -59,16 +59,14 @@ def tried(
     *,
     evaluations: int,
     beside: int,
-    most_cables: int | None = None,
-    solver: MovingAsymptotes | None = None,
+    solver: SequentialConvex | MovingAsymptotes | None = None,
     progress: Callable[[str], None] = lambda text: None,
 ) -> list[CandidateSection]:
     """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness,
     each with its cables optimised.
 
     `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section; `solver`, another method than `optimise` has by default, which keeps no stiffness and no number
-    of cables. What was asked of the optimum as built is asked of each. Raises InputError where no section
+    section; `solver`, what made the optimum, of which the stiffness that it kept is asked here too. What was asked of the optimum as built is asked of each. Raises InputError where no section
     that the net allows is stiff enough.
     """
     shell = best.problem.shell
@@ -85,8 +83,7 @@ def tried(
             [design, _whole(start, design)],
             best.stiffness,
             evaluations,
-            most_cables,
-            solver,
+            solver or SequentialConvex(),
             None if best.asked is None else best.asked.trial.safety,
         )
         found.append(_candidate(name, other, optimum, why, weights, best.problem, other.rod.section == up))
@@ -119,8 +116,7 @@ def _optimised(
     starts: Sequence[Design],
     least: float,
     evaluations: int,
-    most_cables: int | None,
-    solver: MovingAsymptotes | None,
+    solver: SequentialConvex | MovingAsymptotes,
     safety: Safety | None,
 ) -> tuple[Optimum | None, str]:
     """The best design from the first of the starts that leads to a feasible one, or the last found; and why
@@ -132,8 +128,9 @@ def _optimised(
             found = optimise(
                 problem,
                 start,
-                solver=solver
-                or SequentialConvex(stiffness=_share(problem, start, least), most_cables=most_cables),
+                solver=replace(solver, stiffness=_share(problem, start, least))
+                if isinstance(solver, SequentialConvex)
+                else solver,
                 evaluations=evaluations,
                 safety=safety,
                 initial=starts[-1],

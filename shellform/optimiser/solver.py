@@ -25,6 +25,8 @@ class SequentialConvex:
       the design load (0: nothing). Deviations don't see buckling coming, its stiffness does.
     - `most_cables`: down to so many cables are taken away whatever they do for the objective, as long as
       every constraint is kept.
+    - `deviation`, m: no cable is taken away if a node then is farther than this from its place under the design load, or
+      farther than before where it was beyond it.
 
     The trust region:
     - `smallest`: window at which no better design is to be found, which ends a turn.
@@ -74,6 +76,7 @@ class SequentialConvex:
     thin: bool = True
     stiffness: float = 0.08
     most_cables: int | None = None
+    deviation: float | None = None
 
     smallest: float = 0.03
     grow: float = 1.6

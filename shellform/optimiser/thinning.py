@@ -9,21 +9,51 @@ stays positive definite as long as
 does, B being the cables' directions and k = EA/l0. One block solve gives S for all cables; its diagonal is
 what the structure keeps of its stiffness along each cable when that one goes, small numbers belonging to
 cables that hold the softest mode. Sets are chosen greedily by a Cholesky factor of S that grows row by row
-and may not lose more than a set share.
+and may not lose more than a set share. What they may cost is a budget: of the objective, and of the shape.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from shellform.arrays import Indices, Reals
+from shellform.optimiser.search_state import Iterate, Search
+from shellform.problem.evaluation import Evaluated
+from shellform.problem.paths import deviations
 from shellform.structure.answers.sensitivity import element_columns
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
 
 _BLOCK = 256  # columns solved for at once
+
+
+@dataclass(frozen=True)
+class Budget:
+    """What cables may cost that are taken away: the `objective` that is left, and the `deviation`, m, of any node from its
+    place under the design load."""
+
+    objective: float = np.inf
+    deviation: float = np.inf
+
+    def covers(self, search: Search, trial: Evaluated) -> bool:
+        """Whether the trial costs no more."""
+        near = self.deviation == np.inf or farthest(search, trial) <= self.deviation
+        return trial.objective <= self.objective and near
+
+
+def allowed(search: Search, it: Iterate) -> float:
+    """The deviation, m, to which cables may be taken away: the solver's, or the present one where that is beyond it."""
+    most = search.solver.deviation
+    return np.inf if most is None else max(most, farthest(search, it.point))
+
+
+def farthest(search: Search, trial: Evaluated) -> float:
+    """The largest distance, m, of a node from its place under the design load."""
+    return float(deviations(search.problem.shell, trial.states[search.base]).max())
 
 
 def kept_stiffness(

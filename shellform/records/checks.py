@@ -29,13 +29,14 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 @dataclass(frozen=True)
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
-    mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) `stress`
-    over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
+    mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
+    `deviation`, m, under the design load, `stress` over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
     `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
     structures as built (`safety`); and how the case gives its `rods`' size."""
 
     force: float
     misfit: float
+    deviation: float | None = None
     stress: float | None = None
     turn: float | None = None
     uplift: float | None = None
@@ -134,6 +135,11 @@ def _stress(row: LoadRecord) -> float:
     return max(row.rod_utilisation_max, row.rod_utilisation_max - 0.75 * error)
 
 
+def _deviation(row: LoadRecord) -> float:
+    """The largest, m, on the mesh on which it is larger, likewise."""
+    return max(row.deviation_max, row.deviation_max - 0.75 * (row.deviation_max_error or 0.0))
+
+
 def _edged(row: LoadRecord) -> Cell:
     """The stress of edge beams over their strength."""
     share = row.edge_utilisation_max or 0.0
@@ -142,86 +148,92 @@ def _edged(row: LoadRecord) -> Cell:
     )
 
 
+@dataclass(frozen=True)
+class _Limit:
+    """One that an engineer set, or (5): its `title`, the `most` of what is limited (None: not limited), in the unit of the
+    case's `entry`; the `unit` in which people read it, so many of which (`times`) make one of the entry's; and a design's
+    `value`, in the entry's unit."""
+
+    title: str
+    entry: str
+    most: float | None
+    value: Callable[[DesignRecord], float | None]
+    unit: str
+    times: float = 1.0
+
+
 def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: Bounds) -> list[Check]:
     """Constraint (5), and what an engineer limits, each at its worst over the load cases."""
 
-    def worst(
-        title: str,
-        unit: str,
-        limit: float,
-        value: Callable[[DesignRecord], float | None],
-        entry: str,
-        size: float,
-    ) -> Check:
-        """`size` is what one of the unit is in the entry that limits it."""
-        cells = {}
-        for name in designs:
-            found = value(rows[name]) if name in rows else None
-            cells[name] = below(found, limit, unit, "" if found is None else allow(entry, found * size))
-        return Check(title, f"{number(limit)} {unit}", cells)
+    def worst(value: Callable[[LoadRecord], float | None]) -> Callable[[DesignRecord], float | None]:
+        return lambda row: _largest(value(each) for each in row.loads.values())
 
-    found = [
-        worst(
+    limits = [
+        _Limit(
             "Largest cable force under the design load and those beyond it (5)",
-            "N",
+            "cable.force_max",
             bounds.force,
             lambda row: (
                 _largest(each.cable_force_max for load, each in row.loads.items() if load != "none")
                 or row.cable_force_max
             ),
-            "cable.force_max",
-            1.0,
-        )
+            "N",
+        ),
+        _Limit(
+            "Largest deviation under the design load",
+            "limits.deviation",
+            bounds.deviation,
+            lambda row: _deviation(row.loads["design"]) if "design" in row.loads else None,
+            "mm",
+            1e3,
+        ),
+        _Limit(
+            "Rods' stress with axial force under any load",
+            "limits.utilisation",
+            bounds.stress,
+            worst(lambda load: load.stress_utilisation_max),
+            "% of the strength",
+            100.0,
+        ),
+        _Limit(
+            "Connectors' turning under any load",
+            "limits.connector_turn",
+            bounds.turn,
+            worst(lambda load: load.connector_turn_max),
+            "°",
+            180.0 / math.pi,
+        ),
+        _Limit(
+            "Uplift of a support under any load",
+            "limits.uplift",
+            bounds.uplift,
+            worst(lambda load: load.uplift_max),
+            "N",
+        ),
+        _Limit(
+            "Thrust on a support under any load",
+            "limits.thrust",
+            bounds.thrust,
+            worst(lambda load: load.thrust_max),
+            "N",
+        ),
     ]
-    if bounds.stress is not None:
-        found.append(
-            worst(
-                "Rods' stress with axial force under any load",
-                "% of the strength",
-                100.0 * bounds.stress,
-                lambda row: _largest((each.stress_utilisation_max for each in row.loads.values()), 100.0),
-                "limits.utilisation",
-                0.01,
-            )
-        )
-    if bounds.turn is not None:
-        degrees = 180.0 / math.pi
-        found.append(
-            worst(
-                "Connectors' turning under any load",
-                "°",
-                degrees * bounds.turn,
-                lambda row: _largest((each.connector_turn_max for each in row.loads.values()), degrees),
-                "limits.connector_turn",
-                1.0 / degrees,
-            )
-        )
-    if bounds.uplift is not None:
-        found.append(
-            worst(
-                "Uplift of a support under any load",
-                "N",
-                bounds.uplift,
-                lambda row: _largest(each.uplift_max for each in row.loads.values()),
-                "limits.uplift",
-                1.0,
-            )
-        )
-    if bounds.thrust is not None:
-        found.append(
-            worst(
-                "Thrust on a support under any load",
-                "N",
-                bounds.thrust,
-                lambda row: _largest(each.thrust_max for each in row.loads.values()),
-                "limits.thrust",
-                1.0,
-            )
-        )
+    found = [_at_most(each, each.most, rows, designs) for each in limits if each.most is not None]
     if bounds.slack is not None:
-        for load in bounds.slack_loads:
-            found.append(_taut(rows, designs, load, bounds.slack))
+        found += [_taut(rows, designs, load, bounds.slack) for load in bounds.slack_loads]
     return found
+
+
+def _at_most(limit: _Limit, most: float, rows: Mapping[str, DesignRecord], designs: Sequence[str]) -> Check:
+    cells = {}
+    for name in designs:
+        value = limit.value(rows[name]) if name in rows else None
+        cells[name] = (
+            UNKNOWN
+            if value is None or not math.isfinite(value)
+            else below(limit.times * value, limit.times * most, limit.unit, allow(limit.entry, value))
+        )
+    return Check(limit.title, f"{number(limit.times * most)} {limit.unit}", cells)
 
 
 def _of_the_optimiser(
@@ -256,9 +268,9 @@ def _of_the_optimiser(
     return found
 
 
-def _largest(values: Iterable[float | None], scale: float = 1.0) -> float | None:
-    """The largest of those that are known, times the scale."""
-    return max((scale * value for value in values if value is not None), default=None)
+def _largest(values: Iterable[float | None]) -> float | None:
+    """The largest of those that are known."""
+    return max((value for value in values if value is not None), default=None)
 
 
 def _taut(rows: Mapping[str, DesignRecord], designs: Sequence[str], load: str, least: float) -> Check:

@@ -25,6 +25,7 @@ def run_checks(run: Run) -> list[Check]:
     bounds = Bounds(
         force=run.case.cable.force_max,
         misfit=run.case.optimise.misfit_rms_additional,
+        deviation=limits.deviation,
         stress=limits.utilisation,
         turn=limits.connector_turn,
         uplift=limits.uplift,

@@ -13,7 +13,7 @@ from shellform.arrays import Indices, Reals
 from shellform.case.build_gridshell import rounding_catalogue
 from shellform.case.build_problem import case_problem
 from shellform.case.build_safety import case_safety, case_tolerances
-from shellform.case.entries import OptimiseEntry
+from shellform.case.case import Case
 from shellform.compiled import clock_without_compiling
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
@@ -132,7 +132,7 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
     return optimiser.optimise(
         problem,
         start,
-        solver=_solver(entry),
+        solver=_solver(workspace.case),
         evaluations=entry.evaluations,
         safety=case_safety(workspace.case, shell),
         progress=watch,
@@ -142,11 +142,15 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
     )
 
 
-def _solver(entry: OptimiseEntry) -> SequentialConvex | MovingAsymptotes:
+def _solver(case: Case) -> SequentialConvex | MovingAsymptotes:
     """That of the case's method, with its settings."""
+    entry = case.optimise
     if entry.method == "paper":
         return MovingAsymptotes()
-    return SequentialConvex(stiffness=entry.stiffness_min, most_cables=entry.cables_max)
+    off = [each for each in (entry.deviation, case.limits.deviation) if each is not None]
+    return SequentialConvex(
+        stiffness=entry.stiffness_min, most_cables=entry.cables_max, deviation=min(off, default=None)
+    )
 
 
 def _record(best: Optimum) -> OptimisationRecord:
@@ -278,8 +282,7 @@ def _rounded(
         lambda shell: case_problem(workspace.case, shell, loads, start, frees_radius=False),
         evaluations=entry.rounded,
         beside=entry.neighbours,
-        most_cables=entry.cables_max,
-        solver=MovingAsymptotes() if entry.method == "paper" else None,
+        solver=_solver(workspace.case),
         progress=lambda text: workspace.say("optimise", text),
     )
     sections = tuple(_section(each) for each in trials)

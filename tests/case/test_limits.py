@@ -18,6 +18,7 @@ from shellform.optimiser import rounding
 from shellform.problem.robust import RobustMisfit
 from shellform.records.progress import Kind
 from shellform.run.folder import read_run
+from shellform.run.optimising import _solver
 from shellform.run.run import run_case
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.rotation import matrices
@@ -148,6 +149,8 @@ def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
         (["optimise.catalogue=gfrp_rods"], "catalogue is for a free radius"),
         (["optimise.catalogue=none", "optimise.misfit=0.5", "optimise.rod_radius=0.2"], "can't be read"),
         (["optimise.neighbours=-1"], "optimise.neighbours"),
+        (["limits.deviation=0"], "limits.deviation.*greater than 0"),
+        (["optimise.method=paper", "optimise.deviation=0.01"], "deviation need method convex"),
         (["cable.rest_ratio=1.0"], "cable.rest_ratio.*less than 1"),
         (["safety.probability_design=1.0"], "safety.probability_design.*less than 1"),
         (["safety.probability_additional=1.0"], "safety.probability_additional.*less than 1"),
@@ -156,6 +159,20 @@ def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
 def test_wrong_entries_of_limits_and_scatter_are_named(settings, said):
     with pytest.raises(InputError, match=said):
         load_case(CASE, settings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "kept"),
+    [
+        ([], None),
+        (["optimise.deviation=0.003"], 0.003),
+        (["limits.deviation=0.004"], 0.004),
+        (["limits.deviation=0.004", "optimise.deviation=0.003"], 0.003),
+        (["limits.deviation=0.002", "optimise.deviation=0.003"], 0.002),
+    ],
+)
+def test_thinning_keeps_the_shape_that_is_asked_for_and_what_is_required_in_any_case(settings, kept):
+    assert _solver(load_case(CASE, settings)).deviation == kept
 
 
 def test_limits_that_can_t_be_are_refused_when_the_problem_is_made(shell, loads):

@@ -247,7 +247,7 @@ def test_a_thinner_design_is_kept_only_where_it_breaks_no_limit_more_is_sound_an
 
     monkeypatch.setattr(phases, "standing", judged)
     start = standing_at(Point(1.0, "start", np.array([begun])))
-    found, after = phases._made_to_stand(search, start, end, budget=1.0)
+    found, after = phases._made_to_stand(search, start, end, phases.Budget(1.0))
     assert (found is end) is taken
     assert len(asked) == (sound and trial <= max(begun, 0.0)), "what is refused is judged no further"
     assert after.point is start.point or taken

@@ -12,6 +12,7 @@ from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _made_to_stand, _repaired, _thin
 from shellform.optimiser.proposal import _as_far_as_can_be
 from shellform.optimiser.search_state import restiffened, stiffness_of, violation
+from shellform.optimiser.thinning import Budget, farthest
 from shellform.reliability.trial_structures import Demand, JudgedTrial, Required
 from tests.problems import misfit_and_force
 
@@ -76,7 +77,7 @@ def test_a_design_that_falls_is_made_stiffer_until_it_stands(stout, monkeypatch)
     before = stiffness_of(search, it.point)
     answers = iter([False, True])
     monkeypatch.setattr(trials, "stands", lambda *_, **__: told(next(answers)))
-    found, after = _made_to_stand(search, it, it.point, budget=np.inf)
+    found, after = _made_to_stand(search, it, it.point, Budget())
     assert found is not None
     assert stiffness_of(search, found) > 1.01 * before
     assert after.stiffness > it.stiffness
@@ -104,14 +105,27 @@ def test_a_design_that_stands_only_at_a_cost_beyond_the_budget_is_not_taken(stou
     for budget, taken in ((it.point.objective, False), (np.inf, True)):
         answers = iter([False, True])
         monkeypatch.setattr(trials, "stands", lambda *_, own=answers, **__: told(next(own)))
-        assert (_made_to_stand(search, it, it.point, budget)[0] is not None) == taken
+        assert (_made_to_stand(search, it, it.point, Budget(budget))[0] is not None) == taken
+
+
+@pytest.mark.parametrize(("share", "farther"), [(None, True), (0.5, False), (1.05, False)])
+def test_no_cable_goes_that_takes_the_shape_farther_off_than_it_may_be_or_is_already(stout, share, farther):
+    search, it = searched(stout, 0.005, evaluations=24)
+    before = farthest(search, it.point)
+    most = None if share is None else share * before
+    search = replace(search, solver=replace(search.solver, deviation=most, repairs=0))
+    thinned = _thin(search, replace(it, thrifty=np.inf))
+    assert thinned.accepted[-1].taut.sum() < it.accepted[0].taut.sum()
+    after = farthest(search, thinned.point)
+    assert (after > 1.05 * before) == farther
+    assert farther or after <= max(most, before)
 
 
 def test_where_nothing_stands_the_stiffness_asked_for_is_as_before(stout, monkeypatch):
     wet = stout.point_load(4.5, every=2)
     search, it = searched(stout, 0.005, asked=demanded({"wet": wet}))
     monkeypatch.setattr(trials, "stands", lambda *_, **__: told(False))
-    found, after = _made_to_stand(search, it, it.point, budget=np.inf)
+    found, after = _made_to_stand(search, it, it.point, Budget())
     assert found is None
     assert after.stiffness == it.stiffness
     np.testing.assert_array_equal(after.point.constraints, it.point.constraints)
@@ -122,11 +136,11 @@ def test_a_design_that_stands_may_have_less_stiffness_than_was_aimed_for(stout, 
     search, it = searched(stout, 0.005, stiffness=5.0, asked=demanded({"wet": wet}))
     assert violation(search, it.point) > 0.0
     monkeypatch.setattr(trials, "stands", lambda *_, **__: told(True))
-    found, after = _made_to_stand(search, it, it.point, budget=np.inf)
+    found, after = _made_to_stand(search, it, it.point, Budget())
     assert found is not None
     assert violation(search, found) <= 0.0
     # the smooth least of several modes, whose sharpness goes with the stiffness asked for
     assert after.stiffness == pytest.approx(stiffness_of(search, found), rel=1e-4)
     without = replace(search, asked=None)
-    found, _ = _made_to_stand(without, replace(it, point=it.point), it.point, budget=np.inf)
+    found, _ = _made_to_stand(without, replace(it, point=it.point), it.point, Budget())
     assert found is not None  # no worse than it

@@ -160,8 +160,19 @@ def test_the_guide_judges_nothing_and_tells_of_how_many_pairs_of_designs_it_orde
     assert guide_checks({"a": design()}, ["a"], ["design"], {"design": 1.0}) == []
 
 
+@pytest.mark.parametrize(("error", "told"), [(0.0004, "4 mm"), (-0.0004, "4.3 mm"), (None, "4 mm")])
+def test_the_deviation_is_the_larger_one_of_both_meshes(shell, designs, error, told):
+    asked = replace(BOUNDS, deviation=0.0042)
+    cell = found(shell, designs, "design", bounds=asked, deviation_max=0.004, deviation_max_error=error)[
+        "Largest deviation under the design load"
+    ]
+    assert (cell.found, cell.holds) == (told, told == "4 mm")
+
+
 def test_a_remedy_gives_the_entry_in_the_entry_s_own_unit(shell, designs):
-    asked = replace(BOUNDS, stress=0.9, turn=0.1, uplift=1.0, thrust=2.0)
+    asked = replace(BOUNDS, deviation=0.004, stress=0.9, turn=0.1, uplift=1.0, thrust=2.0)
+    away = found(shell, designs, "design", bounds=asked, deviation_max=0.00411)
+    assert away["Largest deviation under the design load"].remedy == "Allow limits.deviation = 0.0042."
     stress = found(shell, designs, "none", bounds=asked, stress_utilisation_max=0.95)
     assert stress["Rods' stress with axial force under any load"].remedy == "Allow limits.utilisation = 0.95."
     turn = found(shell, designs, "none", bounds=asked, connector_turn_max=0.2)

@@ -13,6 +13,7 @@ from tests.run.small_run import begin, small_case
 
 ROOT = Path(__file__).parent.parent.parent
 LIMITS = {
+    "deviation": "Largest deviation under the design load",
     "utilisation": "Rods' stress with axial force under any load",
     "connector_turn": "Connectors' turning under any load",
     "uplift": "Uplift of a support under any load",
@@ -24,6 +25,7 @@ LIMITS = {
 def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
     assert set(LIMITS) == set(LimitsEntry.model_fields) - {"slack_loads"}
     amounts = {
+        "deviation": 5e-6,
         "utilisation": 1e-6,
         "connector_turn": 2e-6,
         "uplift": 3e-6,
@@ -36,6 +38,7 @@ def test_every_limit_of_a_case_is_a_check_of_its_designs(tmp_path):
     found = {check.name: check.cells["initial"] for check in made}
     limits = {check.name: check.limit for check in made}
     assert [limits[LIMITS[name]] for name in LIMITS] == [
+        f"{number(5e-3)} mm",
         f"{number(1e-4)} % of the strength",
         f"{number(math.degrees(2e-6))} °",
         f"{number(3e-6)} N",
