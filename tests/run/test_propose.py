@@ -1,6 +1,7 @@
 """`shellform new`: what it proposes stands, and what can't be built is said with a way out that works."""
 
 import re
+import tomllib
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -25,7 +26,7 @@ from shellform.run.first_design import first_design
 from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
-from shellform.run.propose import propose_case
+from shellform.run.propose import _optimise, propose_case
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
     STRAINED,
@@ -108,6 +109,27 @@ def test_a_proposed_case_says_why_and_what_its_edges_stand_on(proposed):
     case = load_case(proposed[0])
     assert {each.name for each in case.load} == {"design", "additional"}
     assert case.rod.section in {label.split()[0] + " mm" for label in re.findall(r"[\d.]+ mm", text)}
+
+
+@pytest.mark.parametrize(
+    ("size", "thickness", "deviation", "why"),
+    [
+        (8.0, 0.05, 0.025, "half the concrete"),
+        (24.0, 0.05, 0.048, "500th of the span"),
+        (1.0, 0.012, 0.006, "half"),
+    ],
+)
+def test_a_proposed_case_saves_cables_up_to_half_its_concrete_or_a_500th_of_its_span(
+    size, thickness, deviation, why
+):
+    entry = _optimise(dish(size=size, rise=0.2 * size), SimpleNamespace(thickness=thickness, spacing=0.5))
+    assert tomllib.loads(entry)["optimise"]["deviation"] == deviation
+    assert why in entry
+
+
+def test_what_the_shape_of_a_proposed_case_may_be_off_by_is_no_requirement_before_it_is_made_one(proposed):
+    case = load_case(proposed[0])
+    assert (case.optimise.deviation, case.limits.deviation) == (0.0055, None)
 
 
 def test_the_same_surface_gives_the_same_case(proposed, tmp_path):

@@ -12,7 +12,7 @@ from shellform.surface import cad
 from shellform.surface.funicular import force_density
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.locate import Locator
-from shellform.surface.shape.target import curvature, make_surface
+from shellform.surface.shape.target import curvature, make_surface, width
 
 ROOT = Path(__file__).parent.parent.parent
 
@@ -176,3 +176,13 @@ def test_a_line_of_equal_branches_hangs_as_force_densities_say():
 def test_unknown_dimensions_get_the_nearest_name():
     with pytest.raises(InputError, match="Did you mean 'height'"):
         cad.build_surface(ROOT / "surfaces/vault.py", size=0.05, hight=0.2)
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 77.7])
+def test_the_width_of_a_surface_is_the_least_in_plan_however_it_is_turned(angle):
+    x, y = (each.ravel() for each in np.meshgrid([-10.0, 0.0, 10.0], [-3.0, 3.0], indexing="ij"))
+    cos, sin = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+    place = np.column_stack([cos * x - sin * y, sin * x + cos * y, 4.0 - 0.04 * x**2])
+    triangles = [[0, 2, 3], [0, 3, 1], [2, 4, 5], [2, 5, 3]]
+    assert width(make_surface(place, triangles)) == pytest.approx(6.0, rel=0.03)
+    assert width(make_surface(place, triangles)) >= 6.0 - 1e-9

@@ -125,6 +125,13 @@ def largest_curvature(surface: Surface) -> float:
     return float(np.percentile(bent[inner], 99.5)) if inner.any() else 0.0
 
 
+def width(surface: Surface) -> float:
+    """The least extent, m, of its plan in any direction, to within a hundredth of the largest: what a shell spans."""
+    turns = np.linspace(0.0, np.pi, 180, endpoint=False)
+    along = surface.vertices[:, :2] @ np.vstack([np.cos(turns), np.sin(turns)])
+    return float(np.ptp(along, axis=0).min())
+
+
 def triangle_areas(points: Reals, triangles: Indices) -> Reals:
     """The areas (t,), m², of the triangles (t, 3) between the points (v, 3)."""
     return np.asarray(np.linalg.norm(_area_vectors(points, triangles), axis=1))
