@@ -201,6 +201,19 @@ def test_a_cable_counts_for_what_structures_in_mind_would_lose_without_it(search
     assert at[0] - at[1] == pytest.approx(step * rows[:, present[cable]], rel=1e-2)
 
 
+@pytest.mark.parametrize(("evaluations", "turn"), [(12, 4), (40, 4), (100, 10)])
+def test_a_turn_takes_a_tenth_of_all_evaluations_and_four_at_the_least(searching, evaluations, turn):
+    search, it, _ = searching
+    spent = search.evaluator.evaluations
+    begun = minding.turned(replace(search, evaluations=evaluations), replace(it, window=7.0, before=0.1))
+    assert begun.until == spent + turn
+    assert begun.before == np.inf
+    assert begun.window == pytest.approx(0.05 * search.tension)
+    assert minding.finely(replace(search, evaluations=evaluations), begun.until).evaluations == min(
+        evaluations, begun.until
+    )
+
+
 def test_a_search_that_is_led_is_judged_by_more_structures(stout):
     load = stout.point_load(4.5, every=2)
     loads = {"wet": load, "wetter": 1.2 * load}
