@@ -30,9 +30,10 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
-    `deviation`, m, under the design load, `stress` over strength, connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull
-    `slack`, N, of cables under the `slack_loads`, and by load the least `critical` factor; what is asked of
-    structures as built (`safety`); and how the case gives its `rods`' size."""
+    `deviation`, m, under the design load, `stress` over strength, connectors' `turn`, rad, `uplift` and
+    `thrust`, N, of supports under any load, least pull `slack`, N, of cables under the `slack_loads`, and by
+    load the least `critical` factor; what is asked of structures as built (`safety`); and how the case gives
+    its `rods`' size."""
 
     force: float
     misfit: float

@@ -134,3 +134,10 @@ def test_a_damaged_history_is_refused(tmp_path, old, new, words):
     file.write_text(file.read_text(encoding="utf-8").replace(old, new), encoding="utf-8")
     with pytest.raises(Damaged, match=rf"history.csv: is damaged.*{words}"):
         read_history(tmp_path)
+
+
+def test_the_total_of_seconds_is_that_of_the_stages_however_often_it_is_taken():
+    once = Summary().with_seconds("net", 1.25).with_seconds("initial", 2.5).totalled()
+    assert once.seconds == {"net": 1.25, "initial": 2.5, "total": 3.75}
+    assert once.totalled() == once
+    assert once.with_seconds("net", 2.0).totalled().seconds["total"] == 4.5
