@@ -2,6 +2,7 @@
 Svanberg's."""
 
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ import scipy.sparse as sp
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
+from shellform.optimiser import moving_asymptotes
 from shellform.problem.terms import Measurement, Term
 
 SHARE = np.array([61.0, 37.0, 19.0, 7.0, 1.0])  # of Svanberg's cantilever
@@ -141,3 +143,51 @@ def test_settings_and_starts_that_can_t_be_are_refused(coarse):
         sf.optimise(problem(coarse, 40.0), coarse.design(), solver=sf.MovingAsymptotes(), evaluations=3)
     with pytest.raises(NotConverged, match="No design was found that carries all loads"):
         sf.optimise(problem(coarse, 4.0, 9.0), coarse.design(), solver=sf.MovingAsymptotes(), evaluations=3)
+
+
+def test_trials_begin_at_the_nearest_of_the_last_points_and_of_the_best_one(monkeypatch):
+    """A worse point takes the place of the oldest, and the best one stays the last."""
+    for name in ("_tell", "_note"):
+        monkeypatch.setattr(moving_asymptotes, name, lambda *_: None)
+    monkeypatch.setattr(moving_asymptotes, "_as_told", lambda search, x, point, objective: point)
+
+    def point(place, objective):
+        design = SimpleNamespace(present=None)
+        return SimpleNamespace(
+            variables=np.array([place]),
+            rank=(0.0, objective),
+            objective=objective,
+            design=design,
+            states=place,
+        )
+
+    begun = []
+
+    def evaluated(design, states, stage, lead):
+        begun.append(states)
+        return point(design[0], abs(design[0] - 5.0))
+
+    best = point(4.0, 1.0)
+    search = SimpleNamespace(
+        evaluator=SimpleNamespace(
+            blocks=SimpleNamespace(design=lambda x, present: x),
+            evaluate=evaluated,
+            linearised=lambda each: each,
+        ),
+        near=[point(1.0, 4.0), point(2.0, 3.0), best],
+        best=best,
+        accepted=[],
+        taut=lambda each: each,
+        solver=SimpleNamespace(starts=3),
+        stage=1.0,
+    )
+    for place, nearest, left in (
+        (9.0, 4.0, [2.0, 9.0, 4.0]),  # worse: the best stays last
+        (8.0, 9.0, [9.0, 8.0, 4.0]),
+        (4.5, 4.0, [8.0, 4.0, 4.5]),  # better
+    ):
+        found = moving_asymptotes._tried(search, np.array([place]))
+        assert begun[-1] == nearest
+        assert [each.variables[0] for each in search.near] == left
+        search.best = min(search.best, found, key=lambda each: each.rank)
+    assert [each.variables[0] for each in search.accepted] == [4.5]

@@ -83,6 +83,14 @@ def test_a_design_that_falls_is_made_stiffer_until_it_stands(stout, monkeypatch)
     assert after.stiffness > it.stiffness
 
 
+def test_no_less_stiffness_is_aimed_for_than_the_solver_s_share_of_the_start_s(stout):
+    search, it = searched(stout, 0.005, asked=demanded({"wet": stout.point_load(4.5, every=2)}))
+    least = search.solver.stiffness * search.softest
+    assert 0.0 < least < it.stiffness
+    assert phases._aiming_for(search, it, 0.0).stiffness == pytest.approx(least)
+    assert phases._aiming_for(search, it, 2.0 * it.stiffness).stiffness == pytest.approx(2.0 * it.stiffness)
+
+
 def descended(stout, stiffness):
     """A search whose rods are as thin as the stiffness asked for allows, as good as a descent gets them."""
     wet = stout.point_load(4.5, every=2)

@@ -143,6 +143,16 @@ def test_no_more_has_to_stand_under_another_load_than_under_the_design_load():
     assert standing_checks(rows, {"initial": RODS}, ["additional"], {"additional": 1.2}, None) == []
 
 
+@pytest.mark.parametrize("required", [True, False])
+def test_what_was_not_drawn_is_asked_for_only_where_it_is_required_and_the_design_has_the_load(required):
+    (check, other) = standing_checks(
+        {"polished": design()}, {"polished": RODS}, ["design", "half"], {"design": 1.0, "half": 0.5},
+        AsBuilt(0.99, 0.99, 200, required),
+    )  # fmt: skip
+    assert (check.cells["polished"].holds, check.cells["polished"].asked) == (None, required)
+    assert (other.cells["polished"].holds, other.cells["polished"].asked) == (None, False)
+
+
 def test_the_guide_judges_nothing_and_tells_of_how_many_pairs_of_designs_it_orders_as_the_drawn_ones_do():
     rows = {
         name: design("design", stands=standing(20, number), expected_stiffness=stiffness)
