@@ -322,10 +322,9 @@ class OptimiseEntry(Entry):
             )
         if self.symmetric and not self.polish:
             raise ValueError("symmetric lengths are found in polishing: give polish some evaluations")
-        thins = self.cables_max is not None or self.deviation is not None
-        if self.method == "paper" and (self.symmetric or thins):
+        if self.method == "paper" and (self.symmetric or self.cables_max is not None):
             raise ValueError(
-                "the paper's method neither polishes nor takes cables away: symmetric, cables_max and deviation need method convex"
+                "the paper's method neither polishes nor takes cables away: symmetric and cables_max need method convex"
             )
         if self.catalogue is not None and not self.rod_radius:
             raise ValueError("catalogue is for a free radius: give rod_radius a share")

@@ -150,7 +150,6 @@ def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
         (["optimise.catalogue=none", "optimise.misfit=0.5", "optimise.rod_radius=0.2"], "can't be read"),
         (["optimise.neighbours=-1"], "optimise.neighbours"),
         (["limits.deviation=0"], "limits.deviation.*greater than 0"),
-        (["optimise.method=paper", "optimise.deviation=0.01"], "deviation need method convex"),
         (["cable.rest_ratio=1.0"], "cable.rest_ratio.*less than 1"),
         (["safety.probability_design=1.0"], "safety.probability_design.*less than 1"),
         (["safety.probability_additional=1.0"], "safety.probability_additional.*less than 1"),
@@ -164,15 +163,21 @@ def test_wrong_entries_of_limits_and_scatter_are_named(settings, said):
 @pytest.mark.parametrize(
     ("settings", "kept"),
     [
-        ([], None),
+        ([], 0.004),  # of the case
         (["optimise.deviation=0.003"], 0.003),
-        (["limits.deviation=0.004"], 0.004),
+        (["limits.deviation=0.005"], 0.004),
         (["limits.deviation=0.004", "optimise.deviation=0.003"], 0.003),
         (["limits.deviation=0.002", "optimise.deviation=0.003"], 0.002),
     ],
 )
 def test_thinning_keeps_the_shape_that_is_asked_for_and_what_is_required_in_any_case(settings, kept):
     assert _solver(load_case(CASE, settings)).deviation == kept
+    free = load_case(ROOT / "scripts/scale_model_radius.toml")
+    assert _solver(free).deviation is None
+    assert (
+        _solver(load_case(ROOT / "scripts/scale_model_radius.toml", ["limits.deviation=0.002"])).deviation
+        == 0.002
+    )
 
 
 def test_limits_that_can_t_be_are_refused_when_the_problem_is_made(shell, loads):
