@@ -29,6 +29,7 @@ from shellform.optimiser.search_state import (
 )
 from shellform.optimiser.step_model import StepModel
 from shellform.optimiser.trials import sound, standing
+from shellform.problem.evaluation import OffBranch
 from shellform.reliability.drawing import PERFECT
 from shellform.reliability.trial_structures import closer, to_bear
 
@@ -118,7 +119,8 @@ def led_by(search: Search, it: Iterate, design: Design, least: Mapping[int, floa
 
 def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
     """With these structures in mind beside those that are, the latest first, all remembered in the `design`,
-    as far as they can be followed; the stiffness to keep goes down to the solver's own. As it was where none can."""
+    as far as they can be followed; the stiffness to keep goes down to the solver's own. As it was where none can, or
+    what one of them bears isn't found at the present point."""
     known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
     latest = list({**least, **known, **least}.items())
     if it.phase == "agree":  # fewest may fall under the smallest load
@@ -126,27 +128,29 @@ def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, flo
     every = dict(latest[:_MOST])
     if not every:
         return it
+    before, aim = search.evaluator.problem, min(search.solver.stiffness * search.softest, it.stiffness)
     try:
         mind = kept_in_mind(search, design, every)
-    except NotConverged:
+        return restiffened(search, replace(it, mind=mind, remembered=design), aim)
+    except (NotConverged, OffBranch):
+        search.evaluator.problem = before
         return it
-    aim = min(search.solver.stiffness * search.softest, it.stiffness)
-    return restiffened(search, replace(it, mind=mind, remembered=design), aim)
 
 
 def as_borne(search: Search, it: Iterate, least: Mapping[int, float]) -> Iterate:
     """With the structures of the numbers in `least` in mind that are to bear what they bear in the present design, as
     far as they have to: an aim that is missed to begin with would lead the search to it instead of
-    where the objective does. As it was where none of them can be followed."""
+    where the objective does. As it was where none of them can be followed, or what one bears isn't found."""
     if not least:
         return it
-    design, point = it.point.design, it.point
+    design, point, before = it.point.design, it.point, search.evaluator.problem
     try:
         mind = kept_in_mind(search, design, least)
-    except NotConverged:
+        search.evaluator.problem = aimed(search.inner, it.stiffness, mind)
+        found = search.evaluator.seed(design, point.states, it.stage).constraints[-len(mind.scenarios) :]
+    except (NotConverged, OffBranch):
+        search.evaluator.problem = before
         return it
-    search.evaluator.problem = aimed(search.inner, it.stiffness, mind)
-    found = search.evaluator.seed(design, point.states, it.stage).constraints[-len(mind.scenarios) :]
     own = [
         replace(each, least=min(1.0 / _OVER, (1.0 - _LESS) * (1.0 - by)) * each.least)
         for each, by in zip(mind.scenarios, found, strict=True)

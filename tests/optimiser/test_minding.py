@@ -14,6 +14,7 @@ from shellform.optimiser.optimise import begin
 from shellform.optimiser.optimum import Checkpoint
 from shellform.optimiser.resuming import resumed, tell
 from shellform.optimiser.search_state import accepted_design, merit, missed, violation
+from shellform.problem.evaluation import OffBranch
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability.drawing import PERFECT
 from shellform.reliability.scenarios import FactorsAsBuilt, Scenario
@@ -107,6 +108,21 @@ def test_structures_kept_as_they_bear_ask_for_nothing_that_the_design_misses(sea
     assert least[1] < 50.0
     assert kept.stiffness == it.stiffness
     assert minding.as_borne(search, it, {}) is it
+
+
+@pytest.mark.parametrize(
+    "mind", [minding.minding, lambda search, it, _, least: minding.as_borne(search, it, least)]
+)
+def test_where_what_a_structure_bears_is_not_found_a_search_goes_on_as_it_was(searching, monkeypatch, mind):
+    search, it, _ = searching
+
+    def lost(*_):
+        raise OffBranch("the load that structure 17 as built bears was not found")
+
+    before = search.evaluator.problem
+    monkeypatch.setattr(search.evaluator, "seed", lost)
+    assert mind(search, it, it.point.design, {0: 1.03}) is it
+    assert search.evaluator.problem is before
 
 
 def test_a_search_resumed_while_it_is_led_knows_the_same_structures_and_point(searching, monkeypatch):
