@@ -7,6 +7,7 @@ concrete last.
 What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
 forty structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or stiffer steel tubes where
 these are stressed too much or the shell nearly stands (first_edges.py).
+What stands gets heavier edge beams and thicker strands at last, where they help (first_finish.py).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from shellform.errors import InputError
 from shellform.gridshell.joints import turning_stress, usual_gap
@@ -24,12 +25,14 @@ from shellform.gridshell.loads import pressure
 from shellform.net.edges import Edges, stand
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
+from shellform.run.first_finish import came_to, straighter, with_room
 from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
 from shellform.run.first_trial import (
     DRAWN,
     NEEDED,
     PULLED,
     STRESSED,
+    FirstDesign,
     FirstParts,
     Followed,
     drawn_standing,
@@ -82,24 +85,6 @@ _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyon
 Say = Callable[[str], None]
 
 
-@dataclass(frozen=True)
-class FirstDesign:
-    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of the concrete;
-    what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest fibre distance, m,
-    that equation (1) allows rods of that material (`allowed`); what was `told` on the way."""
-
-    spacing: float
-    reason: str
-    placed: Placed
-    parts: FirstParts
-    thickness: float
-    tried: Followed
-    standing: int
-    drawn: int
-    allowed: float
-    told: tuple[str, ...]
-
-
 def first_design(
     surface: Surface,
     wish: DesignWish,
@@ -133,6 +118,11 @@ class _Search:
         self._say(text)
 
     def found(self) -> FirstDesign:
+        """What stands, on edge beams that don't sag too far, with strands that leave a search room."""
+        found = straighter(self._first_that_holds(), self.surface, self._with_edges, self.allowance)
+        return with_room(found, self.surface, self.say)
+
+    def _first_that_holds(self) -> FirstDesign:
         spacing, reason = self._first_spacing()
         self.reasons[spacing] = reason
         thickness = self.wish.thickness or usual_thickness(self.surface)
@@ -312,9 +302,7 @@ class _Search:
             except (NoNet, Stalled) as error:
                 return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             parts, tried, failure = self._solved(placed, parts, spacing, thickness)
-        self.say(
-            f"{what}: stands up to {tried.factor:.2f} × its load, rods at {tried.stress:.0%} of their strength"
-        )
+        self.say(f"{what}: {came_to(placed, tried)}")
         if failure is not None:
             return self._keep(failure)
         self.allowance.spend(len(placed.net.grid.lattice), times=2)

@@ -25,7 +25,7 @@ from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.reliability.trial_structures import enlarged
 from shellform.run.first_edges import EdgeChoice
-from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, RodChoice, Rope, thicker
+from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, Placed, RodChoice, Rope, thicker
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -91,14 +91,39 @@ class FirstParts:
 class Followed:
     """What a design came to: the `factor` of its load up to which it stands; under the additional load the
     stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge beams
-    (`edge`), and the cables' largest force over its limit (`pull`); `where` (3,), m, the last state is farthest off."""
+    (`edge`), how far these are off at most (`sag`, m), and the cables' largest force over its limit (`pull`); `where` (3,), m,
+    the last state is farthest off."""
 
     factor: float
     stress: float
     edge: float
+    sag: float
     pull: float
     where: Reals
     most_stressed: Reals
+
+    @property
+    def sag_told(self) -> str:
+        """In two digits: "87 mm"."""
+        return f"{float(f'{1e3 * self.sag:.2g}'):g} mm"
+
+
+@dataclass(frozen=True)
+class FirstDesign:
+    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of the concrete;
+    what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest fibre distance, m,
+    that equation (1) allows rods of that material (`allowed`); what was `told` on the way."""
+
+    spacing: float
+    reason: str
+    placed: Placed
+    parts: FirstParts
+    thickness: float
+    tried: Followed
+    standing: int
+    drawn: int
+    allowed: float
+    told: tuple[str, ...]
 
 
 def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) -> Followed:
@@ -130,6 +155,7 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
         factor,
         float(stress.max()),
         edge_utilisation(shell, beams, beams.local_forces(stressed)),
+        float(deviations(shell, stressed)[net.edge_lines].max(initial=0.0)),
         float(shell.cables(design).tension(stressed).max(initial=0.0)) / parts.rope.force_max,
         shell.target.positions[int(np.argmax(away))],
         shell.target.positions[breaks].mean(axis=0),

@@ -23,7 +23,7 @@ from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.remedies import rounded_up
-from shellform.run.first_design import FirstDesign, first_design
+from shellform.run.first_design import first_design
 from shellform.run.first_edges import TUBES
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance
@@ -33,16 +33,16 @@ from shellform.run.first_trial import (
     ELEMENTS,
     ENLARGED,
     NEEDED,
+    FirstDesign,
     FirstParts,
 )
 from shellform.run.plinths import plinths_for
-from shellform.run.sizes import THICKNESS, DesignWish, RodChoice, usual_thickness
-from shellform.surface.shape.target import Surface, width
+from shellform.run.sizes import OF_SPAN, THICKNESS, DesignWish, RodChoice, may_come_off, usual_thickness
+from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
-_OF_SPAN = 500.0
 _SEARCH, _WAYS_OUT = 60.0, 90.0  # s of a processor after which no design, and no way out, is begun any more
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
@@ -179,17 +179,15 @@ utilisation = 1.0    # of the rods' strength, under any load
 
 
 def _optimise(surface: Surface, design: FirstDesign) -> str:
-    """The table of the search. By saving cables the shape may come off by a 500th of the span, by which EN 1992-1-1, 7.4.1,
-    lets concrete be bent in use; but by half its thickness in any case, since the thrust line of the shape as designed lies
-    in it up to that."""
-    half, of_span = 0.5 * design.thickness, width(surface) / _OF_SPAN
-    why = f"a {_OF_SPAN:g}th of the span" if of_span > half else "half the concrete's thickness"
+    """The table of the search."""
+    off = may_come_off(surface, design.thickness)
+    why = f"a {OF_SPAN:g}th of the span" if off > 0.5 * design.thickness else "half the concrete's thickness"
     return f"""\
 [optimise]
 misfit = 0.7         # w1
 cable_force = 0.3    # w2
 misfit_rms_additional = {_short(0.005 * design.spacing / _SPACING)!r}     # m, constraint (6): the paper's 5 mm × {design.spacing / _SPACING:.3g}
-deviation = {rounded_up(max(half, of_span))!r}    # m, {why}: beyond it no cable is taken away for shape; limits.deviation requires it
+deviation = {rounded_up(off)!r}    # m, {why}: beyond it no cable is taken away for shape; limits.deviation requires it
 evaluations = {_EVALUATIONS}     # a first answer in minutes; 100 leave fewer cables
 polish = {_POLISHED}
 unloaded = false     # true: make the design without regard to the loads too, to compare with
@@ -214,7 +212,7 @@ def _outer(wish: DesignWish) -> str:
 
 def _edge_beams(design: FirstDesign) -> str:
     """The entries of [edges.beam]."""
-    section, told = design.parts.edge.section, _edges_stressed(design)
+    section, told = design.parts.edge.section, _edges_came_to(design)
     if isinstance(section, Bundle):
         return f"""\
 rods = {section.count}            # {told}in a bundle, as the rods are; or width and height, radius and wall, catalogue and section
@@ -224,8 +222,14 @@ catalogue = "{TUBES}"
 section = "{_named(label(section))}"    # {told}rolled to the edge's curve; or rods in a bundle, width and height, radius and wall"""
 
 
-def _edges_stressed(design: FirstDesign) -> str:
-    return f"stressed to {design.tried.edge:.0%} of their strength; " if design.placed.net.edges else ""
+def _edges_came_to(design: FirstDesign) -> str:
+    """What the initial design's edge beams came to: no cable lifts an edge, so that what it sags by stays in the shape."""
+    if not design.placed.net.edges:
+        return ""
+    tried = design.tried
+    return (
+        f"stressed to {tried.edge:.0%} of their strength, up to {tried.sag_told} off under 1.2 × the load; "
+    )
 
 
 def _layers(choice: RodChoice) -> str:

@@ -26,7 +26,7 @@ from shellform.gridshell.layers import TwoLayers, layers_of, locked_bending
 from shellform.gridshell.tolerances import tolerances_of_size
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length
-from shellform.surface.shape.target import Surface, curvature, vertex_areas
+from shellform.surface.shape.target import Surface, curvature, vertex_areas, width
 
 SHOWN = 0.95  # of the surface's area keeps the curvature by which cells are sized
 _USUALLY = 0.75  # of its area: what is curved more may be creases, which bear nothing
@@ -37,12 +37,13 @@ MOST_CROSSINGS = 1100  # beyond which a first design takes minutes
 CURVED = 600  # crossings for the sake of curvature, at the most: what asks for more are creases
 _USUAL = 1.0  # m, of rods on site
 THICKNESS = 0.05  # m: usual
+OF_SPAN = 500.0
 _SLENDER = 80.0  # thicknesses across the larger side of a model, on which 50 mm would be a block
 _DEPTH = 7.0  # spacings over a rod's depth, at the least: thicker, it is no grid of slender rods
 _CATALOGUES = ("gfrp_rods", "gfrp_tubes", "steel_tubes")
 _LATHS = "timber_laths"  # whose rods are built in two layers
 # m, diameters in stock
-_ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008, 0.010, 0.012)
+_ROPES = (0.0003, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.005, 0.006, 0.008, 0.010, 0.012, 0.014, 0.016)
 _MOST_ROPE = 0.008  # m, to begin with
 _ROPE = 0.006  # of the spacing, a rope's diameter
 _ROPE_AREA, _ROPE_YOUNG, _ROPE_STRENGTH = 0.597, 120e9, 1380e6  # of the diameter's square; Pa; Pa at breaking
@@ -197,6 +198,12 @@ def usual_thickness(surface: Surface) -> float:
     return max(min(THICKNESS, whole_mm(float(surface.size[:2].max()) / _SLENDER)), 0.002)
 
 
+def may_come_off(surface: Surface, thickness: float) -> float:
+    """How far the shape may be off for the sake of cables, m: a 500th of the span, by which EN 1992-1-1, 7.4.1, lets concrete be
+    bent in use; but half its thickness in any case, since the thrust line of the shape as designed lies in it up to that."""
+    return max(0.5 * thickness, width(surface) / OF_SPAN)
+
+
 def whole_mm(thickness: float) -> float:
     """Rounded down."""
     return math.floor(1e3 * thickness) / 1e3
@@ -208,9 +215,11 @@ def rope_for(spacing: float) -> Rope:
     return Rope(min(usual, key=lambda each: abs(math.log(each / (_ROPE * spacing)))))
 
 
-def thicker(rope: Rope) -> Rope | None:
-    """The next strand in stock; None after the last."""
-    return next((Rope(each) for each in _ROPES if each > rope.diameter), None)
+def thicker(rope: Rope, times: float = 1.0) -> Rope | None:
+    """The first strand in stock whose area is so many `times` as large, the last where none is; None after that."""
+    larger = [each for each in _ROPES if each > rope.diameter]
+    enough = (each for each in larger if each**2 >= times * rope.diameter**2)
+    return Rope(next(enough, larger[-1])) if larger else None
 
 
 def rest_ratio_for(surface: Surface, spacing: float) -> float:

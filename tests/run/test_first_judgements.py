@@ -19,7 +19,7 @@ PARTS = SimpleNamespace(easier=lambda tried, most: None, choice=None)
 
 
 def came_to(factor, stress, edge, pull):
-    return Followed(factor, stress, edge, pull, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
+    return Followed(factor, stress, edge, 0.0, pull, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
 
 
 STANDS = "stands"
@@ -210,12 +210,15 @@ def test_rods_edge_beams_and_cables_are_judged_under_the_additional_load(monkeyp
     monkeypatch.setattr(first_trial, "apply_load", loaded)
     monkeypatch.setattr(first_trial, "edge_utilisation", lambda shell, beams, forces: 0.5 * forces)
     monkeypatch.setattr(first_trial, "deviations", lambda shell, state: np.array([1.3, state, 0.0]))
-    net = SimpleNamespace(grid=SimpleNamespace(rod_ends=np.array([[0, 1], [1, 2]])))
+    net = SimpleNamespace(
+        grid=SimpleNamespace(rod_ends=np.array([[0, 1], [1, 2]])), edge_lines=np.array([[1, 2]])
+    )
     parts = SimpleNamespace(rest_ratio=0.997, rope=SimpleNamespace(force_max=200.0))
     found = first_trial.followed(net, None, parts, 0.05)
     assert found.factor == pytest.approx(factor)
     assert found.stress == pytest.approx(0.4 * 1.2)
     assert found.edge == pytest.approx(0.5 * 1.2)
+    assert found.sag == pytest.approx(1.2), "of the edge alone, though node 0 is farther off"
     assert found.pull == pytest.approx(1.2 / 2.0)
     np.testing.assert_array_equal(found.where, [0.0, 1.0, 0.0])
     np.testing.assert_array_equal(found.most_stressed, [0.0, 0.5, 0.5])

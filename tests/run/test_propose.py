@@ -26,7 +26,7 @@ from shellform.run.first_design import first_design
 from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
-from shellform.run.propose import _optimise, propose_case
+from shellform.run.propose import _edge_beams, _optimise, propose_case
 from shellform.run.sizes import (
     LEAST_PRESTRAIN,
     STRAINED,
@@ -286,7 +286,7 @@ def test_cables_pulled_too_much_with_the_least_prestrain_become_thicker_as_far_a
     while parts is not None:
         diameters.append(parts.rope.diameter)
         parts = parts.eased(1.2)
-    assert diameters == [0.006, 0.008, 0.010, 0.012]
+    assert diameters == [0.006, 0.008, 0.010, 0.012, 0.014, 0.016]
     assert rope_for(2.0).diameter == 0.008, "none begins with more"
 
 
@@ -318,6 +318,21 @@ def test_a_shell_on_four_feet_that_no_rods_hold_up_stands_on_heavier_edge_beams(
     assert found.thickness >= 0.03
     assert found.parts.edge != edge_choices(found.parts.choice)[0]
     assert any("edge beams of" in each and found.parts.edge.label not in each for each in said)
+
+
+@pytest.mark.parametrize(("lines", "told"), [(("line",), True), ((), False)])
+def test_a_proposed_case_tells_how_far_its_edge_beams_are_off_where_it_has_any(lines, told):
+    rods = wished("gfrp_rods/32 mm")[0]
+    tried = Followed(NEEDED, 0.5, 0.31, 0.0873, 0.5, np.zeros(3), np.zeros(3))
+    for edge, key in zip(edge_choices(rods)[:2], ("rods", "section"), strict=True):
+        parts = FirstParts(rods, edge, 0.996, rope_for(1.0), swivels=False)
+        entry = _edge_beams(
+            SimpleNamespace(
+                parts=parts, tried=tried, placed=SimpleNamespace(net=SimpleNamespace(edges=lines))
+            )
+        )
+        assert key in tomllib.loads(entry)
+        assert ("stressed to 31% of their strength, up to 87 mm off under 1.2 ×" in entry) is told
 
 
 @pytest.mark.parametrize(
@@ -360,7 +375,7 @@ def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_bef
         rope_for(1.0),
         swivels=True,
     )
-    breaks = Followed(NEEDED, 1.4, 0.5, 2.0, np.zeros(3), np.zeros(3))
+    breaks = Followed(NEEDED, 1.4, 0.5, 0.0, 2.0, np.zeros(3), np.zeros(3))
     assert parts.easier(breaks, PULLED).rest_ratio == pytest.approx(0.998)
     assert parts.easier(breaks, PULLED).easier(breaks, PULLED).rest_ratio == 1.0 - LEAST_PRESTRAIN
     assert replace(parts, rest_ratio=1.0 - LEAST_PRESTRAIN).easier(breaks, PULLED) is None
@@ -378,7 +393,7 @@ def test_joints_turn_where_cables_are_made_slacker_for_rods_that_are_stressed_to
         rope_for(1.0),
         swivels=False,
     )
-    breaks = Followed(NEEDED, 1.4, 0.5, 0.5, np.zeros(3), np.zeros(3))
+    breaks = Followed(NEEDED, 1.4, 0.5, 0.0, 0.5, np.zeros(3), np.zeros(3))
     eased = parts.easier(breaks, PULLED)
     assert eased == replace(parts, rest_ratio=0.998, swivels=True)
     assert eased.joint.torsion == pytest.approx(0.1 * parts.joint.torsion)
