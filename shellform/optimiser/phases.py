@@ -174,7 +174,7 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
     fell = it.accepted[-1].built
     it = last_standing(search, replace(it, fallen=other.fallen))
     if found is not None:  # the way to more stiffness, or the way back: which costs less
-        budget = search.solver.thrift * found.objective
+        budget = found.objective + search.solver.allowance
         if it.accepted and it.point.objective < budget and violation(search, it.point) <= 0.0:
             return _ready_as_it_is(search, it)
         return _ready_to_thin(search, accepted(search, other, found))
@@ -258,7 +258,7 @@ def _ready_to_thin(search: Search, it: Iterate) -> Iterate:
         window=max(it.window, 0.1 * search.tension),
         guarded=True,
         phase="thin",
-        thrifty=solver.thrift * it.point.objective,
+        thrifty=it.point.objective + solver.allowance,
         batch=max(1, taut_count(search, it.point) // solver.batch),
         needed=np.zeros(len(it.tensioned), dtype=bool),
     )

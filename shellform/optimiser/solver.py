@@ -54,8 +54,10 @@ class SequentialConvex:
       while they fit and are cut to a third where not.
     - `candidates`: of thousands of cables, those that are looked at for a batch.
     - `kept`: of the stiffness in any direction at the decisive load, that a batch must leave: the others'
-      lengths are to make up for the rest.
-    - `thrift`: of the objective, what cables with little use may cost.
+      lengths are to make up for the rest. It only keeps trials from failing for nothing: what a design has to
+      bear, its constraints and structures as built decide, and of stiff strands each holds most of its direction.
+    - `allowance`: what all cables with little use together may cost, of the objective at the start, which is 1: a share
+      of what is left of it would forbid the more the better the shape became.
     - `failures`: single cables in a row that can't go, after which thinning ends.
     - `idle`: of the cables, that may be slack under all loads before they are left out of the search, whose
       models solve for every cable in it.
@@ -96,8 +98,8 @@ class SequentialConvex:
 
     batch: int = 8
     candidates: int = 1024
-    kept: float = 0.4
-    thrift: float = 1.1
+    kept: float = 0.1
+    allowance: float = 0.08
     failures: int = 6
     idle: float = 0.2
     repairs: int = 2

@@ -147,11 +147,13 @@ def test_a_descent_leaves_evaluations_to_what_comes_next_once_it_keeps_every_lim
     assert len(bare.taken) == 2  # as long as a limit is broken it goes on
 
 
-@pytest.mark.parametrize(("earlier", "ready"), [(0.99, "as it is"), (1.15, "stiffened"), (None, "stiffened")])
+@pytest.mark.parametrize(
+    ("earlier", "ready"), [(0.09, "as it is"), (0.17, "as it is"), (0.19, "stiffened"), (None, "stiffened")]
+)
 def test_the_way_back_to_a_design_that_stands_is_taken_where_it_costs_less_than_more_stiffness(
     bare, monkeypatch, earlier, ready
 ):
-    there, last = Point(1.0, "stiffer"), Point(0.5, "last")
+    there, last = Point(0.1, "stiffer"), Point(0.05, "last")
     it = standing_at(last, accepted=(SimpleNamespace(built=None),))
     back = replace(it, point=Point(earlier or 0.0), accepted=it.accepted if earlier else ())
     monkeypatch.setattr(phases, "_ready_to_thin", lambda search, it: (it.point, "stiffened"))
@@ -164,6 +166,14 @@ def test_the_way_back_to_a_design_that_stands_is_taken_where_it_costs_less_than_
     )
     found = phases._stiffened(searching(asked=object()), it)
     assert found == ((back if ready == "as it is" else replace(it, point=there)).point, ready)
+
+
+@pytest.mark.parametrize("reached", [0.9, 0.05])
+def test_what_cables_may_cost_is_a_share_of_the_start_not_of_what_is_left_of_it(monkeypatch, reached):
+    monkeypatch.setattr(phases, "taut_count", lambda *_: 80)
+    solver = sf.SequentialConvex(allowance=0.07)
+    ready = phases._ready_to_thin(searching(solver=solver), standing_at(Point(reached)))
+    assert ready.thrifty == pytest.approx(reached + 0.07)
 
 
 def test_a_search_has_settled_where_little_is_predicted_or_the_window_is_smallest():

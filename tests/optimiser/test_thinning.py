@@ -152,3 +152,14 @@ def test_a_design_that_stands_may_have_less_stiffness_than_was_aimed_for(stout, 
     without = replace(search, asked=None)
     found, _ = _made_to_stand(without, replace(it, point=it.point), it.point, Budget())
     assert found is not None  # no worse than it
+
+
+@pytest.mark.parametrize(("share", "go"), [(None, True), (0.4, False)])
+def test_stiff_strands_that_can_be_spared_go_though_each_holds_most_of_the_stiffness_along_it(
+    stout, share, go
+):
+    strands = replace(stout, cable=sf.Cable(stiffness=100.0 * 187.0))
+    search, it = searched(strands, 0.005, evaluations=24)
+    if share is not None:
+        search = replace(search, solver=replace(search.solver, kept=share))
+    assert (len(phases._leaving(search, it, search.models.at(it.point))) > 0) == go
