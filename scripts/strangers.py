@@ -82,12 +82,9 @@ class Stranger:
 
     @property
     def options(self) -> list[str]:
-        """Of the command line."""
+        """Of the command line: which axis is vertical is to be found."""
         stated = self.ending in (".3dm", ".step", ".glb")
-        return [
-            *(["--unit", self.unit] if self.unit != "m" and not stated else []),
-            *(["--up", "y"] if self.up == "y" and not stated else []),
-        ]
+        return [] if self.unit == "m" or stated else ["--unit", self.unit]
 
 
 # ---------------------------------------------------------------------------------------------- meshes
@@ -784,7 +781,7 @@ def main() -> None:
         for file in (sorted(path.iterdir()) if path.is_dir() else [path])
         if file.suffix in READABLE
     ]
-    corpus += [(file, OPTIONS_OF_OTHERS.get(file.stem, [])) for file in others]
+    corpus += [(file, []) for file in others]
     if given.do == ["make"]:
         return
     rows = []
@@ -811,7 +808,6 @@ QUICK = [
         "safety.compared=5",
     )
 ]
-OPTIONS_OF_OTHERS = {"igl_igloo": ["--up", "y"]}
 
 if __name__ == "__main__":
     main()

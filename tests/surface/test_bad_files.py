@@ -414,6 +414,18 @@ def test_a_shell_on_its_side_is_told(tmp_path):
     assert not read_surface(write_obj(tmp_path / "a.obj", POINTS, QUADS)).mended
 
 
+def test_a_shell_with_y_up_is_set_upright_unasked_and_told(tmp_path):
+    file = write_obj(tmp_path / "a.obj", np.column_stack([POINTS[:, 0], POINTS[:, 2], -POINTS[:, 1]]), QUADS)
+    found, asked = read_surface(file), read_surface(file, up="y")
+    np.testing.assert_array_equal(found.vertices, asked.vertices)
+    np.testing.assert_array_equal(found.triangles, asked.triangles)
+    assert any("y axis is taken for the vertical" in note for note in found.mended)
+    assert not asked.mended
+    as_told = read_surface(file, up="z")
+    assert as_told.size[2] > asked.size[2]
+    assert any("it stands upright" in note for note in as_told.mended)
+
+
 def test_wrong_settings_are_refused_before_the_file_is_read(tmp_path):
     file = write_obj(tmp_path / "a.obj", POINTS, QUADS)
     for choice, word in [

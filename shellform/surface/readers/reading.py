@@ -36,6 +36,8 @@ FORMATS = {
 MOST_BYTES = 512 * 1024**2
 _HEAD = 65536
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
+_STATED_UP = ("gltf",)  # formats that say which axis is vertical
+_TURNED = "its y axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
 _OWN = {
     "obj": plain.read_obj,
     "off": plain.read_off,
@@ -68,7 +70,7 @@ def read_surface(
     """The surface in a file, in metres, z up.
 
     `unit` of files that state none ("m" if left out); `up`, the file's vertical axis, "y" or "z" (left out:
-    the format's); `size`, m, of the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a
+    the format's; where that is none, z, but for a shell that lies on its side with z up and not with y); `size`, m, of the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a
     closed solid its "upper" or "lower" `face`; of several separate pieces the `piece` with that number, 1
     being the largest; `fill` "holes", "edges" or "all" closes openings (fill.py), edges down to the `ground`,
     m (left out: the edge's lowest point). `mended` of the result tells what was done. Raises InputError.
@@ -90,7 +92,19 @@ def read_surface(
     else:
         settings = {"unit": unit, "size": size, "up": up or "z", "layer": layer, "name": name, "face": face}
         draft = foreign.read_foreign(file, kind, settings)
-    return surface_of(_upright(draft, unit, up), str(file), face=face, piece=piece, fill=fill, ground=ground)
+    surface = surface_of(
+        _upright(draft, unit, up), str(file), face=face, piece=piece, fill=fill, ground=ground
+    )
+    if up is not None or kind in _STATED_UP or _plan_share(surface) >= _UPRIGHT:
+        return surface
+    turned = read_surface(
+        file, unit=unit, up="y", size=size, layer=layer, name=name, face=face, piece=piece, fill=fill, ground=ground
+    )  # fmt: skip
+    if _plan_share(turned) < _UPRIGHT:
+        return surface
+    return Surface(
+        turned.vertices, turned.triangles, turned.normals, turned.source, (*turned.mended, _TURNED)
+    )
 
 
 def surface_of(
@@ -108,14 +122,12 @@ def surface_of(
         whole = filled(whole, source, what=fill, ground=ground)
     surface = make_surface(whole.points, whole.triangles, normals=whole.normals, source=source)
     notes = whole.notes + surface.mended
-    corner = surface.vertices[surface.triangles]
-    plan = 0.5 * abs(float(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].sum()))
-    if plan < _UPRIGHT * surface.area:
-        share = f"{100.0 * plan / surface.area:.0f} %"
+    plan = _plan_share(surface)
+    if plan < _UPRIGHT:
         notes = (
             *notes,
-            f"it stands upright, with a plan of {share} of its area: check the vertical axis (surface.up, "
-            "--up)",
+            f"it stands upright, with a plan of {100.0 * plan:.0f} % of its area: check the vertical axis "
+            "(surface.up, --up)",
         )
     return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
 
@@ -199,6 +211,13 @@ def _content(head: bytes, file: Path) -> str | None:
     if b"\0" not in head and re.search(rb"(?m)^v[ \t]+[-+\d.]", head):
         return "obj"
     return None
+
+
+def _plan_share(surface: Surface) -> float:
+    """Of its area, the plan's: little where a shell lies on its side."""
+    corner = surface.vertices[surface.triangles]
+    plan = 0.5 * abs(float(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].sum()))
+    return plan / surface.area
 
 
 def _upright(draft: Draft, unit: str | None, up: str | None) -> Draft:
