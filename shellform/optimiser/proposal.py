@@ -44,7 +44,7 @@ class Task:
     keep a least tension; `guards` of cables that may not go slack under the further loads, none where all
     may; whether stability stands in for the objective, `climbing`; `groups` (c,) of cables alike; `excess`
     (k,) of the constraints over their linear model in a whole window; the `least` tension, N, that cables
-    keep."""
+    keep; how many of the constraints, the last ones, are `aims` of structures in mind."""
 
     solver: SequentialConvex
     model: StepModel
@@ -57,6 +57,7 @@ class Task:
     groups: Indices | None
     excess: Reals
     least: float
+    aims: int = 0
 
 
 def propose(task: Task) -> tuple[Reals, float]:
@@ -86,7 +87,8 @@ def propose(task: Task) -> tuple[Reals, float]:
         asked = scaled_curvature, scaled_slope, rows, limits, low, high
         if task.groups is not None:
             return _equal_steps(task, width, *asked)
-        u = minimise_quadratic(*asked)
+        # without a reserve an aim is met as far as that is worth its price, even if it could be met
+        u = None if _at_their_price(task, values) else minimise_quadratic(*asked)
         if u is None:
             u = _as_far_as_can_be(task, *asked)
         elif not task.guards and len(limits) <= _FEW:
@@ -130,28 +132,36 @@ def _from_there(
 def _as_far_as_can_be(
     task: Task, curvature: Reals | LowRank, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
 ) -> Reals | None:
-    """The model's optimum in windows (y,) where more is asked for than a step can give. Of what constraints
-    are broken by a share t remains, of what guards ask for another, 0 <= t <= 1, each at a price that
-    outweighs the objective as it does in judging trials."""
+    """The model's optimum in windows (y,) where more is asked for than a step can give. Of what limits are broken by
+    a share t remains, of what aims miss and of what guards ask for others, 0 <= t <= 1, each at its price."""
     size, count = len(slope), len(task.model.point.constraints)
+    limits = count - task.aims
     wider: Reals | LowRank
     if isinstance(curvature, LowRank):
-        wider = curvature.widened(2)
+        wider = curvature.widened(3)
     else:
-        wider = np.zeros((size + 2, size + 2))
+        wider = np.zeros((size + 3, size + 3))
         wider[:size, :size] = curvature
-    broken = np.zeros((len(values), 2))
-    broken[:count, 0] = np.maximum(values[:count], 0.0)
-    broken[count:, 1] = np.maximum(values[count:], 0.0)
+    broken = np.zeros((len(values), 3))
+    for k, own in enumerate((slice(limits), slice(limits, count), slice(count, None))):
+        broken[own, k] = np.maximum(values[own], 0.0)
+    price = task.solver.penalty * np.array([1.0, task.solver.reserve, 1.0])
     found = minimise_quadratic(
         wider,
-        np.append(slope, task.solver.penalty * broken.max(axis=0)),
+        np.append(slope, price * broken.max(axis=0, initial=0.0)),
         np.hstack([rows, -broken]),
         values,
-        np.append(low, np.zeros(2)),
-        np.append(high, np.ones(2)),
+        np.append(low, np.zeros(3)),
+        np.append(high, np.ones(3)),
     )
     return None if found is None else found[:size]
+
+
+def _at_their_price(task: Task, values: Reals) -> bool:
+    """Whether aims are missed, `values` (k,) of the constraints being at most 0 where they are met, that steps are to
+    meet as far as that is worth the price by which they are judged."""
+    missed = values[len(values) - task.aims :] > 0.0
+    return task.solver.reserve <= task.solver.aim and bool(missed.any())
 
 
 def _curvature(model: StepModel, width: Reals) -> Reals | LowRank:

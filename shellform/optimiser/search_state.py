@@ -32,7 +32,6 @@ Keep = Callable[[Checkpoint], None]
 
 _FOLLOWED = 1.25  # times what structures in mind are to bear: beyond, steps see no end of their branch
 _MAY_MISS = 0.02  # of an aim: along its edge a step that is judged to the last bit leads nowhere
-_AIM = 0.3  # of a limit's weight
 _NEARLY = 0.01  # of the stiffness left, to which the end of their branch is sought
 
 
@@ -269,7 +268,7 @@ def taut_count(search: Search, point: Evaluated) -> int:
 def violation(search: Search, point: Evaluated) -> float:
     """Of the constraint that is broken most, as a share of its scale; 0 where all hold. What structures kept
     in mind are to bear is an aim and no limit: whoever judges draws them again."""
-    limits = len(point.constraints) - _in_mind(search)
+    limits = len(point.constraints) - in_mind(search)
     values = [float(point.constraints[:limits].max(initial=-1.0))]
     pull = tensions(search, point).max(initial=0.0)
     values += [float(residuals(part, np.array([pull]))[0]) for part in search.bounded]
@@ -279,11 +278,11 @@ def violation(search: Search, point: Evaluated) -> float:
 
 def missed(search: Search, point: Evaluated) -> float:
     """By what share of what it is to bear a structure in mind misses it, beyond what an aim may be missed by."""
-    aims = len(point.constraints) - _in_mind(search)
+    aims = len(point.constraints) - in_mind(search)
     return max(float(point.constraints[aims:].max(initial=0.0)) - _MAY_MISS, 0.0)
 
 
-def _in_mind(search: Search) -> int:
+def in_mind(search: Search) -> int:
     """How many of the constraints' values, the last ones, are of structures that the search keeps in mind."""
     added = search.evaluator.problem.constraints[len(search.inner.constraints) :]
     return sum(len(part.term.scenarios) for part in added if isinstance(part.term, FactorsAsBuilt))
@@ -292,8 +291,8 @@ def _in_mind(search: Search) -> int:
 def merit(search: Search, point: Evaluated) -> float:
     """The objective and a penalty for the constraint that is broken most, or for the aim that is missed most,
     which is made up for later more easily than a limit."""
-    penalty = search.solver.penalty
-    return point.objective + penalty * max(violation(search, point), _AIM * missed(search, point), 0.0)
+    penalty, aim = search.solver.penalty, search.solver.aim
+    return point.objective + penalty * max(violation(search, point), aim * missed(search, point), 0.0)
 
 
 def noted(search: Search, it: Iterate, point: Evaluated, accepted: bool) -> Iterate:
@@ -313,7 +312,7 @@ def record(search: Search, point: Evaluated, stage: float, accepted: bool, phase
     constraints |= {
         problem.column(part.term): float(point.constraints[own].max(initial=-np.inf))
         for part, own in zip(problem.constraints, problem.places(), strict=True)
-        if own.stop <= len(point.constraints) - _in_mind(search)
+        if own.stop <= len(point.constraints) - in_mind(search)
     }
     step = Step(
         search.evaluator.evaluations,

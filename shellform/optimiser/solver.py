@@ -26,7 +26,7 @@ class SequentialConvex:
     - `most_cables`: down to so many cables are taken away whatever they do for the objective, as long as
       every constraint is kept.
     - `deviation`, m: no cable is taken away if a node then is farther than this from its place under the design load, or
-      farther than before where it was beyond it.
+      farther than before where it was beyond it; polished, a design with a farther node is led by its farthest ones too.
 
     The trust region:
     - `smallest`: window at which no better design is to be found, which ends a turn.
@@ -36,6 +36,10 @@ class SequentialConvex:
       a constraint may be violated by.
     - `penalty`: of a violated constraint beside the objective, which is 1 at the start: a violation of a
       tenth of the limit outweighs the whole objective.
+    - `aim`: of that penalty, the price of what drawn structures that a search keeps in mind miss of what they are to bear: it
+      is made up for later more easily than a limit.
+    - `reserve`: of that penalty, the price at which steps are proposed. Above `aim` they lead to more than trials are judged
+      by, which thinning spends; at `aim` to what is judged best, where nothing is thinned.
     - `near`: below a limit, as a share of it, from where on its curvature counts; farther off it would hold
       steps back for nothing.
 
@@ -87,6 +91,8 @@ class SequentialConvex:
     poor: float = 0.3
     settled: float = 1e-3
     penalty: float = 10.0
+    aim: float = 0.3
+    reserve: float = 1.0
     near: float = 0.5
 
     margin: float = 0.15
@@ -145,5 +151,5 @@ _MAY_BE_ZERO = (
 )
 
 # A polished design serves the shape alone and is near: smaller windows, and of the stiffness kept before it
-# may use up a fifth.
-POLISHING = SequentialConvex(thin=False, stiffness=0.8, smallest=0.003)
+# may use up a fifth. It needs no reserve.
+POLISHING = SequentialConvex(thin=False, stiffness=0.8, smallest=0.003, reserve=0.3)

@@ -13,7 +13,15 @@ from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.proposal import Task
-from shellform.optimiser.search_state import Accepted, Iterate, Search, accepted_design, noted, violation
+from shellform.optimiser.search_state import (
+    Accepted,
+    Iterate,
+    Search,
+    accepted_design,
+    in_mind,
+    noted,
+    violation,
+)
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
@@ -39,6 +47,7 @@ def task(search: Search, it: Iterate, model: StepModel) -> Task:
         search.groups,
         it.excess * it.window**2,
         max(search.least if it.phase == "thin" else 0.0, search.solver.least_tension * search.tension),
+        in_mind(search),
     )
 
 

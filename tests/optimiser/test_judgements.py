@@ -554,7 +554,7 @@ def test_the_violation_is_that_of_the_limit_broken_most_and_none_within_what_cou
 def test_the_merit_is_the_objective_and_ten_times_what_is_broken_or_three_times_what_is_missed(monkeypatch):
     search = searching()
     monkeypatch.setattr(search_state, "tensions", lambda *_: np.zeros(0))
-    monkeypatch.setattr(search_state, "_in_mind", lambda _: 1)
+    monkeypatch.setattr(search_state, "in_mind", lambda _: 1)
 
     def of(limit, aim):
         return Point(0.5, constraints=np.array([limit, aim]))

@@ -1,5 +1,7 @@
 """The convex problem of a step comes to its optimum, in windows however wide."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize
@@ -84,3 +86,27 @@ def test_a_dual_problem_is_left_after_the_evaluations_that_it_may_take():
     np.testing.assert_array_equal(broken(dual_evaluations=100_000), broken())
     np.testing.assert_array_equal(broken(dual_evaluations=100), broken())
     assert np.abs(broken(dual_evaluations=2) - broken()).max() > 1e-3
+
+
+def test_a_step_meets_an_aim_as_far_as_that_is_worth_its_price_where_trials_are_judged_by_it(dome):
+    problem = misfit_and_force(dome, 2.0, most=200.0, rms=1e-4)
+    search, it = begin(problem, dome.design(), SequentialConvex(window=0.05), lambda softest: 0.0, 10)
+    model = search.models.at(it.point)
+    missed = it.point.constraints
+    assert len(missed) == 1  # taken for an aim
+    assert missed[0] > 0.1
+
+    def step(aims, price):
+        solver = replace(search.solver, aim=price, reserve=price)
+        y, predicted = propose(replace(task(search, it, model), aims=aims, solver=solver))
+        return predicted, float(model.constraints_at(y)[0] - missed[0])
+
+    free, rising = step(1, 1e-9)
+    dear, falling = step(1, 1e3)
+    assert free < dear  # of the objective, which alone decides where missing an aim costs nothing
+    assert falling < min(rising, 0.0)
+    for price in (0.03, 0.3):  # the sum by which trials are judged is the least at its own price
+        predicted, change = step(1, price)
+        for other, of_other in ((free, rising), (dear, falling)):
+            worth = search.solver.penalty * price
+            assert predicted + worth * change <= other + worth * of_other + 1e-9
