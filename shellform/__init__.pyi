@@ -67,6 +67,7 @@ from shellform.problem.problem import FEASIBLE as FEASIBLE
 from shellform.problem.problem import LoadCase as LoadCase
 from shellform.problem.problem import Problem as Problem
 from shellform.problem.robust import RobustMisfit as RobustMisfit
+from shellform.problem.terms import Bulges as Bulges
 from shellform.problem.terms import CableForce as CableForce
 from shellform.problem.terms import CableForces as CableForces
 from shellform.problem.terms import LoadedDesign as LoadedDesign

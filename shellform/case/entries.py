@@ -299,7 +299,8 @@ class OptimiseEntry(Entry):
     )
     deviation: PositiveFloat | None = Field(
         None,
-        description="distance of a node from its place under the design load, m, beyond which no cable is taken away for it",
+        description="distance of a node from its place under the design load, m, beyond which no cable is taken away for it, "
+        "and polishing serves the farthest nodes beside all",
     )
     symmetric: bool = Field(
         False, description="cables that a symmetry of the net joins are polished to one length"

@@ -69,8 +69,9 @@ from shellform.optimiser.solver import POLISHING, SequentialConvex
 from shellform.optimiser.trials import reach, staged
 from shellform.problem.constraints import Constraint
 from shellform.problem.evaluation import Evaluator
+from shellform.problem.paths import deviations
 from shellform.problem.problem import Problem
-from shellform.problem.terms import Misfit, Share
+from shellform.problem.terms import Bulges, Misfit, Share
 from shellform.reliability.guide import stretch_deviation
 from shellform.reliability.perfect import perfect
 from shellform.reliability.safety import Safety
@@ -151,7 +152,8 @@ def polish(
     constraints kept; the solver's `stiffness` is a share of what `best` had to keep.
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
-    shape alone. The misfit never rises: where no better design is found, `best` comes back. Drawn structures that
+    shape alone. Where a node is farther off than the solver's `deviation`, half of the objective is the farthest nodes'
+    (terms.py: Bulges). The objective never rises: where no better design is found, `best` comes back. Drawn structures that
     the search for `best` kept in mind bear what they did, as far as they have to, and a fresh sample judges; else
     what was asked of `best` as built in trials is asked of the polished design, and whether it stands as often is
     left to whoever judges it, but where trials know no enlarged errors. Only the cables' lengths are varied, where
@@ -167,7 +169,7 @@ def polish(
     cables = [block for block in best.problem.variables if block.of_each_cable]
     problem = replace(
         best.problem,
-        minimise=[Share(1.0, Misfit(best.problem.design_load.name))],
+        minimise=_shape(best, solver),
         variables=cables or best.problem.variables,
     )
     asked = best.asked
@@ -203,6 +205,15 @@ def polish(
     if better or groups is not None:
         return polished
     return replace(best, status="no design with less misfit was found", history=polished.history)
+
+
+def _shape(best: Optimum, solver: SequentialConvex) -> list[Share]:
+    """What a polished design is to serve."""
+    base = best.problem.design_load.name
+    farthest = float(deviations(best.problem.shell, best.states[base]).max())
+    if solver.deviation is None or farthest <= solver.deviation:
+        return [Share(1.0, Misfit(base))]
+    return [Share(0.5, Misfit(base)), Share(0.5, Bulges(base))]
 
 
 def begin(

@@ -164,6 +164,28 @@ class Misfit(Term):
 
 
 @dataclass(frozen=True)
+class Bulges(Term):
+    """The sum over all nodes of the fourth power of the distance from the target, m⁴: the misfit's sibling that the
+    farthest nodes decide."""
+
+    name = "bulges"
+    load: str
+
+    def measure(self, at: LoadedDesign) -> Measurement:
+        """One value, m⁴, the sum of squares of squared distances."""
+        away = at.state.positions - at.shell.target.positions
+        square = (away**2).sum(axis=1)
+        slope = np.hstack([4.0 * square[:, None] * away, np.zeros_like(away)])
+        places = np.arange(6 * len(away)).reshape(-1, 6)[:, :3]
+        entries = (2.0 * away).ravel(), (np.repeat(np.arange(len(away)), 3), places.ravel())
+        return Measurement(
+            np.array([float((square**2).sum())]),
+            sp.csr_array(slope.reshape(1, -1)),
+            squares=Squares(square, sp.csr_array(entries, shape=(len(away), slope.size))),
+        )
+
+
+@dataclass(frozen=True)
 class RmsMisfit(Term):
     """d'd over the number of nodes, m²; limits on it are given as root mean square distances, m (6)."""
 

@@ -22,7 +22,7 @@ from shellform.gridshell.joints import doubts
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.optimum import Optimum, Step
 from shellform.optimiser.rounding import CandidateSection
-from shellform.optimiser.solver import SequentialConvex
+from shellform.optimiser.solver import POLISHING, SequentialConvex
 from shellform.problem.constraints import AtMost
 from shellform.problem.problem import FEASIBLE, LoadCase, Problem
 from shellform.problem.terms import CableForces, Misfit, Share
@@ -34,7 +34,7 @@ from shellform.records.summary import Summary
 from shellform.reliability.trial_structures import Judging
 from shellform.run.checkpoint import drop_checkpoint, load_checkpoint, save_checkpoint
 from shellform.run.designs import followed, forget, keep
-from shellform.run.pace import POLISHING, WITHOUT_LOADS, Pace, time_words
+from shellform.run.pace import POLISHING_TAKES, WITHOUT_LOADS, Pace, time_words
 from shellform.run.robustness import robustness
 from shellform.run.workspace import Workspace
 from shellform.tables import Table, table_text
@@ -107,7 +107,7 @@ def _best(workspace: Workspace, shell: Gridshell, start: Design, loads: Mapping[
 
     entry = workspace.case.optimise
     polishes = entry.polish > 0 and entry.method != "paper"
-    pace = Pace(entry.evaluations, POLISHING * polishes + WITHOUT_LOADS * entry.unloaded)
+    pace = Pace(entry.evaluations, POLISHING_TAKES * polishes + WITHOUT_LOADS * entry.unloaded)
 
     def watch(step: Step) -> None:
         rejected = "" if step.accepted else ", rejected"
@@ -147,10 +147,15 @@ def _solver(case: Case) -> SequentialConvex | MovingAsymptotes:
     entry = case.optimise
     if entry.method == "paper":
         return MovingAsymptotes()
-    off = [each for each in (entry.deviation, case.limits.deviation) if each is not None]
     return SequentialConvex(
-        stiffness=entry.stiffness_min, most_cables=entry.cables_max, deviation=min(off, default=None)
+        stiffness=entry.stiffness_min, most_cables=entry.cables_max, deviation=_deviation(case)
     )
+
+
+def _deviation(case: Case) -> float | None:
+    """How far, m, a node may be off by what is saved: the wish, and the limit."""
+    off = [each for each in (case.optimise.deviation, case.limits.deviation) if each is not None]
+    return min(off, default=None)
 
 
 def _record(best: Optimum) -> OptimisationRecord:
@@ -185,6 +190,7 @@ def _polished(
         most = workspace.case.optimise.polish
         polished = optimiser.polish(
             last,
+            solver=replace(POLISHING, deviation=_deviation(workspace.case)),
             evaluations=most,
             groups=groups,
             progress=_telling(workspace, "polishing", most),

@@ -10,7 +10,7 @@ from shellform.compiled import clock_without_compiling
 _BELIEVED = 5
 _CONFIRMING = 1  # of the time between two notes of the last phase: a fresh sample's judgement at the end
 # In evaluations of the first phase, measured on 22 searches (vaults, full-size shells, strangers' surfaces):
-POLISHING = 30  # polishing, which judges as built too
+POLISHING_TAKES = 30  # polishing, which judges as built too
 WITHOUT_LOADS = 5  # the design without regard to the loads
 
 

@@ -7,6 +7,8 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser import trials
+from shellform.optimiser.solver import POLISHING
+from shellform.problem.paths import deviations
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability import trial_structures
 from shellform.reliability.scenarios import scenarios
@@ -130,6 +132,23 @@ def test_a_design_that_structures_led_to_is_polished_with_these_in_mind_and_judg
     ]
     assert (bear[0] > 0.99).all(), "an aim may be missed by a little"
     assert bear[0].min() > bear[1].min(), "what the objective alone leads to bears less"
+
+
+def test_a_design_with_a_node_too_far_off_is_polished_for_its_farthest_nodes_too(stout, found):
+    best, _ = found
+    best = replace(best, asked=None)
+
+    def farthest(polished):
+        return float(deviations(stout, polished.states["wet"]).max())
+
+    usual, kept = (
+        sf.polish(best, solver=replace(POLISHING, deviation=each), evaluations=12)
+        for each in (None, 1.001 * farthest(best))
+    )
+    np.testing.assert_array_equal(kept.design.rest_length, usual.design.rest_length)
+    led = sf.polish(best, solver=replace(POLISHING, deviation=0.999 * farthest(best)), evaluations=12)
+    assert [part.term for part in led.problem.minimise] == [sf.Misfit("wet"), sf.Bulges("wet")]
+    assert farthest(led) < min(farthest(usual), farthest(best))
 
 
 def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem):

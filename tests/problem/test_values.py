@@ -38,6 +38,30 @@ def test_the_misfit_is_the_sum_of_squared_distances_and_its_mean_has_limits_as_l
     np.testing.assert_array_equal(slope[:, 3:], 0.0)
 
 
+def test_bulges_are_fourth_powers_of_distances_with_their_derivatives_and_squares(moved):
+    at, away = moved
+
+    def value(places):
+        return sf.Bulges("wet").measure(replace(at, state=replace(at.state, positions=places))).value[0]
+
+    found = sf.Bulges("wet").measure(at)
+    assert found.value == pytest.approx([(np.linalg.norm(away, axis=1) ** 4).sum()], rel=1e-12)
+    assert (found.squares.residual**2).sum() == pytest.approx(found.value[0], rel=1e-12)
+    slope = found.by_dof.toarray().ravel()
+    np.testing.assert_allclose(2.0 * found.squares.residual @ found.squares.by_dof, slope, rtol=1e-12)
+    aside = np.random.default_rng(6).normal(size=away.shape)
+    expected = slope @ np.hstack([aside, np.zeros_like(aside)]).ravel()
+    errors = [
+        abs(
+            (value(at.state.positions + h * aside) - value(at.state.positions - h * aside)) / (2.0 * h)
+            - expected
+        )
+        for h in (1e-4, 5e-5)
+    ]
+    assert errors[0] < 0.1 * abs(expected)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.01), "Taylor"
+
+
 def test_cable_forces_are_stiffness_times_strain_and_absent_cables_have_none(moved):
     at, _ = moved
     ends = at.state.positions[at.shell.cable_ends]
