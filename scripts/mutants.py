@@ -460,6 +460,8 @@ def is_compiled(fault: Fault) -> bool:
 def in_one_process(faults: Sequence[Fault], tests: Sequence[str], told: TextIO) -> Planter:
     """What the tests notice of faults in functions."""
     os.environ["NUMBA_THREADING_LAYER"] = "workqueue"  # GNU's OpenMP ends a forked process at its first loop
+    # MKL waits in a forked process for ever for threads that weren't forked with it
+    os.environ |= {"OMP_NUM_THREADS": "1", "SHELLFORM_SOLVER": "cholmod"}
     planter = Planter(faults, told)
     files = tests or sorted({file for fault in faults for file in likeliest(fault)})
     os.chdir(ROOT)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from shellform.case.build_gridshell import rounding_catalogue
+from shellform.case.build_gridshell import has_edge_cells, rounding_catalogue
 from shellform.case.build_rod import given_section
 from shellform.case.build_safety import critical_factors_asked
 from shellform.case.case import check_script, dump_case, load_case, shipped_surfaces
@@ -105,3 +105,18 @@ def test_scripts_from_elsewhere_are_not_run_unasked(tmp_path):
     check_script(shipped_surfaces() / "vault.py", allow_scripts=False)
     with pytest.raises(InputError, match="--allow-scripts"):
         check_script(shipped_surfaces() / ".." / "tests" / "conftest.py", allow_scripts=False)
+
+
+@pytest.mark.parametrize(
+    ("settings", "there"),
+    [
+        ([], False),
+        (["optimise.method=paper"], True),
+        (["cable.edge_cells=true"], True),
+        (["optimise.method=paper", "cable.edge_cells=false"], False),
+    ],
+)
+def test_cells_at_the_edge_have_candidates_by_the_paper_s_method_and_where_they_are_asked_for(
+    settings, there
+):
+    assert has_edge_cells(load_case(ROOT / "scripts/scale_model.toml", settings)) is there

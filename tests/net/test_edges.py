@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import shellform as sf
+from shellform.case.build_net import edge_records
 from shellform.errors import InputError
 from shellform.net.edges import Edges, Place, _near, stand
+from shellform.net.rims import _chains
 from shellform.net.saved import load_net, net_document, save_net
 from tests.net.edge_shells import barrel, oculus, sail, undulating
 
@@ -56,6 +58,26 @@ def test_arches_hang_on_edge_beams_that_come_down_to_feet_on_the_ground(vault_of
         assert length.max() <= 0.5 * SPACING * 1.001
         assert length.sum() == pytest.approx(2 * 0.9 * 0.5, rel=1e-3)
         assert set(line.nodes[[0, -1]]) <= set(found.supports)
+
+
+def test_the_record_of_an_edge_tells_from_where_up_to_where_it_reaches(vault_of_two_arches):
+    surface, net = vault_of_two_arches
+    told = edge_records(stand(net, surface))
+    assert {each.kind for each in told} == {"ground", "beam"}
+    for each in told:
+        assert each.height[0] == pytest.approx(0.0, abs=2e-3)
+        assert (each.height[1] > 0.1) == (each.kind == "beam")
+
+
+def test_ends_round_a_cut_are_told_apart_at_gaps_wherever_the_first_one_lies():
+    round_it = np.linspace(0.0, 2.0 * np.pi, 10, endpoint=False)
+    round_it[3:7] += 0.2  # gaps after 2 and after 6
+    round_it[7:] += 0.4
+    middle = np.column_stack([np.cos(round_it), np.sin(round_it), np.zeros(10)])
+    ends = np.arange(10)
+    chains = [each.tolist() for each in _chains(ends, middle, 0.7)]
+    assert chains == [[3, 4, 5, 6], [7, 8, 9, 0, 1, 2]]
+    assert [each.tolist() for each in _chains(ends, middle, 2.0)] == [ends.tolist()]
 
 
 def test_an_edge_that_undulates_on_the_ground_stands_on_it_but_where_it_is_high():

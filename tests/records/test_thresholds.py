@@ -170,6 +170,15 @@ def test_the_guide_judges_nothing_and_tells_of_how_many_pairs_of_designs_it_orde
     assert guide_checks({"a": design()}, ["a"], ["design"], {"design": 1.0}) == []
 
 
+def test_the_guide_is_held_against_the_share_that_stands_however_many_were_drawn():
+    rows = {
+        name: design("design", stands=standing(drawn, number), expected_stiffness=stiffness)
+        for name, drawn, number, stiffness in (("a", 20, 20, 9.0), ("b", 200, 100, 3.0))
+    }
+    (check,) = guide_checks(rows, list(rows), ["design"], {"design": 1.0})
+    assert "orders 1 of 1 pairs" in check.limit
+
+
 @pytest.mark.parametrize(("error", "told"), [(0.0004, "4 mm"), (-0.0004, "4.3 mm"), (None, "4 mm")])
 def test_the_deviation_is_the_larger_one_of_both_meshes(shell, designs, error, told):
     asked = replace(BOUNDS, deviation=0.0042)
