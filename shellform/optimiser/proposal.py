@@ -135,24 +135,27 @@ def _as_far_as_can_be(
     """The model's optimum in windows (y,) where more is asked for than a step can give. Of what limits are broken by
     a share t remains, of what aims miss and of what guards ask for others, 0 <= t <= 1, each at its price."""
     size, count = len(slope), len(task.model.point.constraints)
-    limits = count - task.aims
+    limits, price = count - task.aims, task.solver.penalty
+    kinds = [(slice(limits), price), (slice(count, None), price)]
+    if task.aims:
+        kinds.append((slice(limits, count), task.solver.reserve * price))
+    more = len(kinds)
     wider: Reals | LowRank
     if isinstance(curvature, LowRank):
-        wider = curvature.widened(3)
+        wider = curvature.widened(more)
     else:
-        wider = np.zeros((size + 3, size + 3))
+        wider = np.zeros((size + more, size + more))
         wider[:size, :size] = curvature
-    broken = np.zeros((len(values), 3))
-    for k, own in enumerate((slice(limits), slice(limits, count), slice(count, None))):
+    broken = np.zeros((len(values), more))
+    for k, (own, _) in enumerate(kinds):
         broken[own, k] = np.maximum(values[own], 0.0)
-    price = task.solver.penalty * np.array([1.0, task.solver.reserve, 1.0])
     found = minimise_quadratic(
         wider,
-        np.append(slope, price * broken.max(axis=0, initial=0.0)),
+        np.append(slope, [each for _, each in kinds] * broken.max(axis=0, initial=0.0)),
         np.hstack([rows, -broken]),
         values,
-        np.append(low, np.zeros(3)),
-        np.append(high, np.ones(3)),
+        np.append(low, np.zeros(more)),
+        np.append(high, np.ones(more)),
     )
     return None if found is None else found[:size]
 
