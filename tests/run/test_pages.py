@@ -87,7 +87,8 @@ def test_a_design_whose_stage_was_broken_off_is_named_and_left_out(copy):
 def test_a_case_changed_after_its_designs_is_told(copy):
     assert not any("before the last change" in note for note in shown_run(read_run(copy)).notes)
     settings = text_of(copy / "case.toml")
-    (copy / "case.toml").write_text(settings.replace("polish = 20", "polish = 5"), encoding="utf-8")
+    assert "polish = 80" in settings
+    (copy / "case.toml").write_text(settings.replace("polish = 80", "polish = 5"), encoding="utf-8")
     assert any(
         "optimised designs were computed before the last change" in note
         for note in shown_run(read_run(copy)).notes
