@@ -1,5 +1,7 @@
 """What an analysis tells of how it came to its state, and the ways in which it gets there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -38,6 +40,21 @@ def test_newton_doesn_t_tell_whether_it_stayed_on_the_branch_and_a_path_does():
     assert analyse(toggle(), factor=0.05, method="newton").on_branch is None
     assert analyse(toggle(), factor=0.05, method="path").on_branch is True
     assert analyse(toggle(), method="path").on_branch is False
+
+
+@pytest.mark.parametrize("method", ["newton", "relaxation"])
+def test_a_support_has_moved_by_the_factor_times_what_is_imposed_after_any_number_of_increments(method):
+    points = line(4)
+    network = chain(points, (1e4, 1.0, 0.2, 0.2), {0: CLAMP, 4: CLAMP})
+    imposed = np.zeros((5, 6))
+    imposed[4, 2] = 0.01
+    model = Model(replace(network, imposed=imposed), {}, None, (0, 4))
+    for increments in (1, 2, 3):
+        moved = analyse(model, factor=2.0, increments=increments, method=method)
+        assert moved.converged
+        np.testing.assert_allclose(
+            moved.equilibrium.state.positions[4] - points[4], [0.0, 0.0, 0.02], atol=1e-12
+        )
 
 
 def test_none_is_the_structure_without_load():
