@@ -57,7 +57,7 @@ class Task:
     groups: Indices | None
     excess: Reals
     least: float
-    aims: int = 0
+    aims: int
 
 
 def propose(task: Task) -> tuple[Reals, float]:

@@ -152,4 +152,4 @@ _MAY_BE_ZERO = (
 
 # A polished design serves the shape alone and is near: smaller windows, and of the stiffness kept before it
 # may use up a fifth. It needs no reserve.
-POLISHING = SequentialConvex(thin=False, stiffness=0.8, smallest=0.003, reserve=0.3)
+POLISHING = SequentialConvex(thin=False, stiffness=0.8, smallest=0.003, reserve=SequentialConvex.aim)
