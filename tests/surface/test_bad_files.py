@@ -426,6 +426,20 @@ def test_a_shell_with_y_up_is_set_upright_unasked_and_told(tmp_path):
     assert any("it stands upright" in note for note in as_told.mended)
 
 
+def test_which_axis_is_vertical_is_found_before_openings_are_filled(tmp_path):
+    """A barrel between two open arches, y up: with z up it lies on its side, where its ends can't be filled down to
+    a ground, or come out flat."""
+    turn, along = np.meshgrid(np.linspace(0.1 * np.pi, 0.9 * np.pi, 13), np.linspace(-1.5, 1.5, 9))
+    corners = np.column_stack([2.0 * np.cos(turn.ravel()), 2.0 * np.sin(turn.ravel()), along.ravel()])
+    grid = np.arange(corners.shape[0]).reshape(9, 13)
+    faces = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    file = write_obj(tmp_path / "barrel.obj", corners, faces)
+    found, asked = read_surface(file, fill="edges"), read_surface(file, up="y", fill="edges")
+    np.testing.assert_array_equal(found.vertices, asked.vertices)
+    np.testing.assert_array_equal(found.triangles, asked.triangles)
+    assert found.area > read_surface(file).area
+
+
 def test_wrong_settings_are_refused_before_the_file_is_read(tmp_path):
     file = write_obj(tmp_path / "a.obj", POINTS, QUADS)
     for choice, word in [

@@ -16,7 +16,7 @@ from shellform.errors import InputError, require_file
 from shellform.surface.readers import compas, foreign, plain
 from shellform.surface.readers.draft import Choice, Draft
 from shellform.surface.readers.fills import filled
-from shellform.surface.readers.mend import mended
+from shellform.surface.readers.mend import mended, noted
 from shellform.surface.shape.target import Surface, make_surface
 from shellform.surface.units import turned_up, unit_factor
 
@@ -87,24 +87,29 @@ def read_surface(
             value=face,
             remedy="Leave it out for a file that holds a surface and no solid.",
         )
-    if kind in _OWN:
-        draft = _OWN[kind](file, Choice(layer, name))
-    else:
-        settings = {"unit": unit, "size": size, "up": up or "z", "layer": layer, "name": name, "face": face}
-        draft = foreign.read_foreign(file, kind, settings)
-    surface = surface_of(
-        _upright(draft, unit, up), str(file), face=face, piece=piece, fill=fill, ground=ground
-    )
-    if up is not None or kind in _STATED_UP or _plan_share(surface) >= _UPRIGHT:
-        return surface
-    turned = read_surface(
-        file, unit=unit, up="y", size=size, layer=layer, name=name, face=face, piece=piece, fill=fill, ground=ground
-    )  # fmt: skip
-    if _plan_share(turned) < _UPRIGHT:
-        return surface
-    return Surface(
-        turned.vertices, turned.triangles, turned.normals, turned.source, (*turned.mended, _TURNED)
-    )
+
+    def whole(axis: str | None) -> Draft:
+        if kind in _OWN:
+            draft = _OWN[kind](file, Choice(layer, name))
+        else:
+            settings = {
+                "unit": unit,
+                "size": size,
+                "up": axis or "z",
+                "layer": layer,
+                "name": name,
+                "face": face,
+            }
+            draft = foreign.read_foreign(file, kind, settings)
+        return mended(_upright(draft, unit, axis), str(file), face=face, piece=piece)
+
+    as_given = whole(up)
+    # told from the skin as it is: what fills its openings depends on the axis
+    if up is None and kind not in _STATED_UP and _plan_share(as_given) < _UPRIGHT:
+        turned = whole("y")
+        if _plan_share(turned) >= _UPRIGHT:
+            return _closed(noted(turned, _TURNED), str(file), fill, ground)
+    return _closed(as_given, str(file), fill, ground)
 
 
 def surface_of(
@@ -117,12 +122,16 @@ def surface_of(
     ground: float | None = None,
 ) -> Surface:
     """A draft in metres, z up, mended and closed as `read_surface` says."""
-    whole = mended(draft, source, face=face, piece=piece)
+    return _closed(mended(draft, source, face=face, piece=piece), source, fill, ground)
+
+
+def _closed(whole: Draft, source: str, fill: str | None, ground: float | None) -> Surface:
+    """Of a mended draft, its openings closed where that is asked for."""
     if fill is not None:
         whole = filled(whole, source, what=fill, ground=ground)
     surface = make_surface(whole.points, whole.triangles, normals=whole.normals, source=source)
     notes = whole.notes + surface.mended
-    plan = _plan_share(surface)
+    plan = _plan_share(whole)
     if plan < _UPRIGHT:
         notes = (
             *notes,
@@ -213,11 +222,11 @@ def _content(head: bytes, file: Path) -> str | None:
     return None
 
 
-def _plan_share(surface: Surface) -> float:
+def _plan_share(draft: Draft) -> float:
     """Of its area, the plan's: little where a shell lies on its side."""
-    corner = surface.vertices[surface.triangles]
-    plan = 0.5 * abs(float(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])[:, 2].sum()))
-    return plan / surface.area
+    corner = draft.points[draft.triangles]
+    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return abs(float(area[:, 2].sum())) / float(np.linalg.norm(area, axis=1).sum())
 
 
 def _upright(draft: Draft, unit: str | None, up: str | None) -> Draft:
