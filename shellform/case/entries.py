@@ -349,6 +349,7 @@ class LimitsEntry(Entry):
     deviation: PositiveFloat | None = Field(
         None, description="largest distance of a node from its place under the design load, m"
     )
+    built_deviation: PositiveFloat | None = Field(None, description="the same as built, at worst, m")
     utilisation: PositiveFloat | None = Field(
         None, description="largest fibre stress of the rods over their strength, erection stress included"
     )

@@ -100,7 +100,13 @@ def tell_verdict(verdict: VerdictRecord) -> None:
 def tell_as_built(summary: Summary) -> None:
     """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one
     to build fails first."""
-    from shellform.records.words import cause_title, critical_words, rare_words, standing_words
+    from shellform.records.words import (
+        built_shape_words,
+        cause_title,
+        critical_words,
+        rare_words,
+        standing_words,
+    )
 
     for name, design in summary.designs.items():
         for load, row in design.loads.items():
@@ -111,6 +117,8 @@ def tell_as_built(summary: Summary) -> None:
             if row.stands is not None:
                 own = row.stands
                 parts.append(standing_words(own))
+            if row.built_shape is not None:
+                parts.append(built_shape_words(row.built_shape))
             if row.expected_stiffness is not None:
                 parts.append(f"softest mode as built {row.expected_stiffness:.3g} N/m")
             if parts:

@@ -30,7 +30,7 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
-    `deviation`, m, under the design load, `stress` over strength, connectors' `turn`, rad, `uplift` and
+    `deviation`, m, under the design load, of the perfect structure and as `built`, `stress` over strength, connectors' `turn`, rad, `uplift` and
     `thrust`, N, of supports under any load, least pull `slack`, N, of cables under the `slack_loads`, and by
     load the least `critical` factor; what is asked of structures as built (`safety`); and how the case gives
     its `rods`' size."""
@@ -38,6 +38,7 @@ class Bounds:
     force: float
     misfit: float
     deviation: float | None = None
+    built: float | None = None
     stress: float | None = None
     turn: float | None = None
     uplift: float | None = None
@@ -141,6 +142,12 @@ def _deviation(row: LoadRecord) -> float:
     return max(row.deviation_max, row.deviation_max - 0.75 * (row.deviation_max_error or 0.0))
 
 
+def _built_deviation(row: DesignRecord) -> float | None:
+    """The worst, m, of the drawn structures that were looked at; of one that fell before there is none."""
+    shape = None if "design" not in row.loads else row.loads["design"].built_shape
+    return None if shape is None else shape.deviation_max_worst
+
+
 def _edged(row: LoadRecord) -> Cell:
     """The stress of edge beams over their strength."""
     share = row.edge_utilisation_max or 0.0
@@ -185,6 +192,14 @@ def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: B
             "limits.deviation",
             bounds.deviation,
             lambda row: _deviation(row.loads["design"]) if "design" in row.loads else None,
+            "mm",
+            1e3,
+        ),
+        _Limit(
+            "Largest deviation as built under the design load",
+            "limits.built_deviation",
+            bounds.built,
+            _built_deviation,
             "mm",
             1e3,
         ),

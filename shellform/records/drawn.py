@@ -22,13 +22,25 @@ class DrawnSnap:
 
 
 @dataclass(frozen=True)
+class DrawnShape:
+    """Structure `number` at rest under the design load: how far, m, its nodes are from their places on the target,
+    `deviation_max` and `deviation_mean`."""
+
+    number: int
+    deviation_max: float
+    deviation_mean: float
+
+
+@dataclass(frozen=True)
 class DrawnPath:
     """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, which of
-    them `stand`, and the local `snaps` on their ways."""
+    them `stand`, the local `snaps` on their ways, and the `shapes` of some under the design load, where that lies on
+    this path."""
 
     factors: tuple[float, ...] = ()
     stand: tuple[bool, ...] = ()
     snaps: tuple[DrawnSnap, ...] = ()
+    shapes: tuple[DrawnShape, ...] = ()
 
 
 @dataclass(frozen=True)

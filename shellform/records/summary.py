@@ -99,6 +99,20 @@ class StandingRecord:
 
 
 @dataclass(frozen=True)
+class BuiltShapeRecord:
+    """The shape of so many `structures` drawn as they would be built, at rest under the load: of their nodes' largest
+    distances from the target, m, the median, `deviation_max`, and the largest, `deviation_max_worst`; the median of
+    their mean distances, `deviation_mean`. To first order each of the `causes` of error, by name, moves a node by so
+    much, m, root mean square, where it is the only one."""
+
+    structures: int
+    deviation_max: float
+    deviation_max_worst: float
+    deviation_mean: float
+    causes: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class LoadRecord:
     """A design under one load case, `factor` times the design load.
 
@@ -112,7 +126,7 @@ class LoadRecord:
     ("none": it doesn't up to `critical_sought`, the most that was tried), `critical_factor_halved` the same
     with rod elements halved, and `critical_factor_error` what the coarser mesh is off by, as are
     `deviation_max_error`, `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without
-    tension, by name; `stands`: as built; `expected_stiffness`, N/m: the least of the softest mode on the path
+    tension, by name; `stands` and, under the design load, `built_shape`: as built; `expected_stiffness`, N/m: the least of the softest mode on the path
     to this load, cables counted for what they are worth under their errors."""
 
     factor: float
@@ -141,6 +155,7 @@ class LoadRecord:
     rod_utilisation_error: float | None = None
     slack: tuple[str, ...] | None = None
     stands: StandingRecord | None = None
+    built_shape: BuiltShapeRecord | None = None
     expected_stiffness: float | None = None
 
 
@@ -155,6 +170,7 @@ _UNEXAMINED: dict[str, Any] = dict.fromkeys(
         "deviation_mean_error",
         "rod_utilisation_error",
         "stands",
+        "built_shape",
         "expected_stiffness",
     ]
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from shellform.records.failures import RareRecord
-from shellform.records.summary import StandingRecord
+from shellform.records.summary import BuiltShapeRecord, StandingRecord
 
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
 TITLES = {
@@ -89,6 +89,19 @@ def standing_words(own: StandingRecord) -> str:
     return (
         f"{own.standing} of {own.drawn} structures as built stand{snapped} (at least {math.floor(100.0 * own.at_least):.0f} % "
         f"with {number(100.0 * own.confidence)} % confidence)"
+    )
+
+
+def built_shape_words(own: BuiltShapeRecord) -> str:
+    """How far drawn structures are off."""
+    driver = max(own.causes, key=lambda name: own.causes[name], default="")
+    driven = f", driven by {cause_title(driver)}" if driver else ""
+    mean, most, worst = (
+        number(1e3 * each, 2) for each in (own.deviation_mean, own.deviation_max, own.deviation_max_worst)
+    )
+    return (
+        f"as built {most} mm off at most and {mean} mm in the mean, in the median of {own.structures} structures, "
+        f"{worst} mm in the worst{driven}"
     )
 
 

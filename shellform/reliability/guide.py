@@ -3,8 +3,7 @@ cable counted for what it is worth under its tolerance (expected_cables.py).
 
 A perfect structure may count on cables that a length error of a hair leaves slack. At each state of the
 perfect path the tangent is taken with the expected law instead of the sharp one, the deviation of a cable's
-stretch being that of its own length and, to first order, of everything else that is off: for drawn errors the
-unbalanced forces r at the perfect state give dx = K⁻¹ r, and so the change of each cable's stretch. The least
+stretch being that of its own length and, to first order (first_order.py), of everything else that is off. The least
 of the lowest eigenvalues along the path is the guide; below zero, the average structure doesn't stand. It
 ranks designs and leads a search; how likely they stand the sample says.
 """
@@ -18,12 +17,12 @@ import numpy as np
 from shellform.arrays import Reals, reals
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import (
-    built_beams,
     built_cables,
     errors_of,
     variables,
 )
 from shellform.reliability.expected_cables import ExpectedCables
+from shellform.reliability.first_order import motions
 from shellform.reliability.perfect import Perfect
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.cable import Cables
@@ -31,7 +30,6 @@ from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import NotPositiveDefinite
-from shellform.structure.solve.residual import held
 
 DRAWN = 24  # structures from which deviations of stretches are taken: a share of 1/sqrt(2·24) off, 14 %
 _LEAST = 1e-6  # m, the smallest deviation that is counted
@@ -79,38 +77,23 @@ def stretch_deviation(
 ) -> Reals:
     """Standard deviation (c,), m, of each cable's stretch l - l0 without load, to first order in all errors
     but the shape's and the load's; where no first order is to be had, that of the cables' own length."""
-    network, state = perfect.network, perfect.unloaded
-    cables, none = network.cables, np.zeros_like(perfect.load)
+    cables, state, none = perfect.network.cables, perfect.unloaded, np.zeros_like(perfect.load)
     own = np.full(len(cables.ends), max(tolerances.cable_length, _LEAST))
     if not len(cables.ends):
         return own
+    some = [
+        errors_of(perfect.members, tolerances, variables(perfect.members, seed, number))
+        for number in range(drawn)
+    ]
     try:
-        factor = assembly.matrix.factor(held(assembly, assembly.evaluate(state)))
+        found = motions(perfect, assembly, state, none, some, shape=False)
     except NotPositiveDefinite:
         return own
-    right, offsets, errors_all = [], [], []
-    for number in range(drawn):
-        errors = errors_of(perfect.members, tolerances, variables(perfect.members, seed, number))
-        built = assembly.with_parts(
-            (
-                built_beams(network.beams, errors),
-                built_cables(cables, perfect.present, errors),
-            )
-        )
-        force = (
-            none - built.evaluate(state, tangent=False).force - assembly.force_along(state, errors.supports)
-        )
-        right.append(force.ravel()[assembly.free])
-        offsets.append(errors.supports)
-        errors_all.append(built_cables(cables, perfect.present, errors).rest_length - cables.rest_length)
-    steps = factor.solve(np.asfortranarray(np.column_stack(right)))
     a, b = cables.ends.T
     unit, _ = cables.directions(state)
+    longer = ((found[:, b] - found[:, a]) * unit).sum(axis=2)
     total = np.zeros(len(cables.ends))
-    for k in range(drawn):
-        step = offsets[k].ravel().copy()
-        step[assembly.free] = steps[:, k]
-        motion = step.reshape(-1, 6)[:, :3]
-        longer = ((motion[b] - motion[a]) * unit).sum(axis=1) - errors_all[k]
-        total += longer**2
+    for k, errors in enumerate(some):
+        rest = built_cables(cables, perfect.present, errors).rest_length
+        total += (longer[k] - (rest - cables.rest_length)) ** 2
     return np.asarray(np.maximum(np.sqrt(total / drawn), own))

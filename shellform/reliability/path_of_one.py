@@ -5,7 +5,7 @@ method).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import cast
 
@@ -58,7 +58,8 @@ class Snap:
 class DrawnOutcome:
     """One drawn structure: the load `factor` up to which its stable branch was followed, whether it `stands`,
     how `far`, m, a node ends from the perfect structure's place (inf where it fell), its last `state` on the
-    branch, the `factorisations` spent, and the local `snaps` on the way."""
+    branch, the `factorisations` spent, and the local `snaps` on the way; its state at rest under a share of the load,
+    `resting`, where that was asked for: None where it fell before."""
 
     number: int
     factor: float
@@ -67,6 +68,7 @@ class DrawnOutcome:
     state: State
     factorisations: int
     snaps: tuple[Snap, ...] = ()
+    resting: State | None = None
 
 
 @dataclass(frozen=True)
@@ -127,6 +129,23 @@ class Loading(Branch):
             far = float(np.linalg.norm(here.state.positions - nominal.states[-1].positions, axis=1).max())
         stands = far <= FAR * nominal.members.span
         return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent, snaps)
+
+    def rested(self, found: DrawnOutcome, share: float, step: float, smallest: float) -> DrawnOutcome:
+        """The structure's outcome with its state at rest under a `share` of the load: back along the branch, on
+        which it is elastic; where that leads nowhere, or something has snapped since, from nothing again."""
+        if found.factor < share:
+            return found
+        there = None
+        if not any(each.factor >= share for each in found.snaps):
+            there = self.at(found.state)  # its factor was replaced
+            if there is not None and found.factor > share:
+                there = self.step(there, share, last=True)
+        if there is None:
+            self.snaps.clear()
+            there, factor = self.borne(share, step, smallest)
+            there = there if factor >= share else None
+        resting = None if there is None else there.state
+        return replace(found, resting=resting, factorisations=self.spent)
 
     def borne(
         self,

@@ -100,12 +100,16 @@ class Workshop:
         step: float = STEP,
         smallest: float = SMALLEST,
         marks: Sequence[float] = (),
+        resting: float | None = None,
     ) -> DrawnOutcome:
         """The structure with the errors, loaded from nothing, and surely on which side of load factors in
-        `marks` it falls."""
-        return self.with_structure(
-            errors, lambda loading: loading.outcome(step, smallest, marks), number=number
-        )
+        `marks` it falls; where it rests under a share `resting` of the load, if that is asked for."""
+
+        def outcome(loading: Loading) -> DrawnOutcome:
+            found = loading.outcome(step, smallest, marks)
+            return found if resting is None else loading.rested(found, resting, step, smallest)
+
+        return self.with_structure(errors, outcome, number=number)
 
     def limit(
         self,
@@ -169,13 +173,14 @@ class Workshop:
         numbers: Sequence[int],
         step: float = STEP,
         marks: Sequence[float] = (),
+        resting: float | None = None,
     ) -> list[DrawnOutcome]:
         """The structures of these numbers under the seed, each as `load` loads it."""
         members = self.nominal.members
 
         def one(number: int) -> DrawnOutcome:
             errors = errors_of(members, tolerances, variables(members, seed, number))
-            return self.load(errors, number=number, step=step, marks=marks)
+            return self.load(errors, number=number, step=step, marks=marks, resting=resting)
 
         return side_by_side(one, list(numbers))
 

@@ -30,6 +30,7 @@ from shellform.records.drawn import DrawnPath
 from shellform.records.failures import FailureRecord, RareRecord
 from shellform.records.progress import Event, Kind
 from shellform.records.summary import (
+    BuiltShapeRecord,
     DesignRecord,
     StandingRecord,
     Summary,
@@ -38,9 +39,10 @@ from shellform.records.summary import (
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, open_checks, to_build
 from shellform.reliability.failure import explained
+from shellform.reliability.first_order import moved_by_cause
 from shellform.reliability.guide import guide
 from shellform.reliability.path_of_one import SOUGHT
-from shellform.reliability.perfect import perfect
+from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.probability import counted
 from shellform.reliability.refinement import mesh_error
 from shellform.reliability.safety import paths
@@ -206,9 +208,12 @@ def _stand(workspace: Workspace, each: _Examined, count: int, summary: Summary, 
         path = _drawn(workspace, each, largest, count, clock)
         if path is None:
             continue
-        guided = {} if before is not None else _guided(each, largest, shares, entry.seed)
+        first = before is None
+        guided = _guided(each, largest, shares, entry.seed) if first else {}
         for name, share in shares.items():
             own = replace(rows[name], stands=_standing(path, share, workspace.case))
+            if name == "design" and first:
+                own = replace(own, built_shape=_built_shape(path, each, entry.seed))
             rows[name] = replace(own, expected_stiffness=guided.get(name, own.expected_stiffness))
     record = replace(summary.designs[each.name], loads=rows)
     summary = summary.with_design(each.name, record)
@@ -279,6 +284,22 @@ def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
         min(fallen.values(), default=share) / share,
         len(snaps),
         max((own.far for own in path.snaps if own.number in snaps), default=0.0),
+    )
+
+
+def _built_shape(path: DrawnPath, each: _Examined, seed: int) -> BuiltShapeRecord | None:
+    """The shape under the design load of those structures that were looked at and rest under it."""
+    if not path.shapes:
+        return None
+    largest = [each.deviation_max for each in path.shapes]
+    means = [each.deviation_mean for each in path.shapes]
+    nominal = perfect(each.shell, each.design, each.loads["design"], step=TO_ITS_END)
+    return BuiltShapeRecord(
+        len(largest),
+        float(np.median(largest)),
+        max(largest),
+        float(np.median(means)),
+        moved_by_cause(nominal, each.tolerances, seed=seed),
     )
 
 

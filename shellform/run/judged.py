@@ -26,6 +26,7 @@ def run_checks(run: Run) -> list[Check]:
         force=run.case.cable.force_max,
         misfit=run.case.optimise.misfit_rms_additional,
         deviation=limits.deviation,
+        built=limits.built_deviation,
         stress=limits.utilisation,
         turn=limits.connector_turn,
         uplift=limits.uplift,

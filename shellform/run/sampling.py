@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -14,12 +14,15 @@ from shellform.arrays import Reals
 from shellform.compiled import clock_without_compiling
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.records.drawn import DrawnPath, DrawnSnap, read_drawn, write_drawn
+from shellform.problem.paths import deviations
+from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn, write_drawn
+from shellform.reliability.path_of_one import DrawnOutcome
 from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
 
 _AT_ONCE = 10  # structures, before they are kept
+_SHAPES = 20  # structures of which the shape is looked at: each takes some factorisations more
 
 
 class Clock:
@@ -66,6 +69,7 @@ def drawn_of(
     kept = read_drawn(folder, name, key)
     path = kept.paths.get(load, DrawnPath())
     clock.kept(min(len(path.factors), count))
+    own = paths(loads).get(load, {})
     workshop = None
     while len(path.factors) < count:
         began = clock_without_compiling()
@@ -76,23 +80,36 @@ def drawn_of(
             tolerances,
             seed=seed,
             numbers=range(first, min(first + _AT_ONCE, count)),
-            marks=tuple(paths(loads).get(load, {}).values()),
+            marks=tuple(own.values()),
+            resting=own.get("design") if first < _SHAPES else None,
         )
         path = DrawnPath(
             (*path.factors, *(each.factor for each in some)),
             (*path.stand, *(each.stands for each in some)),
             (
                 *path.snaps,
-                *(DrawnSnap(each.number, own.factor, own.far) for each in some for own in each.snaps),
+                *(DrawnSnap(each.number, snap.factor, snap.far) for each in some for snap in each.snaps),
             ),
+            (*path.shapes, *_shapes(shell, some)),
         )
         kept = kept.also(load, path)
         write_drawn(folder, name, kept)
         clock.took(len(some), clock_without_compiling() - began)
         tell(len(path.factors))
     return DrawnPath(
-        path.factors[:count], path.stand[:count], tuple(own for own in path.snaps if own.number < count)
+        path.factors[:count],
+        path.stand[:count],
+        tuple(each for each in path.snaps if each.number < count),
+        tuple(each for each in path.shapes if each.number < count),
     )
+
+
+def _shapes(shell: Gridshell, outcomes: Sequence[DrawnOutcome]) -> Iterator[DrawnShape]:
+    """Of the first structures, those that rest under the design load."""
+    for each in outcomes:
+        if each.resting is not None and each.number < _SHAPES:
+            far = deviations(shell, each.resting)
+            yield DrawnShape(each.number, float(far.max()), float(far.mean()))
 
 
 def key_of(

@@ -150,6 +150,7 @@ def test_a_share_of_the_objective_goes_to_the_robust_misfit(shell, loads):
         (["optimise.catalogue=none", "optimise.misfit=0.5", "optimise.rod_radius=0.2"], "can't be read"),
         (["optimise.neighbours=-1"], "optimise.neighbours"),
         (["limits.deviation=0"], "limits.deviation.*greater than 0"),
+        (["limits.built_deviation=0"], "limits.built_deviation.*greater than 0"),
         (["cable.rest_ratio=1.0"], "cable.rest_ratio.*less than 1"),
         (["safety.probability_design=1.0"], "safety.probability_design.*less than 1"),
         (["safety.probability_additional=1.0"], "safety.probability_additional.*less than 1"),

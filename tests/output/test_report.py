@@ -17,7 +17,7 @@ from shellform.output.page.embed import embed
 from shellform.output.page.first_answers import answers
 from shellform.output.page.shown_run import ShownRun
 from shellform.records.check import Cell
-from shellform.records.summary import StandingRecord, VerdictRecord
+from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
 from shellform.records.words import constraint_title, number
 from shellform.structure.elements.state import State
 from tests.records.made import summary
@@ -58,6 +58,10 @@ def test_the_answers_are_numbers_of_the_design(shell, designs):
     }
     pull = shell.cables(design).tension(shell.target)
     assert found["How far off is the shell?"].words == "4 mm at most"
+    shape = BuiltShapeRecord(20, 0.0531, 0.0674, 0.0113)
+    drawn = answers(shell, "polished", design, states, summary(designs, "design", built_shape=shape))[0]
+    assert drawn.detail.endswith("in the median of 20 structures, 67 mm in the worst")
+    assert "as built" not in found["How far off is the shell?"].detail, "nothing was drawn"
     assert found["How many cables?"].detail.startswith(f"{number(pull.max())} N at most in one")
     assert found["Which rods?"].words == "⌀ 2 mm"
     length = sum(rod.length for rod in shell.net.grid.rods)

@@ -10,10 +10,10 @@ from shellform.records.check import SLACK, below, share_of
 from shellform.records.checks import Bounds, checks
 from shellform.records.optimisation import CableCountRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
-from shellform.records.summary import StandingRecord
+from shellform.records.summary import BuiltShapeRecord, StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, headline, to_build, verdict
-from shellform.records.words import critical_words, load_title, number, standing_words
+from shellform.records.words import built_shape_words, critical_words, load_title, number, standing_words
 from tests.records.made import design, load, optimisation, summary
 
 RODS = RodsOf(0.001, 0.002, 0.1)
@@ -188,6 +188,18 @@ def test_the_deviation_is_the_larger_one_of_both_meshes(shell, designs, error, t
     assert (cell.found, cell.holds) == (told, told == "4 mm")
 
 
+def test_the_worst_structure_as_built_keeps_a_limit_of_its_own(shell, designs):
+    title = "Largest deviation as built under the design load"
+    assert title not in found(shell, designs, "design"), "told only, where nobody limits it"
+    asked = replace(BOUNDS, built=0.0062)
+    assert found(shell, designs, "design", bounds=asked)[title].holds is None, "not drawn"
+    for worst, told in [(0.0062, True), (0.0064, False)]:
+        shape = BuiltShapeRecord(20, 0.003, worst, 0.001)
+        cell = found(shell, designs, "design", bounds=asked, deviation_max=0.001, built_shape=shape)[title]
+        assert (cell.found, cell.holds) == (f"{1e3 * worst:g} mm", told)
+        assert told or cell.remedy == "Allow limits.built_deviation = 0.0064."
+
+
 def test_a_remedy_gives_the_entry_in_the_entry_s_own_unit(shell, designs):
     asked = replace(BOUNDS, deviation=0.004, stress=0.9, turn=0.1, uplift=1.0, thrust=2.0)
     away = found(shell, designs, "design", bounds=asked, deviation_max=0.00411)
@@ -284,6 +296,15 @@ def test_numbers_are_told_with_three_digits_and_powers_of_ten_only_where_they_mu
     assert {value: number(value) for value in told} == told
     assert number(np.inf) == number(np.nan) == "?"
     assert number(1.23456, 5) == "1.2346"
+
+
+def test_words_of_the_shape_as_built_name_what_drives_it():
+    shape = BuiltShapeRecord(19, 0.0531, 0.0674, 0.0113, {"marks": 0.006, "supports": 0.0095, "shape": 0.001})
+    assert built_shape_words(shape) == (
+        "as built 53 mm off at most and 11 mm in the mean, in the median of 19 structures, 67 mm in the worst, driven by "
+        "the supports' places"
+    )
+    assert built_shape_words(replace(shape, causes={})).endswith("67 mm in the worst")
 
 
 def test_words_of_loads_paths_and_structures_keep_their_numbers():

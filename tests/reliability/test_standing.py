@@ -229,3 +229,35 @@ def test_no_more_than_so_many_spots_may_snap_before_a_structure_counts_as_fallen
     made = Workshop(nominal).drawn(coarse, seed=1, numbers=range(12))
     assert not any(each.snaps for each in made)
     assert not made[9].stands
+
+
+def test_a_structure_rests_under_a_share_of_the_load_where_one_loaded_with_that_alone_does(dome):
+    share, load = 1.0 / 1.2, dome.point_load(4.5, every=2)
+    more, less = perfect(dome, dome.design(), 1.2 * load), perfect(dome, dome.design(), load)
+    made = Workshop(more).drawn(LARGE, seed=7, numbers=range(12), resting=share)
+    alone = Workshop(less)
+    looked_at = [each for each in made if each.resting is not None]
+    assert any(not each.stands for each in looked_at), "one that falls later rested there before"
+    for each in looked_at:
+        expected = alone.load(drawn(less, LARGE, each.number), number=each.number)
+        assert each.resting.positions == pytest.approx(expected.state.positions, abs=1e-8)
+        assert np.abs(each.resting.positions - each.state.positions).max() > 1e-5
+    for each in made:
+        assert (each.resting is None) == (each.factor < share)
+    for each, same in zip(made, Workshop(more).drawn(LARGE, seed=7, numbers=range(12)), strict=True):
+        assert same.resting is None, "where nobody asks"
+        assert (same.factor, same.stands) == (each.factor, each.stands)
+
+
+def test_a_structure_that_has_snapped_beyond_a_load_tells_where_it_rested_before(dome):
+    share, coarse = 0.2, Tolerances(marks=1e-3, supports=5e-4)
+    nominal = perfect(dome, dome.design(), dome.point_load(3.0, every=2))
+    made = Workshop(nominal).drawn(coarse, seed=1, numbers=range(16), resting=share)
+    beyond = [each for each in made if each.snaps and each.snaps[0].factor > share]
+    assert len(beyond) >= 2
+    workshop = Workshop(perfect(dome, dome.design(), share * dome.point_load(3.0, every=2)))
+    for each in beyond:
+        alone = workshop.load(drawn(nominal, coarse, each.number, seed=1))
+        assert not alone.snaps
+        assert each.resting.positions == pytest.approx(alone.state.positions, abs=1e-8)
+        assert len(each.snaps) >= 1, "which are told as before"

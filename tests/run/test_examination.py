@@ -3,23 +3,27 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from shellform.case.build_safety import case_safety, case_tolerances, critical_factors_asked
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.tolerances import SOURCES, default_tolerances
-from shellform.records.drawn import DrawnPath, DrawnSnap
+from shellform.records.drawn import DrawnPath, DrawnSnap, read_drawn
 from shellform.records.progress import Kind
 from shellform.records.summary import read_summary
+from shellform.reliability.drawing import CAUSES
+from shellform.reliability.perfect import perfect
 from shellform.reliability.probability import counted
 from shellform.reliability.safety import paths
-from shellform.reliability.standing import sample
+from shellform.reliability.standing import Workshop, sample
 from shellform.run import examination, optimising
 from shellform.run.examination import _standing
 from shellform.run.folder import read_run
 from shellform.run.judged import run_checks
 from shellform.run.run import run_case
+from shellform.run.sampling import key_of
 from tests.stubs import CASE
 
 FEW = ["safety.drawn=12", "safety.compared=4", "safety.probability_design=0.9", "optimise.unloaded=false"]
@@ -91,6 +95,45 @@ def test_under_a_share_of_a_load_those_stand_that_bear_it_and_the_lowest_factor_
         assert told.at_least == counted(6, told.standing, seed=5, confidence=0.9).at_least
         assert (told.confidence, told.seed) == (0.9, 5)
     assert _standing(DrawnPath((1.0,), (True,)), 0.8, case).lowest == 1.0
+
+
+def test_of_the_shape_as_built_the_median_the_worst_and_what_drives_it_are_told(whole):
+    run = read_run(whole[0])
+    for name, design in run.summary.designs.items():
+        told = design.loads["design"].built_shape
+        assert design.loads["additional"].built_shape is None, "concrete hardens under the design load"
+        if name == "unbraced":
+            assert told is None
+            continue
+        shell, tolerances = run.shell_of(name), case_tolerances(run.case, run.shell_of(name))
+        count = design.loads["design"].stands.drawn if name == run.summary.verdict.design else 4
+        (largest,) = paths(run.loads)
+        share = paths(run.loads)[largest]["design"]
+        workshop = Workshop(perfect(shell, run.designs[name], run.loads[largest]))
+        made = workshop.drawn(tolerances, seed=0, numbers=range(4), resting=share)
+        places = np.array([each.resting.positions for each in made])
+        far = np.linalg.norm(places - shell.target.positions, axis=2)
+        drawn = read_drawn(whole[0], name, key_of(shell, run.designs[name], tolerances, run.loads, 0))
+        shapes = drawn.paths[largest].shapes
+        assert [each.deviation_max for each in shapes[:4]] == pytest.approx(far.max(axis=1), abs=1e-8)
+        assert [each.deviation_mean for each in shapes[:4]] == pytest.approx(far.mean(axis=1), abs=1e-8)
+        assert len(shapes) == count
+        assert told.structures == 4, "those of the designs that are compared, for each the same"
+        assert told.deviation_max == pytest.approx(np.median(far.max(axis=1)), abs=1e-8)
+        assert told.deviation_max_worst == pytest.approx(far.max(), abs=1e-8)
+        assert told.deviation_mean == pytest.approx(np.median(far.mean(axis=1)), abs=1e-8)
+        assert told.deviation_max > design.loads["design"].deviation_max
+        assert set(told.causes) == {each for each in CAUSES if getattr(tolerances, each) > 0.0}
+
+
+def test_a_limit_on_the_shape_as_built_is_judged_by_the_worst_structure(file, whole):
+    run = read_run(whole[0])
+    worst = run.summary.designs["optimised"].loads["design"].built_shape.deviation_max_worst
+    for limit, holds in [(1.01 * worst, True), (0.99 * worst, False)]:
+        asked = replace(run, case=load_case(file, [*FEW, f"limits.built_deviation={limit}"]))
+        found = {check.name: check for check in run_checks(asked)}
+        cell = found["Largest deviation as built under the design load"].cells["optimised"]
+        assert cell.holds is holds
 
 
 def test_of_those_that_stand_it_is_counted_which_have_snapped_below_the_load_and_how_far(file):

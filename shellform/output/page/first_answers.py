@@ -16,7 +16,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import critical_words, number
+from shellform.records.words import built_shape_words, critical_words, number
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 
@@ -132,9 +132,14 @@ def _how_far(main: LoadRecord) -> Answer:
     return Answer(
         "How far off is the shell?",
         f"{_mm(main.deviation_max)} at most",
-        f"{_mm(main.deviation_mean)} in the mean, under the design load",
+        f"{_mm(main.deviation_mean)} in the mean, under the design load, as planned{_as_built(main)}",
         None if main.stable and main.on_branch else False,
     )
+
+
+def _as_built(main: LoadRecord) -> str:
+    """How far drawn structures are off."""
+    return "" if main.built_shape is None else f"; {built_shape_words(main.built_shape)}"
 
 
 def _is_safe(
