@@ -115,6 +115,19 @@ def test_a_trial_off_the_branch_is_infinite_and_has_the_derivatives_of_the_neare
     assert plain.best.violation == 0.0
 
 
+def test_the_nearest_design_is_the_one_whose_variables_are_nearest(coarse):
+    """Of two designs on the branch a trial off it takes the nearer one's derivatives, not those of the one with the
+    shorter cables."""
+    plain = Plain(problem(coarse, 4.0), coarse.design())
+    slope = plain.gradient(plain.start)
+    shorter = plain.start - 1e-3
+    assert np.isfinite(plain.value(shorter))
+    assert not np.array_equal(plain.gradient(shorter), slope)
+    slack = plain.start + 0.1
+    assert plain.value(slack) == np.inf
+    np.testing.assert_array_equal(plain.gradient(slack), slope)
+
+
 def test_what_can_t_be_compared_is_refused(coarse):
     asked = problem(coarse, 4.0)
     with pytest.raises(InputError, match=r"trust-constr, SLSQP"):

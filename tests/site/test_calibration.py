@@ -10,7 +10,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.site import calibration
 from shellform.site.calibration import calibrate, foresee
 from shellform.site.identifiability import TELLABLE
-from shellform.site.scans import Scan, match, read_points
+from shellform.site.scans import Scan, laid, match, read_points
 
 NOISE = 0.15e-3
 
@@ -155,6 +155,30 @@ def test_points_of_a_symmetric_set_are_said_to_fit_two_ways():
     lopsided = match(markers[:-9] + 5.0, markers[:-9], reach=0.4)
     assert lopsided.doubts == ()
     np.testing.assert_array_equal(lopsided.point, np.arange(26))
+
+
+def test_more_than_half_of_the_markers_have_to_be_found():
+    places = np.random.default_rng(4).normal(size=(11, 3))
+    for count in (5, 6):
+        points = places[:count]
+        if count == 5:
+            with pytest.raises(InputError, match="only 5 of 11 markers are found"):
+                match(points, places, reach=0.01, placed=True)
+            continue
+        assert match(points, places, reach=0.01, placed=True).point[:6].tolist() == list(range(6))
+
+
+def test_scans_of_one_frame_are_laid_by_one_motion_and_tell_what_distance_that_leaves(truth, markers):
+    """One scan is shifted against the other by 2 mm: their common motion leaves half of it to each."""
+    apart = np.array([2e-3, 0.0, 0.0])
+    points = [truth[0].positions[markers], truth[1].positions[markers] + apart]
+    none = np.zeros((len(truth[0].positions), 6))
+    for frame, expected in [(3, 1e-3), (None, 2e-3)]:
+        scans = [Scan(each, none, frame) for each in points]
+        one, other = laid(scans, truth[:2], markers, reach=0.01)
+        assert other.distance == pytest.approx(expected, rel=0.05)
+        assert one.distance == pytest.approx(1e-3 if frame else 0.0, rel=0.05, abs=1e-9)
+        assert (one.motion == other.motion) if frame else True
 
 
 def test_points_that_can_t_be_named_are_refused(shell, markers):
