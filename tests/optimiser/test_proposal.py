@@ -1,6 +1,7 @@
 """The convex problem of a step comes to its optimum, in windows however wide."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -110,3 +111,26 @@ def test_a_step_meets_an_aim_as_far_as_that_is_worth_its_price_where_trials_are_
         for other, of_other in ((free, rising), (dear, falling)):
             worth = search.solver.penalty * price
             assert predicted + worth * change <= other + worth * of_other + 1e-9
+
+
+def test_a_dead_cable_s_slope_is_that_of_its_tension_under_the_design_load():
+    """Terms at other loads say nothing of it, and a live cable keeps the slope by its rest length."""
+
+    def summand(load, *by_tension):
+        part = SimpleNamespace(term=SimpleNamespace(load=load))
+        return part, SimpleNamespace(by_tension=np.array([by_tension]))
+
+    parts, measured = zip(summand("wet", 3.0, 5.0, 7.0), summand("wetter", 11.0, 13.0, 17.0), strict=True)
+    model = SimpleNamespace(
+        tensions=2,
+        origin=np.array([1.0, 0.0, 0.0]),
+        evaluator=SimpleNamespace(
+            base="wet", weights=np.array([2.0, 4.0]), problem=SimpleNamespace(minimise=parts)
+        ),
+        point=SimpleNamespace(
+            design=SimpleNamespace(present=np.array([True, False, True])), summands=measured
+        ),
+        quadratics=(None, None),
+    )
+    slope = proposal._exact_in_tension(np.array([0.1, 0.2, 0.3]), model)
+    assert slope.tolist() == [0.1, 2.0 * 7.0, 0.3]
