@@ -7,6 +7,7 @@ import pytest
 
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import built_beams, built_cables, built_load, errors_of, variables
+from shellform.reliability.members import _chains
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.state import from_vectors
 
@@ -99,3 +100,11 @@ def test_a_bowed_rod_is_free_of_stress_on_its_arc(nominal, z, axis):
     arc = from_vectors(np.vstack([np.zeros(3), np.cumsum(chords, axis=0)]), turned[:, None] * about)
     np.testing.assert_allclose(bowed.local_forces(arc), 0.0, atol=1e-9)
     assert np.abs(bowed.local_forces(from_vectors(flat, np.zeros((5, 3))))).max() > 0.5
+
+
+def test_a_rod_s_elements_are_told_with_the_sense_in_which_each_runs_along_it():
+    """Three in a row, the first and the last of which run against it."""
+    places = np.array([[float(k), 0.0, 0.0] for k in range(4)])
+    rod = make_beams(places, [[1, 2], [1, 0], [3, 2]], axial=1e5, torsion=1.0, bending_y=1.0, bending_z=1.0)
+    ((elements, sense),) = _chains(rod, np.arange(3), 4)
+    assert (elements.tolist(), sense.tolist()) == ([1, 0, 2], [-1.0, 1.0, -1.0])

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from shellform.errors import InputError
-from shellform.reliability.subset import subset_simulation
+from shellform.reliability.subset import _level, subset_simulation
 
 
 def plane(beta, size):
@@ -85,3 +85,15 @@ def test_the_same_seed_gives_the_same_probability():
 def test_a_count_that_cannot_be_shared_out_is_refused(count):
     with pytest.raises(InputError, match="multiple of 10"):
         subset_simulation(plane(2.0, 2), 2, count=count, seed=0)
+
+
+def test_chains_step_farther_where_most_trials_are_taken_and_less_far_where_few_are():
+    """From 0.6 of a deviation; the share that is taken is to come to 0.44."""
+    begin = np.zeros((100, 20))
+    for bound, farther in [(np.inf, True), (-np.inf, False)]:
+        *_, step, spent = _level(
+            lambda z: z[:, 0], begin, begin[:, 0], bound, 10, 0.6, np.random.default_rng(5)
+        )
+        assert spent == 900
+        changes = (1.0 / np.sqrt([1, 2, 3, 4])).sum()  # after 2, 4, 6 and 8 of the chains' states
+        assert step == pytest.approx(0.6 * np.exp((0.56 if farther else -0.44) * changes))

@@ -16,7 +16,12 @@ from shellform.structure.elements.state import extended as with_tail
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
 from shellform.structure.solve import equilibrium
-from shellform.structure.solve.extended import ExtendedSymmetric, fit_for, with_twice_the_digits
+from shellform.structure.solve.extended import (
+    ExtendedSymmetric,
+    _ExactChords,
+    fit_for,
+    with_twice_the_digits,
+)
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.loading import Drive
 from shellform.structure.solve.residual import ResidualNorm
@@ -195,3 +200,14 @@ def test_loads_that_cancel_to_their_last_digit_are_none():
     weight[:, 2] = [-0.1, -0.3]
     assert (Drive(-weight * (1.0 + 2e-16), 0.0 * weight, weight).at(1.0) == 0.0).all()
     assert (Drive(-weight * (1.0 + 1e-12), 0.0 * weight, weight).at(1.0)[:, 2] != 0.0).all()
+
+
+@pytest.mark.parametrize("angle", [1e-4, 9e-3, 0.02, 0.7, 2.5])
+def test_a_chord_s_correction_leads_it_along_the_arc_that_its_step_turns_it_by(angle):
+    """A step of s along the chord and of l t across it is meant as a turn by t and a stretch by s."""
+    along, stretch, turned = np.array([0.6, 0.0, 0.8]), 0.3, np.array([0.0, 1.0, 0.0])
+    length = 2.0
+    chord, change = length * along, stretch * along + length * angle * turned
+    end = (length + stretch) * (np.cos(angle) * along + np.sin(angle) * turned)
+    gap = _ExactChords._gap(chord[None], change[None])[0]
+    assert chord + change + gap == pytest.approx(end, abs=1e-14)

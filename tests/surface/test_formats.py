@@ -131,6 +131,14 @@ def test_of_several_compas_meshes_one_has_to_be_named(tmp_path):
     np.testing.assert_allclose(read_surface(tmp_path / "two.json", name="big").size, np.array(SIZE) * 2)
 
 
+def test_what_has_vertices_and_no_faces_in_a_compas_file_is_no_mesh(tmp_path):
+    """A form diagram's network beside the mesh, as sessions hold them."""
+    network = {"vertex": {"0": {"x": 0.0}, "1": {"x": 1.0}}, "edge": {"0": {"1": {}}}}
+    file = tmp_path / "session.json"
+    file.write_text(json.dumps({"network": network, "mesh": compas_mesh(POINTS, QUADS)}), encoding="utf-8")
+    assert read_surface(file).size == pytest.approx(np.ptp(POINTS, axis=0))
+
+
 def test_faces_without_load_in_a_compas_mesh_are_openings(tmp_path):
     mesh = compas_mesh(POINTS, QUADS)
     mesh["data"]["facedata"] = {"44": {"_is_loaded": False}}
