@@ -94,8 +94,8 @@ def standing_words(own: StandingRecord) -> str:
 
 def built_shape_words(own: BuiltShapeRecord) -> str:
     """How far drawn structures are off."""
-    driver = max(own.causes, key=lambda name: own.causes[name], default="")
-    driven = f", driven by {cause_title(driver)}" if driver else ""
+    driver = built_shape_driver(own)
+    driven = f", driven by {driver}" if driver else ""
     mean, most, worst = (
         number(1e3 * each, 2) for each in (own.deviation_mean, own.deviation_max, own.deviation_max_worst)
     )
@@ -103,6 +103,12 @@ def built_shape_words(own: BuiltShapeRecord) -> str:
         f"as built {most} mm off at most and {mean} mm in the mean, in the median of {own.structures} structures, "
         f"{worst} mm in the worst{driven}"
     )
+
+
+def built_shape_driver(own: BuiltShapeRecord) -> str:
+    """The cause of error that moves nodes farthest; "" where none is known."""
+    driver = max(own.causes, key=lambda name: own.causes[name], default="")
+    return cause_title(driver) if driver else ""
 
 
 def rare_words(found: RareRecord) -> str:

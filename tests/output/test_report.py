@@ -60,7 +60,8 @@ def test_the_answers_are_numbers_of_the_design(shell, designs):
     assert found["How far off is the shell?"].words == "4 mm at most"
     shape = BuiltShapeRecord(20, 0.0531, 0.0674, 0.0113)
     drawn = answers(shell, "polished", design, states, summary(designs, "design", built_shape=shape))[0]
-    assert drawn.detail.endswith("in the median of 20 structures, 67 mm in the worst")
+    assert drawn.words == "4 mm as planned, 53 mm as built", "which may be ten times as much"
+    assert drawn.detail.endswith("the median of 20 drawn structures; the worst is 67 mm off")
     assert "as built" not in found["How far off is the shell?"].detail, "nothing was drawn"
     assert found["How many cables?"].detail.startswith(f"{number(pull.max())} N at most in one")
     assert found["Which rods?"].words == "⌀ 2 mm"
