@@ -160,8 +160,7 @@ class Models:
     def at(self, point: Evaluated) -> StepModel:
         """The step model at the point."""
         if self._model is None or self._at is not point:
-            linear = self.evaluator.linearised(point)
-            self._model = step_model(self.evaluator, linear, whole=self._whole(point))
+            self._model = step_model(self.evaluator, point, whole=self._whole(point))
             self._at = point
         return self._model
 

@@ -34,7 +34,7 @@ from shellform.gridshell.gridshell import Design
 from shellform.optimiser.solved_answers import solved_answers
 from shellform.optimiser.step_setting import Answers, Quadratic, setting
 from shellform.optimiser.whole_answers import whole_answers
-from shellform.problem.evaluation import Evaluator, Linearisation
+from shellform.problem.evaluation import Evaluated, Evaluator, Linearisation
 from shellform.problem.terms import Squares
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
@@ -103,11 +103,16 @@ class StepModel:
         return np.where(tension > _DEAD * stiffness, stiffness * length / (stiffness + tension), self.longest)
 
 
-def step_model(evaluator: Evaluator, point: Linearisation, *, whole: bool) -> StepModel:
-    """The model at the point, with dense matrices if it is to be `whole`."""
+def step_model(evaluator: Evaluator, point: Evaluated, *, whole: bool) -> StepModel:
+    """The model at the point, with dense matrices if it is to be `whole`. Its answers take as long as the point's
+    derivatives, beside which they are worked out."""
     shell, blocks, design = evaluator.shell, evaluator.blocks, point.design
     at, residuals = setting(evaluator, point), _distinct(evaluator, point)
-    answers: Answers = whole_answers(at, residuals) if whole else solved_answers(at, residuals)
+
+    def answered() -> Answers:
+        return whole_answers(at, residuals) if whole else solved_answers(at, residuals)
+
+    linear, answers = evaluator.linearised_beside(point, answered)
     values = blocks.values(design)
     lower, upper = blocks.value_bounds()
     shortest, longest = (
@@ -117,7 +122,7 @@ def step_model(evaluator: Evaluator, point: Linearisation, *, whole: bool) -> St
     return StepModel(
         evaluator,
         at.assembly,
-        point,
+        linear,
         at.state,
         count,
         shortest,
@@ -128,12 +133,12 @@ def step_model(evaluator: Evaluator, point: Linearisation, *, whole: bool) -> St
         blocks.step(design)[at.other],
         length,
         answers,
-        answers.by_variables(point.constraints_by_variables),
-        _of_terms(evaluator, point, residuals, answers.quadratics),
+        answers.by_variables(linear.constraints_by_variables),
+        _of_terms(evaluator, linear, residuals, answers.quadratics),
     )
 
 
-def _distinct(evaluator: Evaluator, point: Linearisation) -> list[Squares]:
+def _distinct(evaluator: Evaluator, point: Evaluated) -> list[Squares]:
     """The sums of squares in the objective under the design load, with residuals of their own each."""
     found: list[Squares] = []
     for part, measurement in zip(evaluator.problem.minimise, point.summands, strict=True):

@@ -15,7 +15,7 @@ import scipy.sparse as sp
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.optimiser.quadratic import LowRank
-from shellform.problem.evaluation import Evaluator, Linearisation
+from shellform.problem.evaluation import Evaluated, Evaluator
 from shellform.structure.answers.sensitivity import by_rest_length, element_columns, force_by_stiffness
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
@@ -36,7 +36,7 @@ class Setting:
 
     evaluator: Evaluator
     assembly: Assembly
-    point: Linearisation
+    point: Evaluated
     state: State
     cables: Cables
     present: Indices
@@ -95,7 +95,7 @@ class Answers(Protocol):
         """Of the sums of squares under the design load that the answers were made for."""
 
 
-def setting(evaluator: Evaluator, point: Linearisation) -> Setting:
+def setting(evaluator: Evaluator, point: Evaluated) -> Setting:
     """The setting of a step from the point."""
     shell, blocks, design = evaluator.shell, evaluator.blocks, point.design
     state, assembly = point.states[evaluator.base], evaluator.assembly(design)
@@ -131,7 +131,7 @@ def setting(evaluator: Evaluator, point: Linearisation) -> Setting:
 
 
 def _forces(
-    evaluator: Evaluator, assembly: Assembly, state: State, point: Linearisation, rate: sp.csr_array
+    evaluator: Evaluator, assembly: Assembly, state: State, point: Evaluated, rate: sp.csr_array
 ) -> sp.csc_array:
     """(f, v): the internal forces by values that change rest lengths and radius by `rate` (c + 1, v)."""
     shell, design = evaluator.shell, point.design

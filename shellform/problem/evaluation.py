@@ -9,8 +9,9 @@ to a design that does.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -31,6 +32,7 @@ from shellform.structure.answers.sensitivity import (
     respond,
 )
 from shellform.structure.elements.state import State
+from shellform.structure.elements.threads import cores, side_by_side
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -45,6 +47,9 @@ _KNOWN = 16  # measurements of terms that need no equilibrium, which are kept
 
 # of an Evaluator's work: `factorisations` are those of its equilibria
 COUNTS = ("evaluations", "rejected", "equilibria", "factorisations", "wasted")
+
+
+Made = TypeVar("Made")
 
 
 class OffBranch(Exception):
@@ -94,6 +99,16 @@ class Linearisation(Evaluated):
     constraints_by_variables: Reals
 
 
+@dataclass(frozen=True)
+class _Tried:
+    """The stable equilibrium that was found next to a start, None where there is none, and `why`; the
+    `factorisations` that it took."""
+
+    state: State | None
+    factorisations: int
+    why: str
+
+
 class Evaluator:
     """Evaluates designs of one problem, its objective weighted as at the start, and counts its work."""
 
@@ -103,7 +118,7 @@ class Evaluator:
         self.blocks = Blocks(problem.variables, problem.shell, start)
         self.weights: Reals = np.ones(len(problem.minimise))
         self.factorisations = self.equilibria = self.evaluations = self.rejected = self.wasted = 0
-        self._assembly: Assembly | None = None
+        self._assemblies: list[Assembly] = []
         self._present: Flags | None = None
         self._known: list[tuple[Term, Design, Measurement]] = []
         self._far = np.inf
@@ -160,23 +175,44 @@ class Evaluator:
         """The point with its derivatives, which cost as much as its values: only where steps start are they
         asked for. Raises OffBranch where an equilibrium isn't stable.
         """
-        problem, blocks, assembly = point.problem, self.blocks, self.assembly(point.design)
+        return self.linearised_beside(point, lambda: None)[0]
+
+    def linearised_beside(self, point: Evaluated, work: Callable[[], Made]) -> tuple[Linearisation, Made]:
+        """The same, and what other `work` makes on another core meanwhile, which may use the `assembly` of the point's
+        design."""
+        assembly = self.assembly(point.design, 1)
+        # drawn structures keep all cores busy by themselves
+        whole = [each.whole() for each in point.measurements]
+
+        def derived() -> Linearisation:
+            return self._linearised(point, self._rows(point, whole, assembly))
+
+        tasks: list[Callable[[], Any]] = [derived, work]
+        linear, made = side_by_side(lambda task: task(), tasks)
+        return linear, made
+
+    def _rows(self, point: Evaluated, whole: Sequence[Measurement], assembly: Assembly) -> list[Reals]:
+        """The total derivatives (g, s) of each of the problem's terms by the variables."""
+        blocks, terms = self.blocks, point.problem.terms
         rates = blocks.rates(point.design).multiply(blocks.unit).tocsc()
-        terms = problem.terms
         rows = [np.zeros((0, blocks.size))] * len(terms)
         for name in dict.fromkeys(term.load for term in terms):
             own = [k for k, term in enumerate(terms) if term.load == name]
             at = self._at(terms[own[0]], point.design, point.states, point.stage, assembly)
-            whole = [point.measurements[k].whole() for k in own]
+            measured = [whole[k] for k in own]
             try:
-                total = _chained(whole, at, assembly if name else None, blocks.moves_radius)
+                total = _chained(measured, at, assembly if name else None, blocks.moves_radius)
             except NotPositiveDefinite as error:
                 raise OffBranch(str(error)) from error
             by_variables = np.empty_like(total, shape=(len(total), blocks.size))
             by_variables[...] = total @ rates[: total.shape[1]]
-            pieces = np.split(by_variables, np.cumsum([len(each.value) for each in whole])[:-1])
+            pieces = np.split(by_variables, np.cumsum([len(each.value) for each in measured])[:-1])
             for k, piece in zip(own, pieces, strict=True):
                 rows[k] = piece
+        return rows
+
+    def _linearised(self, point: Evaluated, rows: Sequence[Reals]) -> Linearisation:
+        problem, blocks = point.problem, self.blocks
         summands, kept = rows[: len(problem.minimise)], rows[len(problem.minimise) :]
         slopes = [w * piece.sum(axis=0) for w, piece in zip(self.weights, summands, strict=True)]
         limited = [residual_rows(part, piece) for part, piece in zip(problem.constraints, kept, strict=True)]
@@ -193,15 +229,20 @@ class Evaluator:
         Raises OffBranch."""
         self.evaluations += 1
         before = self.factorisations
-        assembly = self.assembly(design)
         used = self.problem.used()
+        # The loads that a design may not bear first, so that giving up costs little; to lead, the design
+        # load's state is needed.
+        order = used if lead else tuple(reversed(used))
         try:
             found: dict[str, State] = {}
-            # The loads that a design may not bear first, so that giving up costs little; to lead, the design
-            # load's state is needed.
-            for name in used if lead else reversed(used):
-                known = found.get(self.base) if lead else None
-                found[name] = self._settled(assembly, near[name], known, self.load(name, stage))
+            for name, tried in zip(order, self._tried(design, near, stage, order, lead), strict=True):
+                self._count(tried.factorisations)
+                if tried.state is not None:
+                    found[name] = tried.state
+                elif lead and self.base in found:
+                    found[name] = self._led(design, found[self.base], self.load(name, stage))
+                else:
+                    raise OffBranch(tried.why)
             return self.seed(design, {name: found[name] for name in used}, stage)
         except OffBranch:
             self.rejected += 1
@@ -231,47 +272,55 @@ class Evaluator:
             found[name] = predicted(assembly, respond(assembly, state, *columns), change)
         return found
 
-    def assembly(self, design: Design) -> Assembly:
-        """The assembly of a design; its pattern is kept while the same cables are present."""
+    def assembly(self, design: Design, number: int = 0) -> Assembly:
+        """The assembly of a design; its pattern is kept while the same cables are present. Those of other numbers have
+        factors of their own, for work side by side."""
+        if self._present is None or not np.array_equal(self._present, design.present):
+            self._assemblies, self._present = [assemble(self.shell.network(design))], design.present
+        while len(self._assemblies) <= number:
+            self._assemblies.append(self._assemblies[0].beside())
         parts = (self.shell.beams(design.radius), self.shell.cables(design))
-        if (
-            self._assembly is None
-            or self._present is None
-            or not np.array_equal(self._present, design.present)
-        ):
-            self._assembly, self._present = assemble(self.shell.network(design)), design.present
-            return self._assembly
-        return self._assembly.with_parts(parts)
+        return self._assemblies[number].with_parts(parts)
 
-    def _settled(self, assembly: Assembly, near: State, known: State | None, load: Reals) -> State:
-        """The equilibrium next to `near`, or where that is too far off, the one that the load leads to from
-        the design load's, if that is `known`.
-        """
+    def _tried(
+        self, design: Design, near: Mapping[str, State], stage: float, order: Sequence[str], lead: bool
+    ) -> list[_Tried]:
+        """The equilibria under the loads in `order`, sought side by side; after one that has none, and unless others are
+        to `lead` to it, those that haven't begun are given up."""
+        idle = [self.assembly(design, number) for number in range(min(cores(), len(order)))]
+        lost: list[str] = []
+
+        def settled(name: str) -> _Tried:
+            if lost and (not lead or self.base in lost):
+                return _Tried(None, 0, "another load wasn't borne")
+            own = idle.pop()
+            found = self._settled(own, near[name], self.load(name, stage))
+            idle.append(own)
+            if found.state is None:
+                lost.append(name)
+            return found
+
+        return side_by_side(settled, list(order))
+
+    def _settled(self, assembly: Assembly, start: State, load: Reals) -> _Tried:
+        """The stable equilibrium next to the state `start` under the `load`."""
         try:
-            return self.settle(assembly, near, load)
-        except OffBranch:
-            if known is None:
-                raise
-        loaded = apply_load(
-            assembly, known, self.load(self.base, 1.0), load, step=_LED, smallest=_LED, stay=True
-        )
+            found = find_equilibrium(assembly, start, load, limit=_TRIAL, on_branch=True)
+        except NotConverged as error:
+            return _Tried(None, error.iterations, str(error))
+        misfit = float(((found.state.positions - self.shell.target.positions) ** 2).sum())
+        if not found.stable or misfit > self._far:
+            return _Tried(None, found.factorisations, "the equilibrium found isn't next to the start")
+        return _Tried(found.state, found.factorisations, "")
+
+    def _led(self, design: Design, known: State, load: Reals) -> State:
+        """The equilibrium to which the load leads from the design load's, which is `known`. Raises OffBranch."""
+        first = self.load(self.base, 1.0)
+        loaded = apply_load(self.assembly(design), known, first, load, step=_LED, smallest=_LED, stay=True)
         self._count(loaded.factorisations)
         if not loaded.on_branch:
             raise OffBranch("the design doesn't bear the load on its stable branch")
         return loaded.equilibrium.state
-
-    def settle(self, assembly: Assembly, start: State, load: Reals) -> State:
-        """The stable equilibrium next to the state `start` under the `load`. Raises OffBranch."""
-        try:
-            found = find_equilibrium(assembly, start, load, limit=_TRIAL, on_branch=True)
-        except NotConverged as error:
-            self._count(error.iterations)
-            raise OffBranch(str(error)) from error
-        self._count(found.factorisations)
-        misfit = float(((found.state.positions - self.shell.target.positions) ** 2).sum())
-        if not found.stable or misfit > self._far:
-            raise OffBranch("the equilibrium found isn't next to the start")
-        return found.state
 
     def _count(self, factorisations: int) -> None:
         self.factorisations += factorisations

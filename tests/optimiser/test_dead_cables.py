@@ -70,7 +70,7 @@ def test_the_model_tells_what_a_dead_cable_s_first_tension_does_to_second_order(
     for size in (1.0, 0.5):
         y = model.origin + size * change
         design = model.design(y)
-        found = search.evaluator.settle(search.evaluator.assembly(design), model.predicted(y), wet)
+        found = search.evaluator._settled(search.evaluator.assembly(design), model.predicted(y), wet).state
         errors.append(np.abs(dome.cables(design).tension(found) - y).max())
     assert errors[1] < 0.1 * np.abs(change).max()
     assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3

@@ -98,7 +98,7 @@ def test_a_change_of_rest_lengths_and_radius_is_predicted_to_second_order(dome):
         design = replace(point.design, rest_length=rest, radius=(1.0 + 0.02 * size) * point.design.radius)
         near = evaluator.predicted(point, design, but="wetter")
         assert set(near) == {"wet"}
-        found = evaluator.settle(evaluator.assembly(design), near["wet"], load)
+        found = evaluator._settled(evaluator.assembly(design), near["wet"], load).state
         errors.append(np.abs(found.positions - near["wet"].positions).max())
     assert errors[0] > 1e-7
     assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3
@@ -124,7 +124,7 @@ def test_the_tension_model_predicts_the_next_equilibrium_to_second_order(shell, 
     for size in (1.0, 0.5):
         y = model.origin + size * change
         design = model.design(y)
-        found = search.evaluator.settle(search.evaluator.assembly(design), model.predicted(y), wet)
+        found = search.evaluator._settled(search.evaluator.assembly(design), model.predicted(y), wet).state
         tension = shell.cables(design).tension(found)
         errors.append(np.abs(tension - y).max())
     assert 1.7 < np.log2(errors[0] / errors[1]) < 2.3

@@ -83,6 +83,13 @@ class Assembly:
         other._entries = np.empty_like(self._entries)
         return other
 
+    def beside(self) -> Assembly:
+        """The same assembly, its pattern shared, with a factor of its own, for work that goes on side by side."""
+        other = self.with_parts(self.parts)
+        other.matrix = Symmetric(self.matrix.indptr, self.matrix.indices)
+        other.clock = dict.fromkeys(self.clock, 0.0)
+        return other
+
     @property
     def beams(self) -> list[Beams]:
         """The parts that are beams."""
