@@ -34,6 +34,7 @@ from shellform.net.pull import (
 from shellform.net.quality import measure, nearness, refuse_distance, refuse_folds
 from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
+from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.target import Surface, triangle_areas
 
@@ -59,6 +60,7 @@ Method = Literal["pull", "compass"]
 Start = Literal["compass", "flat"]
 
 
+@dense_on_one()
 def pull_net(
     surface: Surface,
     *,

@@ -38,6 +38,7 @@ from shellform.run.first_trial import (
 )
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import OF_SPAN, THICKNESS, DesignWish, RodChoice, may_come_off, usual_thickness
+from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
@@ -47,6 +48,7 @@ _SEARCH, _WAYS_OUT = 60.0, 90.0  # s of a processor after which no design, and n
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
+@dense_on_one()
 def propose_case(
     file: Path,
     output: Path,

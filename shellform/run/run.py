@@ -46,6 +46,7 @@ from shellform.run.profiling import Profiler
 from shellform.run.sketch import STAGES_OF_SKETCH, draw_sketch, drop_other, refuse_over_full, sketched
 from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
 from shellform.run.workspace import Workspace
+from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.work_clock import listening
 from shellform.written import folder as made_folder
@@ -74,6 +75,7 @@ class _Ended:
     complete: bool = True
 
 
+@dense_on_one()
 def run_case(
     case: Case,
     folder: str | Path,

@@ -4,6 +4,10 @@ in seconds.
 
 import csv
 import json
+import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +19,8 @@ from shellform.run import checkpoint, documents, optimising
 from shellform.run.folder import read_run
 from shellform.run.run import run_case
 from tests.stubs import CASE
+
+ROOT = Path(__file__).parent.parent.parent
 
 
 @pytest.fixture(scope="module")
@@ -182,3 +188,19 @@ def test_the_log_tells_every_step_and_how_a_stage_ended(file, tmp_path):
     assert " run: shellform " in told
     assert " surface: done in " in told
     assert " initial: ended: The initial design " in told
+
+
+def test_a_design_has_the_same_bytes_on_one_core_and_on_two(tmp_path):
+    """Sums over many numbers in dense algebra come out otherwise on another number of threads."""
+    few = ["optimise.evaluations=3", "optimise.polish=0", "optimise.unloaded=false", "cable.without=false"]
+    made = []
+    for threads in ("1", "2"):
+        folder = tmp_path / threads
+        command = [
+            sys.executable, "-m", "shellform", "design", str(ROOT / "scripts/scale_model_radius.toml"),
+            "--output", str(folder), "--until", "optimise", "--quiet", *(f"--set={each}" for each in few),
+        ]  # fmt: skip
+        subprocess.run(command, check=True, env={**os.environ, "OMP_NUM_THREADS": threads})
+        made.append([(folder / name).read_bytes() for name in ("net.json", "designs/optimised.json")])
+    assert made[0][0] == made[1][0], "the net"
+    assert made[0][1] == made[1][1], "the optimised design"

@@ -52,6 +52,22 @@ def random_matrix(shift):
 
 
 @pytest.mark.parametrize("backend", factorisation.installed())
+def test_many_right_hand_sides_have_the_same_bits_on_one_core_and_on_two(backend, monkeypatch, shell):
+    """PARDISO solves them in blocks, of all on one thread and of half as many on each of two."""
+    monkeypatch.setenv("SHELLFORM_SOLVER", backend)
+    assembly = assemble(shell.network(shell.design()))
+    right = np.random.default_rng(3).normal(size=(len(assembly.free), 290))
+    found = []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        matrix = assembly.beside().matrix
+        values = assembly.evaluate(shell.target).tangent
+        values = matrix.raised(values, matrix.diagonal, 1.0)
+        found.append(matrix.factor(values).solve(right))
+    np.testing.assert_array_equal(found[0], found[1])
+
+
+@pytest.mark.parametrize("backend", factorisation.installed())
 def test_every_solver_solves_and_counts_negative_eigenvalues(backend, monkeypatch):
     monkeypatch.setenv("SHELLFORM_SOLVER", backend)
     definite, indefinite = random_matrix(30.0), random_matrix(0.0)

@@ -40,7 +40,8 @@ _ANALYSIS = 96  # bytes an entry: 51 to 62 were measured for cubes of rods of 50
 # bytes of addresses: 260e6 of files that it loads for the newest processors, and its buffers
 _PARTS = 320_000_000
 _BESIDE = 64_000_000  # bytes that a phase takes beside what it tells of; 31e6 were measured
-# right-hand sides, which are solved side by side without waiting; each comes out the same on one thread
+# right-hand sides, which two threads solve side by side without waiting, on one core too: each comes out otherwise
+# as one of so many on a thread than as one of half as many
 _MANY = 16
 
 
@@ -76,6 +77,7 @@ def library() -> Any:
             # The same bytes wherever an array happens to begin: otherwise a run that was resumed ended 4e-13
             # m beside one that wasn't.
             loaded.MKL_CBWR_Set(_STRICT)
+            loaded.MKL_Set_Dynamic(0)  # as many threads as are asked for, on however few cores
             return loaded
     return None
 
@@ -219,8 +221,8 @@ def _pardiso(
     step, order, sides, error = ctypes.c_int(phase), ctypes.c_int(size), ctypes.c_int(count), ctypes.c_int(0)
     ref = ctypes.byref
     mkl = library()
-    many = size > _TWO_THREADS_FROM or (phase == _SOLVE and count >= _MANY)
-    before = mkl.MKL_Set_Num_Threads_Local(min(2, cores()) if many else 1)
+    large, many = size > _TWO_THREADS_FROM, phase == _SOLVE and count >= _MANY
+    before = mkl.MKL_Set_Num_Threads_Local(2 if many else min(2, cores()) if large else 1)
     mkl.PARDISO(
         _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values),
         _at(rows), _at(columns), _at(kept),
