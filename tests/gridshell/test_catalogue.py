@@ -155,6 +155,14 @@ def test_sections_that_the_net_would_break_are_not_allowed(mine, net):
     assert largest(mine, net).radius == pytest.approx(0.0012)
 
 
+def test_a_section_that_is_used_to_the_full_by_the_net_is_allowed(mine, net):
+    full = erection_stress(net, mine.sections[2])
+    for share, count in [(1.0, 3), (1.0 - 1e-6, 2)]:
+        material = replace(mine.material, strength=share * full)
+        sections = tuple(replace(each, material=material) for each in mine.sections)
+        assert len(allowed(replace(mine, sections=sections, material=material), net)) == count
+
+
 @pytest.mark.parametrize(
     ("radius", "higher"), [(0.0009, 0.001), (0.001, 0.001), (0.00101, 0.0011), (0.0012, 0.0012)]
 )

@@ -141,6 +141,21 @@ class Askew(Ratios):
         return sf.Rates(radius=np.ones(3))
 
 
+@dataclass(frozen=True)
+class InUnits(Ratios):
+    units: tuple[float, ...]
+
+    def unit(self, shell, start):
+        return np.array(self.units)
+
+
+@pytest.mark.parametrize("units", [(1.0, 1.0), (1.0, 1.0, 1.0, 0.0), (1.0, 1.0, np.inf, 1.0)])
+def test_a_variable_without_a_positive_unit_for_each_of_its_values_is_refused(coarse, units):
+    asked = problem(coarse, variables=[InUnits(units)])
+    with pytest.raises(sf.InputError, match="each needs a positive unit"):
+        sf.optimise(asked, coarse.design(), evaluations=1)
+
+
 def test_a_term_or_variable_whose_shapes_are_not_those_that_it_says_is_refused(coarse):
     start = coarse.design()
     wrong = problem(coarse, sf.AtMost(1.0, Wrong("wet", (1, 2))), variables=[sf.RestLengths()])

@@ -2,6 +2,7 @@
 
 import matplotlib.image
 import numpy as np
+import pytest
 
 from shellform.output.pictures import maps, net_maps
 
@@ -25,3 +26,10 @@ def test_values_at_crossings_are_carried_along_the_rods_and_kept_at_them(net):
     np.testing.assert_array_equal(carried[net.grid.crossing_nodes[:, 0]], values)
     np.testing.assert_array_equal(carried[net.grid.crossing_nodes[:, 1]], values)
     assert 1.0 <= carried.min() <= carried.max() <= 2.0
+
+
+def test_the_map_of_skew_shows_how_far_crossings_are_from_a_right_angle(net):
+    shown = net_maps._values(net, "skew")
+    skew = np.abs(0.5 * np.pi - net.quality.shear_angle)
+    assert shown.max() == pytest.approx(skew.max())
+    assert 0.0 < skew.max() < 0.25 * np.pi

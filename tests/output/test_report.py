@@ -230,7 +230,10 @@ def test_what_the_view_is_given_is_the_state_of_the_design(shell, vault):
         [],
         [],
     )
-    drawn = view_data.view_data(report.viewed(run))
+    seen = report.viewed(run)
+    drawn = view_data.view_data(seen)
+    farthest = 1e3 * np.linalg.norm(moved.positions - shell.target.positions, axis=1).max()
+    assert farthest <= view_data.fitting(seen) < 2.0 * farthest
     half = 0.5 * np.ptp(shell.target.positions, axis=0)
     assert np.array(drawn["box"]) == pytest.approx(np.array([-half, half]), rel=1e-5)
     found = drawn["designs"][0]["states"]["design"]

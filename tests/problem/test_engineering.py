@@ -98,6 +98,10 @@ def test_the_smooth_maximum_is_never_below_the_largest_and_little_above(shell, w
     assert largest <= told <= largest + np.log(2 * len(forces)) / SHARPNESS
 
 
+def test_of_many_ends_used_to_the_full_the_smooth_maximum_is_a_twenty_fifth_too_high():
+    assert np.log(3000) / SHARPNESS == pytest.approx(0.04, abs=1e-3)
+
+
 def test_supports_that_would_lift_are_told_with_their_force(shell, wet):
     evaluator = Evaluator(limited(shell, wet, Uplift("wet", 2.0)), shell.design())
     state = evaluator.begin()["wet"].equilibrium.state

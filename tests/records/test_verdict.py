@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import pytest
 
+from shellform.cli.terminal import tell_designs
 from shellform.records.as_built import AsBuilt
 from shellform.records.checks import Bounds, checks
 from shellform.records.optimisation import CableCountRecord, SymmetryRecord
 from shellform.records.summary import StandingRecord
 from shellform.records.verdict import asked, failed, headline, to_build, verdict
+from tests.records import made
 from tests.records.made import design, load, optimisation, summary
 
 
@@ -302,3 +304,9 @@ def test_wishes_for_cables_are_checked_on_the_design_to_build(shell, designs):
     assert found["Number of cables"].cells["polished"].holds is False
     assert not found["Number of cables"].cells["initial"].asked
     assert found["Symmetric cables have one length"].cells["polished"].found == "the load isn't borne"
+
+
+def test_the_terminal_names_limits_that_are_broken_by_more_than_a_thousandth(capsys):
+    told = made.summary(["optimised"], constraints={"cable_force": 0.0016, "misfit": 0.0008})
+    tell_designs(told)
+    assert "limits that are not kept: cable_force by 0.2%\n" in capsys.readouterr().out

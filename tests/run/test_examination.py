@@ -74,6 +74,18 @@ def test_every_design_tells_its_critical_factor_on_both_meshes_and_how_many_stru
         assert ratio == pytest.approx(1.2)
 
 
+def test_a_critical_factor_is_kept_where_every_load_s_is_at_least_what_is_asked(file, whole):
+    asked = critical_factors_asked(load_case(file, FEW))
+    assert asked
+    kept = {}
+    for name, design in read_summary(whole[0]).designs.items():
+        kept[name] = all(
+            design.loads[load].critical_factor >= least * (1.0 - 1e-3) for load, least in asked.items()
+        )
+        assert design.critical_factor_kept is kept[name]
+    assert set(kept.values()) == {True, False}, "else the test says nothing"
+
+
 def test_what_is_told_is_what_a_sample_of_the_same_seed_finds(whole):
     run = read_run(whole[0])
     shell, design = run.shell_of("optimised"), run.designs["optimised"]

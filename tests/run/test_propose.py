@@ -498,6 +498,11 @@ def test_a_flat_surface_is_refused_whichever_way_it_lies_and_one_with_the_rise_n
         refuse_flat(flat)
     rise = float(re.search(r"span, ([\d.]+) m", refused.value.remedy).group(1))
     refuse_flat(dish(rise=rise))
+    for times in (0.02, 50.0):  # a model and a stadium: flat is what is flat for its size
+        with pytest.raises(InputError, match="flat plate"):
+            refuse_flat(make_surface(times * flat.vertices, flat.triangles))
+        shell = dish(rise=rise)
+        refuse_flat(make_surface(times * shell.vertices, shell.triangles))
     points = flat.vertices.copy()
     points[:, 2] += 0.5 * points[:, 0]
     with pytest.raises(InputError, match="flat plate"):
