@@ -21,6 +21,8 @@ from shellform.reliability.trial_structures import aims
 
 _MORE = 0.2  # of all evaluations, that come on top where a sample disagrees
 _MOST = 12  # samples, after which a turn without a step is the last
+_DEARER = 2.0  # times, with each sample that disagrees
+_PAUSE = 0.75  # of the cables, at which thinning asks a sample on its way
 _LEFT = 0.4  # of all evaluations, that thinning leaves where trials know no enlarged errors
 
 
@@ -32,12 +34,28 @@ def leaving_some(search: Search) -> Search:
     return replace(search, evaluations=search.evaluations - int(_LEFT * search.evaluations))
 
 
+def pausing(search: Search, cables: int, counted: int) -> bool:
+    """Whether thinning, with so many `cables` left of those that were `counted` at the last sample, is to ask another
+    one: those that few structures with errors as they are have let go are too many as a rule, and where a fresh sample
+    says so soon a few lengths make up for them."""
+    if search.asked is None or search.asked.trusted or search.asked.confirmed is None:
+        return False
+    return cables < _PAUSE * counted
+
+
+def _dearer(search: Search, disagreed: int) -> Search:
+    """The search with what structures in mind miss of their aims the dearer, up to a limit's whole price, the more often
+    samples have disagreed: what is worth missing them at a low price falls in every one."""
+    price = min(1.0, search.solver.aim * _DEARER**disagreed)
+    return replace(search, solver=replace(search.solver, aim=price))
+
+
 def agreed(
     search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]
 ) -> tuple[bool, Iterate]:
     """Whether a fresh sample agrees that the last design stands, after turns of a sample and a descent led by
-    what falls in it; and the iterate. Where the search was led, turns follow as long as they lead to a better design
-    with which a sample agrees. After a turn without a step another sample leads on, and can't agree: drawn often
+    what falls in it; and the iterate. Where the search was led and thinning has ended, turns follow as long as they lead
+    to a better design with which a sample agrees. After a turn without a step another sample leads on, and can't agree: drawn often
     enough, a design stands by luck."""
     if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return True, it
@@ -47,7 +65,7 @@ def agreed(
         refused = False
         if it.until:  # in the middle of a turn
             spent = search.evaluator.evaluations
-            it = descend(finely(search, it.until), it)
+            it = descend(finely(_dearer(search, it.disagreed), it.until), it)
             refused = len(it.accepted) == it.begun  # by the sample that led the turn, which found no step
             if refused and (
                 it.begun == it.stood or it.samples >= _MOST or search.evaluator.evaluations == spent
@@ -59,13 +77,14 @@ def agreed(
                     break
                 it = replace(it, point=there, accepted=(*it.accepted[:-1], accepted_design(search, there)))
         judged, it = fresh(search, it)
+        it = replace(it, disagreed=it.disagreed + (not judged.stands))
         if judged.stands and refused:
             break
         if judged.stands:
             found, before = it.point.objective, it.led_to
             if found < before:
                 it = replace(it, stood=len(it.accepted), led_to=found)
-            if it.mind is None or not found < (1.0 - WORTH) * before:
+            if it.mind is None or it.paused or not found < (1.0 - WORTH) * before:
                 break
         least = {} if judged.stands else aims(asked.sample(it.samples), judged)
         it = led_by(search, it, it.accepted[-1].built, least)

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices
-from shellform.optimiser.agreeing import agreed, leaving_some
+from shellform.optimiser.agreeing import agreed, leaving_some, pausing
 from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
 from shellform.optimiser.minding import (
     joined,
@@ -72,13 +72,16 @@ def run(search: Search, it: Iterate) -> Iterate:
             it = last_standing(search, it)
     if it.phase == "lead":
         it = _led(looking_closer(search), it)
-    if it.phase == "thin":
-        it = _thin(leaving_some(search if it.mind is None else looking_closer(search)), it)
-        it = replace(it, phase="agree", until=0, stood=0, led_to=np.inf)
-    if it.phase == "agree":
+    while it.phase in ("thin", "agree"):
+        if it.phase == "thin":
+            it = _thin(leaving_some(search if it.mind is None else looking_closer(search)), it)
+            it = replace(it, phase="agree", until=0, stood=0, led_to=np.inf)
         agrees, it = agreed(search, it, _descend)
-        if agrees:
+        if agrees and not it.paused:
             return it
+        if not agrees:
+            break
+        it = _going_on(search, it)
     return last_confirmed(search, it)
 
 
@@ -261,6 +264,19 @@ def _ready_to_thin(search: Search, it: Iterate) -> Iterate:
         thrifty=it.point.objective + solver.allowance,
         batch=max(1, taut_count(search, it.point) // solver.batch),
         needed=np.zeros(len(it.tensioned), dtype=bool),
+        counted=taut_count(search, it.point),
+    )
+
+
+def _going_on(search: Search, it: Iterate) -> Iterate:
+    """Ready to thin on after a pause, with what is left of the objective that may be spent."""
+    return replace(
+        it,
+        window=max(it.window, 0.1 * search.tension),
+        guarded=True,
+        phase="thin",
+        paused=False,
+        counted=taut_count(search, it.point),
     )
 
 
@@ -275,6 +291,8 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     solver = search.solver
     most = solver.most_cables
     while it.failures < solver.failures and search.left() > 0:
+        if pausing(search, taut_count(search, it.point), it.counted):
+            return replace(it, paused=True)
         it = _without_slack(search, it)
         tell(search, it)
         over = most is not None and taut_count(search, it.point) > most

@@ -87,7 +87,7 @@ def propose(task: Task) -> tuple[Reals, float]:
         asked = scaled_curvature, scaled_slope, rows, limits, low, high
         if task.groups is not None:
             return _equal_steps(task, width, *asked)
-        # without a reserve an aim is met as far as that is worth its price, even if it could be met
+        # an aim is met as far as that is worth its price, even if it could be met
         u = None if _at_their_price(task, values) else minimise_quadratic(*asked)
         if u is None:
             u = _as_far_as_can_be(task, *asked)
@@ -138,7 +138,7 @@ def _as_far_as_can_be(
     limits, price = count - task.aims, task.solver.penalty
     kinds = [(slice(limits), price), (slice(count, None), price)]
     if task.aims:
-        kinds.append((slice(limits, count), task.solver.reserve * price))
+        kinds.append((slice(limits, count), task.solver.aim * price))
     more = len(kinds)
     wider: Reals | LowRank
     if isinstance(curvature, LowRank):
@@ -163,8 +163,7 @@ def _as_far_as_can_be(
 def _at_their_price(task: Task, values: Reals) -> bool:
     """Whether aims are missed, `values` (k,) of the constraints being at most 0 where they are met, that steps are to
     meet as far as that is worth the price by which they are judged."""
-    missed = values[len(values) - task.aims :] > 0.0
-    return task.solver.reserve <= task.solver.aim and bool(missed.any())
+    return bool((values[len(values) - task.aims :] > 0.0).any())
 
 
 def _curvature(model: StepModel, width: Reals) -> Reals | LowRank:

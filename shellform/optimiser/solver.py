@@ -38,8 +38,6 @@ class SequentialConvex:
       tenth of the limit outweighs the whole objective.
     - `aim`: of that penalty, the price of what drawn structures that a search keeps in mind miss of what they are to bear: it
       is made up for later more easily than a limit.
-    - `reserve`: of that penalty, the price at which steps are proposed. Above `aim` they lead to more than trials are judged
-      by, which thinning spends; at `aim` to what is judged best, where nothing is thinned.
     - `near`: below a limit, as a share of it, from where on its curvature counts; farther off it would hold
       steps back for nothing.
 
@@ -92,7 +90,6 @@ class SequentialConvex:
     settled: float = 1e-3
     penalty: float = 10.0
     aim: float = 0.3
-    reserve: float = 1.0
     near: float = 0.5
 
     margin: float = 0.15
@@ -151,5 +148,5 @@ _MAY_BE_ZERO = (
 )
 
 # A polished design serves the shape alone and is near: smaller windows, and of the stiffness kept before it
-# may use up a fifth. It needs no reserve.
-POLISHING = SequentialConvex(thin=False, stiffness=0.8, smallest=0.003, reserve=SequentialConvex.aim)
+# may use up a fifth.
+POLISHING = SequentialConvex(thin=False, stiffness=0.8, smallest=0.003)

@@ -178,3 +178,88 @@ def test_thinning_leaves_evaluations_to_turns_where_trials_arent_trusted(searchi
     fragile = replace(search, asked=replace(search.asked, trusted=False))
     assert agreeing.leaving_some(fragile).evaluations == 12
     assert agreeing.leaving_some(replace(fragile, asked=None)).evaluations == 20
+
+
+def untrusted(search):
+    return replace(search, asked=replace(search.asked, trusted=False))
+
+
+@pytest.mark.parametrize(("cables", "asks"), [(75, False), (74, True)])
+def test_thinning_asks_a_sample_where_a_quarter_of_the_cables_has_gone_since_the_last_one(
+    searching, cables, asks
+):
+    search, _, _ = searching
+    assert agreeing.pausing(untrusted(search), cables, 100) is asks
+    assert not agreeing.pausing(search, cables, 100), "trials with enlarged errors are trusted"
+    assert not agreeing.pausing(replace(search, asked=None), cables, 100)
+    unasked = replace(untrusted(search), asked=replace(search.asked, trusted=False, confirmed=None))
+    assert not agreeing.pausing(unasked, cables, 100)
+
+
+def test_a_paused_search_is_thinned_on_with_what_is_left_to_spend_once_a_sample_agrees(
+    searching, monkeypatch
+):
+    search, it, _ = searching
+    search = untrusted(search)
+    begun = phases._ready_to_thin(search, it)
+    assert begun.counted == phases.taut_count(search, it.point)
+    paused = phases._thin(search, replace(begun, counted=2 * begun.counted))
+    assert paused.paused
+    assert search.evaluator.evaluations == 0, "nothing was tried"
+    ways = []
+    needed = np.ones(len(it.tensioned), dtype=bool)
+
+    def thin(search, it):
+        ways.append(("thin", it.counted, it.thrifty, it.needed.all()))
+        return replace(it, paused=len(ways) == 1)
+
+    def agreed(search, it, descend):
+        ways.append(("agree", it.paused))
+        return answers.pop(0), it
+
+    def back(search, it):
+        ways.append("back")
+        return it
+
+    monkeypatch.setattr(phases, "_thin", thin)
+    monkeypatch.setattr(phases, "agreed", agreed)
+    monkeypatch.setattr(phases, "last_confirmed", back)
+    start = replace(begun, counted=500, thrifty=0.77, needed=needed)
+    answers = [True, True]
+    phases.run(search, start)
+    assert ways == [
+        ("thin", 500, 0.77, True),
+        ("agree", True),
+        ("thin", begun.counted, 0.77, True),
+        ("agree", False),
+    ]
+    ways.clear()
+    answers = [False]
+    phases.run(search, start)
+    assert ways == [("thin", 500, 0.77, True), ("agree", True), "back"]
+
+
+def test_a_paused_search_takes_the_first_design_with_which_a_sample_agrees(searching, samples):
+    """Others follow once thinning has ended: what a better shape takes now, thinning spends."""
+    search, it, _ = searching
+    told, judged = samples
+    told[:] = [FALLS, *[STANDS] * 20]
+    agrees, _ = agreeing.agreed(search, replace(it, paused=True), phases._descend)
+    assert agrees
+    assert len(judged) == 2
+
+
+def test_what_is_missed_becomes_dearer_with_each_sample_that_disagrees(searching, samples):
+    search, it, _ = searching
+    told, _ = samples
+    prices = []
+
+    def descend(search, it):
+        prices.append(search.solver.aim)
+        return phases._descend(search, it)
+
+    told[:] = [FALLS, OTHER, FALLS, *[STANDS] * 20]
+    after = agreeing.agreed(search, it, descend)[1]
+    assert after.disagreed == 3
+    assert prices[:3] == pytest.approx([0.6, 1.0, 1.0]), "twice, and not beyond a limit's"
+    assert search.solver.aim == 0.3, "thinning goes on at its own"

@@ -98,7 +98,7 @@ def test_a_step_meets_an_aim_as_far_as_that_is_worth_its_price_where_trials_are_
     assert missed[0] > 0.1
 
     def step(aims, price):
-        solver = replace(search.solver, aim=price, reserve=price)
+        solver = replace(search.solver, aim=price)
         y, predicted = propose(replace(task(search, it, model), aims=aims, solver=solver))
         return predicted, float(model.constraints_at(y)[0] - missed[0])
 
