@@ -9,6 +9,7 @@ scripts/benchmark.json. The rest stands in shellform/documentation as it is.
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import inspect
 import json
@@ -393,4 +394,6 @@ def speed() -> str:
 
 
 if __name__ == "__main__":
-    build(Path(sys.argv[1]) if len(sys.argv) > 1 else SITE)
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("folder", type=Path, nargs="?", default=SITE)
+    build(asked.parse_args().folder)

@@ -43,6 +43,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -51,7 +52,7 @@ from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.minding import as_borne, finely
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes, minimise_directly
-from shellform.optimiser.optimum import Checkpoint, Optimum
+from shellform.optimiser.optimum import Checkpoint, Optimum, Step
 from shellform.optimiser.phases import run
 from shellform.optimiser.resuming import resumed
 from shellform.optimiser.search_state import (
@@ -80,6 +81,7 @@ from shellform.structure.answers.stability import modes
 from shellform.structure.elements.threads import dense_on_one
 from shellform.structure.network import assemble
 
+_AGAIN = 0.01  # of the objective, gained by polishing, for which it is begun again from there
 _SEED = 1  # added to the safety's: margins of tension are told by structures that judge nothing
 
 
@@ -159,10 +161,43 @@ def polish(
     left to whoever judges it, but where trials know no enlarged errors. Only the cables' lengths are varied, where
     they are variables of their own.
 
+    Where structures are kept in mind and evaluations are left, it is polished again from there, with what they bear
+    measured anew, as long as that gains something and brings no node beyond the `deviation`.
+
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
     the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
     doesn't bear the loads.
     """
+    found = _polished(best, solver, evaluations, groups, progress, judging)
+    better = found.design is not best.design
+    while (
+        better and found.mind and groups is None and found.objective < (1.0 - _AGAIN) * found.objective_start
+    ):
+        spent = found.evaluations
+        if spent >= evaluations:
+            break
+        watch = None if progress is None else partial(_counting_on, progress, spent)
+        more = _polished(found, solver, evaluations - spent, None, watch, judging)
+        if more.design is found.design or _farthest(more) > max(_farthest(found), solver.deviation or 0.0):
+            break
+        steps = [replace(step, evaluation=step.evaluation + spent) for step in more.history]
+        found = replace(more, history=(*found.history, *steps), evaluations=spent + more.evaluations)
+    return found
+
+
+def _counting_on(watch: Watch, spent: int, step: Step) -> None:
+    watch(replace(step, evaluation=step.evaluation + spent))
+
+
+def _polished(
+    best: Optimum,
+    solver: SequentialConvex,
+    evaluations: int,
+    groups: Indices | None,
+    progress: Watch | None,
+    judging: Judging | None,
+) -> Optimum:
+    """Polished once."""
     if groups is not None:
         lengths = averaged(best.design.rest_length, groups, best.design.present)
         best = replace(best, design=replace(best.design, rest_length=lengths))
@@ -210,10 +245,15 @@ def polish(
 def _shape(best: Optimum, solver: SequentialConvex) -> list[Share]:
     """What a polished design is to serve."""
     base = best.problem.design_load.name
-    farthest = float(deviations(best.problem.shell, best.states[base]).max())
-    if solver.deviation is None or farthest <= solver.deviation:
+    if solver.deviation is None or _farthest(best) <= solver.deviation:
         return [Share(1.0, Misfit(base))]
     return [Share(0.5, Misfit(base)), Share(0.5, Bulges(base))]
+
+
+def _farthest(best: Optimum) -> float:
+    """How far, m, the farthest node is off under the design load."""
+    problem = best.problem
+    return float(deviations(problem.shell, best.states[problem.design_load.name]).max())
 
 
 def begin(

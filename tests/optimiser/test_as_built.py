@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
+from shellform.optimiser import optimise as optimiser
 from shellform.optimiser import trials
 from shellform.optimiser.solver import POLISHING
 from shellform.problem.paths import deviations
@@ -132,6 +133,60 @@ def test_a_design_that_structures_led_to_is_polished_with_these_in_mind_and_judg
     ]
     assert (bear[0] > 0.99).all(), "an aim may be missed by a little"
     assert bear[0].min() > bear[1].min(), "what the objective alone leads to bears less"
+
+
+def test_with_structures_in_mind_polishing_goes_on_from_where_it_ended(found, monkeypatch):
+    best = replace(found[0], mind={0: 1.0})
+    asked, told = [], []
+
+    def once(before, solver, evaluations, groups, progress, judging):
+        asked.append((before, evaluations))
+        if progress is not None:
+            progress(replace(before.history[0], evaluation=2))
+        after = made.pop(0)
+        return replace(before, status="none better") if after is None else after
+
+    def better(objective, evaluations=5, **changes):
+        design = replace(best.design, rest_length=best.design.rest_length * (1.0 - 1e-9 * len(made)))
+        history = (replace(best.history[0], evaluation=1),)
+        return replace(
+            best, design=design, objective=objective, objective_start=1.0, evaluations=evaluations,
+            history=history, **changes,
+        )  # fmt: skip
+
+    monkeypatch.setattr(optimiser, "_polished", once)
+    made = []
+    first, second = better(0.9), better(0.995, 4)
+    made[:] = [first, second]
+    polished = sf.polish(best, evaluations=12, progress=told.append)
+    assert asked == [(best, 12), (first, 7)], "until a round gains less than a hundredth"
+    assert polished.design is second.design
+    assert polished.evaluations == 9
+    assert [step.evaluation for step in polished.history] == [1, 6]
+    assert [step.evaluation for step in told] == [2, 7]
+    for made_now, rounds, kept in [
+        ([better(0.9), None], 2, 0),
+        ([better(0.9, 12)], 1, 0),
+        ([better(0.9, mind={})], 1, 0),
+        ([None], 1, None),
+    ]:
+        asked.clear()
+        made[:], before = made_now, list(made_now)
+        polished = sf.polish(best, evaluations=12)
+        assert len(asked) == rounds
+        assert polished.design is (best.design if kept is None else before[kept].design)
+    asked.clear()
+    made[:] = [better(0.9), better(0.5)]
+    limit = 0.5 * float(deviations(best.problem.shell, best.states["wet"]).max())
+    far = made[1]
+    off = far.states["wet"]
+    moved = replace(off, positions=1.01 * off.positions)
+    reached = far.loaded["wet"]
+    away = replace(reached, equilibrium=replace(reached.equilibrium, state=moved))
+    made[1] = replace(far, loaded={**far.loaded, "wet": away})
+    polished = sf.polish(best, solver=replace(POLISHING, deviation=limit), evaluations=12)
+    assert len(asked) == 2
+    assert polished.objective == 0.9, "a round that brings a node farther off than it was isn't kept"
 
 
 def test_a_design_with_a_node_too_far_off_is_polished_for_its_farthest_nodes_too(stout, found):
