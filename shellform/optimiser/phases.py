@@ -291,7 +291,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     solver = search.solver
     most = solver.most_cables
     while it.failures < solver.failures and search.left() > 0:
-        if pausing(search, taut_count(search, it.point), it.counted):
+        if search.asked is not None and pausing(search, taut_count(search, it.point), it.counted):
             return replace(it, paused=True)
         it = _without_slack(search, it)
         tell(search, it)
