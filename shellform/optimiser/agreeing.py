@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from shellform.optimiser.going_back import last_sound
 from shellform.optimiser.minding import WORTH, finely, led_by, turned
-from shellform.optimiser.search_state import Iterate, Search, accepted_design
+from shellform.optimiser.search_state import Iterate, Search, accepted_design, taut_count
 from shellform.optimiser.trials import fresh, sound
 from shellform.reliability.trial_structures import aims
 
@@ -34,13 +34,13 @@ def leaving_some(search: Search) -> Search:
     return replace(search, evaluations=search.evaluations - int(_LEFT * search.evaluations))
 
 
-def pausing(search: Search, cables: int, counted: int) -> bool:
-    """Whether thinning, with so many `cables` left of those that were `counted` at the last sample, is to ask another
-    one: those that few structures with errors as they are have let go are too many as a rule, and where a fresh sample
+def pausing(search: Search, it: Iterate) -> bool:
+    """Whether thinning is to ask a sample, so few being left of the cables that were `counted` at the last one: those
+    that few structures with errors as they are have let go are too many as a rule, and where a fresh sample
     says so soon a few lengths make up for them."""
     if search.asked is None or search.asked.trusted or search.asked.confirmed is None:
         return False
-    return cables < _PAUSE * counted
+    return taut_count(search, it.point) < _PAUSE * it.counted
 
 
 def _dearer(search: Search, disagreed: int) -> Search:

@@ -162,31 +162,36 @@ def polish(
     they are variables of their own.
 
     Where structures are kept in mind and evaluations are left, it is polished again from there, with what they bear
-    measured anew, as long as that gains something and brings no node beyond the `deviation`.
+    measured anew, as long as that gains something and brings no node beyond the `deviation`; the objective that comes
+    back counts from the start of the last round.
 
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
     the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
     doesn't bear the loads.
     """
     found = _polished(best, solver, evaluations, groups, progress, judging)
-    better = found.design is not best.design
-    while (
-        better and found.mind and groups is None and found.objective < (1.0 - _AGAIN) * found.objective_start
-    ):
+    if groups is not None or found.design is best.design:
+        return found
+    while found.mind and found.objective < (1.0 - _AGAIN) * found.objective_start:
         spent = found.evaluations
         if spent >= evaluations:
             break
-        watch = None if progress is None else partial(_counting_on, progress, spent)
+        watch = None if progress is None else partial(_tell_later, progress, spent)
         more = _polished(found, solver, evaluations - spent, None, watch, judging)
         if more.design is found.design or _farthest(more) > max(_farthest(found), solver.deviation or 0.0):
             break
-        steps = [replace(step, evaluation=step.evaluation + spent) for step in more.history]
-        found = replace(more, history=(*found.history, *steps), evaluations=spent + more.evaluations)
+        history = (*found.history, *(_later(step, spent) for step in more.history))
+        found = replace(more, history=history, evaluations=spent + more.evaluations)
     return found
 
 
-def _counting_on(watch: Watch, spent: int, step: Step) -> None:
-    watch(replace(step, evaluation=step.evaluation + spent))
+def _later(step: Step, spent: int) -> Step:
+    """The step of a round before which so many evaluations were spent."""
+    return replace(step, evaluation=step.evaluation + spent)
+
+
+def _tell_later(watch: Watch, spent: int, step: Step) -> None:
+    watch(_later(step, spent))
 
 
 def _polished(

@@ -255,21 +255,17 @@ def _tensioned(search: Search, it: Iterate) -> Flags:
 
 
 def _ready_to_thin(search: Search, it: Iterate) -> Iterate:
-    solver = search.solver
+    ready = _going_on(search, it)
     return replace(
-        it,
-        window=max(it.window, 0.1 * search.tension),
-        guarded=True,
-        phase="thin",
-        thrifty=it.point.objective + solver.allowance,
-        batch=max(1, taut_count(search, it.point) // solver.batch),
+        ready,
+        thrifty=it.point.objective + search.solver.allowance,
+        batch=max(1, ready.counted // search.solver.batch),
         needed=np.zeros(len(it.tensioned), dtype=bool),
-        counted=taut_count(search, it.point),
     )
 
 
 def _going_on(search: Search, it: Iterate) -> Iterate:
-    """Ready to thin on after a pause, with what is left of the objective that may be spent."""
+    """Ready to thin on, as after a pause, with what is left of the objective that may be spent."""
     return replace(
         it,
         window=max(it.window, 0.1 * search.tension),
@@ -291,7 +287,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
     solver = search.solver
     most = solver.most_cables
     while it.failures < solver.failures and search.left() > 0:
-        if search.asked is not None and pausing(search, taut_count(search, it.point), it.counted):
+        if pausing(search, it):
             return replace(it, paused=True)
         it = _without_slack(search, it)
         tell(search, it)

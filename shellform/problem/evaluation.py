@@ -175,44 +175,38 @@ class Evaluator:
         """The point with its derivatives, which cost as much as its values: only where steps start are they
         asked for. Raises OffBranch where an equilibrium isn't stable.
         """
-        return self.linearised_beside(point, lambda: None)[0]
+        return self._linearised(point, _whole(point), self.assembly(point.design))
 
     def linearised_beside(self, point: Evaluated, work: Callable[[], Made]) -> tuple[Linearisation, Made]:
         """The same, and what other `work` makes on another core meanwhile, which may use the `assembly` of the point's
         design."""
         assembly = self.assembly(point.design, 1)
-        # drawn structures keep all cores busy by themselves
-        whole = [each.whole() for each in point.measurements]
-
-        def derived() -> Linearisation:
-            return self._linearised(point, self._rows(point, whole, assembly))
-
-        tasks: list[Callable[[], Any]] = [derived, work]
+        whole = _whole(point)  # before: drawn structures keep all cores busy by themselves
+        tasks: list[Callable[[], Any]] = [lambda: self._linearised(point, whole, assembly), work]
         linear, made = side_by_side(lambda task: task(), tasks)
         return linear, made
 
-    def _rows(self, point: Evaluated, whole: Sequence[Measurement], assembly: Assembly) -> list[Reals]:
-        """The total derivatives (g, s) of each of the problem's terms by the variables."""
-        blocks, terms = self.blocks, point.problem.terms
+    def _linearised(
+        self, point: Evaluated, whole: Sequence[Measurement], assembly: Assembly
+    ) -> Linearisation:
+        """The point with derivatives chained from those of its `whole` measurements, on an assembly of its design."""
+        problem, blocks = point.problem, self.blocks
+        terms = problem.terms
         rates = blocks.rates(point.design).multiply(blocks.unit).tocsc()
         rows = [np.zeros((0, blocks.size))] * len(terms)
         for name in dict.fromkeys(term.load for term in terms):
             own = [k for k, term in enumerate(terms) if term.load == name]
             at = self._at(terms[own[0]], point.design, point.states, point.stage, assembly)
-            measured = [whole[k] for k in own]
+            parts = [whole[k] for k in own]
             try:
-                total = _chained(measured, at, assembly if name else None, blocks.moves_radius)
+                total = _chained(parts, at, assembly if name else None, blocks.moves_radius)
             except NotPositiveDefinite as error:
                 raise OffBranch(str(error)) from error
             by_variables = np.empty_like(total, shape=(len(total), blocks.size))
             by_variables[...] = total @ rates[: total.shape[1]]
-            pieces = np.split(by_variables, np.cumsum([len(each.value) for each in measured])[:-1])
+            pieces = np.split(by_variables, np.cumsum([len(each.value) for each in parts])[:-1])
             for k, piece in zip(own, pieces, strict=True):
                 rows[k] = piece
-        return rows
-
-    def _linearised(self, point: Evaluated, rows: Sequence[Reals]) -> Linearisation:
-        problem, blocks = point.problem, self.blocks
         summands, kept = rows[: len(problem.minimise)], rows[len(problem.minimise) :]
         slopes = [w * piece.sum(axis=0) for w, piece in zip(self.weights, summands, strict=True)]
         limited = [residual_rows(part, piece) for part, piece in zip(problem.constraints, kept, strict=True)]
@@ -357,6 +351,11 @@ def start_weights(problem: Problem, start: Design, reached: Mapping[str, Loaded]
         at = LoadedDesign(problem.shell, start, reached[name].equilibrium.state, loads[name])
         values.append(measured(part.term, at).value.sum())
     return np.array([part.share for part in problem.minimise]) / np.maximum(np.abs(values), 1e-300)
+
+
+def _whole(point: Evaluated) -> list[Measurement]:
+    """The point's measurements with their derivatives."""
+    return [each.whole() for each in point.measurements]
 
 
 def not_carried(name: str, loaded: Loaded, remedy: str) -> NotConverged:

@@ -28,11 +28,9 @@ def follow(
     NotConverged where no equilibrium is found.
     """
     none = np.zeros((shell.node_count, 6))
-    network = shell.network(design)
-    idle = [
-        assemble(network)
-    ]  # assemblies that no case is using: each keeps one factor, and the cases go side by side
-    unloaded = find_equilibrium(idle[0], shell.target, none)
+    first = assemble(shell.network(design))
+    unloaded = find_equilibrium(first, shell.target, none)
+    idle = [first]  # assemblies that no case is using: each keeps one factor, and the cases go side by side
 
     def loaded(load: Reals) -> Loaded:
         if not load.any():
@@ -40,7 +38,7 @@ def follow(
         try:
             own = idle.pop()
         except IndexError:
-            own = assemble(network)
+            own = first.beside()
         found = apply_load(own, unloaded.state, none, load, stay=stay)
         idle.append(own)
         return found

@@ -94,21 +94,19 @@ def standing_words(own: StandingRecord) -> str:
 
 def built_shape_words(own: BuiltShapeRecord) -> str:
     """How far drawn structures are off."""
-    driver = built_shape_driver(own)
-    driven = f", driven by {driver}" if driver else ""
     mean, most, worst = (
         number(1e3 * each, 2) for each in (own.deviation_mean, own.deviation_max, own.deviation_max_worst)
     )
     return (
         f"as built {most} mm off at most and {mean} mm in the mean, in the median of {own.structures} structures, "
-        f"{worst} mm in the worst{driven}"
+        f"{worst} mm in the worst{driven_words(own)}"
     )
 
 
-def built_shape_driver(own: BuiltShapeRecord) -> str:
-    """The cause of error that moves nodes farthest; "" where none is known."""
+def driven_words(own: BuiltShapeRecord) -> str:
+    """By which cause of error nodes are moved farthest; "" where none is known."""
     driver = max(own.causes, key=lambda name: own.causes[name], default="")
-    return cause_title(driver) if driver else ""
+    return f", driven by {cause_title(driver)}" if driver else ""
 
 
 def rare_words(found: RareRecord) -> str:

@@ -7,7 +7,7 @@ r = p' - f'(x) - K u, u the places of its supports that are off. It moves by dx 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,13 +64,12 @@ def moved_by_cause(
 ) -> dict[str, float]:
     """By cause of error, the root mean square motion of a node, m, from its place in the perfect structure at the
     end of its path, where no other cause is off; nothing where that structure isn't stable."""
-    none = {each.name: 0.0 for each in fields(Tolerances)}
     assembly, state, load = assemble(nominal.network), nominal.states[-1], nominal.factors[-1] * nominal.load
     causes = [name for name in CAUSES if getattr(tolerances, name) > 0.0]
     some = [
         errors_of(
             nominal.members,
-            replace(tolerances, **{**none, name: getattr(tolerances, name)}),
+            replace(Tolerances(), **{name: getattr(tolerances, name)}),
             variables(nominal.members, seed, number),
         )
         for name in causes

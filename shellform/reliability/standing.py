@@ -188,6 +188,4 @@ class Workshop:
         try:
             return self._idle.get_nowait()
         except Empty:
-            other = assemble(self.nominal.network)
-            other.__dict__["chords"] = self._first.chords
-            return Bench(self.nominal, other)
+            return Bench(self.nominal, self._first.beside())

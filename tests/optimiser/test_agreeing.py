@@ -186,14 +186,16 @@ def untrusted(search):
 
 @pytest.mark.parametrize(("cables", "asks"), [(75, False), (74, True)])
 def test_thinning_asks_a_sample_where_a_quarter_of_the_cables_has_gone_since_the_last_one(
-    searching, cables, asks
+    searching, cables, asks, monkeypatch
 ):
-    search, _, _ = searching
-    assert agreeing.pausing(untrusted(search), cables, 100) is asks
-    assert not agreeing.pausing(search, cables, 100), "trials with enlarged errors are trusted"
-    assert not agreeing.pausing(replace(search, asked=None), cables, 100)
+    search, it, _ = searching
+    it = replace(it, counted=100)
+    monkeypatch.setattr(agreeing, "taut_count", lambda search, point: cables)
+    assert agreeing.pausing(untrusted(search), it) is asks
+    assert not agreeing.pausing(search, it), "trials with enlarged errors are trusted"
+    assert not agreeing.pausing(replace(search, asked=None), it)
     unasked = replace(untrusted(search), asked=replace(search.asked, trusted=False, confirmed=None))
-    assert not agreeing.pausing(unasked, cables, 100)
+    assert not agreeing.pausing(unasked, it)
 
 
 def test_a_paused_search_is_thinned_on_with_what_is_left_to_spend_once_a_sample_agrees(

@@ -16,7 +16,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import built_shape_driver, critical_words, number
+from shellform.records.words import critical_words, driven_words, number
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 
@@ -135,13 +135,11 @@ def _how_far(main: LoadRecord) -> Answer:
     if built is None:
         detail = f"{mean} in the mean, under the design load, as planned"
         return Answer(question, f"{planned} at most", detail, good)
-    driver = built_shape_driver(built)
-    driven = f", driven by {driver}" if driver else ""
     return Answer(
         question,
         f"{planned} as planned, {_mm(built.deviation_max)} as built",
         f"at most, under the design load; {mean} and {_mm(built.deviation_mean)} in the mean. As built is the median of "
-        f"{built.structures} drawn structures; the worst is {_mm(built.deviation_max_worst)} off{driven}",
+        f"{built.structures} drawn structures; the worst is {_mm(built.deviation_max_worst)} off{driven_words(built)}",
         good,
     )
 

@@ -221,8 +221,10 @@ def _pardiso(
     step, order, sides, error = ctypes.c_int(phase), ctypes.c_int(size), ctypes.c_int(count), ctypes.c_int(0)
     ref = ctypes.byref
     mkl = library()
-    large, many = size > _TWO_THREADS_FROM, phase == _SOLVE and count >= _MANY
-    before = mkl.MKL_Set_Num_Threads_Local(2 if many else min(2, cores()) if large else 1)
+    threads = min(2, cores()) if size > _TWO_THREADS_FROM else 1
+    if phase == _SOLVE and count >= _MANY:
+        threads = 2
+    before = mkl.MKL_Set_Num_Threads_Local(threads)
     mkl.PARDISO(
         _at(handle), ref(one), ref(one), ref(ctypes.c_int(kind)), ref(step), ref(order), _at(values),
         _at(rows), _at(columns), _at(kept),
