@@ -21,7 +21,6 @@ from shellform.reliability.trial_structures import aims
 
 _MORE = 0.2  # of all evaluations, that come on top where a sample disagrees
 _MOST = 12  # samples, after which a turn without a step is the last
-_DEARER = 2.0  # times, with each sample that disagrees
 _PAUSE = 0.75  # of the cables, at which thinning asks a sample on its way
 _LEFT = 0.4  # of all evaluations, that thinning leaves where trials know no enlarged errors
 
@@ -43,13 +42,6 @@ def pausing(search: Search, it: Iterate) -> bool:
     return taut_count(search, it.point) < _PAUSE * it.counted
 
 
-def _dearer(search: Search, disagreed: int) -> Search:
-    """The search with what structures in mind miss of their aims the dearer, up to a limit's whole price, the more often
-    samples have disagreed: what is worth missing them at a low price falls in every one."""
-    price = min(1.0, search.solver.aim * _DEARER**disagreed)
-    return replace(search, solver=replace(search.solver, aim=price))
-
-
 def agreed(
     search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]
 ) -> tuple[bool, Iterate]:
@@ -65,7 +57,7 @@ def agreed(
         refused = False
         if it.until:  # in the middle of a turn
             spent = search.evaluator.evaluations
-            it = descend(finely(_dearer(search, it.disagreed), it.until), it)
+            it = descend(finely(search, it.until), it)
             refused = len(it.accepted) == it.begun  # by the sample that led the turn, which found no step
             if refused and (
                 it.begun == it.stood or it.samples >= _MOST or search.evaluator.evaluations == spent
@@ -77,7 +69,6 @@ def agreed(
                     break
                 it = replace(it, point=there, accepted=(*it.accepted[:-1], accepted_design(search, there)))
         judged, it = fresh(search, it)
-        it = replace(it, disagreed=it.disagreed + (not judged.stands))
         if judged.stands and refused:
             break
         if judged.stands:

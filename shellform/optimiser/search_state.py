@@ -109,7 +109,7 @@ class Iterate:
     the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables
     `needed` (c,), and whether it is `paused` for a sample since so few are left of the cables `counted` at the last one.
     As built: structures that have `fallen`, the last ones first; whether the last design
-    judged `fell`; how many fresh `samples` were drawn, and how many of them `disagreed`; drawn structures that the search keeps in `mind`, which are to bear their loads, and the
+    judged `fell`; how many fresh `samples` were drawn; drawn structures that the search keeps in `mind`, which are to bear their loads, and the
     design in which they are `remembered`, None where nothing but stiffness leads it. Leading: how many
     designs were accepted when the last one `stood`, the objective that it was `led_to`, the design
     evaluations `until` which a turn lasts, and how many designs were accepted when it had `begun`.
@@ -145,7 +145,6 @@ class Iterate:
     until: int = 0
     begun: int = 0
     samples: int = 0
-    disagreed: int = 0
 
 
 class Models:

@@ -249,19 +249,3 @@ def test_a_paused_search_takes_the_first_design_with_which_a_sample_agrees(searc
     agrees, _ = agreeing.agreed(search, replace(it, paused=True), phases._descend)
     assert agrees
     assert len(judged) == 2
-
-
-def test_what_is_missed_becomes_dearer_with_each_sample_that_disagrees(searching, samples):
-    search, it, _ = searching
-    told, _ = samples
-    prices = []
-
-    def descend(search, it):
-        prices.append(search.solver.aim)
-        return phases._descend(search, it)
-
-    told[:] = [FALLS, OTHER, FALLS, *[STANDS] * 20]
-    after = agreeing.agreed(search, it, descend)[1]
-    assert after.disagreed == 3
-    assert prices[:3] == pytest.approx([0.6, 1.0, 1.0]), "twice, and not beyond a limit's"
-    assert search.solver.aim == 0.3, "thinning goes on at its own"
