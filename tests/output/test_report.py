@@ -10,6 +10,7 @@ from PIL import Image
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.net.edges import stand
 from shellform.net.net import Stretch
 from shellform.output.page import report, view_data
 from shellform.output.page.charts import line_chart
@@ -20,6 +21,7 @@ from shellform.records.check import Cell
 from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
 from shellform.records.words import constraint_title, number
 from shellform.structure.elements.state import State
+from tests.net.edge_shells import barrel
 from tests.records.made import summary
 
 
@@ -275,3 +277,14 @@ def test_cables_that_are_slack_before_the_load_are_named(shell, designs):
     found = answers(shell, "polished", designs["polished"], {}, given)
     cables = next(answer for answer in found if answer.question == "How many cables?")
     assert "slack before any load: C3, C7" in cables.detail
+
+
+def test_the_view_has_the_edge_beams_on_which_arches_hang():
+    surface = barrel()
+    net = sf.pull_net(surface, spacing=0.1, gap=0.002, angle=np.deg2rad(45.0), elements=2)
+    none = np.zeros((0, 2), dtype=np.int64)
+    assert view_data.net_data(net, "arches", "", none)["edges"] == []
+    standing = stand(net, surface)
+    drawn = view_data.net_data(standing, "arches", "", none)
+    assert len(standing.edges) == 2
+    assert drawn["edges"] == [pair for line in standing.edges for pair in line.ends.tolist()]

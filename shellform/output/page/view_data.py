@@ -195,6 +195,7 @@ def _geometry(net: Net, middle: Reals, place: Reals) -> dict[str, Any]:
         "flat": _floats(laid_out(grid.flat, place) - middle),
         "crossings": grid.crossing_nodes.tolist(),
         "supports": net.supports.tolist(),
+        "edges": net.edge_lines.tolist(),
         "rods": [
             {
                 "name": f"{rod.direction.upper()}{number}",

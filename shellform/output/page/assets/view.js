@@ -119,6 +119,9 @@ class View {
         add(this.node(a), thick, this.node(b), thick, own ? picked : shade(a), own ? picked : shade(b), own ? 2.6 : 1.4, own ? 1 : 0);
       }
     });
+    if (this.between.from.state) for (const [a, b] of run.edges) { // edge beams, which the flat grid has none of; as thick as in the pictures
+      add(this.node(a), 1.8 * thick, this.node(b), 1.8 * thick, colour("support"), colour("support"), 2.2);
+    }
     if (show.cables && this.hung) {
       const top = this.forceScale;
       this.design.cables.forEach((cable, k) => {
