@@ -156,13 +156,19 @@ def _is_text(node: ast.BinOp) -> bool:
     )
 
 
-def sample(count: int, seed: int, rooms: Sequence[str]) -> list[Fault]:
-    """So many faults, as evenly over the rooms as they come. Raises ValueError where a reason stands in mutants.toml
-    for a line that isn't there any more."""
+def listed() -> set[str]:
+    """The names of the faults that stand in mutants.toml with a reason. Raises ValueError where one is for a line that
+    isn't there any more."""
     known = set(tomllib.loads(KNOWN.read_text(encoding="utf-8"))) if KNOWN.is_file() else set()
     gone = known - {fault.name for file in (ROOT / "shellform").rglob("*.py") for fault in faults(file)}
     if gone:
         raise ValueError("no such lines any more: " + "; ".join(sorted(gone)))
+    return known
+
+
+def sample(count: int, seed: int, rooms: Sequence[str]) -> list[Fault]:
+    """So many faults, as evenly over the rooms as they come. Raises ValueError as `listed`."""
+    known = listed()
     found: dict[str, list[Fault]] = {}
     for file in sorted((ROOT / "shellform").rglob("*.py")):
         if not any(part in _LEFT_OUT for part in file.parts):
