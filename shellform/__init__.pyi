@@ -82,6 +82,10 @@ from shellform.problem.variables import FreeRadius as FreeRadius
 from shellform.problem.variables import Rates as Rates
 from shellform.problem.variables import RestLengths as RestLengths
 from shellform.problem.variables import Variable as Variable
+from shellform.reliability.built_misfit import BuiltMisfit as BuiltMisfit
+from shellform.reliability.built_misfit import built_misfit as built_misfit
+from shellform.reliability.drawing import Errors as Errors
+from shellform.reliability.drawing import Imperfections as Imperfections
 from shellform.reliability.path_of_one import Limit as Limit
 from shellform.reliability.probability import Standing as Standing
 from shellform.reliability.safety import Judgement as Judgement

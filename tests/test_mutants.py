@@ -1,6 +1,7 @@
 """scripts/mutants.py plants small faults; here only what its list of reasons has to keep."""
 
 import pytest
+
 from scripts import mutants
 
 

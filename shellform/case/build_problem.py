@@ -38,6 +38,8 @@ from shellform.problem.problem import LoadCase, Problem
 from shellform.problem.robust import RobustMisfit
 from shellform.problem.terms import CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.problem.variables import FreeRadius, RestLengths, Variable
+from shellform.reliability.built_misfit import built_misfit
+from shellform.reliability.trial_structures import SEED
 from shellform.structure.answers import results
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
@@ -61,9 +63,10 @@ def case_problem(
     variables = varied(case, shell, frees_radius=frees_radius)
     if frees_radius:
         shares.append((entry.rod_radius, RodRadius()))
-    robust = robust_misfit(case, shell)
-    if robust is not None:
-        shares.append((entry.robust, robust))
+    if entry.built_misfit > 0.0:
+        design = LoadCase("design", loads["design"])
+        tolerances, seed = case_tolerances(case, shell), case.safety.seed + SEED
+        shares.append((entry.built_misfit, built_misfit(shell, start, design, tolerances, seed=seed)))
     total = sum(share for share, _ in shares)
     others = [name for name in loads if name not in ("none", "design")]
     constraints: list[Constraint] = [AtMost(case.cable.force_max, CableForces("design"))]
@@ -72,7 +75,8 @@ def case_problem(
         if entry.method != "paper":  # whose constraint (5) is on the design load
             constraints.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
     constraints += _engineers(case, shell, loads)
-    if case.robust is not None and case.robust.limit is not None and robust is not None:
+    if case.robust is not None and case.robust.limit is not None:
+        robust = RobustMisfit("design", case_tolerances(case, shell), case.robust.deviations)
         constraints.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
     used = dict(loads)
     further = {name: factor for name, factor in critical_factors_asked(case).items() if name != "design"}
@@ -104,13 +108,6 @@ def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[V
     if frees_radius and entry.rod_radius > 0.0:
         blocks.append(FreeRadius(*bounds) if bounds else FreeRadius())
     return blocks
-
-
-def robust_misfit(case: Case, shell: Gridshell) -> RobustMisfit | None:
-    """The robust misfit of the case under the design load, if it has one."""
-    if case.robust is None:
-        return None
-    return RobustMisfit("design", case_tolerances(case, shell), case.robust.deviations)
 
 
 def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[Constraint]:

@@ -99,12 +99,6 @@ class Case(Entry):
         return self
 
     @model_validator(mode="after")
-    def _robust(self) -> Case:
-        if self.optimise.robust and self.robust is None:
-            raise ValueError("a share robust needs a table [robust], which may be empty")
-        return self
-
-    @model_validator(mode="after")
     def _known_parts(self) -> Case:
         if isinstance(self.load, LoadEntry):
             if self.part:

@@ -263,11 +263,11 @@ class OptimiseEntry(Entry):
     rod_radius: float = Field(
         0.0, ge=0.0, le=1.0, description="share of the rod radius; above 0 it is a variable"
     )
-    robust: float = Field(
+    built_misfit: float = Field(
         0.0,
         ge=0.0,
         le=1.0,
-        description="share of the misfit's mean and deviation with [tolerances]; needs [robust]",
+        description="share of the mean misfit of structures as built with [tolerances], to first order",
     )
     rest_length_min: PositiveFloat = Field(0.01, description="bound (3), m")
     rest_length_max: float = Field(1.1, gt=1.0, description="bound (3), times the initial rest length")
@@ -316,10 +316,10 @@ class OptimiseEntry(Entry):
 
     @model_validator(mode="after")
     def _whole(self) -> OptimiseEntry:
-        total = self.misfit + self.cable_force + self.rod_radius + self.robust
+        total = self.misfit + self.cable_force + self.rod_radius + self.built_misfit
         if abs(total - 1.0) > 1e-9:
             raise ValueError(
-                f"the shares misfit, cable_force, rod_radius and robust must add up to 1, not {total:g}"
+                f"the shares misfit, cable_force, rod_radius and built_misfit must add up to 1, not {total:g}"
             )
         if self.symmetric and not self.polish:
             raise ValueError("symmetric lengths are found in polishing: give polish some evaluations")
@@ -388,7 +388,7 @@ class RobustEntry(Entry):
 
     deviations: NonNegativeFloat = Field(
         1.0,
-        description="standard deviations that are added to the mean misfit where it is limited or minimised",
+        description="standard deviations that are added to the mean misfit where it is limited",
     )
     limit: PositiveFloat | None = Field(
         None, description="of that misfit under the design load, as root mean square distance a node, m"

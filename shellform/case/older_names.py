@@ -1,5 +1,6 @@
 """Entries of case files written before 0.4, run folders' among them, under the names that they have now: what a
-structure is off by stands in [tolerances] alone, and critical factors in [safety].
+structure is off by stands in [tolerances] alone, critical factors in [safety], and what errors do to the shape has a share
+`built_misfit` of the objective.
 """
 
 from __future__ import annotations
@@ -24,7 +25,15 @@ _CRITICAL = SafetyEntry.model_fields["critical_factor"].default
 
 def with_present_names(data: Mapping[str, Any]) -> Mapping[str, Any]:
     """The tables of a case; what is given under both names stays as it is under the present one."""
-    return _with_critical_factors(_with_tolerances(data))
+    return _with_built_misfit(_with_critical_factors(_with_tolerances(data)))
+
+
+def _with_built_misfit(data: Mapping[str, Any]) -> Mapping[str, Any]:
+    optimise = data.get("optimise")
+    if not isinstance(optimise, Mapping) or "robust" not in optimise:
+        return data
+    kept = {name: value for name, value in optimise.items() if name != "robust"}
+    return {**data, "optimise": {"built_misfit": optimise["robust"]} | kept}
 
 
 def _with_tolerances(data: Mapping[str, Any]) -> Mapping[str, Any]:

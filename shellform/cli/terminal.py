@@ -105,6 +105,7 @@ def tell_as_built(summary: Summary) -> None:
         cause_title,
         critical_words,
         rare_words,
+        spent_words,
         standing_words,
     )
 
@@ -123,6 +124,10 @@ def tell_as_built(summary: Summary) -> None:
                 parts.append(f"softest mode as built {row.expected_stiffness:.3g} N/m")
             if parts:
                 print(f"{name:>10}  {load}: {', '.join(parts)}")
+    if summary.verdict is not None:
+        spent = spent_words(summary.designs, summary.verdict.design)
+        if spent:
+            print(f"{spent}.")
     found = summary.failure
     if found is not None:
         cables = f"; {', '.join(found.cables)} go slack" if found.cables else ""

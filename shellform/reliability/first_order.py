@@ -7,15 +7,16 @@ r = p' - f'(x) - K u, u the places of its supports that are off. It moves by dx 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Flags, Reals
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import (
     CAUSES,
     Errors,
+    Imperfections,
     built_beams,
     built_cables,
     built_load,
@@ -24,6 +25,7 @@ from shellform.reliability.drawing import (
 )
 from shellform.reliability.perfect import Perfect
 from shellform.structure.elements.state import State
+from shellform.structure.elements.threads import side_by_side
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import NotPositiveDefinite
@@ -32,31 +34,55 @@ from shellform.structure.solve.residual import held
 DRAWN = 8  # structures of each cause: what moves nodes farthest does so by far
 
 
-def motions(
-    nominal: Perfect,
+@dataclass(frozen=True)
+class Moved:
+    """Assemblies of `structures` as built, k of them, and how far each goes from a perfect structure's equilibrium,
+    `motions` (6 n, k), m and rad, supports included."""
+
+    structures: tuple[Assembly, ...]
+    motions: Reals
+
+    @property
+    def translations(self) -> Reals:
+        """Of the nodes in each (k, n, 3), m."""
+        return np.asarray(self.motions.T.reshape(len(self.structures), -1, 6)[:, :, :3])
+
+
+def moved_from(
     assembly: Assembly,
     state: State,
     load: Reals,
+    present: Flags,
     some: Sequence[Errors],
-    *,
-    shape: bool = True,
-) -> Reals:
-    """How each node moves (k, n, 3), m, from the perfect structure's equilibrium `state` under the `load` (n, 6) in
-    structures with `some` errors, k of them; with the imperfections of `shape`, or without. Raises
-    NotPositiveDefinite where the state isn't stable."""
-    network, imperfections = nominal.network, nominal.imperfections if shape else None
+    imperfections: Imperfections | None,
+) -> Moved:
+    """The structures that are a perfect one, with this `assembly` and those of the candidate cables that are `present`, but
+    for `some` errors, moved from its equilibrium `state` under the dead `load` (n, 6). Raises NotPositiveDefinite where that
+    isn't stable."""
+    (beams,), (cables,) = assembly.beams, assembly.cables
+
+    def one(errors: Errors) -> tuple[Assembly, Reals]:
+        """A structure as built, and the forces that its load has more than it."""
+        own = (
+            built_beams(beams, errors, imperfections),
+            built_cables(cables, present, errors, imperfections),
+        )
+        built = assembly.with_parts(own)
+        more = built_load(load, errors) - built.evaluate(state, tangent=False).force
+        return built, (more - assembly.force_along(state, errors.supports)).ravel()
+
+    found = side_by_side(one, list(some))
+    motions = solved(assembly, state, np.column_stack([more for _, more in found]))
+    motions += np.column_stack([errors.supports.ravel() for errors in some])
+    return Moved(tuple(built for built, _ in found), motions)
+
+
+def solved(assembly: Assembly, state: State, right: Reals) -> Reals:
+    """K⁻¹ of the columns (6 n, k) at the free degrees of freedom, 0 at the held ones. Raises NotPositiveDefinite."""
     factor = assembly.matrix.factor(held(assembly, assembly.evaluate(state)))
-    right = []
-    for errors in some:
-        beams = built_beams(network.beams, errors, imperfections)
-        cables = built_cables(network.cables, nominal.present, errors, imperfections)
-        balance = assembly.with_parts((beams, cables)).evaluate(state, tangent=False)
-        force = built_load(load, errors) - balance.force - assembly.force_along(state, errors.supports)
-        right.append(force.ravel()[assembly.free])
-    steps = factor.solve(np.asfortranarray(np.column_stack(right)))
-    found = np.array([errors.supports.ravel() for errors in some])
-    found[:, assembly.free] = steps.T
-    return np.asarray(found.reshape(len(some), -1, 6)[:, :, :3])
+    result = np.zeros_like(right)
+    result[assembly.free] = factor.solve(np.asfortranarray(right[assembly.free]))
+    return result
 
 
 def moved_by_cause(
@@ -78,8 +104,8 @@ def moved_by_cause(
     if not some:
         return {}
     try:
-        found = motions(nominal, assembly, state, load, some)
+        found = moved_from(assembly, state, load, nominal.present, some, nominal.imperfections)
     except NotPositiveDefinite:
         return {}
-    squares = (found**2).sum(axis=2).mean(axis=1).reshape(len(causes), drawn)
+    squares = (found.translations**2).sum(axis=2).mean(axis=1).reshape(len(causes), drawn)
     return dict(zip(causes, np.sqrt(squares.mean(axis=1)).tolist(), strict=True))

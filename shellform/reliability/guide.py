@@ -22,7 +22,7 @@ from shellform.reliability.drawing import (
     variables,
 )
 from shellform.reliability.expected_cables import ExpectedCables
-from shellform.reliability.first_order import motions
+from shellform.reliability.first_order import moved_from
 from shellform.reliability.perfect import Perfect
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.cable import Cables
@@ -86,7 +86,7 @@ def stretch_deviation(
         for number in range(drawn)
     ]
     try:
-        found = motions(perfect, assembly, state, none, some, shape=False)
+        found = moved_from(assembly, state, none, perfect.present, some, None).translations
     except NotPositiveDefinite:
         return own
     a, b = cables.ends.T

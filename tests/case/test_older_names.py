@@ -34,6 +34,10 @@ CASE = Path(__file__).parent.parent.parent / "scripts/scale_model.toml"
             ["robust.supports=1e-4", "robust.joints_all=0.0", "tolerances.supports=2e-4"],
             ["tolerances.supports=2e-4", "robust.deviations=1.0"],
         ),
+        (
+            ["optimise.robust=0.3", "optimise.misfit=0.4", "robust.samples=9"],
+            ["optimise.built_misfit=0.3", "optimise.misfit=0.4", "robust.samples=9"],
+        ),
     ],
 )
 def test_an_older_entry_is_the_present_one(older, now):

@@ -64,6 +64,17 @@ def test_the_answers_are_numbers_of_the_design(shell, designs):
     drawn = answers(shell, "polished", design, states, summary(designs, "design", built_shape=shape))[0]
     assert drawn.words == "4 mm as planned, 53 mm as built", "which may be ten times as much"
     assert drawn.detail.endswith("the median of 20 drawn structures; the worst is 67 mm off")
+    rows = summary(designs, "design", built_shape=shape)
+    initial = replace(shape, deviation_mean=0.0045)
+    rows = rows.with_design(
+        "initial",
+        replace(
+            rows.designs["initial"],
+            loads={"design": replace(rows.designs["initial"].loads["design"], built_shape=initial)},
+        ),
+    )
+    spent = answers(shell, "polished", design, states, rows)[0]
+    assert "off. Structures as built were 4.5 mm off in the mean with all cables" in spent.detail
     assert "as built" not in found["How far off is the shell?"].detail, "nothing was drawn"
     assert found["How many cables?"].detail.startswith(f"{number(pull.max())} N at most in one")
     assert found["Which rods?"].words == "⌀ 2 mm"

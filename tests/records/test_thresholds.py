@@ -13,7 +13,14 @@ from shellform.records.remedies import RodSizes, RodsOf, allow
 from shellform.records.summary import BuiltShapeRecord, StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, headline, to_build, verdict
-from shellform.records.words import built_shape_words, critical_words, load_title, number, standing_words
+from shellform.records.words import (
+    built_shape_words,
+    critical_words,
+    load_title,
+    number,
+    spent_words,
+    standing_words,
+)
 from tests.records.made import design, load, optimisation, summary
 
 RODS = RodsOf(0.001, 0.002, 0.1)
@@ -305,6 +312,24 @@ def test_words_of_the_shape_as_built_name_what_drives_it():
         "the supports' places"
     )
     assert built_shape_words(replace(shape, causes={})).endswith("67 mm in the worst")
+
+
+def test_what_fewer_cables_cost_of_the_shape_as_built_is_told_from_a_quarter_on_with_what_keeps_it():
+    def row(mean):
+        shape = None if mean is None else BuiltShapeRecord(20, 0.05, 0.06, mean)
+        return design("design", built_shape=shape)
+
+    def told(before, after):
+        return spent_words({"initial": row(before), "optimised": row(after)}, "optimised")
+
+    assert told(0.0113, 0.0221) == (
+        "Structures as built were 11 mm off in the mean with all cables, and are 22 mm with those that are left: a share "
+        "optimise.built_misfit of the objective, such as 0.3, or a larger one, keeps cables for it"
+    )
+    assert told(0.0100, 0.01251)
+    assert [told(0.0100, 0.01249), told(None, 0.0221), told(0.0113, None)] == [""] * 3
+    assert spent_words({"optimised": row(0.0221)}, "optimised") == ""
+    assert spent_words({"initial": row(0.0113)}, "initial") == ""
 
 
 def test_words_of_loads_paths_and_structures_keep_their_numbers():

@@ -7,7 +7,7 @@ import pytest
 
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import CAUSES, errors_of, variables
-from shellform.reliability.first_order import motions, moved_by_cause
+from shellform.reliability.first_order import moved_by_cause, moved_from
 from shellform.reliability.standing import Workshop
 from shellform.structure.network import assemble
 
@@ -26,7 +26,8 @@ def test_the_error_of_the_first_order_falls_with_the_square_of_the_errors(nomina
     assembly, left = assemble(nominal.network), []
     for times in (1 / 4, 1 / 8, 1 / 16):
         errors = errors_of(nominal.members, of_one(cause, times), variables(nominal.members, 3, 0))
-        (way,) = motions(nominal, assembly, state, load, [errors])
+        moved = moved_from(assembly, state, load, nominal.present, [errors], nominal.imperfections)
+        (way,) = moved.translations
         end = workshop.load(errors)
         assert end.stands
         left.append(np.abs(end.state.positions - state.positions - way).max())
