@@ -248,11 +248,13 @@ def _polished(
 
 
 def _shape(best: Optimum, solver: SequentialConvex) -> list[Share]:
-    """What a polished design is to serve."""
+    """What a polished design is to serve: what the objective holds of the shape, and the farthest nodes where they are
+    beyond the solver's deviation."""
     base = best.problem.design_load.name
-    if solver.deviation is None or _farthest(best) <= solver.deviation:
-        return [Share(1.0, Misfit(base))]
-    return [Share(0.5, Misfit(base)), Share(0.5, Bulges(base))]
+    own = [each for each in best.problem.minimise if each.term.of_shape] or [Share(1.0, Misfit(base))]
+    farthest = [] if solver.deviation is None or _farthest(best) <= solver.deviation else [Bulges(base)]
+    whole = sum(each.share for each in own) / (0.5 if farthest else 1.0)
+    return [Share(each.share / whole, each.term) for each in own] + [Share(0.5, each) for each in farthest]
 
 
 def _farthest(best: Optimum) -> float:

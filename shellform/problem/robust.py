@@ -167,6 +167,7 @@ class RobustMisfit(Term):
     the misfit's curvature for its own."""
 
     name = "robust_misfit"
+    of_shape = True
     load: str
     tolerances: Tolerances
     deviations: float = 1.0

@@ -105,11 +105,13 @@ class Term(ABC):
     from this class and says `name`, `load` and `measure`, and `size` where it isn't 1.
 
     `name` heads its column in histories. `stabilises`: whether it tells how far a state is from losing its
-    stability, so that a start that doesn't bear the further loads is led along its gradient.
+    stability, so that a start that doesn't bear the further loads is led along its gradient. `of_shape`: whether it
+    tells how far the whole shape is off, so that polishing serves it.
     """
 
     name: ClassVar[str]
     stabilises: ClassVar[bool] = False
+    of_shape: ClassVar[bool] = False
     load: str
 
     def size(self, shell: Gridshell) -> int:
@@ -150,6 +152,7 @@ class Misfit(Term):
     (A.9) is 0/0 at zero distance, its product with d is not."""
 
     name = "misfit"
+    of_shape = True
     load: str
 
     def measure(self, at: LoadedDesign) -> Measurement:
@@ -190,6 +193,7 @@ class RmsMisfit(Term):
     """d'd over the number of nodes, m²; limits on it are given as root mean square distances, m (6)."""
 
     name = "misfit"
+    of_shape = True
     load: str
 
     def measure(self, at: LoadedDesign) -> Measurement:

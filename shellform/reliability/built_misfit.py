@@ -54,6 +54,7 @@ class BuiltMisfit(Term):
     misfit's curvature for its own."""
 
     name = "built_misfit"
+    of_shape = True
     load: str
     errors: tuple[Errors, ...]
     imperfections: Imperfections

@@ -206,6 +206,29 @@ def test_a_design_with_a_node_too_far_off_is_polished_for_its_farthest_nodes_too
     assert farthest(led) < min(farthest(usual), farthest(best))
 
 
+def test_polishing_serves_what_the_objective_holds_of_the_shape_as_built_in_every_round(stout, found):
+    best, _ = found
+    case = best.problem.design_load
+    built = sf.built_misfit(stout, best.design, case, ROUGH, seed=3, pairs=2)
+    shares = [sf.Share(0.2, sf.Misfit("wet")), sf.Share(0.6, built), sf.Share(0.2, sf.CableForce("wet"))]
+    told = replace(best, asked=None, problem=replace(best.problem, minimise=shares))
+
+    def served(polished):
+        return [(round(part.share, 9), part.term.name) for part in polished.problem.minimise]
+
+    one = sf.polish(told, evaluations=6)
+    assert served(one) == [(0.25, "misfit"), (0.75, "built_misfit")]
+    near = replace(POLISHING, deviation=1e-9)
+    led = sf.polish(told, solver=near, evaluations=2)
+    assert served(led) == [(0.125, "misfit"), (0.375, "built_misfit"), (0.5, "bulges")]
+    assert served(sf.polish(led, solver=near, evaluations=2)) == served(led)
+
+    def as_built(design, state):
+        return built.measure(LoadedDesign(stout, design, state, case.force)).value[0]
+
+    assert as_built(one.design, one.states["wet"]) < as_built(best.design, best.states["wet"])
+
+
 def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem):
     heavy = {"wet": 2.2 * problem.loads["wet"]}
     asked = Required(ASKED, heavy, "wet", {"wet": 6})
