@@ -7,7 +7,8 @@ first the drawing and the usual error of a cable. A survey y of the nodes x(l), 
 
     l <- m + K (y - x(l) - J (m - l)),   K = C J' (J C J' + s² 1)⁻¹,   C <- C - K J C,
 
-x(l) being a re-solved equilibrium every time. Then the turns k, whole numbers of the turnbuckle's step h, are
+x(l) being a re-solved equilibrium every time, and steps halved until they lead to a likelier estimate: the sum of squares of
+what the survey and the belief are missed by, each over its deviation, falls. Then the turns k, whole numbers of the turnbuckle's step h, are
 sought that minimise
 
     |x + J h k - goal|² + λ |h k|²,
@@ -38,9 +39,9 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.tables import Table, table_text
 
-_LEARNING = 4  # linearisations of one survey; the error is of second order after each
+_LEARNING = 8  # linearisations of one survey; where no cable becomes slack the error is of second order after each
 _SETTLED = 0.02  # of a cable's usual error: smaller changes of the estimate end the learning
-_HALVINGS = 5  # of a change that leaves the stable branch
+_HALVINGS = 5  # of a change that leaves the stable branch, or leads to no likelier estimate
 _TRIAL = 25  # factorisations of an equilibrium next to a known one
 _BATCHES = 50  # in which cables are chosen and rounded: one by one as long as there are fewer of them
 _SWEEPS = 20  # over all chosen cables, trying single turns
@@ -161,17 +162,45 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
     present = belief.design.present
     mean, state, now = belief.design.rest_length[present], belief.state, belief.design
     usual = np.sqrt(np.diag(belief.covariance).max())
+    likelihood = _Likelihood(mean, belief.covariance, goal, marked, noise)
+    missed = likelihood.missed(now.rest_length[present], state)
     for _ in range(_LEARNING):
         rates = _rates(shell, assembly, now, state)[marked].reshape(len(goal), -1)
         spread = belief.covariance @ rates.T
         gain = np.linalg.solve(rates @ spread + noise**2 * np.eye(len(goal)), spread.T).T
         here = now.rest_length[present]
-        wanted = mean + gain @ (goal - state.positions[marked].ravel() - rates @ (mean - here))
-        now, state, _ = _followed(shell, assembly, now, state, belief.load, wanted - here)
+        step = mean + gain @ (goal - state.positions[marked].ravel() - rates @ (mean - here)) - here
+        # Whole steps go to and fro where cables become slack by one and taut by the next.
+        for _ in range(_HALVINGS):
+            then, there, _ = _followed(shell, assembly, now, state, belief.load, step)
+            fewer = likelihood.missed(then.rest_length[present], there)
+            if fewer < missed:
+                break
+            step = 0.5 * step
+        else:
+            break
+        now, state, missed = then, there, fewer
         if np.abs(now.rest_length[present] - here).max() < _SETTLED * usual:
             break
     covariance = belief.covariance - gain @ spread.T
     return Belief(now, 0.5 * (covariance + covariance.T), state, belief.load)
+
+
+@dataclass(frozen=True)
+class _Likelihood:
+    """How unlikely lengths are, after a survey that put the `marked` nodes at the `goal` (3 m,) with `noise`."""
+
+    mean: Reals
+    covariance: Reals
+    goal: Reals
+    marked: Indices
+    noise: float
+
+    def missed(self, lengths: Reals, state: State) -> float:
+        """The sum of squares of what survey and belief are missed by, each over its deviation."""
+        away = (state.positions[self.marked].ravel() - self.goal) / self.noise
+        off = lengths - self.mean
+        return float(away @ away + off @ np.linalg.solve(self.covariance, off))
 
 
 def adjust(shell: Gridshell, belief: Belief, goal: Reals, crew: Crew, *, noise: float) -> Adjustment:

@@ -223,6 +223,26 @@ def test_letters_are_as_large_as_the_largest_usual_scale_on_the_smallest_paper_l
         assert sheet.lettering / scale >= 1.6
 
 
+def test_each_paper_is_two_of_the_next_smaller_one_side_by_side():
+    """ISO 216, in whole millimetres."""
+    sizes = list(drawings.PAPERS.values())
+    assert sizes[0] == (420.0, 297.0)
+    for (smaller_long, smaller_short), (long, short) in pairwise(sizes):
+        assert short == smaller_long
+        assert 0.0 <= long - 2.0 * smaller_short <= 1.0
+
+
+@pytest.mark.parametrize("direction", ["u", "v"])
+def test_words_run_along_the_rods_and_stand_to_their_left(built, direction):
+    rod = next(each for each in built.grid.rods if each.direction == direction)
+    angle, along, left = layout._directions(rod)
+    turn = np.radians(angle)
+    np.testing.assert_allclose(along, [np.cos(turn), np.sin(turn)], atol=1e-12)
+    np.testing.assert_allclose(left, [-np.sin(turn), np.cos(turn)], atol=1e-12)
+    way = np.ptp(built.grid.flat[rod.nodes, :2], axis=0)
+    assert np.abs(along) @ way == pytest.approx(np.linalg.norm(way))
+
+
 @pytest.mark.parametrize("upright", [False, True])
 def test_a_dimension_on_paper_has_its_ticks_at_its_ends_and_its_text_in_the_middle(upright):
     ends, base = [(2.0, 0.0), (12.0, 0.0)], (2.0, -5.0)

@@ -454,9 +454,21 @@ def test_the_best_view_has_the_long_axis_across_and_looks_at_what_opens_towards_
     assert _fitted(panel().positions).away[1] < 0.0
 
 
-def _fitted(positions):
+@pytest.mark.parametrize(
+    ("name", "away", "right"), [("top", 2, 0), ("front", 1, 0), ("side", 0, 1), ("best", None, None)]
+)
+def test_a_camera_s_axes_are_unit_vectors_and_those_of_plain_views_the_shell_s(name, away, right):
+    seen = _fitted(panel().positions, replace(SMALL, view=name))
+    axes = np.column_stack([seen.right, seen.up, seen.away])
+    np.testing.assert_allclose(axes.T @ axes, np.eye(3), atol=1e-12)
+    assert np.linalg.det(axes) > 0.0
+    if away is not None:
+        assert (np.abs(seen.away).argmax(), np.abs(seen.right).argmax()) == (away, right)
+
+
+def _fitted(positions, look=SMALL):
     given = bare(positions=positions)
-    return view.fitted([given], SMALL, scale_of([given], SMALL, SIZE), SIZE)
+    return view.fitted([given], look, scale_of([given], look, SIZE), SIZE)
 
 
 @pytest.mark.parametrize(("ending", "head"), [(".svg", b"<?xml"), (".pdf", b"%PDF")])

@@ -1,5 +1,7 @@
 """The judge within a search: which structures it draws, and how many may fall."""
 
+from dataclasses import replace
+
 import pytest
 
 from shellform.gridshell.tolerances import Tolerances
@@ -103,6 +105,9 @@ def test_a_judgement_knows_what_each_structure_bears(dome, nominal):
     )
     found = tried(dome, dome.design(), asked)
     assert set(found.factors) == {0, 1, 2}
+    assert max(found.factors.values()) <= 1.0, "none is followed beyond the largest load"
+    light = replace(asked, loads={"design": 0.2 * nominal.load}, fallen={"design": 3})
+    assert set(tried(dome, dome.design(), light).factors.values()) == {1.0}
     for name, share in (("design", 0.8), ("additional", 1.0)):
         assert set(found.fallen[name]) == {
             number for number, factor in found.factors.items() if factor < share - 1e-9

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError, NotConverged
+from shellform.site import retensioning
 from shellform.site.retensioning import Adjustment, Crew, adjust, drawn, learn, replay, whole_turns
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -68,6 +69,23 @@ def test_one_survey_of_every_crossing_teaches_the_shape_beyond_the_noise_and_nev
     assert after < NOISE
     gained = np.linalg.eigvalsh(belief.covariance - learnt.covariance)
     assert gained.min() > -1e-12 * gained.max()
+
+
+def test_a_survey_teaches_in_as_many_rounds_as_its_estimate_moves(shell, belief, errors, upper, monkeypatch):
+    """What is learnt is the likeliest estimate: the sum of squares of what the survey and the drawing are missed by, each
+    over its deviation, is least. After one linearisation it isn't."""
+    design = replace(belief.design, rest_length=belief.design.rest_length + 2.0 * errors)
+    true = find_equilibrium(assemble(shell.network(design)), belief.state, belief.load, on_branch=True).state
+    survey = true.positions[upper]
+
+    def missed():
+        learnt = learn(shell, belief, upper, survey, noise=NOISE)
+        off = (learnt.state.positions[upper] - survey) / NOISE
+        return (off**2).sum() + (((learnt.design.rest_length - belief.design.rest_length) / ERROR) ** 2).sum()
+
+    whole = missed()
+    monkeypatch.setattr(retensioning, "_LEARNING", 1)
+    assert whole < 0.9 * missed(), (whole, missed())
 
 
 def test_the_predicted_shape_is_right_to_first_order(shell, belief):
