@@ -229,6 +229,20 @@ def test_polishing_serves_what_the_objective_holds_of_the_shape_as_built_in_ever
     assert as_built(one.design, one.states["wet"]) < as_built(best.design, best.states["wet"])
 
 
+def test_cables_keep_a_tension_that_errors_of_their_lengths_leave_them(stout, problem, found):
+    best, _ = found
+    asked, start = best.asked, stout.design()
+    least = optimiser._least_tension(problem, start, asked)
+    stiff = stout.cables(start)
+    assert least >= 0.5 * np.median(stiff.stiffness / stiff.rest_length) * ROUGH.cable_length
+    trial = replace(asked.trial, safety=replace(asked.trial.safety, margin=1.0))
+    assert optimiser._least_tension(problem, start, replace(asked, trial=trial)) == pytest.approx(2.0 * least)
+    none = replace(asked, trial=replace(asked.trial, safety=replace(asked.trial.safety, margin=0.0)))
+    bare = replace(start, present=np.zeros_like(start.present))
+    for given, design in ((none, start), (None, start), (asked, bare)):
+        assert optimiser._least_tension(problem, design, given) == 0.0
+
+
 def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem):
     heavy = {"wet": 2.2 * problem.loads["wet"]}
     asked = Required(ASKED, heavy, "wet", {"wet": 6})

@@ -116,6 +116,10 @@ def test_a_film_is_shown_once(copy):
         (copy / f"figures/pour-optimised-design.{ending}").write_bytes(b"film")
     films = [picture for picture in shown_run(read_run(copy)).pictures if picture.name.startswith("pour")]
     assert [film.film for film in films] == [True]
+    (copy / "figures/pour-initial-design.gif").write_bytes(b"GIF89a")
+    shown = shown_run(read_run(copy))
+    told = [*(picture.name for picture in shown.pictures), *shown.notes]
+    assert any("pour-initial-design" in each for each in told), "a film that comes as GIF alone"
 
 
 def test_what_is_no_run_or_has_no_design_is_refused(copy, tmp_path):
