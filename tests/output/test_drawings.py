@@ -223,6 +223,26 @@ def test_letters_are_as_large_as_the_largest_usual_scale_on_the_smallest_paper_l
         assert sheet.lettering / scale >= 1.6
 
 
+def test_a_list_beside_the_drawing_stands_in_lines_and_columns_that_leave_each_other_room():
+    column = drawings._Column(10.0, 200.0, 80.0)
+    rows = [(f"U{k}", f"{1000 + k}") for k in range(80)]
+    column.table(("rod", "mm"), rows, down_to=110.0)
+    assert {label.text for label in column.labels} == {"rod", "mm", *(cell for row in rows for cell in row)}
+    (height,) = {label.height for label in column.labels}
+    levels = sorted({round(label.place[1], 6) for label in column.labels}, reverse=True)
+    assert levels[0] == pytest.approx(200.0 - 1.6 * height)
+    np.testing.assert_allclose(np.diff(levels), -1.6 * height)
+    assert levels[-1] >= 110.0
+    for level in levels:
+        ends = [label for label in column.labels if label.place[1] == pytest.approx(level)]
+        for left, right in pairwise(sorted(ends, key=lambda label: label.place[0])):
+            assert right.place[0] - drawings.WIDE * height * len(right.text) > left.place[0]
+    assert max(label.place[0] for label in column.labels) <= 90.0
+    full = drawings._Column(10.0, 200.0, 80.0)
+    full.table(("rod", "mm"), 4 * rows, down_to=150.0)
+    assert " ".join(label.text for label in full.labels).startswith("The list is too long for this sheet")
+
+
 def test_each_paper_is_two_of_the_next_smaller_one_side_by_side():
     """ISO 216, in whole millimetres."""
     sizes = list(drawings.PAPERS.values())
