@@ -89,7 +89,7 @@ def write(
         if method is None:
             method = folder.with_name(f"{folder.name}_paper")
             # the paper knows its own bounds and constraints, and no engineer's limits
-            asked = load_case(case, [*settings, "optimise.method=paper"])
+            asked = load_case(case, [*settings, "optimise.method=paper", *published.PAPER[study]])
             run_case(asked.model_copy(update={"limits": LimitsEntry()}), method, report=tell)
     run = read_run(folder)
     if published.study_of(run) != study:

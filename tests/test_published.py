@@ -131,7 +131,10 @@ def made(folder, shell, vault, *, radius=False, cables=119, misfit=3e-4):
             step(2, True, 0.2, dict.fromkeys(shares, 0.1), -0.6, -0.5, cables),
         ],
     )
-    case = load_case(ROOT / "scripts" / ("scale_model_radius.toml" if radius else "scale_model.toml"))
+    case = load_case(
+        ROOT / "scripts" / ("scale_model_radius.toml" if radius else "scale_model.toml"),
+        published.PAPER["radius" if radius else "fixed"],
+    )
     return Run(folder, case, vault, shell, {}, dict.fromkeys(designs), {}, summary)
 
 

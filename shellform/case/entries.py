@@ -267,7 +267,8 @@ class OptimiseEntry(Entry):
         0.0,
         ge=0.0,
         le=1.0,
-        description="share of the mean misfit of structures as built with [tolerances], to first order",
+        description="share of the mean misfit of structures as built with [tolerances], to first order; by the paper's "
+        "method it goes to the others",
     )
     rest_length_min: PositiveFloat = Field(0.01, description="bound (3), m")
     rest_length_max: float = Field(1.1, gt=1.0, description="bound (3), times the initial rest length")

@@ -70,7 +70,7 @@ def test_settings_take_the_place_of_entries():
         ),
         ("stiffness = 187.0", "stiffness = nan", "cable.stiffness.*finite"),
         ("young = 40e9", "", r"rod.young is missing.*Add rod.young \(Young's modulus, Pa\)"),
-        ("misfit = 0.7", "misfit = 0.8", "add up to 1"),
+        ("misfit = 0.5", "misfit = 0.8", "add up to 1"),
         ("gap = 0.002", "gap = 0.0275", "well below net.spacing"),
         ("spacing = 0.055", 'spacing = "wide"', "net.spacing.*'wide'"),
         ("[net]", "[net", "isn't valid TOML.*line"),

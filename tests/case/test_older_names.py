@@ -7,7 +7,7 @@ import pytest
 from shellform.case.case import dump_case, load_case
 from shellform.errors import InputError
 
-CASE = Path(__file__).parent.parent.parent / "scripts/scale_model.toml"
+CASE = Path(__file__).parent.parent.parent / "scripts/scale_model_radius.toml"
 
 
 @pytest.mark.parametrize(
@@ -35,8 +35,8 @@ CASE = Path(__file__).parent.parent.parent / "scripts/scale_model.toml"
             ["tolerances.supports=2e-4", "robust.deviations=1.0"],
         ),
         (
-            ["optimise.robust=0.3", "optimise.misfit=0.4", "robust.samples=9"],
-            ["optimise.built_misfit=0.3", "optimise.misfit=0.4", "robust.samples=9"],
+            ["optimise.robust=0.2", "optimise.misfit=0.4", "robust.samples=9"],
+            ["optimise.built_misfit=0.2", "optimise.misfit=0.4", "robust.samples=9"],
         ),
     ],
 )
