@@ -471,6 +471,24 @@ def _fitted(positions, look=SMALL):
     return view.fitted([given], look, scale_of([given], look, SIZE), SIZE)
 
 
+def test_an_arrow_of_lines_is_as_wide_as_it_is_long_never_thinner_than_a_hair_and_seen_from_above_a_dot(
+    monkeypatch,
+):
+    drawn = []
+    monkeypatch.setattr(
+        vectors.plots, "strokes", lambda axes, ends, widths, colours: drawn.append((ends, widths))
+    )
+    monkeypatch.setattr(vectors.plots, "areas", lambda axes, corners, colour: drawn.append(corners))
+    tails = np.array([[0.0, 100.0], [50.0, 10.0], [80.0, 0.5]])
+    heads = np.array([[0.0, 0.0], [50.0, 0.0], [80.0, 0.0]])
+    vectors._arrows(None, tails, heads, 1.0)
+    (shafts, widths), tips, (dots, size) = drawn
+    np.testing.assert_allclose(widths, [6.0, 0.8])
+    np.testing.assert_allclose(shafts[0], [[0.0, 100.0], [0.0, 36.0]])
+    np.testing.assert_allclose(tips[0], [[0.0, 1.0], [11.0, 36.0], [-11.0, 36.0]])
+    np.testing.assert_allclose((dots[0], [[size[0]] * 2] * 2), ([[80.0, 0.0]] * 2, [[2.4] * 2] * 2))
+
+
 @pytest.mark.parametrize(("ending", "head"), [(".svg", b"<?xml"), (".pdf", b"%PDF")])
 def test_a_page_of_lines_is_small_repeats_to_the_byte_and_needs_no_opengl(
     tmp_path, ending, head, monkeypatch

@@ -13,6 +13,7 @@ from shellform.reliability.drawing import CAUSES, built_beams, built_cables, bui
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.standing import Workshop, sample
 from shellform.structure.answers.analysis import analyse
+from shellform.structure.elements.state import State
 from shellform.structure.model import Model, read_model, write_model
 
 LARGE = Tolerances(cable_length=3e-4, supports=3e-4, marks=3e-4, load_each=0.1, load_all=0.05, connectors=0.1)
@@ -135,6 +136,19 @@ def test_an_unknown_load_case_of_a_model_is_refused(dome, nominal):
 def test_a_model_without_start_is_refused(nominal):
     with pytest.raises(InputError, match="start"):
         perfect_of(Model(nominal.network, {"design": nominal.load}, None, ()), "design")
+
+
+@pytest.mark.parametrize(("share", "stands"), [(0.048, True), (0.052, False)])
+def test_what_comes_to_rest_farther_than_a_twentieth_of_the_span_from_the_planned_place_has_fallen(
+    nominal, share, stands
+):
+    end = nominal.states[-1]
+    shifted = State(end.positions + [share * nominal.members.span, 0.0, 0.0], end.quaternions)
+    elsewhere = Workshop(replace(nominal, states=(*nominal.states[:-1], shifted)))
+    found = elsewhere.load(errors_of(nominal.members, Tolerances(), variables(nominal.members, 1, 0)))
+    assert found.factor == 1.0
+    assert found.far == pytest.approx(share * nominal.members.span, rel=1e-3)
+    assert found.stands is stands
 
 
 def test_a_sample_counts_those_that_stand(dome, nominal):

@@ -21,7 +21,7 @@ from shellform.gridshell.joints import following
 from shellform.gridshell.layers import single
 from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
-from shellform.run import first_trial
+from shellform.run import first_net, first_trial
 from shellform.run.first_design import first_design
 from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
@@ -37,6 +37,7 @@ from shellform.run.sizes import (
     curvature_usual,
     first_spacing,
     hopeless,
+    least_spacing,
     load_borne,
     next_choice,
     next_thinner,
@@ -192,6 +193,21 @@ def test_a_crease_leaves_the_usual_curvature_and_the_rods_that_bear_the_load_as_
     assert least == pytest.approx(radius_for(smooth, 0.5, 800.0, DesignWish()), rel=0.25)
     assert least > radius_for(creased, 0.5, 100.0, DesignWish()) > 0.0
     assert radius_for(creased, 0.5, 1e6, DesignWish()) == 0.0
+
+
+@pytest.mark.parametrize("name", ["gfrp_rods/25 mm", "gfrp_rods/8 mm", "gfrp_tubes/50 × 5 mm"])
+def test_a_grid_s_least_spacing_is_seven_times_its_rods_depth_in_whole_millimetres(name):
+    (choice,) = wished(name)
+    least = 1e3 * least_spacing(choice)
+    assert least == pytest.approx(round(least))
+    assert 0.0 <= least - 7.0 * 2e3 * max(choice.section.fibres) < 1.0
+
+
+def test_failed_pulls_are_worth_as_many_factorisations_as_the_net_has_crossings_up_to_three_hundred():
+    surface = dish()
+    for crossings, worth in ((300.0, 450), (150.0, 450), (600.0, 225), (4500.0, 30)):
+        spacing = np.sqrt(surface.area / crossings)
+        assert first_net._worth(surface, spacing) == worth
 
 
 def test_rods_far_too_thin_are_told_from_those_worth_a_trial():
