@@ -8,6 +8,7 @@ import pytest
 import scipy.sparse as sp
 
 import shellform as sf
+from shellform.optimiser.optimise import begin
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.terms import LoadedDesign, measured
 
@@ -110,6 +111,20 @@ def test_a_user_s_vector_term_and_variable_improve_a_gridshell_and_their_limits_
     assert best.constraints.keys() >= {"sag", "cable_force"}
     ratio = best.design.rest_length / coarse.cable_lengths
     assert len(np.unique(np.round(ratio, 12))) <= 4
+
+
+def test_a_step_s_model_predicts_where_a_user_s_variable_leads_to_first_order(coarse):
+    asked = problem(coarse, variables=[Ratios()])
+    search, it = begin(asked, coarse.design(), sf.SequentialConvex(), lambda softest: 0.0, 10)
+    model = search.models.at(it.point)
+    way, left = np.array([1.0, -0.4, 0.7, 0.2]), []
+    for size in (2e-4, 1e-4):
+        y = model.origin + size * way
+        there = sf.follow(coarse, model.design(y), {"wet": asked.loads["wet"]})["wet"].equilibrium.state
+        left.append(np.abs(there.positions - model.predicted(y).positions).max())
+        went = np.abs(there.positions - it.point.states["wet"].positions).max()
+    assert left[1] < 0.1 * went
+    assert left[1] < 0.35 * left[0]
 
 
 def test_a_user_s_vector_term_is_limited_from_below_and_minimised_beside_the_cables_own_lengths(coarse):

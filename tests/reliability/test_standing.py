@@ -143,7 +143,8 @@ def test_what_comes_to_rest_farther_than_a_twentieth_of_the_span_from_the_planne
     nominal, share, stands
 ):
     end = nominal.states[-1]
-    shifted = State(end.positions + [share * nominal.members.span, 0.0, 0.0], end.quaternions)
+    aside = np.array([share * nominal.members.span, 0.0, 0.0])
+    shifted = State(end.positions + aside, end.quaternions)
     elsewhere = Workshop(replace(nominal, states=(*nominal.states[:-1], shifted)))
     found = elsewhere.load(errors_of(nominal.members, Tolerances(), variables(nominal.members, 1, 0)))
     assert found.factor == 1.0

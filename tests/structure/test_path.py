@@ -131,6 +131,13 @@ def test_euler_s_column_loses_stability_at_its_load_both_linearised_and_on_the_p
     assert critical_load(assembly, start, forces(load), goal=5.0) is None
 
 
+def test_a_linearised_factor_counts_from_zero_whichever_two_factors_it_is_taken_from():
+    assembly, start, load = column()
+    states = [find_equilibrium(assembly, start, share * load).state for share in (2.0, 4.0)]
+    found = linearised_factor(assembly, *states, (2.0, 4.0))
+    assert found == pytest.approx(np.pi**2, rel=3e-3)
+
+
 def test_a_critical_load_needs_a_stable_start():
     assembly, start, load = column()
     beyond = newton(assembly, start, 11.0 * load)
