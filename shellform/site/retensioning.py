@@ -7,30 +7,25 @@ first the drawing and the usual error of a cable. A survey y of the nodes x(l), 
 
     l <- m + K (y - x(l) - J (m - l)),   K = C J' (J C J' + s² 1)⁻¹,   C <- C - K J C,
 
-x(l) being a re-solved equilibrium every time, and steps halved until they lead to a likelier estimate: the sum of squares of
-what the survey and the belief are missed by, each over its deviation, falls. Then the turns k, whole numbers of the turnbuckle's step h, are
-sought that minimise
-
-    |x + J h k - goal|² + λ |h k|²,
-
-x and J now those of the whole grid at the estimate, with no more cables touched and none changed further than
-the crew can. λ = (noise / largest change)²: a cable isn't turned for less than the survey can see. Cables are
-chosen one by one, each the one that lowers the sum most with all chosen ones solved for again (orthogonal
-matching pursuit); rounding to whole turns goes from the surest to the least sure one with the rest solved for
-again, and single turns more or less are tried in the end. The first-order shape is checked by the true
-equilibrium on the stable branch; turns that leave the branch are halved.
+x(l) being a re-solved equilibrium every time, and steps halved until they lead to a likelier estimate: the
+sum of squares of what the survey and the belief are missed by, each over its deviation, falls. Then the turns
+k, whole numbers of the turnbuckle's step h, are sought that minimise |x + J h k - goal|² + λ |h k|² (turns.py),
+x and J now those of the whole grid at the estimate. λ = (noise / largest change)²: a cable isn't turned for
+less than the survey can see. The first-order shape is checked by the true equilibrium on the stable branch;
+turns that leave the branch are halved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError, NotConverged, require_count, require_number
+from shellform.errors import InputError, NotConverged, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.site.turns import Crew as Crew  # what an adjustment is asked with
+from shellform.site.turns import whole_turns
 from shellform.structure.answers.sensitivity import by_rest_length, predicted, respond, state_by_design
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -39,32 +34,12 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.tables import Table, table_text
 
-_LEARNING = 8  # linearisations of one survey; where no cable becomes slack the error is of second order after each
+_LEARNING = (
+    8  # linearisations of one survey; where no cable becomes slack the error is of second order after each
+)
 _SETTLED = 0.02  # of a cable's usual error: smaller changes of the estimate end the learning
 _HALVINGS = 5  # of a change that leaves the stable branch, or leads to no likelier estimate
 _TRIAL = 25  # factorisations of an equilibrium next to a known one
-_BATCHES = 50  # in which cables are chosen and rounded: one by one as long as there are fewer of them
-_SWEEPS = 20  # over all chosen cables, trying single turns
-
-
-@dataclass(frozen=True)
-class Crew:
-    """What a crew can do in one round: turn a turnbuckle in steps of `step`, m of rest length, by at most
-    `largest`, m, on at most `cables` cables.
-    """
-
-    step: float
-    largest: float
-    cables: int
-
-    def __post_init__(self) -> None:
-        for name, usual in (("step", 0.0001), ("largest", 0.002)):
-            give = f"metres of rest length, such as {usual}"
-            require_number(getattr(self, name), above=0.0, where=f"crew.{name}", give=give)
-        if self.step > self.largest:
-            what, remedy = "must not be more than the largest change", f"Give metres up to {self.largest:g}."
-            raise InputError(what, where="crew.step", value=self.step, remedy=remedy)
-        require_count(self.cables, where="crew.cables", give="a number of cables a round, such as 10")
 
 
 @dataclass(frozen=True)
@@ -242,39 +217,6 @@ def adjust(shell: Gridshell, belief: Belief, goal: Reals, crew: Crew, *, noise: 
     )
 
 
-def whole_turns(jacobian: Reals, away: Reals, crew: Crew, *, weight: float) -> Indices:
-    """Whole numbers k (p,) of steps h that nearly minimise |away + J h k|² + weight |h k|² for J (r, p) and
-    `away` (r,), within what the crew can do.
-    """
-    most = int(crew.largest / crew.step * (1.0 + 1e-9))
-    gram = crew.step**2 * (jacobian.T @ jacobian + weight * np.eye(jacobian.shape[1]))
-    slope = crew.step * (jacobian.T @ away)
-    most_cables = min(crew.cables, len(slope))
-    batch = 1 + most_cables // _BATCHES
-    chosen: list[int] = [] if most_cables < len(slope) else list(range(len(slope)))
-    steps = np.zeros(len(slope))
-    while len(chosen) < most_cables:
-        # What each cable alone would bring more, within its bounds.
-        rest = slope + gram @ steps
-        best = np.clip(-rest / np.diag(gram), -most, most)
-        gain = -(rest * best + 0.5 * np.diag(gram) * best**2)
-        gain[chosen] = 0.0
-        order = np.argsort(-gain, kind="stable")[: min(batch, most_cables - len(chosen))]
-        taken = order[gain[order] > 0.0].tolist()
-        if not taken:
-            break
-        chosen += taken
-        steps[chosen] = _bounded(gram, slope, chosen, np.zeros(len(slope)), most)
-    whole = np.zeros(len(slope))
-    loose = list(chosen)
-    while loose:
-        steps[loose] = _bounded(gram, slope, loose, whole, most)
-        loose.sort(key=lambda each: abs(steps[each] - np.rint(steps[each])))
-        surest, loose = loose[:batch], loose[batch:]
-        whole[surest] = np.rint(steps[surest])
-    return _polished(gram, slope, whole, chosen, most)
-
-
 def replay(
     shell: Gridshell,
     belief: Belief,
@@ -390,36 +332,3 @@ def _followed(
         state=state,
         remedy="Start from a stable equilibrium of the design under this load, or prop the grid first.",
     )
-
-
-def _bounded(gram: Reals, slope: Reals, free: Sequence[int], fixed: Reals, most: int) -> Reals:
-    """Nearly the minimum over the `free` entries, each within ±most, of slope·k + k'Gk/2 with the other
-    entries `fixed`: what would leave its bounds is set there and the rest solved for again."""
-    steps = fixed.copy()
-    steps[list(free)] = 0.0
-    loose = np.asarray(free)
-    while len(loose):
-        steps[loose] = 0.0
-        found = np.linalg.solve(gram[np.ix_(loose, loose)], -(slope + gram @ steps)[loose])
-        steps[loose] = np.clip(found, -most, most)
-        inside = np.abs(found) <= most
-        if inside.all():
-            break
-        loose = loose[inside]
-    return steps[list(free)]
-
-
-def _polished(gram: Reals, slope: Reals, whole: Reals, chosen: Sequence[int], most: int) -> Indices:
-    """Single turns more or less on the chosen cables as long as they help."""
-    steps = whole.copy()
-    rest = slope + gram @ steps
-    for _ in range(_SWEEPS):
-        before = steps.copy()
-        for cable in chosen:
-            there = float(np.clip(np.rint(steps[cable] - rest[cable] / gram[cable, cable]), -most, most))
-            if there != steps[cable]:
-                rest = rest + gram[:, cable] * (there - steps[cable])
-                steps[cable] = there
-        if np.array_equal(before, steps):
-            break
-    return steps.astype(np.int64)

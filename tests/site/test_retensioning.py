@@ -8,7 +8,8 @@ import pytest
 
 from shellform.errors import InputError, NotConverged
 from shellform.site import retensioning
-from shellform.site.retensioning import Adjustment, Crew, adjust, drawn, learn, replay, whole_turns
+from shellform.site.retensioning import Adjustment, Crew, adjust, drawn, learn, replay
+from shellform.site.turns import whole_turns
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
