@@ -89,6 +89,30 @@ def test_a_survey_teaches_in_as_many_rounds_as_its_estimate_moves(shell, belief,
     assert whole < 0.9 * missed(), (whole, missed())
 
 
+@pytest.mark.parametrize(("step", "kept"), [(0.0, 0.5e-3), (0.3e-3, 0.3e-3)])
+def test_changes_that_leave_the_branch_are_halved_until_they_do_not_to_whole_steps_where_there_are_some(
+    shell, belief, monkeypatch, step, kept
+):
+    """The branch is taken to end a little above a half of a millimetre; of two steps of 0.3 mm one is a half."""
+    design, assembly = belief.design, assemble(shell.network(belief.design))
+    change = np.full(design.present.sum(), -1e-3)
+    solved = find_equilibrium
+
+    def ends_soon(there, start, load, **how):
+        if np.abs(there.cables[0].rest_length - design.rest_length).max() > 0.55e-3:
+            raise NotConverged("off the branch", state=start)
+        return solved(there, start, load, **how)
+
+    monkeypatch.setattr(retensioning, "find_equilibrium", ends_soon)
+    then, state, halved = retensioning._followed(
+        shell, assembly, design, belief.state, belief.load, change, step=step
+    )
+    assert halved == 1
+    np.testing.assert_allclose(then.rest_length, design.rest_length - kept, rtol=1e-12)
+    rest = solved(assemble(shell.network(then)), belief.state, belief.load, on_branch=True).state
+    np.testing.assert_allclose(state.positions, rest.positions, atol=1e-7)
+
+
 def test_the_predicted_shape_is_right_to_first_order(shell, belief):
     change = np.zeros(len(shell.cable_ends))
     change[100:110] = 1e-4
