@@ -131,6 +131,21 @@ def test_no_cable_goes_that_takes_the_shape_farther_off_than_it_may_be_or_is_alr
     assert farther or after <= max(most, before)
 
 
+def test_thinning_ends_after_as_many_single_cables_in_a_row_as_it_may_fail_with(stout, monkeypatch):
+    search, it = searched(stout, 0.01)
+    tried = []
+
+    def off_the_branch(search, it, model, leaving):
+        tried.append(len(leaving))
+
+    monkeypatch.setattr(phases, "attempt_without", off_the_branch)
+    ended = _thin(search, it)
+    assert "no further cable can be taken away" in ended.status
+    assert tried[-search.solver.failures :] == [1] * search.solver.failures
+    assert all(count > 1 for count in tried[: -search.solver.failures])
+    assert np.count_nonzero(ended.needed) == search.solver.failures
+
+
 def test_where_nothing_stands_the_stiffness_asked_for_is_as_before(stout, monkeypatch):
     wet = stout.point_load(4.5, every=2)
     search, it = searched(stout, 0.005, asked=demanded({"wet": wet}))

@@ -146,6 +146,27 @@ def test_the_glb_file_has_closed_tubes_of_the_rods_volume(folder, built):
     assert high == pytest.approx(place[:, 2].max() + radius, abs=radius)
 
 
+def test_the_glb_file_draws_each_lath_of_two_layers_beside_the_rod_s_axis(
+    built, vault, tmp_path, monkeypatch
+):
+    drawn, tubes = [], exports._tubes
+
+    def noted(ways, radius):
+        drawn.append(ways)
+        return tubes(ways, radius)
+
+    monkeypatch.setattr(exports, "_levels", lambda built: (-0.004, 0.004))
+    monkeypatch.setattr(exports, "_tubes", noted)
+    exports.write_glb(tmp_path / "two.glb", built, vault)
+    state = built.states["design"]
+    rods = [rod.nodes for direction in "uv" for rod in built.grid.rods if rod.direction == direction]
+    laths = [way for ways in drawn[:2] for way in ways]
+    assert len(laths) == 2 * len(rods)
+    for nodes, lower, upper in zip(rods, laths[::2], laths[1::2], strict=True):
+        np.testing.assert_allclose(0.5 * (lower + upper), state.positions[nodes], atol=1e-12)
+        np.testing.assert_allclose(np.linalg.norm(upper - lower, axis=1), 0.008, atol=1e-12)
+
+
 def test_the_step_file_has_a_curve_of_each_rod_and_cable_at_the_right_scale(folder, built):
     with session():
         gmsh.model.occ.importShapes(str(folder / "gridshell.step"), highestDimOnly=False)
