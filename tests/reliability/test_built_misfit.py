@@ -7,7 +7,6 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
-from shellform.problem.evaluation import Evaluator
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability.built_misfit import BuiltMisfit, built_misfit
 from shellform.reliability.perfect import perfect
@@ -15,6 +14,7 @@ from shellform.reliability.standing import Workshop
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
+from tests.problems import assert_gradient_as_re_solved, solved
 
 CAUSES = {
     "cable_length": 3e-4,
@@ -45,38 +45,11 @@ def term_of(shell, design, load, tolerances, **more):
     return built_misfit(shell, design, sf.LoadCase("wet", load), tolerances, seed=7, **more)
 
 
-def solved(shell, design, near, load):
-    return find_equilibrium(
-        assemble(shell.network(design)), near, load, tolerance=1e-11, on_branch=True
-    ).state
-
-
 @pytest.mark.parametrize("cause", [*CAUSES, "all"])
 def test_its_gradient_agrees_with_re_solved_equilibria(dome, loaded, cause):
     design, state, load = loaded
     term = term_of(dome, design, load, ALL if cause == "all" else ALL.only(cause), pairs=2)
-    problem = sf.Problem(
-        dome,
-        sf.LoadCase("wet", load),
-        [sf.Share(0.6, sf.Misfit("wet")), sf.Share(0.4, sf.RodRadius())],
-        [sf.AtMost(0.01, term)],
-        variables=[sf.RestLengths(), sf.FreeRadius(0.0005, 0.0014)],
-    )
-    evaluator = Evaluator(problem, design)
-    point = evaluator.linearised(evaluator.seed(design, {"wet": solved(dome, design, state, load)}, 1.0))
-    for direction in (
-        np.append(np.random.default_rng(3).normal(size=len(point.variables) - 1), 0.0),
-        np.eye(len(point.variables))[-1],
-    ):
-        values = []
-        for h in (4e-6, -4e-6, 2e-6, -2e-6):
-            other = evaluator.blocks.design(point.variables + h * direction, design.present)
-            there = solved(dome, other, point.states["wet"], load)
-            values.append(term.measure(LoadedDesign(dome, other, there, load)).value[0] / 0.01)
-        wide, near = (values[0] - values[1]) / 8e-6, (values[2] - values[3]) / 4e-6
-        assert point.constraints_by_variables[0] @ direction == pytest.approx(
-            (4.0 * near - wide) / 3.0, rel=1e-5
-        )
+    assert_gradient_as_re_solved(dome, design, state, load, term)
 
 
 def test_its_value_is_the_mean_misfit_of_structures_that_are_built(dome, loaded):
