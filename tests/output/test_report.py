@@ -87,6 +87,11 @@ def test_the_answers_are_numbers_of_the_design(shell, designs):
     answer = answers(shell, "polished", design, states, drawn, as_built=cell)[3]
     assert (answer.words, answer.good) == ("198 of 200 structures as built stand", True)
     assert answer.detail.startswith("At least 96 % with 95 % confidence. As planned")
+    few = summary(designs, "additional", stands=StandingRecord(200, 125, 0.562, 0.95, 0))
+    cell = Cell("125 of 200 structures as built stand (at least 56 % with 95 % confidence)", True)
+    answer = answers(shell, "polished", design, states, few, as_built=cell)[3]
+    assert (answer.words, answer.good) == ("Not surely: 125 of 200 structures as built stand", None)
+    assert "No more are asked for. As planned" in answer.detail
     assert "isn't known" in found["Is it safe at 1.2 × the load?"].detail
     for known, words in [
         ({"critical_factor": 1.85, "critical_kind": "limit point"}, "ends at 1.850 × (limit point)"),

@@ -26,6 +26,9 @@ _EDGES = {
 }  # fmt: skip
 
 
+_SAFE = 0.95  # of the structures as built: fewer may be what is asked for, and aren't safe
+
+
 @dataclass(frozen=True)
 class Answer:
     """What a designer asks first: the `question`, the answer in a few `words`, the `detail` that stands
@@ -165,6 +168,11 @@ def _is_safe(
     else:
         safe, (words, _, more_words) = as_built.holds, as_built.found.partition(" (")
         sure = f"{more_words[:1].upper()}{more_words[1:].rstrip(')')}. " if more_words else ""
+        if (
+            safe and more.stands.standing < _SAFE * more.stands.drawn
+        ):  # no fewer than of an initial design that falls as often
+            safe, words = None, f"Not surely: {words}"
+            sure += "No more are asked for. "
     rods = f", rods at {100.0 * used:.0f} % of their strength" if known else ""
     off = f"{_mm(more.deviation_max)} off at most, {_mm(more.deviation_mean)} in the mean{rods}"
     return Answer(
