@@ -3,8 +3,10 @@
 from dataclasses import replace
 from fractions import Fraction
 
+import mpmath
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from shellform.reliability.branch import ON_THE_WAY, Branch
 from shellform.structure.answers.analysis import analyse
@@ -16,8 +18,10 @@ from shellform.structure.elements.state import extended as with_tail
 from shellform.structure.model import Model
 from shellform.structure.network import assemble
 from shellform.structure.solve import equilibrium
+from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.extended import (
     ExtendedSymmetric,
+    RefinedFactor,
     _ExactChords,
     fit_for,
     with_twice_the_digits,
@@ -108,6 +112,43 @@ def test_the_factor_solves_counts_and_refuses_as_the_ordinary_ones_do():
         assert matrix.newton(both, right[:, 0])[1] == (factor.negative == 0)
     with pytest.raises(NotPositiveDefinite):
         matrix.factor(both)
+
+
+def test_a_solution_has_all_its_digits_where_only_the_leading_ones_are_factorised():
+    rng = np.random.default_rng(3)
+    whole = random_matrix(30.0)
+    plain, values = family(whole)
+    tail = 1e-17 * values * rng.standard_normal(len(values))
+    both = np.column_stack([values, tail])
+    factor = ExtendedSymmetric(plain).factor(both)
+    assert isinstance(factor, RefinedFactor)
+    right = rng.standard_normal((30, 2))
+    lower = sp.csc_array((values, plain.indices, plain.indptr), shape=whole.shape).toarray()
+    small = sp.csc_array((tail, plain.indices, plain.indptr), shape=whole.shape).toarray()
+    with mpmath.workdps(60):
+        exact = mpmath.matrix(np.tril(lower, -1).T + lower) + mpmath.matrix(np.tril(small, -1).T + small)
+        for column in right.T:
+            solution = [float(each) for each in mpmath.lu_solve(exact, mpmath.matrix(column))]
+            np.testing.assert_allclose(factor.solve(column), solution, rtol=4e-16, atol=1e-18)
+        np.testing.assert_allclose(factor.solve(right)[:, 1], solution, rtol=4e-16, atol=1e-18)
+
+
+def test_a_matrix_that_only_its_last_digits_make_indefinite_is_not_told_to_be_definite():
+    below = np.nextafter(1.0, 0.0)
+    plain, values = family(np.array([[1.0, below], [below, 1.0]]))
+    matrix = ExtendedSymmetric(plain)
+    both = np.column_stack([values, [0.0, 1.0 - below + 1e-20, 0.0]])
+    plain.factor(values)  # the leading digits are definite
+    assert matrix.factor_indefinite(both).negative == 1
+    with pytest.raises(NotPositiveDefinite):
+        matrix.factor(both)
+
+
+def test_a_large_net_under_a_small_load_is_factorised_by_its_leading_digits():
+    network, shape, load = stressed_net()
+    assembly = with_twice_the_digits(assemble(network))
+    found = find_equilibrium(assembly, at_rest(shape), load)
+    assert isinstance(assembly.matrix.factor(assembly.evaluate(found.state).tangent), RefinedFactor)
 
 
 def test_a_nearly_singular_matrix_keeps_its_small_eigenvalue():
