@@ -34,6 +34,7 @@ from benchmark_trend import COMMITTED, committed, trend  # noqa: E402
 from gridshell_models import gridshell  # noqa: E402
 from peers import environment  # noqa: E402
 
+import shellform  # noqa: E402
 from shellform.structure.answers import sensitivity  # noqa: E402
 from shellform.structure.elements.state import at_rest  # noqa: E402
 from shellform.structure.model import Model, write_model  # noqa: E402
@@ -101,7 +102,9 @@ def iterations(rods: int) -> tuple[list[Row], float, int]:
         os.environ["SHELLFORM_SOLVER"] = name
         families[name] = factorisation.Symmetric(assembly.matrix.indptr, assembly.matrix.indices)
         if name == "mkl":  # one of its own: how a matrix is laid out depends on the number of threads
-            families["mkl, 2 threads"] = factorisation.Symmetric(assembly.matrix.indptr, assembly.matrix.indices)
+            families["mkl, 2 threads"] = factorisation.Symmetric(
+                assembly.matrix.indptr, assembly.matrix.indices
+            )
     del os.environ["SHELLFORM_SOLVER"]
     step: list[float] = []
     share: list[float] = []
@@ -401,7 +404,7 @@ def main() -> int:
         print(json.dumps(first() if task == "first" else solve(*map(int, rest))))
         return 0
     rows: list[Row] = []
-    notes: list[str] = []
+    notes = [f"version {shellform.__version__}; {CORES} cores; factorised by {factorisation.backend_name()}"]
 
     def tell(more: list[Row]) -> None:
         rows.extend(more)
@@ -440,6 +443,8 @@ def main() -> int:
         for sentence in sorted(set(missing.values())):
             notes.append(sentence)
             print(sentence, flush=True)
+        if python:
+            notes.append(environment.versions(python))
         for rods in chosen.sizes:
             if python and len(missing) < len(environment.PACKAGES):
                 tell(beside_peers(rods, python, missing))

@@ -40,6 +40,14 @@ def find(asked: str | None) -> tuple[str | None, dict[str, str]]:
     return python, missing
 
 
+def versions(python: str) -> str:
+    """The peers that a Python has, with their versions."""
+    names = [packages[0] for packages, _ in PACKAGES.values()]
+    listing = "import importlib.metadata as m, sys; [print(d.name, d.version) for d in m.distributions() if d.name in sys.argv[1:]]"
+    done = subprocess.run([python, "-c", listing, *names], capture_output=True, text=True, check=True)
+    return ", ".join(sorted(set(done.stdout.splitlines())))
+
+
 def _made() -> tuple[str | None, str]:
     home = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "shellform-peers"
     python = home / "bin" / "python"
