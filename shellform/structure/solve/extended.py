@@ -205,7 +205,10 @@ class RefinedFactor:
         """Whether refinement converges fast, for any right-hand side."""
         left = np.random.default_rng(0).standard_normal((len(self._matrix[0]) - 1, 1))
         for _ in range(3):
-            before, left = left, left + self._leading.solve(_residual(*self._matrix, np.zeros_like(left), left))
+            before, left = (
+                left,
+                left + self._leading.solve(_residual(*self._matrix, np.zeros_like(left), left)),
+            )
         return bool(np.linalg.norm(left) <= _NEAR * np.linalg.norm(before))
 
     def solve(self, right: Reals) -> Reals:

@@ -9,12 +9,12 @@ threads, told to add up in the same order however many there are (conditional nu
 34), so that the same case gives the same bytes. Minimum degree beats nested dissection up to some 300,000
 degrees of freedom.
 
-Two levels of blocks (iparm 24) are meant for many threads and serve one as well. Of gridshells with 7,488 and 9,036
-degrees of freedom a factorisation takes 1.05 to 1.15 times as long as in one level, a solve 0.6 to 0.7 times. From some
-10,000 on the later kind of them (10) is better in all: with 11,520, 31,200 and 127,296 a factorisation takes 0.81, 0.78
-and 0.87 times as long as with the first kind, a solve 0.81, 0.75 and 0.74 times, the analysis 0.5, 0.5 and 0.7 times;
-with 9,036 a factorisation 1.5 times. Orders of elimination made outside (iparm 5) do without two levels: AMD of the
-graph of nodes halves the analysis of small ones, and solves take 1.6 times as long. Reference: Intel oneAPI Math Kernel Library, Developer Reference, "oneMKL
+Two levels of blocks (iparm 24) are meant for many threads and serve one as well where many solutions follow each
+factorisation: of gridshells with 7,488, 11,520, 31,200 and 127,296 degrees of freedom a factorisation takes 1.07,
+1.08, 1.16 and 1.08 times as long as in one level, a solve 0.58, 0.68, 0.75 and 1.1 times, the analysis 1.8, 2.0, 1.9 and
+1.5 times. The later kind of them (10) is faster than both, but told of 38 in a hundred matrices that were not definite, and
+of the others nothing. Orders of elimination made outside (iparm 5) do without two levels: AMD of the graph of nodes
+halves the analysis of small ones, and solves take 1.6 times as long. Reference: Intel oneAPI Math Kernel Library, Developer Reference, "oneMKL
 PARDISO", parameters as numbered there (from 1).
 """
 
@@ -38,7 +38,7 @@ _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
 _NOT_DEFINITE, _FULL = -4, -2
 _DISSECTION_FROM = 300_000  # degrees of freedom
 _TWO_THREADS_FROM = 200_000  # degrees of freedom
-_LATER_BLOCKS_FROM = 10_000  # degrees of freedom
+_TWO_LEVELS_UP_TO = 20_000  # degrees of freedom
 _STRICT = 0x10002  # MKL_CBWR_AUTO | MKL_CBWR_STRICT; kept as it is where the processor has no such mode
 _ANALYSIS = 96  # bytes an entry: 51 to 62 were measured for cubes of rods of 50,000 to 3,300,000 entries
 # bytes of addresses: 260e6 of files that it loads for the newest processors, and its buffers
@@ -109,8 +109,8 @@ class Factoriser:
         if self.size > _TWO_THREADS_FROM:
             put[33] = 2  # iparm(34): reproducible
         put[34] = 1  # iparm(35): indices from 0
-        if definite and kept is None and self.size <= _TWO_THREADS_FROM:
-            put[23] = 10 if self.size > _LATER_BLOCKS_FROM else 1  # iparm(24): two levels of blocks
+        if definite and kept is None and self.size <= _TWO_LEVELS_UP_TO:
+            put[23] = 1  # iparm(24): two levels of blocks
         if not definite:
             put[9] = 12  # iparm(10): pivots below 1e-12 of the largest entry are lifted to it
             put[20] = 1  # iparm(21): Bunch and Kaufman's pivots
