@@ -229,13 +229,21 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
 
 
 def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]:
-    """The designs of a batch that have no result yet, with the stages that they share with others."""
+    """The designs of a batch that have no result yet, with the stages that they share with others: as the first
+    of the batch has them, with a result or without, so that their folders are the same however often a study was
+    begun.
+    """
     until, seen = study.plan.study.until, set()
+    first: dict[str, Mapping[str, Value]] = {}
     shared_by_all = study.allow_scripts, study.plan.study.longest
     stages = STAGES[: STAGES.index(until)]
     for own in batch():
         design = _identify(study, own)
-        if design.case is None or design.key in study.log or design.key in seen:
+        if design.case is None:
+            continue
+        for stage in stages:
+            first.setdefault(design.keys[stage], own)
+        if design.key in study.log or design.key in seen:
             continue
         seen.add(design.key)
         before: tuple[Job, ...] = ()
@@ -245,7 +253,9 @@ def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]
             if counts[k] > 1 and counts[k] > (counts[k + 1] if k + 1 < len(counts) else 1):
                 key = design.keys[stage][:_SHORT]
                 folder = str(study.folder / "stages" / key)
-                before = (*before, Job(key, design.case, stage, folder, before, *shared_by_all))
+                case = _identify(study, first[design.keys[stage]]).case
+                assert case is not None
+                before = (*before, Job(key, case, stage, folder, before, *shared_by_all))
         folder = str(study.folder / "runs" / design.key)
         yield Job(design.key, design.case, until, folder, before, *shared_by_all)
 

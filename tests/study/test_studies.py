@@ -6,6 +6,7 @@ import errno
 import json
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -612,6 +613,23 @@ def test_real_designs_share_their_stages_and_end_with_the_bytes_of_single_runs(t
     outcome = work(Job(mine["key"], kept.case, "optimise", str(damaged)))
     assert outcome.status is Status.DONE, outcome.reason
     assert outcome.values["designs.optimised.cables"] == int(mine["cables"])
+
+
+def test_what_designs_share_has_the_first_one_s_case_however_often_the_study_was_begun(tmp_path, on_two):
+    file = study_file(
+        tmp_path, 'until = "initial"\nkeep = "all"\n[vary]\ncable.stiffness = [100, 400, 200]\n'
+    )
+    folder = tmp_path / "out"
+    run_study(file, folder)
+    shared = {each.parent.name: each.read_text() for each in (folder / "stages").glob("*/case.toml")}
+    assert shared
+    assert all("stiffness = 100.0" in case for case in shared.values())
+    results = (folder / "results.jsonl").read_text().splitlines(keepends=True)
+    first = next(line for line in results if rows(folder)[0]["key"] in line)
+    (folder / "results.jsonl").write_text(first)  # as a full disk left it, with what is shared half done
+    shutil.rmtree(folder / "stages")
+    run_study(file, folder)
+    assert {each.parent.name: each.read_text() for each in (folder / "stages").glob("*/case.toml")} == shared
 
 
 def test_work_turns_whatever_happens_into_a_row(tmp_path, monkeypatch):
