@@ -64,7 +64,7 @@ class SolvedAnswers:
     def by_variables(self, rows: Reals) -> Reals:
         """(k, y) from (k, s), or (y,) from (s,)."""
         found = self._by_values(np.atleast_2d(rows) / self.setting.evaluator.blocks.unit)
-        return found.reshape(*rows.shape[:-1], -1)
+        return found if rows.ndim > 1 else found[0]
 
     def by_parameters(self, rows: Reals) -> Reals:
         """(k, y) from (k, p)."""

@@ -100,6 +100,23 @@ def test_a_search_by_solves_ends_with_a_design_as_good(shell):
     assert found[0].objective < 1.02 * found[1].objective
 
 
+def test_a_search_by_solves_needs_no_constraint(shell):
+    """The design without loads has none."""
+    problem = sf.Problem(
+        shell,
+        sf.LoadCase("none", 0.0 * shell.point_load(2.0)),
+        [sf.Share(0.7, sf.Misfit("none")), sf.Share(0.3, sf.CableForce("none"))],
+        [],
+        [],
+        [sf.RestLengths()],
+    )
+    found = [
+        sf.optimise(problem, shell.design(), solver=sf.SequentialConvex(many=many), evaluations=10)
+        for many in (0, 10**6)
+    ]
+    assert found[0].objective < 1.02 * found[1].objective < 0.9
+
+
 def test_eased_cables_have_the_stiffness_that_their_tensions_alone_give(shell):
     search, it = searched(shell)
     assembly, state = search.evaluator.assembly(it.point.design), it.point.states["wet"]
