@@ -276,7 +276,7 @@ def distances(
         each.places(scan.points) - state.positions[markers]
         for each, scan, state in zip(matches, scans, states, strict=True)
     ]
-    return np.linalg.norm(np.stack(away, axis=1), axis=2)
+    return np.linalg.norm(np.array(away).reshape(-1, len(markers), 3), axis=2).T
 
 
 def apart(one: Motion, other: Motion, place: Reals) -> float:

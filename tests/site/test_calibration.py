@@ -229,3 +229,5 @@ def test_calibrations_that_can_t_be_done_are_refused(shell, loads, markers):
         foresee(shell, plain, [9.0 * loads[1]], markers)
     with pytest.raises(NotConverged, match="tell none"):
         calibrate(shell, plain, [scan], markers, free=["axial"])
+    with pytest.raises(NotConverged, match=r"bears 0.*of load 1 only"):
+        calibrate(shell, plain, [replace(scan, load=9.0 * loads[1])], markers)

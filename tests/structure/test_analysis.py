@@ -202,3 +202,9 @@ def test_cables_alone_have_no_beams_to_halve_and_no_error():
 def ropes_only():
     cables = make_cables([[0, 1], [1, 2]], rest_length=0.9, stiffness=100.0)
     return Model(ropes(line(2, 2.0), cables, [0, 2]), {}, None, (0, 2))
+
+
+@pytest.mark.parametrize("increments", [0, 1_000_001])
+def test_no_load_and_increments_that_would_take_for_ever_are_refused(increments):
+    with pytest.raises(InputError, match=r"--increments: must be between 1 and 1000000.*such as 10"):
+        analyse(twisted(20, [2.0, 0.0, 5.0]), increments=increments)

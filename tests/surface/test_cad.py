@@ -216,6 +216,10 @@ def test_a_script_that_fails_is_refused_with_its_own_message(tmp_path, text, mes
 def test_a_missing_script_and_one_that_is_no_python_are_refused(tmp_path):
     with pytest.raises(InputError, match="there is no such file"):
         cad.build_surface(tmp_path / "none.py", size=0.1)
+    with pytest.raises(
+        InputError, match=r"^\\n\\udce9: there is no such file"
+    ):  # a line's end, a byte that is no UTF-8
+        cad.build_surface("\n\udce9", size=0.1)
     (tmp_path / "shell.txt").write_text("")
     with pytest.raises(InputError, match="isn't a Python script"):
         cad.build_surface(tmp_path / "shell.txt", size=0.1)

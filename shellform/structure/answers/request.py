@@ -11,6 +11,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.model import Model
 from shellform.structure.network import Network
 
+_MOST = 1_000_000  # increments: of the smallest structure they take 15 minutes
 METHODS = ("relaxation", "dynamic", "newton", "path")
 
 
@@ -24,7 +25,7 @@ def check_request(
     count: int,
 ) -> None:
     """Raises InputError for numbers, methods and leads that make no sense on `count` nodes."""
-    require_count(increments, where="--increments", give="a number of load steps, such as 10")
+    require_count(increments, where="--increments", give="a number of load steps, such as 10", most=_MOST)
     if not (np.isfinite(factor) and 0.0 < tolerance < 1.0):
         raise InputError(
             "--factor must be finite and --tolerance between 0 and 1",
