@@ -51,6 +51,8 @@ def whole(path: str | Path, ending: str = "") -> Iterator[Path]:
         raise InputError(
             "has another ending", where=str(target), value=target.suffix, remedy=f"Use {ending}."
         )
+    if not target.name:
+        raise InputError("is a folder", where=str(target), remedy="Give the name of a file in it, too.")
     partial = target.with_name(f"{target.stem[:_STEM]}{_PART}{secrets.token_hex(8)}{target.suffix}")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -63,6 +63,8 @@ def test_arrays_and_text_come_back_as_they_were_written(tmp_path):
     assert str(back["name"]) == "ø"
     with pytest.raises(InputError, match=r"a\.txt: has another ending"):
         write_arrays(tmp_path / "a.txt", places=np.eye(3))
+    with pytest.raises(InputError, match=r"^\.: is a folder.*name of a file"):
+        write_text(".", "nowhere")
     write_text(tmp_path / "a.csv", "ø 2 mm\n")
     assert (tmp_path / "a.csv").read_bytes() == "ø 2 mm\n".encode()
 

@@ -29,8 +29,6 @@ from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
 
-_NOISE = "metres, one standard deviation of a measured coordinate, such as 0.0005"
-
 
 @dataclass(frozen=True)
 class SiteResult:
@@ -57,7 +55,7 @@ def calibrate(
     """Connector stiffness from scans "POINTS.csv=LOAD" of the grid built as a run's `design` or, unbraced, as
     a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
     Raises InputError, NotConverged."""
-    require_number(noise, above=0.0, where="--noise", give=_NOISE)
+    measurements.check_noise(noise)
     shell, built, loads, folder = _built(source, design, output, allow_scripts=allow_scripts)
     pairs = [_scan(each, shell, loads, unit, None if placed else 0) for each in scans]
     nodes = (
@@ -192,7 +190,7 @@ def replay(
     Writes replay.csv. Raises InputError, NotConverged.
     """
     require_count(rounds, where="--replay", give="a number of rounds, such as 3")
-    require_number(slip, least=0.0, where="--slip", give="metres, such as 0.00005, or 0 for none")
+    require_number(slip, least=0.0, most=1.0, where="--slip", give="metres, such as 0.00005, or 0 for none")
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
     nodes = (
@@ -285,10 +283,7 @@ def erect(
 
 def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.Belief]:
     """The design's name, its shell, and what is believed of it: as drawn, or after the round before."""
-    require_number(options.noise, above=0.0, where="--noise", give=_NOISE)
-    require_number(
-        options.length_error, above=0.0, where="--length-error", give="metres a cable, such as 0.0001"
-    )
+    measurements.check_noise(options.noise)
     name = _design(run, options.design, run.best)
     if options.load not in run.loads:
         raise InputError(

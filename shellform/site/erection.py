@@ -39,6 +39,7 @@ from shellform.tables import Table, table_text
 STEP = 0.1  # of a stage
 _SMALLEST = 1.0 / 256.0
 _SLACK = 1.5  # times its length in the target: a cable that isn't tightened yet
+_LEAST = 1e-4  # of a stage, which then has ten thousand steps
 _TRIAL = 25  # factorisations of one step of tightening
 
 _COLUMNS = (
@@ -122,7 +123,7 @@ def erect(
     6), N: `lift` while the supports move, `weight` all the time, `load` in the end. Raises NotConverged where
     no stable path leads from the flat grid to the erected one, or tightening or the load ends it.
     """
-    require_number(step, above=0.0, most=1.0, where="erect.step", give="a share of the way, such as 0.1")
+    require_number(step, least=_LEAST, most=1.0, where="erect.step", give="a share of the way, such as 0.1")
     if shell.net.edges:
         raise InputError(
             "is worked out for shells that stand on the ground all round: edge beams are clamped to the grid "

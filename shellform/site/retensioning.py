@@ -107,7 +107,9 @@ class Replay:
 def drawn(shell: Gridshell, design: Design, state: State, load: Reals, *, length_error: float) -> Belief:
     """What is believed before the first survey: lengths as drawn with the usual error `length_error`, m (one
     standard deviation), of a cable; `state` is the design's equilibrium under the `load`."""
-    require_number(length_error, above=0.0, where="length_error", give="metres a cable, such as 0.0001")
+    require_number(
+        length_error, least=1e-9, most=1.0, where="--length-error", give="metres a cable, such as 0.0001"
+    )
     count = int(design.present.sum())
     if count == 0:
         raise InputError("has no cables to turn", where="design", remedy="Name a design that has cables.")

@@ -270,7 +270,9 @@ def test_bad_options_are_refused(folder, tmp_path):
     good = written(tmp_path / "survey.csv", "x,y,z", [(0, 0, 0)])
     for options, said in (
         ({"noise": 0.0}, "--noise"),
+        ({"noise": 1e308}, "--noise"),  # its square is no number
         ({"length_error": -1.0}, "--length-error"),
+        ({"length_error": 1e308}, "--length-error"),
         ({"load": "storm"}, "--load"),
         ({"design": "best"}, "--design"),
         ({"after": tmp_path / "none.npz"}, "isn't there"),
@@ -316,6 +318,7 @@ def test_bad_options_are_refused(folder, tmp_path):
     refused(shellform("survey", folder), "either a survey or --replay")
     refused(shellform("erect", tmp_path), "is no run folder")
     refused(shellform("erect", folder, "--step", 0), "erect.step")
+    refused(shellform("erect", folder, "--step", "1e-300"), "erect.step: must be between 0.0001 and 1")
     refused(shellform("calibrate", folder), "Missing argument")
     assert json.loads((folder / "summary.json").read_text(encoding="utf-8"))["designs"].keys() == {
         "unbraced",

@@ -128,7 +128,7 @@ def test_groups_lift_way_points_weight_and_a_load_are_stages_of_their_own(shell)
 
 def test_erections_that_can_t_be_are_refused(shell):
     design = shell.design()
-    with pytest.raises(InputError, match=r"at most 1.*a share of the way"):
+    with pytest.raises(InputError, match=r"between 0.0001 and 1.*a share of the way"):
         erect(shell, design, step=0.0)
     with pytest.raises(InputError, match="every cable of the design once"):
         erect(shell, design, groups=[[0, 1]], step=1.0)
