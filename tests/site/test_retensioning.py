@@ -179,7 +179,7 @@ def test_nothing_is_turned_where_cables_are_as_good_as_exact(shell, belief, uppe
 
 
 def test_what_a_crew_or_a_survey_can_t_be_is_refused(shell, belief, errors, upper):
-    with pytest.raises(InputError, match="--length-error: must be between"):
+    with pytest.raises(InputError, match="must be positive"):
         Crew(step=0.0, largest=1.0, cables=1)
     with pytest.raises(InputError, match="more than the largest"):
         Crew(step=2.0, largest=1.0, cables=1)
