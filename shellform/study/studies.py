@@ -234,15 +234,16 @@ def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]
     begun.
     """
     until, seen = study.plan.study.until, set()
-    first: dict[str, Mapping[str, Value]] = {}
+    first: dict[str, Case] = {}
     shared_by_all = study.allow_scripts, study.plan.study.longest
     stages = STAGES[: STAGES.index(until)]
     for own in batch():
         design = _identify(study, own)
         if design.case is None:
             continue
-        for stage in stages:
-            first.setdefault(design.keys[stage], own)
+        for key in (design.keys[stage] for stage in stages):
+            if shared[key] > 1:
+                first.setdefault(key, design.case)
         if design.key in study.log or design.key in seen:
             continue
         seen.add(design.key)
@@ -253,8 +254,7 @@ def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]
             if counts[k] > 1 and counts[k] > (counts[k + 1] if k + 1 < len(counts) else 1):
                 key = design.keys[stage][:_SHORT]
                 folder = str(study.folder / "stages" / key)
-                case = _identify(study, first[design.keys[stage]]).case
-                assert case is not None
+                case = first[design.keys[stage]]
                 before = (*before, Job(key, case, stage, folder, before, *shared_by_all))
         folder = str(study.folder / "runs" / design.key)
         yield Job(design.key, design.case, until, folder, before, *shared_by_all)
