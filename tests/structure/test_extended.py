@@ -21,13 +21,13 @@ from shellform.structure.solve import equilibrium
 from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.extended import (
     ExtendedSymmetric,
-    RefinedFactor,
     _ExactChords,
     fit_for,
     with_twice_the_digits,
 )
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.loading import Drive
+from shellform.structure.solve.refined import RefinedFactor
 from shellform.structure.solve.residual import ResidualNorm
 from shellform.verification.cables import hypar
 from shellform.verification.models import CLAMP, chain, line, load_at

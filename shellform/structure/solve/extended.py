@@ -5,12 +5,9 @@ coordinate is a force that the load can't be told from, and the soft part's stif
 the stiff one's. `ExtendedAssembly` stands in for an assembly then: states have tails, the tangent (nnz, 2) is a sum
 of two doubles an entry (elements/double_double.py). What calls for it is told by `ResidualNorm.rounding`.
 
-Where the load is merely small, as that of one crossing of ten thousand, the tangent's leading digits do for its
-factor: solutions are refined against all digits (Wilkinson; Higham 2002, chapter 12). They do where I - M^-1 K, with
-K the tangent and M what was factorised, shrinks a random vector a hundredfold at its third turn, for then the
-eigenvalues of M^-1 K lie about 1 and K is as positive definite as M. Elsewhere L D L' is made column by column with
-all digits (up-looking, Davis 2005), so that its pivots tell definiteness and the number of negative eigenvalues; that
-takes some hundred times as long as PARDISO.
+L D L' of it is made column by column with all its digits (up-looking, Davis 2005), so that its pivots tell definiteness
+and the number of negative eigenvalues; that takes some hundred times as long as PARDISO, and is left for where the
+leading digits' factor can't be refined (refined.py).
 """
 
 from __future__ import annotations
@@ -33,11 +30,10 @@ from shellform.structure.elements.state import State, extended
 from shellform.structure.solve.assembly import Assembly, Balance, add_forces
 from shellform.structure.solve.chords import ChordKeeper
 from shellform.structure.solve.factorisation import Factor, Indefinite, NotPositiveDefinite, Symmetric
+from shellform.structure.solve.refined import RefinedFactor
 from shellform.work_clock import Work, told
 
 _REFINEMENTS = 3  # each leaves 1e-9 of what there was
-_ROUNDS = 12  # of refinement, each of which leaves a hundredth or less
-_NEAR = 1e-2  # of a vector that a third turn may leave of it
 _SMALL = 1e-2  # rad, below which a series of two terms is right to the last digit
 
 
@@ -193,36 +189,6 @@ class ExtendedSymmetric(Symmetric):
         return super().full(values[:, 0])
 
 
-class RefinedFactor:
-    """The factor of a positive definite matrix's leading digits; solutions are refined against `values` (nnz, 2)."""
-
-    negative = 0
-
-    def __init__(self, leading: Factor, indptr: Indices, indices: Indices, values: Reals) -> None:
-        self._leading, self._matrix = leading, (indptr, indices, values)
-
-    def near(self) -> bool:
-        """Whether refinement converges fast, for any right-hand side."""
-        left = np.random.default_rng(0).standard_normal((len(self._matrix[0]) - 1, 1))
-        for _ in range(3):
-            before, left = (
-                left,
-                left + self._leading.solve(_residual(*self._matrix, np.zeros_like(left), left)),
-            )
-        return bool(np.linalg.norm(left) <= _NEAR * np.linalg.norm(before))
-
-    def solve(self, right: Reals) -> Reals:
-        """The solution for right-hand sides (n,) or (n, k)."""
-        columns = np.ascontiguousarray(right[:, None] if right.ndim == 1 else right)
-        found = self._leading.solve(columns)
-        for _ in range(_ROUNDS):
-            change = self._leading.solve(_residual(*self._matrix, columns, found))
-            found = found + change
-            if np.linalg.norm(change) <= np.finfo(float).eps * np.linalg.norm(found):
-                break
-        return found[:, 0] if right.ndim == 1 else found
-
-
 class ExtendedFactor:
     """L D L' with `pivots` (n, 2)."""
 
@@ -308,26 +274,6 @@ def _raise(values, places, by):  # type: ignore[no-untyped-def]
     for k in range(len(places)):
         p = places[k]
         values[p, 0], values[p, 1] = plus((values[p, 0], values[p, 1]), (by[k], 0.0))
-
-
-@njit(cache=True)
-def _residual(indptr, indices, values, right, x):  # type: ignore[no-untyped-def]
-    """right - A x (n, k) of a lower triangle by columns, summed with all digits."""
-    size, sides = right.shape
-    result = np.empty((size, sides))
-    left = np.empty((size, 2))
-    for c in range(sides):
-        for i in range(size):
-            left[i, 0], left[i, 1] = right[i, c], 0.0
-        for j in range(size):
-            for p in range(indptr[j], indptr[j + 1]):
-                i, entry = indices[p], (values[p, 0], values[p, 1])
-                left[i, 0], left[i, 1] = minus((left[i, 0], left[i, 1]), times(entry, (x[j, c], 0.0)))
-                if i != j:
-                    left[j, 0], left[j, 1] = minus((left[j, 0], left[j, 1]), times(entry, (x[i, c], 0.0)))
-        for i in range(size):
-            result[i, c] = left[i, 0]
-    return result
 
 
 @njit(cache=True)
