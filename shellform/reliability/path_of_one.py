@@ -39,10 +39,11 @@ STEP = 1.0  # of the load: most structures bear it whole, and others are followe
 MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
 _RELAXING = 15  # of the unloaded state, before it is relaxed instead
+_BESIDE = 10  # factorisations from the perfect structure's loaded state
 _RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none
 SNAPS = 3  # local ones, that a structure may go on after
 _BEYOND = 2.0  # resolutions of its path, where a structure is relaxed that may have snapped
-_SNAPPING, _LOOKS = 15, 4  # factorisations after which it is looked how far it has gone, and how often
+_SNAPPING, _LOOKS = 8, 8  # factorisations after which it is looked how far it has gone, and how often
 
 
 @dataclass(frozen=True)
@@ -93,8 +94,17 @@ class Bench:
     def unloaded(self) -> Factor | None:
         """The factor of the unloaded perfect structure's tangent, from which each drawn one begins; None where
         it isn't positive definite, which it is to within the friction of numbers that `held` adds."""
+        return self._factor(self.nominal.unloaded)
+
+    @cached_property
+    def loaded(self) -> Factor | None:
+        """The same under the whole load; None where the perfect structure doesn't bear it, too."""
+        return self._factor(self.nominal.states[-1]) if self.nominal.bears else None
+
+    def _factor(self, state: State) -> Factor | None:
+        """One that lasts as long as the bench."""
         matrix = self.assembly.matrix
-        values = self.assembly.evaluate(self.nominal.unloaded).tangent
+        values = self.assembly.evaluate(state).tangent
         assert values is not None
         try:
             return Symmetric(matrix.indptr, matrix.indices).factor(values)
@@ -228,24 +238,13 @@ class Loading(Branch):
         """The unloaded state: supports and free nodes go along with all errors at once, by the perfect
         structure's tangent, since errors of rods' lengths leave the drawn one indefinite until its nodes have
         moved."""
-        nominal, none = self.nominal, np.zeros_like(self.load)
-        start, offset = nominal.unloaded, self.errors.supports
-        balance = self.assembly.evaluate(start, tangent=False)
-        pull = -balance.force
-        if offset.any():
-            pull -= self.bench.assembly.force_along(start, offset)
-        step = offset.ravel().copy()
-        free = self.assembly.free
-        if self.bench.unloaded is not None:
-            step[free] = self.bench.unloaded.solve(pull.ravel()[free])
-        change = step.reshape(-1, 6)
-        begin = moved(start, self.assembly.chords.corrected(start, change))
-        foreseen = self._as_perfect(start, balance.turned, change)
+        none = np.zeros_like(self.load)
+        begin, foreseen = self._taken_along(self.nominal.unloaded, none, self.bench.unloaded)
         found = self.newton(begin, none, limit=_RELAXING, tolerance=ON_THE_WAY, foreseen=foreseen)
         if found is not None:
             return found
         # By small steps then, from where the errors took the perfect structure, or if that fails from the target.
-        for near in (begin, moved(nominal.start, offset)):
+        for near in (begin, moved(self.nominal.start, self.errors.supports)):
             try:
                 relaxed = find_equilibrium(self.assembly, near, none, limit=_RELAXATIONS)
             except NotConverged as error:
@@ -254,6 +253,35 @@ class Loading(Branch):
             self.spent += relaxed.factorisations
             return self.newton(relaxed.state, none, limit=2, tolerance=ON_THE_WAY)
         return None
+
+    def beside(self) -> Here | None:
+        """The equilibrium under the whole load to which all errors at once take the perfect structure's, in a third of the
+        factorisations of a path from nothing; None where whole steps of Newton's, each tangent of them positive definite,
+        lead to none within STRAY of the span of where its own tangent leads. That the drawn structure would
+        come there from nothing isn't known."""
+        if self.bench.loaded is None:
+            return None
+        begin, foreseen = self._taken_along(self.nominal.states[-1], self.load, self.bench.loaded)
+        found = self.newton(begin, self.load, limit=_BESIDE, tolerance=ON_THE_WAY, foreseen=foreseen)
+        return (
+            found if found is not None and self._farthest(found.state, begin) <= STRAY * self.span else None
+        )
+
+    def _taken_along(self, start: State, load: Reals, factor: Factor | None) -> tuple[State, Foreseen]:
+        """Where the errors take the perfect structure at rest at `start` under a `load`, by its tangent's `factor`
+        (None: supports alone move), and the deformations that are foreseen there."""
+        offset = self.errors.supports
+        balance = self.assembly.evaluate(start, tangent=False)
+        pull = load - balance.force
+        if offset.any():
+            pull -= self.bench.assembly.force_along(start, offset)
+        step = offset.ravel().copy()
+        free = self.assembly.free
+        if factor is not None:
+            step[free] = factor.solve(pull.ravel()[free])
+        change = step.reshape(-1, 6)
+        begin = moved(start, self.assembly.chords.corrected(start, change))
+        return begin, self._as_perfect(start, balance.turned, change)
 
     def _as_perfect(self, start: State, turned: float, change: Reals) -> Foreseen:
         """The deformations that a step by the perfect structure's tangent leads to: elements take on the forces

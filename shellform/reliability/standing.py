@@ -151,6 +151,18 @@ class Workshop:
 
         return self.with_structure(errors, ended)
 
+    def rests(self, errors: Errors, *, resolution: float, marks: Sequence[float] = ()) -> Limit:
+        """As `fall`, up to the whole load, but a structure that rests under it beside the perfect one (path_of_one.py)
+        isn't loaded from nothing."""
+
+        def ended(loading: Loading) -> Limit:
+            here, factor = loading.beside(), 1.0
+            if here is None:
+                here, factor = loading.borne(1.0, STEP, resolution, marks=marks)
+            return self._ended(loading, here, factor, 1.0, tell=False)
+
+        return self.with_structure(errors, ended)
+
     def _ended(self, loading: Loading, here: Here | None, factor: float, most: float, tell: bool) -> Limit:
         if here is None:
             return Limit(0.0, UNLOADED, self.nominal.unloaded, loading.spent)

@@ -7,13 +7,18 @@ in sixteen does with half as much again. (Larger errors also lower the mean, whi
 dozen structures then refuse what else a hundred would be needed for. The same numbers are drawn for every
 design (common random numbers), those that fell before first, and no more than it takes to refuse.
 
+A structure counts as standing where it rests under the load beside the perfect one, be it on a path from nothing or
+not (path_of_one.py); a finished design's are loaded from nothing.
+
 The perfect structure's critical factor is asked for beside them, with an allowance for the mesh.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, fields, replace
+from itertools import islice
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -23,11 +28,10 @@ from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import PERFECT, drawn
-from shellform.reliability.path_of_one import STEP
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import Safety, allowed, critical_on_halved, paths
 from shellform.reliability.standing import Workshop
-from shellform.structure.elements.threads import side_by_side
+from shellform.structure.elements.threads import in_turn
 
 SEED = 2  # added to the safety's: a search doesn't see the structures that a finished design is judged by
 FRESH = 100_000  # the number from which on structures are of fresh samples, whose errors are as they are
@@ -222,42 +226,38 @@ def tried(
             shares: Mapping[str, float] = shares,
         ) -> tuple[float, int]:
             """The share of the largest load that a structure bears."""
-            most, begin = 1.0, None
-            if number == PERFECT:  # whose path is known so far
-                most, begin = wanted, nominal.known_to(wanted)
             errors = drawn(nominal.members, asked.tolerances(number), safety.seed + SEED, number)
-            bears = workshop.limit if number == PERFECT else workshop.fall
-            found = bears(
-                errors,
-                most=most,
-                step=STEP,
-                resolution=_RESOLUTION,
-                tell=False,
-                begin=begin,
-                marks=tuple(shares.values()),
-            )
+            marks = tuple(shares.values())
+            if number == PERFECT:  # whose path is known so far
+                begin = nominal.known_to(wanted)
+                found = workshop.limit(
+                    errors, most=wanted, resolution=_RESOLUTION, tell=False, begin=begin, marks=marks
+                )
+            else:
+                found = workshop.rests(errors, resolution=_RESOLUTION, marks=marks)
             return found.factor, found.factorisations
 
         judged = order if asked.design_load in shares else [each for each in order if each in asked.numbers]
         queue = [PERFECT, *judged] if wanted > 0.0 else judged
-        for begin in range(0, len(queue), _AT_ONCE):
-            numbers = queue[begin : begin + _AT_ONCE]
-            for number, (factor, work) in zip(numbers, side_by_side(one, numbers), strict=True):
-                spent += work
-                if number == PERFECT:
-                    kept = factor >= wanted * (1.0 - _SAME)
-                    continue
-                if asked.design_load in shares:
-                    factors[number] = factor
-                for name, share in shares.items():
-                    counts = number in asked.numbers or name == asked.design_load
-                    if counts and factor < share * (1.0 - _SAME):
-                        fallen[name].append(number)
-            if judging is not None:
-                judging(begin + len(numbers), len(queue))
-            refused = not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares)
-            if refused and not whole:
-                return JudgedTrial(_numbers(fallen), kept, False, spent, factors)
+        with closing(in_turn(one, queue)) as results:
+            for begin in range(0, len(queue), _AT_ONCE):
+                numbers = queue[begin : begin + _AT_ONCE]
+                for number, (factor, work) in zip(numbers, islice(results, len(numbers)), strict=True):
+                    spent += work
+                    if number == PERFECT:
+                        kept = factor >= wanted * (1.0 - _SAME)
+                        continue
+                    if asked.design_load in shares:
+                        factors[number] = factor
+                    for name, share in shares.items():
+                        counts = number in asked.numbers or name == asked.design_load
+                        if counts and factor < share * (1.0 - _SAME):
+                            fallen[name].append(number)
+                if judging is not None:
+                    judging(begin + len(numbers), len(queue))
+                refused = not kept or any(len(fallen[name]) > asked.fallen[name] for name in shares)
+                if refused and not whole:
+                    return JudgedTrial(_numbers(fallen), kept, False, spent, factors)
     enough = all(len(own) <= asked.fallen[name] for name, own in fallen.items())
     return JudgedTrial(_numbers(fallen), kept, kept and enough, spent, factors)
 

@@ -48,6 +48,50 @@ def test_a_drawn_structure_ends_as_the_analysis_of_its_own_model_says(dome, shar
             assert found.state.positions == pytest.approx(told.equilibrium.state.positions, abs=1e-8)
 
 
+@pytest.mark.parametrize(
+    ("share", "tolerances"), [(1.0, LARGE), (1.2, LARGE), (0.7, Tolerances(marks=1e-3, supports=5e-4))]
+)
+def test_what_rests_beside_the_perfect_structure_comes_there_from_nothing_too(dome, share, tolerances):
+    """In fewer factorisations; what doesn't is loaded from nothing, and falls where it falls. In the last one some
+    snap on the way."""
+    nominal = perfect(dome, dome.design(), share * dome.point_load(4.5, every=2))
+    workshop, stood = Workshop(nominal), 0
+    for number in range(12):
+        errors = drawn(nominal, tolerances, number)
+        found, expected = (
+            workshop.rests(errors, resolution=1 / 32),
+            workshop.fall(errors, most=1.0, resolution=1 / 32),
+        )
+        assert found.factor == expected.factor, number
+        if workshop.with_structure(errors, lambda loading: loading.beside()) is not None:
+            stood += 1
+            assert found.factorisations < expected.factorisations
+            assert found.state.positions == pytest.approx(expected.state.positions, abs=1e-5)
+        else:
+            assert found.factorisations > expected.factorisations
+    assert stood >= 3
+
+
+def test_nothing_rests_beside_a_perfect_structure_that_falls(dome):
+    nominal = perfect(dome, dome.design(), 2.5 * dome.point_load(4.5, every=2))
+    assert not nominal.bears
+    workshop, errors = Workshop(nominal), drawn(nominal, LARGE, 0)
+    assert workshop.with_structure(errors, lambda loading: loading.beside()) is None
+    found, expected = (
+        workshop.rests(errors, resolution=1 / 32),
+        workshop.fall(errors, most=1.0, resolution=1 / 32),
+    )
+    assert (found.factor, found.factorisations) == (expected.factor, expected.factorisations)
+
+
+def test_an_equilibrium_far_from_where_the_errors_lead_is_none_beside(dome, monkeypatch):
+    nominal = perfect(dome, dome.design(), dome.point_load(4.5, every=2))
+    workshop, errors = Workshop(nominal), drawn(nominal, LARGE, 1)
+    assert workshop.with_structure(errors, lambda loading: loading.beside()) is not None
+    monkeypatch.setattr(path_of_one, "STRAY", 1e-9)
+    assert workshop.with_structure(errors, lambda loading: loading.beside()) is None
+
+
 def test_small_steps_lead_to_the_same_states(nominal):
     workshop = Workshop(nominal)
     for number in range(6):

@@ -30,6 +30,37 @@ def test_an_error_in_one_item_is_raised(asked):
         threads.side_by_side(lambda item: 1 // item, [1, 0, 2])
 
 
+def test_results_in_turn_come_in_order_while_the_next_ones_are_worked_on(asked):
+    later = threading.Event()
+
+    def work(item):
+        if item == 0 and asked > 1:
+            assert later.wait(10.0)  # set by an item that comes after it
+        if item == 2:
+            later.set()
+        return 2 * item
+
+    assert list(threads.in_turn(work, range(9))) == [2 * item for item in range(9)]
+
+
+def test_what_has_not_begun_is_left_out_once_no_more_results_are_taken(asked):
+    begun = []
+    results = threads.in_turn(lambda item: begun.append(item) or item, range(100))
+    assert next(results) == 0
+    results.close()
+    assert 1 <= len(begun) <= 4 * asked
+    count = len(begun)
+    assert not list(results)
+    assert len(begun) == count
+
+
+def test_an_error_in_an_item_is_raised_in_its_turn(asked):
+    results = threads.in_turn(lambda item: 1 // item, [1, 1, 0, 2])
+    assert [next(results), next(results)] == [1, 1]
+    with pytest.raises(ZeroDivisionError):
+        next(results)
+
+
 def test_dense_algebra_within_the_block_runs_on_one_thread():
     import numpy as np
     from threadpoolctl import threadpool_info, threadpool_limits

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import os
 import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections import deque
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, TypeVar
@@ -21,6 +22,7 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 _WORTH_SHARING = 500  # elements; below, starting the threads takes longer than the loop
+_AHEAD = 2  # times the cores: items that are under way or done before their turn
 _OWN = threading.local()  # `taken` in a thread whose siblings keep the other cores busy
 
 
@@ -75,6 +77,29 @@ def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[
             for each in running:
                 each.cancel()
             raise
+
+
+def in_turn(work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[Result, None, None]:
+    """The results of `side_by_side` one after the other, while those that come next are worked on. Who closes it
+    leaves out what hasn't begun by then.
+    """
+    number = 1 if getattr(_OWN, "taken", False) else min(cores(), len(items))
+    if number < 2:
+        for item in items:
+            yield work(item)
+        return
+    with ThreadPoolExecutor(number, "shellform-case", _take) as pool:
+        running: deque[Future[Result]] = deque()
+        try:
+            for item in items:
+                running.append(pool.submit(work, item))
+                if len(running) == _AHEAD * number:
+                    yield running.popleft().result()
+            while running:
+                yield running.popleft().result()
+        finally:
+            for each in running:
+                each.cancel()
 
 
 def _take() -> None:
