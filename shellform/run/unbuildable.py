@@ -21,7 +21,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.gridshell.loads import pressure
 from shellform.net.net import Net
 from shellform.net.refusal import NoNet, Stalled
-from shellform.run.first_trial import NEEDED
+from shellform.run.first_trial import NEEDED, STRESSED
 from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
 from shellform.surface.shape.target import Surface, curvature
@@ -219,9 +219,15 @@ def refused(
     if failure.why is Why.CURVATURE or (failure.why is Why.STRENGTH and bears is None):
         placed = failure.placed
         bends = 0.0 if placed is None else 1.0 / max(placed.net.quality.curvature_max, 1e-12)
+        loaded = failure.why is Why.STRENGTH and failure.factor > 0.0
+        allowed = (
+            f" and with {1e3 * failure.thickness:.3g} mm of concrete, where {STRESSED:.0%} is allowed"
+            if loaded
+            else ""
+        )
         return Unbuildable(
             f"reason: {failure.why.value}. {choice.label} of {choice.catalogue} would be stressed to {stress:.0%} of its "
-            f"strength{place}, at a spacing of {failure.spacing:g} m",
+            f"strength{place}, at a spacing of {failure.spacing:g} m{allowed}",
             why=failure.why,
             where="rod",
             remedy=_thinner_rods(wish)

@@ -51,7 +51,7 @@ def with_way_out(
         try:
             found = faired(surface, wanted)
         except (InputError, NotConverged) as error:
-            say(f"rounded to {wanted:.3g} m: {error}")
+            say(f"rounded to {wanted:.3g} m: {error.what}")  # nobody asked for this radius: no remedy
             break  # still rounder is still harder
         try:
             if float(found.change.max()) > _SLENDER:

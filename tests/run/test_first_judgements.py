@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.run import first_design, first_trial, next_trial
+from shellform.run import first_design, first_trial, next_trial, unbuildable
 from shellform.run.first_design import _Search
 from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
@@ -316,3 +316,21 @@ def test_of_two_failures_that_came_as_near_the_later_is_kept():
         assert _Search._keep(search, failure) is failure
         assert search.best is best
     assert search.failures == [first, nearer, as_near, farther]
+
+
+@pytest.mark.parametrize(
+    ("why", "factor", "is_told"),
+    [(Why.STRENGTH, 1.5, True), (Why.STRENGTH, 0.0, False), (Why.CURVATURE, 0.0, False)],
+)
+def test_how_much_of_the_strength_is_allowed_is_told_of_rods_that_the_load_breaks(
+    monkeypatch, why, factor, is_told
+):
+    """99 % alone would be no reason."""
+    monkeypatch.setattr(unbuildable, "_crease", lambda *_: None)
+    monkeypatch.setattr(unbuildable, "_rounding", lambda *_: 4.0)
+    choice = SimpleNamespace(label="a rod", catalogue="a catalogue")
+    placed = SimpleNamespace(net=SimpleNamespace(quality=SimpleNamespace(curvature_max=0.1)))
+    failure = Obstacle(why, 0.5, 0.05, factor, choice, placed, stress=0.99)
+    told = unbuildable.refused(None, failure, SimpleNamespace(rod=None)).what
+    assert "to 99% of its strength, at a spacing of 0.5 m" in told
+    assert told.endswith(" and with 50 mm of concrete, where 95% is allowed") is is_told

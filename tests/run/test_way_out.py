@@ -149,6 +149,16 @@ def test_a_rounded_surface_is_tried_on_the_plinths_that_whoever_follows_gets(tmp
     assert read_surface(named(told)).size[2] > cut.size[2], "it is offered whole"
 
 
+def test_of_a_radius_that_nobody_asked_for_no_remedy_is_told(tmp_path):
+    refusal = InputError("is no shell", where="surface", remedy="Draw another.")
+    surface, heard = sheet(gable), []
+    radius = 1.1 * float(surface.size[:2].max())
+    assert with_way_out(refusal, surface, radius, tmp_path / "out", pulled, heard.append) is refusal
+    (told,) = heard
+    assert told.startswith(f"rounded to {radius:.3g} m: is more than the surface's size of ")
+    assert told.endswith("it would be another one")
+
+
 def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
     def search(surface, wish, say, allowance):
         raise AssertionError("too late")
