@@ -255,7 +255,7 @@ class Loading(Branch):
         return None
 
     def beside(self) -> Here | None:
-        """The equilibrium under the whole load to which all errors at once take the perfect structure's, in a third of the
+        """The equilibrium under the whole load to which all errors at once take the perfect structure's, in some half of the
         factorisations of a path from nothing; None where whole steps of Newton's, each tangent of them positive definite,
         lead to none within STRAY of the span of where its own tangent leads. That the drawn structure would
         come there from nothing isn't known."""
@@ -263,9 +263,9 @@ class Loading(Branch):
             return None
         begin, foreseen = self._taken_along(self.nominal.states[-1], self.load, self.bench.loaded)
         found = self.newton(begin, self.load, limit=_BESIDE, tolerance=ON_THE_WAY, foreseen=foreseen)
-        return (
-            found if found is not None and self._farthest(found.state, begin) <= STRAY * self.span else None
-        )
+        if found is None or self._farthest(found.state, begin) > STRAY * self.span:
+            return None
+        return found
 
     def _taken_along(self, start: State, load: Reals, factor: Factor | None) -> tuple[State, Foreseen]:
         """Where the errors take the perfect structure at rest at `start` under a `load`, by its tangent's `factor`

@@ -18,7 +18,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, fields, replace
-from itertools import islice
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -242,7 +241,8 @@ def tried(
         with closing(in_turn(one, queue)) as results:
             for begin in range(0, len(queue), _AT_ONCE):
                 numbers = queue[begin : begin + _AT_ONCE]
-                for number, (factor, work) in zip(numbers, islice(results, len(numbers)), strict=True):
+                for number in numbers:
+                    factor, work = next(results)
                     spent += work
                     if number == PERFECT:
                         kept = factor >= wanted * (1.0 - _SAME)

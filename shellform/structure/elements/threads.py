@@ -66,23 +66,20 @@ def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[
     """`work` on every item, on as many threads as there are cores; results in order. What is done so within
     one of the items stays on its thread. The first error that is raised ends the rest.
     """
-    number = 1 if getattr(_OWN, "taken", False) else min(cores(), len(items))
-    if number < 2:
-        return [work(item) for item in items]
-    with ThreadPoolExecutor(number, "shellform-case", _take) as pool:
-        running = [pool.submit(work, item) for item in items]
-        try:
-            return [each.result() for each in running]
-        except BaseException:
-            for each in running:
-                each.cancel()
-            raise
+    return list(_results(work, items, len(items)))
 
 
 def in_turn(work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[Result, None, None]:
     """The results of `side_by_side` one after the other, while those that come next are worked on. Who closes it
     leaves out what hasn't begun by then.
     """
+    return _results(work, items, _AHEAD * cores())
+
+
+def _results(
+    work: Callable[[Item], Result], items: Sequence[Item], ahead: int
+) -> Generator[Result, None, None]:
+    """With no more than `ahead` items whose results nobody has taken."""
     number = 1 if getattr(_OWN, "taken", False) else min(cores(), len(items))
     if number < 2:
         for item in items:
@@ -93,7 +90,7 @@ def in_turn(work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[
         try:
             for item in items:
                 running.append(pool.submit(work, item))
-                if len(running) == _AHEAD * number:
+                if len(running) == ahead:
                     yield running.popleft().result()
             while running:
                 yield running.popleft().result()
