@@ -7,7 +7,7 @@ Files of others can be added by `--files`.
 
 Run: PYTHONPATH=. python scripts/strangers.py FOLDER [--files OTHER ...] [--only NAME ...] [--limit 120]
      [--processor 150] [--rows FILE]
-     [--do make check net new design] [--until safety] [--quick]
+     [--do make check net new design] [--until safety] [--quick] [--way-out]
  or: PYTHONPATH=. python scripts/strangers.py --report FILE ...
 prints the documentation's table of the rows in files that `--rows` wrote, the last one of each shell and step.
 Each row says of which build it is: a digest of the package's modules.
@@ -523,8 +523,10 @@ def measured(
     quick: Sequence[str] = (),
     until: str = "safety",
     processor: float | None = None,
+    way_out: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """One row: what each of the steps in `do` came to; `design` with the further options `quick`."""
+    """One row: what each of the steps in `do` came to; `design` with the further options `quick`, `new` with those
+    that let it take a `way_out`."""
     row: dict[str, Any] = {"name": file.name, "build": build()}
     logs = folder / "logs"
     logs.mkdir(exist_ok=True)
@@ -561,7 +563,7 @@ def measured(
         if step == "new":
             case.unlink(missing_ok=True)
         arguments = (
-            ["new", str(file), *options, "--output", str(case)]
+            ["new", str(file), *options, *way_out, "--output", str(case)]
             if step == "new"
             else [
                 "design",
@@ -593,7 +595,8 @@ def proposed(printed: str) -> dict[str, Any]:
         name: re.split(r" \(equation|, |: ", told[label])[0] for label, name in shown.items() if label in told
     }
     crossings = re.search(r"(\d+) crossings$", told.get("spacing", ""))
-    return found | ({"crossings": crossings[1]} if crossings else {})
+    found |= {"crossings": crossings[1]} if crossings else {}
+    return found | ({"way_out": told["way out"]} if "way out" in told else {})
 
 
 def designed(printed: str) -> dict[str, Any]:
@@ -668,8 +671,10 @@ def reported(new: dict[str, Any], design: dict[str, Any], latest: str) -> dict[s
         ends = "case, not designed"
     else:
         ends = {True: "**holds**", False: "does not hold"}.get(design.get("holds"), "design broken off")  # type: ignore[call-overload]
+        ends += ", by its way out" if new.get("way_out") else ""
     factor = design.get("factor")
     fails = f"fails: {design['fails']}" if design.get("fails") else ""
+    refused = shortened(str(new.get("reason", ""))) if ends in ("broken off", "refused") else ""
     return {
         "file": new["name"],
         "net": f"{new['crossings']} at {new['proposed']}" if "proposed" in new else "",
@@ -683,7 +688,9 @@ def reported(new: dict[str, Any], design: dict[str, Any], latest: str) -> dict[s
         "`new`, s": used(new, "new"),
         "`design`, s": used(design, "design"),
         "ends with": ends,
-        "said": (fails or shortened(str(new.get("reason", "")))) if ends != "**holds**" else "",
+        "said": " ".join(
+            filter(None, [fails or refused, taken(new["way_out"]) if new.get("way_out") else ""])
+        ),
     }
 
 
@@ -692,18 +699,22 @@ def shortened(reason: str) -> str:
     text = re.sub(r"^shellform: (refused: |stopped: )?", "", reason)
     parts = re.split(r"(?<=[a-z0-9%)])[.;] (?=[A-Z]|it is|no surface|\d+ attempts)", text)
     first = re.sub(r"^[^ ]*: (reason: )?", "", parts[0])
-    way = ""
+    way = taken(text)
+    if not way and "no surface near it" in text:
+        way = "none found"
+    elif not way and len(parts) > 1:
+        way = parts[-1].rstrip(".")
+    return first[:230] + (f" → {way}" if way else "")
+
+
+def taken(text: str) -> str:
+    """The way out that is offered in a text, if any is."""
     rounded = re.search(r"creases rounded to ([\d.]+ m), ([\d.]+ m) off at most", text)
     if rounded:
         walls = ", on walls" if "with --edges wall)" in text else ""
-        way = f"rounded to {rounded[1]} ({rounded[2]} off at most){walls}"
-    elif (option := re.search(r"With (--[a-z]+ [a-z0-9.]+) this goes on", text)) is not None:
-        way = f"`{option[1]}`"
-    elif "no surface near it" in text:
-        way = "none found"
-    elif len(parts) > 1:
-        way = parts[-1].rstrip(".")
-    return first[:230] + (f" → {way}" if way else "")
+        return f"rounded to {rounded[1]} ({rounded[2]} off at most){walls}"
+    option = re.search(r"With (--[a-z]+ [a-z0-9.]+) this goes on", text)
+    return f"`{option[1]}`" if option else ""
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:
@@ -765,6 +776,9 @@ def main() -> None:
     parser.add_argument(
         "--quick", action="store_true", help="design: in ten evaluations, eighty structures drawn"
     )
+    parser.add_argument(
+        "--way-out", action="store_true", help="new: take it where the shell is refused as it is"
+    )
     given = parser.parse_args()
     if given.report:
         print(report(given.report))
@@ -772,6 +786,7 @@ def main() -> None:
     if given.folder is None:
         parser.error("a folder is needed")
     quick = QUICK if given.quick else []
+    way_out = ["--way-out"] if given.way_out else []
     made = given.folder / "files"
     made.mkdir(parents=True, exist_ok=True)
     corpus = [(each.make(made), each.options) for each in STRANGERS]
@@ -789,7 +804,17 @@ def main() -> None:
         if given.only and not any(file.stem.startswith(name) for name in given.only):
             continue
         rows.append(
-            measured(file, options, given.folder, given.do, given.limit, quick, given.until, given.processor)
+            measured(
+                file,
+                options,
+                given.folder,
+                given.do,
+                given.limit,
+                quick,
+                given.until,
+                given.processor,
+                way_out,
+            )
         )
         line = json.dumps(rows[-1], ensure_ascii=False)
         print(line, file=sys.stderr, flush=True)

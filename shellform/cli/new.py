@@ -35,6 +35,14 @@ def new(
     edges: Annotated[
         str, typer.Option(help="wall: the outer edge stands on walls all round; auto: on what is found.")
     ] = "auto",
+    way_out: Annotated[
+        bool,
+        typer.Option(
+            "--way-out",
+            help="Where no design stands on the surface as it is, go on with the nearest that can be built, walls all round, "
+            "or a first layer of concrete, whichever is found first; the case says so.",
+        ),
+    ] = False,
     allow_scripts: Scripts = False,
     quiet: Quiet = False,
 ) -> None:
@@ -50,6 +58,7 @@ def new(
             surface_options,
             allow_scripts=allow_scripts,
             wish=DesignWish(rod, spacing, thickness, angle, layers, edges),
+            way_out=way_out,
             report=report,
         )
     finally:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from shellform.errors import InputError, NotConverged
@@ -21,7 +21,7 @@ from shellform.run.first_net import Allowance
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
-from shellform.run.way_out import BUILDABLE, COVERED, renewed, with_way_out
+from shellform.run.way_out import BUILDABLE, COVERED, nearest_buildable, renewed
 from shellform.surface.shape.target import Surface
 
 _SHARES = (0.2, 0.5, 1.0)  # of the radius at which rods bear the load by a cautious estimate
@@ -32,29 +32,57 @@ _FURTHER = 1.7  # times the largest radius, where it helps nothing
 _WORK = 10_000  # crossings pulled and solved on rounded surfaces, and on these again on walls
 _WALLED = 15_000  # on walls, with which large nets are tried once
 _WALLS = "--edges wall"
+TAKEN = "--way-out"
 Refusal = InputError | NotConverged
 Say = Callable[[str], None]
 
 
+@dataclass(frozen=True)
+class WayOut:
+    """With what `new` goes on where it refuses a surface: the `wish`, on the surface in a `file` in metres (None: as given);
+    `told` is the sentence that offers it."""
+
+    wish: DesignWish
+    told: str
+    file: Path | None = None
+
+
+@dataclass(frozen=True)
+class Refused:
+    """What is said of a shell without a design (`error`), and the first way out that leads to one, if any does."""
+
+    error: Refusal
+    way_out: WayOut | None = None
+
+
 def with_ways_out(
     refusal: Refusal, surface: Surface, wish: DesignWish, output: Path, say: Say, until: float = math.inf
-) -> Refusal:
+) -> Refused:
     """The refusal with the first way out that leads to a design as its remedy; else saying which were tried. What is
     offered as a surface is written into a folder beside `output`. `say` hears what is tried; `until` when, of this
     process's processor time, s, trials may begin."""
-    folder = output.with_name(f"{output.stem}-{BUILDABLE}")
+    way_out: WayOut | None = None
     if _walls_may_help(refusal, surface, wish):
-        told = _on_walls(refusal, surface, wish, say, until)
-        if told is not refusal or not isinstance(refusal, Unbuildable):
-            return told
-    if not isinstance(refusal, Unbuildable) or wish.rod:
-        return refusal
+        way_out = _on_walls(surface, wish, say, until)
+    if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
+        way_out = _to_nearest(refusal, surface, wish, output, say, until)
+        if way_out is None:
+            refusal = refusal.in_vain()
+            way_out = _poured_first(refusal, surface, wish, say, until)
+    if way_out is None:
+        return Refused(refusal)
+    return Refused(renewed(refusal, f"{way_out.told}. {TAKEN} goes on so at once"), way_out)
+
+
+def _to_nearest(
+    refusal: Unbuildable, surface: Surface, wish: DesignWish, output: Path, say: Say, until: float
+) -> WayOut | None:
+    """The nearest surface that can be built, on walls where it falls otherwise; None where none was found."""
+    folder = output.with_name(f"{output.stem}-{BUILDABLE}")
     again = _Rounded(wish, until, say)
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
-    told = with_way_out(refusal, surface, refusal.radius, folder, again, say, tried, again.options)
-    if told is not refusal:
-        return told
-    return _poured_first(refusal.in_vain(), surface, wish, say, until)
+    nearest = nearest_buildable(surface, refusal.radius, folder, again, say, tried, lambda: again.options)
+    return None if nearest is None else WayOut(again.wish, nearest.told, nearest.file)
 
 
 def shares(refusal: Unbuildable) -> list[float]:
@@ -72,29 +100,26 @@ class _Rounded:
     that falls on edge beams."""
 
     def __init__(self, wish: DesignWish, until: float, say: Say) -> None:
-        self._wish, self._say = wish, say
+        self.wish = wish  # with which the last surface went on
+        self.options = ""  # of the command, that stand for it
+        self._say = say
         self._brief = Allowance(_WORK, until, thorough=False, thins=False)
         self._walled = Allowance(_WORK, until, thorough=False)
-        self._options = ""
-
-    def options(self) -> str:
-        """Of the command, with which the last surface went on."""
-        return self._options
 
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
         try:
-            _trial("rounded", self._wish, self._brief, self._say)(surface)
+            _trial("rounded", self.wish, self._brief, self._say)(surface)
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
-            if not (covered and _on_edge_beams(surface, self._wish)):
+            if not (covered and _on_edge_beams(surface, self.wish)):
                 raise
             self._say(f"rounded: {error}")
-            walls = replace(self._wish, edges="wall", angle=self._brief.angle)
+            walls = replace(self.wish, edges="wall", angle=self._brief.angle)
             _trial("rounded, on walls", walls, self._walled, self._say)(surface)
-            self._options = _WALLS
+            self.wish, self.options = replace(self.wish, edges="wall"), _WALLS
 
 
 def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callable[[Surface], None]:
@@ -123,16 +148,17 @@ def _on_edge_beams(surface: Surface, wish: DesignWish) -> bool:
     return any(each.kind == "beam" and not each.opening for each in stretches_of(surface))
 
 
-def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say, until: float) -> Refusal:
-    """The refusal with walls as its remedy; as it was, where no design stands on them either."""
+def _on_walls(surface: Surface, wish: DesignWish, say: Say, until: float) -> WayOut | None:
+    """Walls all round; None where no design stands on them either."""
+    walls = replace(wish, edges="wall")
     try:
-        _trial("on walls", replace(wish, edges="wall"), Allowance(_WALLED, until), say)(surface)
+        _trial("on walls", walls, Allowance(_WALLED, until), say)(surface)
     except (InputError, NotConverged) as error:
         say(f"on walls: {error}")
-        return refusal
+        return None
     outer = surface.vertices[surface.boundary[0], 2]
-    return renewed(
-        refusal,
+    return WayOut(
+        walls,
         f"With {_WALLS} this goes on: walls all round, up to {outer.max() - outer.min():.3g} m above the lowest of its "
         "edge",
     )
@@ -140,17 +166,17 @@ def _on_walls(refusal: Refusal, surface: Surface, wish: DesignWish, say: Say, un
 
 def _poured_first(
     refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say, until: float
-) -> Refusal:
-    """The refusal with a first layer of concrete as its remedy; as it was, where none is known to be borne."""
+) -> WayOut | None:
+    """A first layer of concrete; None where none is known to be borne."""
     if refusal.bears is None or wish.thickness is not None:
-        return refusal
-    how = f"with {1e3 * refusal.bears:g} mm"
+        return None
+    how, layer = f"with {1e3 * refusal.bears:g} mm", replace(wish, thickness=refusal.bears)
     try:
-        _trial(how, replace(wish, thickness=refusal.bears), Allowance(_WORK, until), say)(surface)
+        _trial(how, layer, Allowance(_WORK, until), say)(surface)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
-        return refusal
-    return renewed(
-        refusal,
+        return None
+    return WayOut(
+        layer,
         f"With --thickness {refusal.bears:g} this goes on: pour that first, and the rest when it has hardened",
     )

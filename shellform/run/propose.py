@@ -10,7 +10,7 @@ import json
 import os
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ from shellform.run.first_design import first_design
 from shellform.run.first_edges import TUBES
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance
-from shellform.run.first_refusal import with_ways_out
+from shellform.run.first_refusal import Refused, with_ways_out
 from shellform.run.first_trial import (
     ADDITIONAL,
     ELEMENTS,
@@ -48,6 +48,20 @@ _SEARCH, _WAYS_OUT = 60.0, 90.0  # s of a processor after which no design, and n
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
+@dataclass(frozen=True)
+class _Asked:
+    """What was asked for: a case for the surface of a `file`, written to `output`; whether its scripts may run, and who
+    hears what is tried."""
+
+    file: Path
+    output: Path
+    allow_scripts: bool
+    report: Report
+
+    def say(self, text: str) -> None:
+        self.report(Event("new", text, Kind.NOTE))
+
+
 @dense_on_one()
 def propose_case(
     file: Path,
@@ -56,41 +70,60 @@ def propose_case(
     *,
     allow_scripts: bool,
     wish: DesignWish | None = None,
+    way_out: bool = False,
     report: Report = unheard,
 ) -> dict[str, str]:
     """Writes a case for a surface file to `output`; returns what was proposed as labelled lines.
 
-    `options` are the entries of [surface] in a case; `wish` is what the user wants of the design. Raises InputError where
-    `output` exists or isn't named .toml, and InputError or NotConverged where no design stands (unbuildable.py).
+    `options` are the entries of [surface] in a case; `wish` is what the user wants of the design; with `way_out` the case
+    of a shell that gets no design as it is becomes that of the first way out (first_refusal.py), and says so. Raises
+    InputError where `output` exists or isn't named .toml, and InputError or NotConverged where no design stands
+    (unbuildable.py).
     """
     _check(output)
-    wanted = wish or DesignWish()
-    surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
+    asked = _Asked(file, output, allow_scripts, report)
+    found = _proposed(asked, file, options, wish or DesignWish())
+    if not isinstance(found, Refused):
+        return found
+    taken = found.way_out
+    if taken is None or not way_out:
+        raise found.error
+    asked.say(f"not as it is: {found.error.what}. {taken.told}")
+    told = (f"NOT the surface as it is: {found.error.what}", f"but the way out. {taken.told}")
+    options = options if taken.file is None else {}
+    found = _proposed(asked, taken.file or file, options, taken.wish, told)
+    if isinstance(found, Refused):  # tried more thoroughly than when it was offered
+        raise found.error
+    return {"way out": taken.told, **found}
+
+
+def _proposed(
+    asked: _Asked, file: Path, options: Mapping[str, Any], wish: DesignWish, before: tuple[str, ...] = ()
+) -> dict[str, str] | Refused:
+    """The case for the surface in `file`, written, and what it proposes; its head says what came `before`."""
+    surface = surface_of(surface_entry(file, options), allow_scripts=asked.allow_scripts)
     origin = distant_origin(surface, FAR)
     if origin is not None:
-        surface, before = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
-        options = {**options, "origin": [a + b for a, b in zip(before, origin, strict=True)]}
-        report(Event("surface", f"coordinates count from {options['origin']} m", Kind.NOTE))
-    report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
-
-    def say(text: str) -> None:
-        report(Event("new", text, Kind.NOTE))
+        surface, earlier = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
+        options = {**options, "origin": [a + b for a, b in zip(earlier, origin, strict=True)]}
+        asked.report(Event("surface", f"coordinates count from {options['origin']} m", Kind.NOTE))
+    asked.report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
 
     plinths = plinths_for(surface) if "above" not in options else None
     if plinths is not None:
         surface, options = plinths.surface, {**options, "above": plinths.above}
-        say(plinths.told)
+        asked.say(plinths.told)
+        before = (*before, plinths.told)
 
     began = time.process_time()
     try:
-        design = first_design(surface, wanted, say, Allowance(until=began + _SEARCH))
+        design = first_design(surface, wish, asked.say, Allowance(until=began + _SEARCH))
     except (InputError, NotConverged) as error:
-        raise with_ways_out(error, surface, wanted, output, say, began + _WAYS_OUT) from error
-    edges = _edges_told(stretches_of(surface, Edges(outer=wanted.edges)))
-    entries = {"file": os.path.relpath(file.resolve(), output.resolve().parent), **options}
-    if plinths is not None:
-        design = replace(design, told=(plinths.told, *design.told))
-    write_text(output, _text(file, entries, surface, design, wanted, edges))
+        return with_ways_out(error, surface, wish, asked.output, asked.say, began + _WAYS_OUT)
+    edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
+    entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}
+    design = replace(design, told=(*before, *design.told))
+    write_text(asked.output, _text(asked.file, entries, surface, design, wish, edges))
     return {
         "size": size_text(surface.size),
         **({} if plinths is None else {"plinths": plinths.told}),
@@ -102,7 +135,7 @@ def propose_case(
         "concrete": f"{1e3 * design.thickness:g} mm",
         "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures under 1.2 × its load with {_BUILT}",
         "edges": edges,
-        "case": str(output),
+        "case": str(asked.output),
     }
 
 
@@ -117,7 +150,7 @@ def _text(
     """The case file."""
     lines = "\n".join(f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in entries.items())
     placed, parts, choice, rope = design.placed, design.parts, design.parts.choice, design.parts.rope
-    told = "\n".join(f"#   {each}" for each in design.told)
+    told = "\n".join(f"#   {' '.join(each.split())}" for each in design.told)
     offset = "" if placed.offset == (0.0, 0.0) else f"\noffset = {list(placed.offset)!r}"
     angle = "as asked" if wish.angle is not None else "of those tried its rods bend least"
     bent = 1.0 / max(placed.net.quality.curvature_max, 1e-12)

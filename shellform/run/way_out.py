@@ -8,6 +8,7 @@ surface as given. Beside it stands a map of the change.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -27,6 +28,14 @@ MORE = (1.0, 1.5, 2.2)  # times the radius asked for
 _SLENDER = 1e-9  # m: less is no change
 
 
+@dataclass(frozen=True)
+class Nearest:
+    """The nearest buildable surface, in a `file` in metres, and the sentence in which it is offered (`told`)."""
+
+    file: Path
+    told: str
+
+
 def with_way_out(
     refusal: InputError | NotConverged,
     surface: Surface,
@@ -34,11 +43,23 @@ def with_way_out(
     folder: Path,
     again: Callable[[Surface], object],
     say: Callable[[str], None] = lambda text: None,
+) -> InputError | NotConverged:
+    """The refusal of a surface with the nearest buildable one as its remedy (see there); as it was, where none is found."""
+    nearest = nearest_buildable(surface, radius, folder, again, say)
+    return refusal if nearest is None else renewed(refusal, nearest.told)
+
+
+def nearest_buildable(
+    surface: Surface,
+    radius: float,
+    folder: Path,
+    again: Callable[[Surface], object],
+    say: Callable[[str], None] = lambda text: None,
     shares: Sequence[float] = MORE,
     options: Callable[[], str] = lambda: "",
-) -> InputError | NotConverged:
-    """The refusal of a surface with the nearest buildable one as its remedy, written into `folder` as
-    surface.obj, surface.step, change.vtu and change.png; as it was, where none is found.
+) -> Nearest | None:
+    """The nearest buildable surface, written into `folder` as surface.obj, surface.step, change.vtu and change.png;
+    None where none is found.
 
     `radius`, m, to which the surface must be rounded at least; `again` does with a surface what was refused
     and raises InputError or NotConverged where it is refused again; `say` hears what is tried;
@@ -59,12 +80,12 @@ def with_way_out(
                     trial = Path(place) / SURFACE
                     write_mesh(trial, found.surface)
                     again(read_surface(trial))  # the very file that is offered
-                return renewed(refusal, _offer(found, wanted, folder, options()))
+                return Nearest(folder / SURFACE, _offer(found, wanted, folder, options()))
         except (InputError, NotConverged) as error:
             say(f"rounded to {wanted:.3g} m: {error}")
         else:
             say(f"it is rounded to {wanted:.3g} m already")
-    return refusal
+    return None
 
 
 def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:

@@ -21,10 +21,11 @@ from shellform.gridshell.joints import following
 from shellform.gridshell.layers import single
 from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
-from shellform.run import first_net, first_trial
+from shellform.run import first_net, first_trial, propose
 from shellform.run.first_design import first_design
 from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
+from shellform.run.first_refusal import Refused, WayOut
 from shellform.run.first_trial import NEEDED, PULLED, FirstParts, Followed
 from shellform.run.propose import _edge_beams, _optimise, propose_case
 from shellform.run.sizes import (
@@ -433,18 +434,66 @@ def test_a_half_sphere_is_designed_with_joints_that_turn(tmp_path):
     assert found.bending == pytest.approx(fitting.bending)
 
 
-def test_a_shell_that_tips_is_refused_with_walls_all_round_on_which_its_case_then_stands(tmp_path):
+def test_a_shell_that_tips_stands_on_walls_all_round_where_the_way_out_is_taken_and_its_case_says_so(
+    tmp_path,
+):
     flat = dish(size=6.0, count=13)
     x, y, _ = flat.vertices.T
     saddle = make_surface(np.column_stack([x, y, 1.0 + 0.1 * x * y]), flat.triangles)
-    file, case = as_obj(tmp_path / "saddle.obj", saddle), tmp_path / "case.toml"
-    wish = DesignWish(spacing=0.6, angle=0.0)
-    with pytest.raises(InputError, match="tips") as refused:
-        propose_case(file, case, {}, allow_scripts=False, wish=wish)
-    assert "With --edges wall this goes on" in refused.value.remedy
-    told = propose_case(file, case, {}, allow_scripts=False, wish=replace(wish, edges="wall"))
+    file, case, heard = as_obj(tmp_path / "saddle.obj", saddle), tmp_path / "case.toml", []
+    told = propose_case(
+        file,
+        case,
+        {},
+        allow_scripts=False,
+        wish=DesignWish(spacing=0.6, angle=0.0),
+        way_out=True,
+        report=lambda event: heard.append(event.text),
+    )
     assert "wall" in told["edges"]
     assert load_case(case).edges.outer == "wall"
+    assert "With --edges wall this goes on" in told["way out"]
+    head = case.read_text(encoding="utf-8").partition("[surface]")[0]
+    assert re.search(r"#   NOT the surface as it is: .*tips.*\n#   but the way out\. .*walls all round", head)
+    assert any("not as it is" in each and "tips" in each for each in heard), (
+        "nobody is led elsewhere in silence"
+    )
+
+
+def test_the_way_out_taken_may_be_another_surface_which_the_case_then_names(tmp_path, monkeypatch):
+    given = as_obj(tmp_path / "given.obj", dish(size=6.0, count=13))
+    nearest = as_obj(tmp_path / "near\nest.obj", dish(size=6.0, rise=1.2, count=13))
+    wish, search, seen = DesignWish(spacing=0.6, angle=0.0, layers=1), propose.first_design, []
+
+    def refused_at_first(surface, *rest):
+        seen.append(surface.size[2])
+        if len(seen) == 1:
+            raise InputError("is creased", where="rod")
+        return search(surface, *rest)
+
+    offer = WayOut(wish, f"The nearest is {nearest}", nearest)
+    monkeypatch.setattr(propose, "first_design", refused_at_first)
+    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
+    case = tmp_path / "case.toml"
+    propose_case(given, case, {"unit": "cm"}, allow_scripts=False, wish=wish, way_out=True)
+    assert seen == pytest.approx([0.016, 1.2]), "the unit is the given file's"
+    entry = load_case(case).surface
+    assert (tmp_path / entry.file).resolve() == nearest.resolve()
+    assert entry.unit is None
+    assert load_case(case).title == "given"
+
+
+@pytest.mark.parametrize("offer", [None, WayOut(DesignWish(), "Elsewhere")])
+def test_without_a_way_out_and_where_it_ends_too_the_shell_stays_refused(tmp_path, monkeypatch, offer):
+    def search(surface, *rest):
+        raise InputError("is creased", where="rod")
+
+    monkeypatch.setattr(propose, "first_design", search)
+    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
+    given, case = as_obj(tmp_path / "given.obj", dish(size=6.0, count=13)), tmp_path / "case.toml"
+    with pytest.raises(InputError, match="is creased"):
+        propose_case(given, case, {}, allow_scripts=False, way_out=True)
+    assert not case.exists()
 
 
 def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_after_it(monkeypatch, net):

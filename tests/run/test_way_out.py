@@ -1,6 +1,7 @@
 """What can't be built is said with the nearest surface that can be, and that one can."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -111,13 +112,13 @@ def test_where_no_rounded_surface_helps_a_first_layer_of_concrete_is_offered_if_
     )
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
-    )
+    ).error
     assert tried[-1] == 0.012
     assert remedy in told.remedy
     assert ("--thickness" in told.remedy) == stands
     other = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(thickness=0.05), tmp_path / "case.toml", lambda text: None
-    )
+    ).error
     assert "--thickness" not in other.remedy, "another was asked for"
 
 
@@ -133,7 +134,7 @@ def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path
     refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
-    )
+    ).error
     assert tried == ["auto", "wall"]
     assert "(in metres, with --edges wall)" in told.remedy
     assert named(told).is_file()
@@ -144,7 +145,9 @@ def test_a_rounded_surface_is_tried_on_the_plinths_that_whoever_follows_gets(tmp
     monkeypatch.setattr(first_refusal, "first_design", lambda surface, *_: tried.append(surface))
     monkeypatch.setattr(first_refusal, "plinths_for", lambda surface: Plinths(cut, 0.1, 0.1, 0.5))
     refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
-    told = first_refusal.with_ways_out(refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", print)
+    told = first_refusal.with_ways_out(
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", print
+    ).error
     assert tried == [cut]
     assert read_surface(named(told)).size[2] > cut.size[2], "it is offered whole"
 
@@ -168,7 +171,7 @@ def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
     heard = []
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, until=0.0
-    )
+    ).error
     assert "no surface near it" in told.what
     assert any("left untried" in each for each in heard)
 
@@ -181,5 +184,10 @@ def test_a_roof_of_flat_pieces_is_refused_for_its_crease_with_a_vault_on_which_n
     assert refused.value.radius == pytest.approx(4.0)
     with pytest.raises(InputError) as told:
         propose_case(file, tmp_path / "roof.toml", {}, allow_scripts=False)
+    assert "--way-out goes on so at once" in told.value.remedy
     propose_case(named(told.value), tmp_path / "vault.toml", {}, allow_scripts=False)
-    assert (tmp_path / "vault.toml").is_file()
+    propose_case(file, tmp_path / "roof.toml", {}, allow_scripts=False, way_out=True)
+    two, one = (tomllib.loads((tmp_path / f"{each}.toml").read_text("utf-8")) for each in ("vault", "roof"))
+    assert one.pop("title") == "roof"
+    assert two.pop("title") == "surface"
+    assert one == two, "one command gives what two do"
