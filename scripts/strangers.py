@@ -702,6 +702,8 @@ def shortened(reason: str) -> str:
     way = taken(text)
     if not way and "no surface near it" in text:
         way = "none found"
+    elif not way and "left untried" in text:
+        way = "none tried"
     elif not way and len(parts) > 1:
         way = parts[-1].rstrip(".")
     return first[:230] + (f" → {way}" if way else "")

@@ -22,13 +22,14 @@ from shellform.net.orientation import cost
 from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_trial import ELEMENTS
-from shellform.run.sizes import Placed
+from shellform.run.sizes import MOST_CROSSINGS, Placed
 from shellform.surface.shape.target import Surface
 
 ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
 _PULL, _BRIEF = 110, 70  # factorisations of one pull
 _PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
+_FACTORS = 1.5  # with which power of the crossings the time of a factorisation grows
 _STALLED = 4  # times the work of a pull that ends, one that stalls
 Say = Callable[[str], None]
 
@@ -52,9 +53,21 @@ class Allowance:
         """Whether nothing new may begin."""
         return self.left <= 0 or time.process_time() > self.until
 
+    @classmethod
+    def for_size(cls, surface: Surface, spacing: float | None, seconds: float) -> Allowance:
+        """The usual allowance from now on, `seconds` of this process's processor time; so many times more as the `spacing`, m,
+        that was asked for makes more crossings than a first design has by itself, which each trial then takes."""
+        times = larger(surface, spacing)
+        return cls(round(times * cls.left), time.process_time() + times**_FACTORS * seconds)
+
     def spend(self, crossings: float, times: int = 1) -> None:
         """Takes what a pull or a trial on a net of so many `crossings` costs."""
         self.left -= times * round(crossings)
+
+
+def larger(surface: Surface, spacing: float | None) -> float:
+    """How many times more crossings than a first design has by itself the `spacing`, m, asked for makes; at least 1."""
+    return 1.0 if spacing is None else max(surface.area / spacing**2 / MOST_CROSSINGS, 1.0)
 
 
 def least_bent_net(

@@ -17,7 +17,7 @@ from pathlib import Path
 from shellform.errors import InputError, NotConverged
 from shellform.net.edges import stretches_of
 from shellform.run.first_design import first_design
-from shellform.run.first_net import Allowance
+from shellform.run.first_net import Allowance, larger
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
@@ -65,9 +65,10 @@ def with_ways_out(
     if _walls_may_help(refusal, surface, wish):
         way_out = _on_walls(surface, wish, say, until)
     if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
-        way_out = _to_nearest(refusal, surface, wish, output, say, until)
+        again = _Rounded(wish, round(_WORK * larger(surface, wish.spacing)), until, say)
+        way_out = _to_nearest(refusal, surface, output, again, say)
         if way_out is None:
-            refusal = refusal.in_vain()
+            refusal = refusal.untried() if again.too_late else refusal.in_vain()
             way_out = _poured_first(refusal, surface, wish, say, until)
     if way_out is None:
         return Refused(refusal)
@@ -75,11 +76,10 @@ def with_ways_out(
 
 
 def _to_nearest(
-    refusal: Unbuildable, surface: Surface, wish: DesignWish, output: Path, say: Say, until: float
+    refusal: Unbuildable, surface: Surface, output: Path, again: _Rounded, say: Say
 ) -> WayOut | None:
     """The nearest surface that can be built, on walls where it falls otherwise; None where none was found."""
     folder = output.with_name(f"{output.stem}-{BUILDABLE}")
-    again = _Rounded(wish, until, say)
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
     nearest = nearest_buildable(surface, refusal.radius, folder, again, say, tried, lambda: again.options)
     return None if nearest is None else WayOut(again.wish, nearest.told, nearest.file)
@@ -99,15 +99,19 @@ class _Rounded:
     """All of the search on a rounded surface, within the work of all such trials; on walls too where a net covers it
     that falls on edge beams."""
 
-    def __init__(self, wish: DesignWish, until: float, say: Say) -> None:
+    def __init__(self, wish: DesignWish, work: int, until: float, say: Say) -> None:
         self.wish = wish  # with which the last surface went on
         self.options = ""  # of the command, that stand for it
+        self.too_late = False  # whether not even the first was begun in time
+        self._begun = False
         self._say = say
-        self._brief = Allowance(_WORK, until, thorough=False, thins=False)
-        self._walled = Allowance(_WORK, until, thorough=False)
+        self._brief = Allowance(work, until, thorough=False, thins=False)
+        self._walled = Allowance(work, until, thorough=False)
 
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""
+        self.too_late = not self._begun and self._brief.over
+        self._begun = self._begun or not self.too_late
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
         try:
@@ -152,7 +156,9 @@ def _on_walls(surface: Surface, wish: DesignWish, say: Say, until: float) -> Way
     """Walls all round; None where no design stands on them either."""
     walls = replace(wish, edges="wall")
     try:
-        _trial("on walls", walls, Allowance(_WALLED, until), say)(surface)
+        _trial("on walls", walls, Allowance(round(_WALLED * larger(surface, wish.spacing)), until), say)(
+            surface
+        )
     except (InputError, NotConverged) as error:
         say(f"on walls: {error}")
         return None
@@ -172,7 +178,7 @@ def _poured_first(
         return None
     how, layer = f"with {1e3 * refusal.bears:g} mm", replace(wish, thickness=refusal.bears)
     try:
-        _trial(how, layer, Allowance(_WORK, until), say)(surface)
+        _trial(how, layer, Allowance(round(_WORK * larger(surface, wish.spacing)), until), say)(surface)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
         return None

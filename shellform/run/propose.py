@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import os
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,7 +43,10 @@ from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
-_SEARCH, _WAYS_OUT = 60.0, 90.0  # s of a processor after which no design, and no way out, is begun any more
+_SEARCH, _WAYS_OUT = (
+    60.0,
+    90.0,
+)  # s of a processor after which no design, and no way out, is begun any more at usual sizes
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
@@ -115,11 +117,11 @@ def _proposed(
         asked.say(plinths.told)
         before = (*before, plinths.told)
 
-    began = time.process_time()
+    until = Allowance.for_size(surface, wish.spacing, _WAYS_OUT).until
     try:
-        design = first_design(surface, wish, asked.say, Allowance(until=began + _SEARCH))
+        design = first_design(surface, wish, asked.say, Allowance.for_size(surface, wish.spacing, _SEARCH))
     except (InputError, NotConverged) as error:
-        return with_ways_out(error, surface, wish, asked.output, asked.say, began + _WAYS_OUT)
+        return with_ways_out(error, surface, wish, asked.output, asked.say, until)
     edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}
     design = replace(design, told=(*before, *design.told))

@@ -57,12 +57,21 @@ class Unbuildable(InputError):
 
     def in_vain(self) -> Unbuildable:
         """The same, where none of the ways out that were tried led to a design."""
+        found = f"no surface near it that is rounded there to {self.radius:.2g} m or more was found on which a design stands"
+        return self._saying(found, "It takes a rounder form there.")
+
+    def untried(self) -> Unbuildable:
+        """The same, where no time was left to try any way out."""
+        return self._saying(
+            "rounder surfaces were left untried, since the search had taken all its time", self.remedy
+        )
+
+    def _saying(self, more: str, remedy: str) -> Unbuildable:
         return Unbuildable(
-            f"{self.what}; no surface near it that is rounded there to {self.radius:.2g} m or more was found on which a "
-            "design stands",
+            f"{self.what}; {more}",
             why=self.why,
             where=self.where,
-            remedy="It takes a rounder form there.",
+            remedy=remedy,
             spacing=self.spacing,
             radius=self.radius,
             bears=self.bears,

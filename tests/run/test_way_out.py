@@ -1,6 +1,7 @@
 """What can't be built is said with the nearest surface that can be, and that one can."""
 
 import re
+import time
 import tomllib
 from pathlib import Path
 
@@ -14,10 +15,11 @@ from shellform.records.progress import unheard
 from shellform.run import first_refusal
 from shellform.run.first_design import first_design
 from shellform.run.first_look import net_alone
+from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import shares
 from shellform.run.plinths import Plinths
 from shellform.run.propose import propose_case
-from shellform.run.sizes import DesignWish
+from shellform.run.sizes import MOST_CROSSINGS, DesignWish
 from shellform.run.unbuildable import Unbuildable, Why
 from shellform.run.way_out import with_way_out
 from shellform.surface.readers.reading import read_surface
@@ -172,8 +174,21 @@ def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, until=0.0
     ).error
-    assert "no surface near it" in told.what
+    assert "rounder surfaces were left untried" in told.what, "none was found wanting"
+    assert told.remedy == "Round it."
     assert any("left untried" in each for each in heard)
+
+
+def test_a_shell_of_more_crossings_than_usual_is_asked_for_gets_more_work_and_more_time():
+    surface = sheet(gable)
+    now = time.process_time()
+    usual, fine = (Allowance.for_size(surface, spacing, 60.0) for spacing in (None, 0.02))
+    times = surface.area / 0.02**2 / MOST_CROSSINGS
+    assert times > 10.0
+    assert (usual.left, fine.left) == (Allowance.left, pytest.approx(times * Allowance.left, rel=1e-4))
+    assert usual.until - now == pytest.approx(60.0, abs=5.0)
+    assert fine.until - now == pytest.approx(60.0 * times**1.5, rel=0.01)
+    assert Allowance.for_size(surface, 2.0, 60.0).left == Allowance.left, "coarse nets are no reason for less"
 
 
 @pytest.mark.slow
