@@ -3,7 +3,8 @@
 Each rod is cut where it leaves what is to be built; its parts inside become rods whose ends are supports. The
 cuts are found on the bent rod by the Illinois method, so that supports lie on the edge. A joint nearer to an
 end than a set fraction of the spacing is left out, so that no end piece is so short that its support and the
-joint fight; a rod on which fewer than two joints remain is left out too, with its joints.
+joint fight; a rod on which fewer than two joints remain is left out too, with its joints, and so is one that runs
+beside the edge and keeps none over several spacings: it would bend out there as it likes.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from shellform.structure.network import connected
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
 _FEWEST = 2  # joints on a rod
+_FREE = 2.5  # spacings without a joint, at the most; where only a corner's is left out they are two
 _CUT = 1e-9  # of the spacing: how near to the edge rods are cut
 _CUTTINGS = 30  # steps of the Illinois method
 
@@ -214,7 +216,11 @@ def _keep(
     }
     remaining -= close
     while True:
-        poor = [each for each in joints if 0 < len(remaining & each.keys()) < _FEWEST]
+        poor = [
+            each
+            for piece, each in zip(pieces, joints, strict=True)
+            if _loose(piece, [each[crossing] for crossing in remaining & each.keys()], grid)
+        ]
         if not poor:
             break
         for each in poor:
@@ -238,9 +244,15 @@ def _keep(
         near = f"{len(close)} joints nearer to the edge than {merge * grid.scale:.3g} m were left out"
         notes.append(NetNote(NoteKind.JOINTS, near))
     if len(kept) < len(pieces):
-        few = f"{len(pieces) - len(kept)} rods with fewer than {_FEWEST} joints were left out"
+        few = f"{len(pieces) - len(kept)} rods with fewer than {_FEWEST} joints, or none over {_FREE:g} spacings, were left out"
         notes.append(NetNote(NoteKind.RODS, few))
     return kept, notes
+
+
+def _loose(piece: _Piece, arcs: list[float], grid: Grid) -> bool:
+    """Whether joints at the `arcs`, if there are any, are too few for a rod, or leave too long a part of it free."""
+    free = np.diff(np.sort([piece.start, *arcs, piece.end])).max()
+    return 0 < len(arcs) < _FEWEST or (len(arcs) > 0 and bool(free > _FREE * grid.step(piece.rod.direction)))
 
 
 def _largest(pieces: list[_Piece], joints: list[dict[int, float]], remaining: set[int]) -> set[int]:

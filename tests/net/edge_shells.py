@@ -57,3 +57,11 @@ def undulating(radius=0.6, rise=0.22, wave=0.025):
     middle = np.array([(0.0, 0.0, rise)])
     cap = [(len(ring.vertices), k, (k + 1) % 96) for k in range(96)]
     return make_surface(np.vstack([ring.vertices, middle]), np.vstack([ring.triangles, cap]))
+
+
+def waisted(length=8.0, half=4.0, rise=1.6, waist=0.03, flare=0.5):
+    """A low barrel on two straight lines along x, whose arched ends lie `waist` m beyond x = ±length/2 in the middle and
+    `flare` m farther out at their feet."""
+    along, across = (each.ravel() for each in np.meshgrid(np.linspace(-1.0, 1.0, 41), np.linspace(-1.0, 1.0, 41), indexing="ij"))  # fmt: skip
+    x = along * (0.5 * length + waist + flare * across**4)
+    return _sheet(np.column_stack([x, half * across, rise * (1.0 - across**2)]), 41, 41)
