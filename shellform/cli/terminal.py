@@ -104,6 +104,7 @@ def tell_as_built(summary: Summary) -> None:
         built_shape_words,
         cause_title,
         critical_words,
+        far_off_words,
         rare_words,
         spent_words,
         standing_words,
@@ -125,9 +126,11 @@ def tell_as_built(summary: Summary) -> None:
             if parts:
                 print(f"{name:>10}  {load}: {', '.join(parts)}")
     if summary.verdict is not None:
-        spent = spent_words(summary.designs, summary.verdict.design)
-        if spent:
-            print(f"{spent}.")
+        name, search = summary.verdict.design, summary.optimisation
+        wished = None if search is None else search.deviation_wished
+        for told in (far_off_words(summary.designs, name, wished), spent_words(summary.designs, name)):
+            if told:
+                print(f"{told}.")
     found = summary.failure
     if found is not None:
         cables = f"; {', '.join(found.cables)} go slack" if found.cables else ""

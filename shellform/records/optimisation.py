@@ -30,7 +30,8 @@ class OptimisationRecord:
     `iterations`, `evaluations` (so many of them `rejected`), solved `equilibria` and `factorisations` (those
     of rejected evaluations: `factorisations_rejected`); `stiffness_min`, N/m, that the softest mode had to
     keep; its `status`, a sentence; `constraints` as value over limit less 1; whether the optimised design is
-    `feasible`; why it was `not_polished`; what came of the wishes `cables_max` and `symmetric`."""
+    `feasible`; why it was `not_polished`; what came of the wishes `cables_max` and `symmetric`; how far, m, a node may be
+    off by what is saved (`deviation_wished`, None: not said)."""
 
     objective_start: float
     objective_end: float
@@ -47,6 +48,7 @@ class OptimisationRecord:
     not_polished: str | None = None
     cables_max: CableCountRecord | None = None
     symmetric: SymmetryRecord | None = None
+    deviation_wished: float | None = None
 
 
 @dataclass(frozen=True)

@@ -124,6 +124,18 @@ def spent_words(designs: Mapping[str, DesignRecord], name: str) -> str:
     )
 
 
+def far_off_words(designs: Mapping[str, DesignRecord], name: str, wished: float | None) -> str:
+    """That the design is farther off its shape than was `wished` for, m, where it is, and what would require it."""
+    row = designs[name].loads.get("design") if name in designs else None
+    if row is None or wished is None or row.deviation_max <= wished:
+        return ""
+    off, most = (number(1e3 * each, 2) for each in (row.deviation_max, wished))
+    return (
+        f"The shape is {off} mm off where it is farthest, more than the {most} mm of optimise.deviation, which spares cables for "
+        "it and requires nothing; limits.deviation does"
+    )
+
+
 def _built(row: DesignRecord | None) -> BuiltShapeRecord | None:
     """The shape as built under the design load, where it was looked at."""
     load = None if row is None else row.loads.get("design")

@@ -95,8 +95,13 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
         unloaded = _without_loads(workspace, shell, start, loads["none"])
         reached = followed(shell, unloaded, loads)
         summary = keep(workspace, shell, "unloaded", unloaded, reached, loads, summary)
-    record = _record(best)
-    record = replace(record, not_polished=not_polished, cables_max=cable_count, symmetric=symmetry)
+    record = replace(
+        _record(best),
+        not_polished=not_polished,
+        cables_max=cable_count,
+        symmetric=symmetry,
+        deviation_wished=entry.deviation,
+    )
     drop_checkpoint(workspace.folder)
     return replace(summary, optimisation=record)
 

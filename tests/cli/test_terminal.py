@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from shellform.cli.terminal import tell_as_built
-from shellform.records.summary import BuiltShapeRecord, StandingRecord
-from tests.records.made import design, summary
+from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
+from tests.records.made import design, optimisation, summary
 
 
 def test_each_load_of_a_design_tells_what_is_known_of_it_as_built(capsys):
@@ -28,3 +28,15 @@ def test_each_load_of_a_design_tells_what_is_known_of_it_as_built(capsys):
     lost = design("design", critical_factor=None, critical_kind="not found: no equilibrium", stands=None)
     tell_as_built(replace(summary(["initial"]), designs={"initial": lost}))
     assert "critical factor" not in capsys.readouterr().out
+
+
+def test_of_the_design_to_build_it_is_told_where_its_shape_is_farther_off_than_was_wished_for(capsys):
+    told = replace(summary(["polished"]), verdict=VerdictRecord("polished", True, (), ()))
+    for wished, words in (
+        (0.003, "The shape is 4 mm off where it is farthest, more than the 3 mm of"),
+        (0.004, ""),
+    ):
+        tell_as_built(replace(told, optimisation=optimisation(deviation_wished=wished)))
+        out = capsys.readouterr().out
+        assert words in out
+        assert ("The shape is" in out) == bool(words)

@@ -22,7 +22,7 @@ from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictR
 from shellform.records.words import constraint_title, number
 from shellform.structure.elements.state import State
 from tests.net.edge_shells import barrel
-from tests.records.made import summary
+from tests.records.made import optimisation, summary
 
 
 def test_the_edge_is_told_by_what_it_stands_on_where_that_is_known(shell):
@@ -75,6 +75,12 @@ def test_the_answers_are_numbers_of_the_design(shell, designs):
     )
     spent = answers(shell, "polished", design, states, rows)[0]
     assert "off. Structures as built were 4.5 mm off in the mean with all cables" in spent.detail
+    wished = replace(rows, optimisation=optimisation(deviation_wished=0.003))
+    detail = answers(shell, "polished", design, states, wished)[0].detail
+    assert "67 mm off. The shape is 4 mm off where it is farthest, more than the 3 mm" in detail
+    assert "all cables, and are 11 mm" in detail
+    bare = replace(summary(designs), optimisation=optimisation(deviation_wished=0.003))
+    assert "as planned. The shape is 4 mm off" in answers(shell, "polished", design, states, bare)[0].detail
     assert "as built" not in found["How far off is the shell?"].detail, "nothing was drawn"
     assert found["How many cables?"].detail.startswith(f"{number(pull.max())} N at most in one")
     assert found["Which rods?"].words == "⌀ 2 mm"

@@ -16,6 +16,7 @@ from shellform.records.verdict import failed, headline, to_build, verdict
 from shellform.records.words import (
     built_shape_words,
     critical_words,
+    far_off_words,
     load_title,
     number,
     spent_words,
@@ -330,6 +331,17 @@ def test_what_fewer_cables_cost_of_the_shape_as_built_is_told_from_a_quarter_on_
     assert [told(0.0100, 0.01249), told(None, 0.0221), told(0.0113, None)] == [""] * 3
     assert spent_words({"optimised": row(0.0221)}, "optimised") == ""
     assert spent_words({"initial": row(0.0113)}, "initial") == ""
+
+
+def test_a_shape_farther_off_than_was_wished_for_is_told_with_what_would_require_it():
+    rows = {"polished": design("design", deviation_max=0.2612)}
+    told = far_off_words(rows, "polished", 0.032)
+    assert told.startswith(
+        "The shape is 261 mm off where it is farthest, more than the 32 mm of optimise.deviation"
+    )
+    assert told.endswith("limits.deviation does")
+    assert [far_off_words(rows, "polished", each) for each in (None, 0.2612)] == ["", ""]
+    assert far_off_words(rows, "optimised", 0.032) == "", "a design that isn't there"
 
 
 def test_words_of_loads_paths_and_structures_keep_their_numbers():

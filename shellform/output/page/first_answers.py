@@ -16,7 +16,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import critical_words, driven_words, number, spent_words
+from shellform.records.words import critical_words, driven_words, far_off_words, number, spent_words
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 
@@ -55,7 +55,9 @@ def answers(
     of the catalogue that its rods would be rounded to."""
     row = summary.designs.get(name)
     main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
-    found = [] if main is None else [_how_far(main, spent_words(summary.designs, name))]
+    wished = None if summary.optimisation is None else summary.optimisation.deviation_wished
+    notes = far_off_words(summary.designs, name, wished), spent_words(summary.designs, name)
+    found = [] if main is None else [_how_far(main, [each for each in notes if each])]
     cables = shell.cables(design)
     pull = cables.tension(states["design"]) if "design" in states else np.zeros(len(cables.ends))
     found.append(
@@ -131,20 +133,22 @@ def _stands_on(net: Net, more: LoadRecord | None) -> Answer:
     return Answer("What does its edge stand on?", words, f"{len(net.supports)} supports{beams}")
 
 
-def _how_far(main: LoadRecord, spent: str) -> Answer:
-    """Of the perfect structure, and of drawn ones beside it, which may be ten times as far off; what was `spent` of
+def _how_far(main: LoadRecord, notes: Sequence[str]) -> Answer:
+    """Of the perfect structure, and of drawn ones beside it, which may be ten times as far off; what is to be noted of
     that."""
     question, good = "How far off is the shell?", None if main.stable and main.on_branch else False
     planned, mean, built = _mm(main.deviation_max), _mm(main.deviation_mean), main.built_shape
     if built is None:
-        detail = f"{mean} in the mean, under the design load, as planned"
+        detail = ". ".join([f"{mean} in the mean, under the design load, as planned", *notes])
         return Answer(question, f"{planned} at most", detail, good)
+    drawn = (
+        f"at most, under the design load; {mean} and {_mm(built.deviation_mean)} in the mean. As built is the median of "
+        f"{built.structures} drawn structures; the worst is {_mm(built.deviation_max_worst)} off{driven_words(built)}"
+    )
     return Answer(
         question,
         f"{planned} as planned, {_mm(built.deviation_max)} as built",
-        f"at most, under the design load; {mean} and {_mm(built.deviation_mean)} in the mean. As built is the median of "
-        f"{built.structures} drawn structures; the worst is {_mm(built.deviation_max_worst)} off{driven_words(built)}"
-        f"{spent and f'. {spent}'}",
+        ". ".join([drawn, *notes]),
         good,
     )
 
