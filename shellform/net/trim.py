@@ -3,8 +3,8 @@
 Each rod is cut where it leaves what is to be built; its parts inside become rods whose ends are supports. The
 cuts are found on the bent rod by the Illinois method, so that supports lie on the edge. A joint nearer to an
 end than a set fraction of the spacing is left out, so that no end piece is so short that its support and the
-joint fight; a rod on which fewer than two joints remain is left out too, with its joints, and so is one that runs
-beside the edge and keeps none over several spacings: it would bend out there as it likes.
+joint fight. A rod that runs beside the edge is left out with its joints, where most of it keeps none: it would bend
+out there as it likes; so is one on which fewer than two joints remain.
 """
 
 from __future__ import annotations
@@ -26,7 +26,10 @@ from shellform.structure.network import connected
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
 _FEWEST = 2  # joints on a rod
-_FREE = 2.5  # spacings without a joint, at the most; where only a corner's is left out they are two
+_FREE, _FREE_SHARE = (
+    2.5,
+    0.4,
+)  # spacings, and of a rod, without a joint: rods with more of both run beside the edge
 _CUT = 1e-9  # of the spacing: how near to the edge rods are cut
 _CUTTINGS = 30  # steps of the Illinois method
 
@@ -215,12 +218,16 @@ def _keep(
         if min(arc - piece.start, piece.end - arc) < merge * grid.step(piece.rod.direction)
     }
     remaining -= close
+    kept_at = [[each[crossing] for crossing in remaining & each.keys()] for each in joints]
+    loose = [
+        each
+        for piece, each, arcs in zip(pieces, joints, kept_at, strict=True)
+        if _loose(piece, arcs, grid.step(piece.rod.direction))
+    ]
+    for each in loose:
+        remaining -= each.keys()
     while True:
-        poor = [
-            each
-            for piece, each in zip(pieces, joints, strict=True)
-            if _loose(piece, [each[crossing] for crossing in remaining & each.keys()], grid)
-        ]
+        poor = [each for each in joints if 0 < len(remaining & each.keys()) < _FEWEST]
         if not poor:
             break
         for each in poor:
@@ -243,16 +250,20 @@ def _keep(
     if close:
         near = f"{len(close)} joints nearer to the edge than {merge * grid.scale:.3g} m were left out"
         notes.append(NetNote(NoteKind.JOINTS, near))
-    if len(kept) < len(pieces):
-        few = f"{len(pieces) - len(kept)} rods with fewer than {_FEWEST} joints, or none over {_FREE:g} spacings, were left out"
+    if loose:
+        beside = f"{len(loose)} rods that run beside the edge, with no joint over {_FREE:g} spacings or more, were left out"
+        notes.append(NetNote(NoteKind.RODS, beside))
+    if len(kept) + len(loose) < len(pieces):
+        few = f"{len(pieces) - len(kept) - len(loose)} rods with fewer than {_FEWEST} joints were left out"
         notes.append(NetNote(NoteKind.RODS, few))
     return kept, notes
 
 
-def _loose(piece: _Piece, arcs: list[float], grid: Grid) -> bool:
-    """Whether joints at the `arcs`, if there are any, are too few for a rod, or leave too long a part of it free."""
-    free = np.diff(np.sort([piece.start, *arcs, piece.end])).max()
-    return 0 < len(arcs) < _FEWEST or (len(arcs) > 0 and bool(free > _FREE * grid.step(piece.rod.direction)))
+def _loose(piece: _Piece, arcs: list[float], step: float) -> bool:
+    """Whether with joints at the `arcs` too long a part of the rod is free: over so many steps, m, and so much of it. Beside
+    an opening rods that go on far beyond it stay."""
+    free = float(np.diff(np.sort([piece.start, *arcs, piece.end])).max())
+    return len(arcs) > 0 and free > max(_FREE * step, _FREE_SHARE * (piece.end - piece.start))
 
 
 def _largest(pieces: list[_Piece], joints: list[dict[int, float]], remaining: set[int]) -> set[int]:

@@ -65,3 +65,16 @@ def waisted(length=8.0, half=4.0, rise=1.6, waist=0.03, flare=0.5):
     along, across = (each.ravel() for each in np.meshgrid(np.linspace(-1.0, 1.0, 41), np.linspace(-1.0, 1.0, 41), indexing="ij"))  # fmt: skip
     x = along * (0.5 * length + waist + flare * across**4)
     return _sheet(np.column_stack([x, half * across, rise * (1.0 - across**2)]), 41, 41)
+
+
+def opened(size=10.0, rise=1.2, count=41):
+    """A low dome over a square, with a rectangular opening of 3 × 2 m off its middle."""
+    x, y = (
+        each.ravel() for each in np.meshgrid(*2 * [np.linspace(-size / 2, size / 2, count)], indexing="ij")
+    )
+    z = rise * (1.0 - (2.0 * x / size) ** 2) * (1.0 - (2.0 * y / size) ** 2)
+    whole = _sheet(np.column_stack([x, y, z]), count, count)
+    middle = whole.vertices[whole.triangles].mean(axis=1)
+    kept = whole.triangles[(np.abs(middle[:, 0]) > 1.5) | (np.abs(middle[:, 1] - 2.5) > 1.0)]
+    used = np.unique(kept)
+    return make_surface(whole.vertices[used], np.searchsorted(used, kept))
