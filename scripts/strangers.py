@@ -637,7 +637,10 @@ def report(files: Sequence[Path]) -> str:
         name, latest = row["name"], row.get("build", latest)
         if "new" in row:
             before = proposals.get(name, {})
-            if any(before.get(key) != row.get(key) for key in ("new", "section", "proposed", "crossings")):
+            if any(
+                before.get(key) != row.get(key)
+                for key in ("new", "section", "proposed", "crossings", "way_out")
+            ):
                 designs.pop(name, None)
             proposals[name] = row
         if "design" in row:

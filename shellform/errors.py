@@ -28,7 +28,7 @@ class InputError(ShellformError, ValueError):
         self.where = where
         self.value = value
         self.remedy = remedy
-        head = f"{_printable(where)}: {what}" if where else what
+        head = f"{printable(where)}: {what}" if where else what
         found = "" if value is None else f" (found {value!r})"
         tail = f". {remedy}" if remedy else ""
         super().__init__(f"{head}{found}{tail}")
@@ -39,7 +39,7 @@ class InputError(ShellformError, ValueError):
         return InputError(self.what, where=where, value=self.value, remedy=self.remedy)
 
 
-def _printable(text: str) -> str:
+def printable(text: str) -> str:
     """The text with what can't be printed, as a line's end in a file's name, written out."""
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
 

@@ -29,6 +29,7 @@ ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
 _PULL, _BRIEF = 110, 70  # factorisations of one pull
 _PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
+_LARGEST = 20.0  # times the usual crossings: one and a half hours of a processor before a design must have been found
 _FACTORS = 1.5  # with which power of the crossings the time of a factorisation grows
 _STALLED = 4  # times the work of a pull that ends, one that stalls
 Say = Callable[[str], None]
@@ -66,8 +67,12 @@ class Allowance:
 
 
 def larger(surface: Surface, spacing: float | None) -> float:
-    """How many times more crossings than a first design has by itself the `spacing`, m, asked for makes; at least 1."""
-    return 1.0 if spacing is None else max(surface.area / spacing**2 / MOST_CROSSINGS, 1.0)
+    """How many times more crossings than a first design has by itself the `spacing`, m, asked for makes: at least 1, and no
+    more than is worth waiting for."""
+    if spacing is None:
+        return 1.0
+    across = math.sqrt(surface.area / MOST_CROSSINGS) / spacing
+    return min(max(across, 1.0), math.sqrt(_LARGEST)) ** 2
 
 
 def least_bent_net(

@@ -49,16 +49,30 @@ class WayOut:
 
 @dataclass(frozen=True)
 class Refused:
-    """What is said of a shell without a design (`error`), and the first way out that leads to one, if any does."""
+    """Why a shell has no design (`error`), and the first way out that leads to one, if any does."""
 
     error: Refusal
     way_out: WayOut | None = None
+
+    @property
+    def offered(self) -> Refusal:
+        """The error with the way out as its remedy."""
+        if self.way_out is None:
+            return self.error
+        return renewed(self.error, f"{self.way_out.told}. {TAKEN} goes on so at once")
+
+    def in_vain(self, error: Refusal) -> Refusal:
+        """The same error, where the way out was taken and ended with another."""
+        assert self.way_out is not None
+        return renewed(
+            self.error, f"{self.way_out.told}; but looked at more closely that ends too: {error}".rstrip(".")
+        )
 
 
 def with_ways_out(
     refusal: Refusal, surface: Surface, wish: DesignWish, output: Path, say: Say, until: float = math.inf
 ) -> Refused:
-    """The refusal with the first way out that leads to a design as its remedy; else saying which were tried. What is
+    """The refusal with the first way out that leads to a design; without one, saying that none was found or tried. What is
     offered as a surface is written into a folder beside `output`. `say` hears what is tried; `until` when, of this
     process's processor time, s, trials may begin."""
     way_out: WayOut | None = None
@@ -70,16 +84,14 @@ def with_ways_out(
         if way_out is None:
             refusal = refusal.untried() if again.too_late else refusal.in_vain()
             way_out = _poured_first(refusal, surface, wish, say, until)
-    if way_out is None:
-        return Refused(refusal)
-    return Refused(renewed(refusal, f"{way_out.told}. {TAKEN} goes on so at once"), way_out)
+    return Refused(refusal, way_out)
 
 
 def _to_nearest(
     refusal: Unbuildable, surface: Surface, output: Path, again: _Rounded, say: Say
 ) -> WayOut | None:
     """The nearest surface that can be built, on walls where it falls otherwise; None where none was found."""
-    folder = output.with_name(f"{output.stem}-{BUILDABLE}")
+    folder = _unused(output.with_name(f"{output.stem}-{BUILDABLE}"))
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
     nearest = nearest_buildable(surface, refusal.radius, folder, again, say, tried, lambda: again.options)
     return None if nearest is None else WayOut(again.wish, nearest.told, nearest.file)
@@ -93,6 +105,15 @@ def shares(refusal: Unbuildable) -> list[float]:
         if share > _APART * found[-1]:
             found.append(share)
     return [*found, _FURTHER * found[-1], _FURTHER**2 * found[-1]]
+
+
+def _unused(folder: Path) -> Path:
+    """The folder, or the first numbered one where it is there already: a case may name the surface in it."""
+    number, found = 1, folder
+    while found.exists():
+        number += 1
+        found = folder.with_name(f"{folder.name}-{number}")
+    return found
 
 
 class _Rounded:

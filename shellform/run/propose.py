@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.case.build_net import FAR, counted_from, distant_origin, size_text, surface_of
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, printable
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.layers import layers_of, single
@@ -25,7 +25,7 @@ from shellform.records.remedies import rounded_up
 from shellform.run.first_design import first_design
 from shellform.run.first_edges import TUBES
 from shellform.run.first_look import surface_entry
-from shellform.run.first_net import Allowance
+from shellform.run.first_net import Allowance, larger
 from shellform.run.first_refusal import Refused, with_ways_out
 from shellform.run.first_trial import (
     ADDITIONAL,
@@ -43,10 +43,8 @@ from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
-_SEARCH, _WAYS_OUT = (
-    60.0,
-    90.0,
-)  # s of a processor after which no design, and no way out, is begun any more at usual sizes
+# s of a processor after which no design, and no way out, is begun any more at usual sizes
+_SEARCH, _WAYS_OUT = 60.0, 90.0
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
@@ -84,47 +82,77 @@ def propose_case(
     """
     _check(output)
     asked = _Asked(file, output, allow_scripts, report)
-    found = _proposed(asked, file, options, wish or DesignWish())
-    if not isinstance(found, Refused):
-        return found
-    taken = found.way_out
+    first = _proposed(asked, file, options, wish or DesignWish())
+    if isinstance(first, dict):
+        return first
+    refused, taken = first.refused, first.refused.way_out
     if taken is None or not way_out:
-        raise found.error
-    asked.say(f"not as it is: {found.error.what}. {taken.told}")
-    told = (f"NOT the surface as it is: {found.error.what}", f"but the way out. {taken.told}")
-    options = options if taken.file is None else {}
-    found = _proposed(asked, taken.file or file, options, taken.wish, told)
-    if isinstance(found, Refused):  # tried more thoroughly than when it was offered
-        raise found.error
-    return {"way out": taken.told, **found}
+        raise refused.offered from first.cause
+    asked.say(f"not as it is: {refused.error.what}. {taken.told}")
+    told: tuple[str, ...] = (
+        f"NOT the surface as it is: {refused.error.what}",
+        f"but the way out. {taken.told}",
+    )
+    if (
+        taken.file is not None
+    ):  # in coordinates of the surface as it was refused, whose feet may have been cut off
+        options, told = {}, (*told, *first.told)
+    second = _proposed(asked, taken.file or file, options, taken.wish, told, ways_out=False)
+    if isinstance(second, dict):
+        return {"way out": taken.told, **second}
+    raise refused.in_vain(second.refused.error) from second.cause
+
+
+@dataclass(frozen=True)
+class _Without:
+    """That a surface got no design: how it is `refused`, for what `cause`; and what was `told` of it before."""
+
+    refused: Refused
+    cause: InputError | NotConverged
+    told: tuple[str, ...]
 
 
 def _proposed(
-    asked: _Asked, file: Path, options: Mapping[str, Any], wish: DesignWish, before: tuple[str, ...] = ()
-) -> dict[str, str] | Refused:
-    """The case for the surface in `file`, written, and what it proposes; its head says what came `before`."""
+    asked: _Asked,
+    file: Path,
+    options: Mapping[str, Any],
+    wish: DesignWish,
+    before: tuple[str, ...] = (),
+    *,
+    ways_out: bool = True,
+) -> dict[str, str] | _Without:
+    """The case for the surface in `file`, written, and what it proposes; its head says what came `before`. Where there is no
+    design, `ways_out` are looked for or not."""
+    told: tuple[str, ...] = ()
     surface = surface_of(surface_entry(file, options), allow_scripts=asked.allow_scripts)
     origin = distant_origin(surface, FAR)
     if origin is not None:
         surface, earlier = counted_from(surface, origin), options.get("origin") or (0.0, 0.0, 0.0)
         options = {**options, "origin": [a + b for a, b in zip(earlier, origin, strict=True)]}
-        asked.report(Event("surface", f"coordinates count from {options['origin']} m", Kind.NOTE))
+        told = (f"coordinates count from {options['origin']} m",)
+        asked.report(Event("surface", told[0], Kind.NOTE))
     asked.report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
 
     plinths = plinths_for(surface) if "above" not in options else None
     if plinths is not None:
         surface, options = plinths.surface, {**options, "above": plinths.above}
         asked.say(plinths.told)
-        before = (*before, plinths.told)
+        told = (*told, plinths.told)
 
+    times = larger(surface, wish.spacing)
+    if times > 1.0:
+        asked.say(f"{times:.2g} times the usual work is allowed, for so many crossings")
     until = Allowance.for_size(surface, wish.spacing, _WAYS_OUT).until
     try:
         design = first_design(surface, wish, asked.say, Allowance.for_size(surface, wish.spacing, _SEARCH))
     except (InputError, NotConverged) as error:
-        return with_ways_out(error, surface, wish, asked.output, asked.say, until)
+        refused = Refused(error)
+        if ways_out:
+            refused = with_ways_out(error, surface, wish, asked.output, asked.say, until)
+        return _Without(refused, error, told)
     edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}
-    design = replace(design, told=(*before, *design.told))
+    design = replace(design, told=(*before, *told, *design.told))
     write_text(asked.output, _text(asked.file, entries, surface, design, wish, edges))
     return {
         "size": size_text(surface.size),
@@ -152,7 +180,7 @@ def _text(
     """The case file."""
     lines = "\n".join(f"{name} = {json.dumps(value, ensure_ascii=False)}" for name, value in entries.items())
     placed, parts, choice, rope = design.placed, design.parts, design.parts.choice, design.parts.rope
-    told = "\n".join(f"#   {' '.join(each.split())}" for each in design.told)
+    told = "\n".join(f"#   {printable(each)}" for each in design.told)
     offset = "" if placed.offset == (0.0, 0.0) else f"\noffset = {list(placed.offset)!r}"
     angle = "as asked" if wish.angle is not None else "of those tried its rods bend least"
     bent = 1.0 / max(placed.net.quality.curvature_max, 1e-12)

@@ -483,17 +483,54 @@ def test_the_way_out_taken_may_be_another_surface_which_the_case_then_names(tmp_
     assert load_case(case).title == "given"
 
 
-@pytest.mark.parametrize("offer", [None, WayOut(DesignWish(), "Elsewhere")])
-def test_without_a_way_out_and_where_it_ends_too_the_shell_stays_refused(tmp_path, monkeypatch, offer):
+def test_without_a_way_out_and_where_it_ends_too_the_shell_stays_refused_for_its_own_reason(
+    tmp_path, monkeypatch
+):
+    asked = []
+
     def search(surface, *rest):
-        raise InputError("is creased", where="rod")
+        asked.append(surface)
+        raise InputError(
+            "is creased" if len(asked) == 1 else "falls elsewhere", where="rod", remedy="Round it."
+        )
 
     monkeypatch.setattr(propose, "first_design", search)
-    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
     given, case = as_obj(tmp_path / "given.obj", dish(size=6.0, count=13)), tmp_path / "case.toml"
-    with pytest.raises(InputError, match="is creased"):
-        propose_case(given, case, {}, allow_scripts=False, way_out=True)
-    assert not case.exists()
+    for offer in (None, WayOut(DesignWish(edges="wall"), "With walls this goes on")):
+        monkeypatch.setattr(propose, "with_ways_out", lambda error, *_, offer=offer: Refused(error, offer))
+        asked.clear()
+        with pytest.raises(InputError, match="is creased") as refused:
+            propose_case(given, case, {}, allow_scripts=False, way_out=True)
+        assert len(asked) == (1 if offer is None else 2)
+        assert ("With walls this goes on; but" in refused.value.remedy) == (offer is not None)
+        assert ("falls elsewhere" in refused.value.remedy) == (offer is not None)
+        assert "--way-out" not in refused.value.remedy, "it was given"
+        assert not case.exists()
+
+
+def test_what_was_done_to_a_surface_before_it_was_rounded_stays_in_the_case_s_head(tmp_path, monkeypatch):
+    flat = dish(size=6.0, count=13)
+    far = make_surface(flat.vertices + np.array([500000.0, 200000.0, 0.0]), flat.triangles)
+    folder = tmp_path / "my  shells \x1b[31m"
+    folder.mkdir()
+    given, nearest = as_obj(folder / "given.obj", far), as_obj(folder / "nearest.obj", flat)
+    wish, search, seen = DesignWish(spacing=0.6, angle=0.0, layers=1), propose.first_design, []
+
+    def refused_at_first(surface, *rest):
+        seen.append(surface)
+        if len(seen) == 1:
+            raise InputError("is creased", where="rod")
+        return search(surface, *rest)
+
+    monkeypatch.setattr(propose, "first_design", refused_at_first)
+    offer = WayOut(wish, f"The nearest is {nearest}", nearest)
+    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
+    case = folder / "case.toml"
+    propose_case(given, case, {}, allow_scripts=False, wish=wish, way_out=True)
+    assert load_case(case).title == "given", "what can't be printed in a path is written out"
+    head = case.read_text(encoding="utf-8").partition("[surface]")[0]
+    assert "#   coordinates count from [499997.0, 199997.0, 0.0] m\n" in head
+    assert "my  shells \\x1b[31m" in head
 
 
 def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_after_it(monkeypatch, net):

@@ -114,13 +114,13 @@ def test_where_no_rounded_surface_helps_a_first_layer_of_concrete_is_offered_if_
     )
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
-    ).error
+    ).offered
     assert tried[-1] == 0.012
     assert remedy in told.remedy
     assert ("--thickness" in told.remedy) == stands
     other = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(thickness=0.05), tmp_path / "case.toml", lambda text: None
-    ).error
+    ).offered
     assert "--thickness" not in other.remedy, "another was asked for"
 
 
@@ -136,10 +136,15 @@ def test_a_rounded_surface_that_falls_on_edge_beams_is_offered_on_walls(tmp_path
     refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", lambda text: None
-    ).error
+    ).offered
     assert tried == ["auto", "wall"]
     assert "(in metres, with --edges wall)" in told.remedy
     assert named(told).is_file()
+    before = named(told).stat().st_mtime_ns
+    again = first_refusal.with_ways_out(refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", print)
+    assert again.way_out.file == tmp_path / "case-buildable-2" / "surface.obj", "a case may name the first"
+    assert again.way_out.wish.edges == "wall"
+    assert named(told).stat().st_mtime_ns == before
 
 
 def test_a_rounded_surface_is_tried_on_the_plinths_that_whoever_follows_gets(tmp_path, monkeypatch):
@@ -149,7 +154,7 @@ def test_a_rounded_surface_is_tried_on_the_plinths_that_whoever_follows_gets(tmp
     refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", print
-    ).error
+    ).offered
     assert tried == [cut]
     assert read_surface(named(told)).size[2] > cut.size[2], "it is offered whole"
 
@@ -173,7 +178,7 @@ def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
     heard = []
     told = first_refusal.with_ways_out(
         refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, until=0.0
-    ).error
+    ).offered
     assert "rounder surfaces were left untried" in told.what, "none was found wanting"
     assert told.remedy == "Round it."
     assert any("left untried" in each for each in heard)
@@ -182,13 +187,15 @@ def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
 def test_a_shell_of_more_crossings_than_usual_is_asked_for_gets_more_work_and_more_time():
     surface = sheet(gable)
     now = time.process_time()
-    usual, fine = (Allowance.for_size(surface, spacing, 60.0) for spacing in (None, 0.02))
-    times = surface.area / 0.02**2 / MOST_CROSSINGS
-    assert times > 10.0
+    usual, fine = (Allowance.for_size(surface, spacing, 60.0) for spacing in (None, 0.1))
+    times = surface.area / 0.1**2 / MOST_CROSSINGS
+    assert 2.0 < times < 20.0
     assert (usual.left, fine.left) == (Allowance.left, pytest.approx(times * Allowance.left, rel=1e-4))
     assert usual.until - now == pytest.approx(60.0, abs=5.0)
     assert fine.until - now == pytest.approx(60.0 * times**1.5, rel=0.01)
     assert Allowance.for_size(surface, 2.0, 60.0).left == Allowance.left, "coarse nets are no reason for less"
+    for absurd in (1e-3, 1e-200):
+        assert Allowance.for_size(surface, absurd, 60.0).left == 20 * Allowance.left
 
 
 @pytest.mark.slow
