@@ -129,7 +129,9 @@ def far_off_words(designs: Mapping[str, DesignRecord], name: str, wished: float 
     row = designs[name].loads.get("design") if name in designs else None
     if row is None or wished is None or row.deviation_max <= wished:
         return ""
-    off, most = (number(1e3 * each, 2) for each in (row.deviation_max, wished))
+    off, most = (number(1e3 * each) for each in (row.deviation_max, wished))
+    if off == most:
+        return ""
     return (
         f"The shape is {off} mm off where it is farthest, more than the {most} mm of optimise.deviation, which spares cables for "
         "it and requires nothing; limits.deviation does"

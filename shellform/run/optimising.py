@@ -100,7 +100,7 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
         not_polished=not_polished,
         cables_max=cable_count,
         symmetric=symmetry,
-        deviation_wished=entry.deviation,
+        deviation_wished=_wished(workspace.case),
     )
     drop_checkpoint(workspace.folder)
     return replace(summary, optimisation=record)
@@ -161,6 +161,12 @@ def _deviation(case: Case) -> float | None:
     """How far, m, a node may be off by what is saved: the wish, and the limit."""
     off = [each for each in (case.optimise.deviation, case.limits.deviation) if each is not None]
     return min(off, default=None)
+
+
+def _wished(case: Case) -> float | None:
+    """How far, m, a node may be off by what is saved, where that is a wish alone."""
+    required = case.limits.deviation is not None or case.optimise.method == "paper"
+    return None if required else case.optimise.deviation
 
 
 def _record(best: Optimum) -> OptimisationRecord:
