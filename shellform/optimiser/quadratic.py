@@ -20,6 +20,7 @@ from shellform.work_clock import Work, told
 
 _REGULAR = 1e-8  # of the mean curvature, where the model has none
 _CORRECTIONS = 2  # of what a small diagonal costs the formula in digits
+_EXACT = 1e-12  # of the right side, below which nothing is left to correct
 
 _Linear = Callable[[Reals], Reals]
 # from the bounds' weights (s,) and the constraints' (k,) to the solution of the condensed system
@@ -128,22 +129,27 @@ def _low_rank(hessian: LowRank, rows: Reals) -> tuple[_Linear, _Condensed]:
 
     def condensed(of_bounds: Reals, of_rows: Reals) -> _Linear:
         diagonal = regular + of_bounds
-        eased = few / diagonal[:, None]
-        middle = few.T @ eased
-        middle[np.diag_indices(few.shape[1])] += np.append(np.ones(count), 1.0 / of_rows)
+        root, stiff = np.sqrt(diagonal), np.append(np.ones(count), of_rows)
+        scaled = few / root[:, None]
+        middle = scaled.T @ scaled  # of the same array: half the products
+        middle[np.diag_indices(few.shape[1])] += 1.0 / stiff
         factor = cho_factor(middle, check_finite=False)
 
         def near(right: Reals) -> Reals:
-            plain = right / diagonal
-            return np.asarray(plain - eased @ cho_solve(factor, few.T @ plain, check_finite=False))
+            plain = right / root
+            return np.asarray(
+                (plain - scaled @ cho_solve(factor, scaled.T @ plain, check_finite=False)) / root
+            )
 
         def left_of(right: Reals, x: Reals) -> Reals:
-            return np.asarray(right - diagonal * x - hessian @ x - rows.T @ (of_rows * (rows @ x)))
+            return np.asarray(right - diagonal * x - few @ (stiff * (few.T @ x)))
 
         def solved(right: Reals) -> Reals:
             found = near(right)
-            left = left_of(right, found)
+            left, exact = left_of(right, found), _EXACT * np.abs(right).max()
             for _ in range(_CORRECTIONS):
+                if np.abs(left).max() <= exact:
+                    break
                 better = found + near(left)
                 after = left_of(right, better)
                 if not np.abs(after).max() < np.abs(left).max():
