@@ -153,7 +153,8 @@ def _proposed(
     edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}
     design = replace(design, told=(*before, *told, *design.told))
-    write_text(asked.output, _text(asked.file, entries, surface, design, wish, edges))
+    title = asked.file.stem + ("" if file == asked.file else ", nearest buildable surface")
+    write_text(asked.output, _text(asked.file, title, entries, surface, design, wish, edges))
     return {
         "size": size_text(surface.size),
         **({} if plinths is None else {"plinths": plinths.told}),
@@ -171,6 +172,7 @@ def _proposed(
 
 def _text(
     file: Path,
+    title: str,
     entries: Mapping[str, Any],
     surface: Surface,
     design: FirstDesign,
@@ -188,7 +190,7 @@ def _text(
 # Proposed by `shellform new` for {json.dumps(file.name, ensure_ascii=False)}: {size_text(surface.size)}, {surface.area:.4g} m².
 # If that size is wrong, the unit is: run `shellform new` again with --unit. What was tried:
 {told}
-title = {json.dumps(file.stem, ensure_ascii=False)}
+title = {json.dumps(title, ensure_ascii=False)}
 
 [surface]            # relative to this file
 {lines}

@@ -210,6 +210,6 @@ def test_a_roof_of_flat_pieces_is_refused_for_its_crease_with_a_vault_on_which_n
     propose_case(named(told.value), tmp_path / "vault.toml", {}, allow_scripts=False)
     propose_case(file, tmp_path / "roof.toml", {}, allow_scripts=False, way_out=True)
     two, one = (tomllib.loads((tmp_path / f"{each}.toml").read_text("utf-8")) for each in ("vault", "roof"))
-    assert one.pop("title") == "roof"
+    assert one.pop("title") == "roof, nearest buildable surface"
     assert two.pop("title") == "surface"
     assert one == two, "one command gives what two do"
