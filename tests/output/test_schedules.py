@@ -209,6 +209,16 @@ def test_turnbuckles_reach_from_the_length_hung_in_to_the_rest_length(read):
         assert float(row["turnbuckle longest [m]"]) == pytest.approx(1.02 * max(rest, hung), abs=2e-6)
 
 
+def test_lengths_that_differ_in_their_last_bits_alone_are_one(built):
+    every_other = np.cumsum(built.design.present) % 2 == 0
+    lengths = np.where(every_other, 0.05, np.nextafter(0.05, 1.0))
+    alike = replace(built, design=replace(built.design, rest_length=lengths))
+    assert schedules.cut_counts(alike)["rest_lengths"] == 1
+    lengths[every_other] += 1e-6
+    apart = replace(built, design=replace(built.design, rest_length=lengths))
+    assert schedules.cut_counts(apart)["rest_lengths"] == 2
+
+
 def test_cables_are_tightened_from_the_supports_to_the_crown(read, built):
     rows = sorted(read["cables"], key=lambda row: int(row["tensioning order"]))
     assert [int(row["tensioning order"]) for row in rows] == list(range(1, len(rows) + 1))

@@ -248,10 +248,10 @@ def cables(built: Built) -> Table:
 
 def cut_counts(built: Built) -> dict[str, int]:
     """For the summary: how many different `rest_lengths` the cables have, and to how many `cut_lengths` they
-    are cut, if turnbuckles' range is known.
-    """
+    are cut, if turnbuckles' range is known."""
     lengths = built.shell.cables(built.design).rest_length
-    found = {"rest_lengths": len(np.unique(lengths))}
+    alike = lengths.round(9)  # what symmetry makes alike differs in its last bits
+    found = {"rest_lengths": len(np.unique(alike))}
     if built.adjustment is not None:
         found["cut_lengths"] = len(np.unique(cut_lengths(lengths, built.adjustment)))
     return found
