@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from shellform.net.chebyshev import NetTuning, pull_net
@@ -60,6 +60,10 @@ class Allowance:
         that was asked for makes more crossings than a first design has by itself, which each trial then takes."""
         times = larger(surface, spacing)
         return cls(round(times * cls.left), time.process_time() + times**_FACTORS * seconds)
+
+    def share(self, share: float) -> Allowance:
+        """Another one, of a `share` of the work that is left."""
+        return replace(self, left=round(share * self.left))
 
     def spend(self, crossings: float, times: int = 1) -> None:
         """Takes what a pull or a trial on a net of so many `crossings` costs."""

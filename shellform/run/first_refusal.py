@@ -9,7 +9,6 @@ read.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,7 +16,7 @@ from pathlib import Path
 from shellform.errors import InputError, NotConverged
 from shellform.net.edges import stretches_of
 from shellform.run.first_design import first_design
-from shellform.run.first_net import Allowance, larger
+from shellform.run.first_net import Allowance
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
@@ -29,10 +28,10 @@ _FLAT_SHARES = (1.0, 1.8)  # of a radius that makes a vault of flat pieces
 _WELL_COVERED = 1.4 * COVERED  # spacings: of COVERED itself half the nets are bent a little too much
 _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
-_WORK = 10_000  # crossings pulled and solved on rounded surfaces, and on these again on walls
-_WALLED = 15_000  # on walls, with which large nets are tried once
+_WORK = 0.4  # of what a search may do: on rounded surfaces, and on these again on walls
+_WALLED = 0.6  # on walls, with which large nets are tried once
 _WALLS = "--edges wall"
-TAKEN = "--way-out"
+_TAKEN = "--way-out"
 Refusal = InputError | NotConverged
 Say = Callable[[str], None]
 
@@ -59,7 +58,7 @@ class Refused:
         """The error with the way out as its remedy."""
         if self.way_out is None:
             return self.error
-        return renewed(self.error, f"{self.way_out.told}. {TAKEN} goes on so at once")
+        return renewed(self.error, f"{self.way_out.told}. {_TAKEN} goes on so at once")
 
     def in_vain(self, error: Refusal) -> Refusal:
         """The same error, where the way out was taken and ended with another."""
@@ -70,20 +69,26 @@ class Refused:
 
 
 def with_ways_out(
-    refusal: Refusal, surface: Surface, wish: DesignWish, output: Path, say: Say, until: float = math.inf
+    refusal: Refusal,
+    surface: Surface,
+    wish: DesignWish,
+    output: Path,
+    say: Say,
+    allowance: Allowance | None = None,
 ) -> Refused:
     """The refusal with the first way out that leads to a design; without one, saying that none was found or tried. What is
-    offered as a surface is written into a folder beside `output`. `say` hears what is tried; `until` when, of this
-    process's processor time, s, trials may begin."""
+    offered as a surface is written into a folder beside `output`. `say` hears what is tried; each kind of way out has its
+    share of the `allowance`, that of a whole search."""
+    whole = allowance or Allowance()
     way_out: WayOut | None = None
     if _walls_may_help(refusal, surface, wish):
-        way_out = _on_walls(surface, wish, say, until)
+        way_out = _on_walls(surface, wish, say, whole.share(_WALLED))
     if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
-        again = _Rounded(wish, round(_WORK * larger(surface, wish.spacing)), until, say)
+        again = _Rounded(wish, whole.share(_WORK), say)
         way_out = _to_nearest(refusal, surface, output, again, say)
         if way_out is None:
             refusal = refusal.untried() if again.too_late else refusal.in_vain()
-            way_out = _poured_first(refusal, surface, wish, say, until)
+            way_out = _poured_first(refusal, surface, wish, say, whole.share(_WORK))
     return Refused(refusal, way_out)
 
 
@@ -120,14 +125,14 @@ class _Rounded:
     """All of the search on a rounded surface, within the work of all such trials; on walls too where a net covers it
     that falls on edge beams."""
 
-    def __init__(self, wish: DesignWish, work: int, until: float, say: Say) -> None:
+    def __init__(self, wish: DesignWish, allowance: Allowance, say: Say) -> None:
         self.wish = wish  # with which the last surface went on
         self.options = ""  # of the command, that stand for it
         self.too_late = False  # whether not even the first was begun in time
         self._begun = False
         self._say = say
-        self._brief = Allowance(work, until, thorough=False, thins=False)
-        self._walled = Allowance(work, until, thorough=False)
+        self._brief = replace(allowance, thorough=False, thins=False)
+        self._walled = replace(allowance, thorough=False)
 
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""
@@ -173,13 +178,11 @@ def _on_edge_beams(surface: Surface, wish: DesignWish) -> bool:
     return any(each.kind == "beam" and not each.opening for each in stretches_of(surface))
 
 
-def _on_walls(surface: Surface, wish: DesignWish, say: Say, until: float) -> WayOut | None:
+def _on_walls(surface: Surface, wish: DesignWish, say: Say, allowance: Allowance) -> WayOut | None:
     """Walls all round; None where no design stands on them either."""
     walls = replace(wish, edges="wall")
     try:
-        _trial("on walls", walls, Allowance(round(_WALLED * larger(surface, wish.spacing)), until), say)(
-            surface
-        )
+        _trial("on walls", walls, allowance, say)(surface)
     except (InputError, NotConverged) as error:
         say(f"on walls: {error}")
         return None
@@ -192,14 +195,14 @@ def _on_walls(surface: Surface, wish: DesignWish, say: Say, until: float) -> Way
 
 
 def _poured_first(
-    refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say, until: float
+    refusal: Unbuildable, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
 ) -> WayOut | None:
     """A first layer of concrete; None where none is known to be borne."""
     if refusal.bears is None or wish.thickness is not None:
         return None
     how, layer = f"with {1e3 * refusal.bears:g} mm", replace(wish, thickness=refusal.bears)
     try:
-        _trial(how, layer, Allowance(round(_WORK * larger(surface, wish.spacing)), until), say)(surface)
+        _trial(how, layer, allowance, say)(surface)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
         return None

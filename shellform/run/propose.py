@@ -93,9 +93,8 @@ def propose_case(
         f"NOT the surface as it is: {refused.error.what}",
         f"but the way out. {taken.told}",
     )
-    if (
-        taken.file is not None
-    ):  # in coordinates of the surface as it was refused, whose feet may have been cut off
+    if taken.file is not None:
+        # its coordinates are those of the surface as it was refused, whose feet may have been cut off
         options, told = {}, (*told, *first.told)
     second = _proposed(asked, taken.file or file, options, taken.wish, told, ways_out=False)
     if isinstance(second, dict):
@@ -142,13 +141,13 @@ def _proposed(
     times = larger(surface, wish.spacing)
     if times > 1.0:
         asked.say(f"{times:.2g} times the usual work is allowed, for so many crossings")
-    until = Allowance.for_size(surface, wish.spacing, _WAYS_OUT).until
+    search, ways = (Allowance.for_size(surface, wish.spacing, each) for each in (_SEARCH, _WAYS_OUT))
     try:
-        design = first_design(surface, wish, asked.say, Allowance.for_size(surface, wish.spacing, _SEARCH))
+        design = first_design(surface, wish, asked.say, search)
     except (InputError, NotConverged) as error:
         refused = Refused(error)
         if ways_out:
-            refused = with_ways_out(error, surface, wish, asked.output, asked.say, until)
+            refused = with_ways_out(error, surface, wish, asked.output, asked.say, ways)
         return _Without(refused, error, told)
     edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}

@@ -44,7 +44,7 @@ def with_way_out(
     again: Callable[[Surface], object],
     say: Callable[[str], None] = lambda text: None,
 ) -> InputError | NotConverged:
-    """The refusal of a surface with the nearest buildable one as its remedy (see there); as it was, where none is found."""
+    """The refusal of a surface with the nearest buildable one, as `nearest_buildable` finds it, for its remedy; as it was, where none is found."""
     nearest = nearest_buildable(surface, radius, folder, again, say)
     return refusal if nearest is None else renewed(refusal, nearest.told)
 

@@ -177,7 +177,7 @@ def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
     refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
     heard = []
     told = first_refusal.with_ways_out(
-        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, until=0.0
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, Allowance(until=0.0)
     ).offered
     assert "rounder surfaces were left untried" in told.what, "none was found wanting"
     assert told.remedy == "Round it."
