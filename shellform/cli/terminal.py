@@ -104,9 +104,8 @@ def tell_as_built(summary: Summary) -> None:
         built_shape_words,
         cause_title,
         critical_words,
-        far_off_words,
         rare_words,
-        spent_words,
+        shape_notes,
         standing_words,
     )
 
@@ -126,11 +125,8 @@ def tell_as_built(summary: Summary) -> None:
             if parts:
                 print(f"{name:>10}  {load}: {', '.join(parts)}")
     if summary.verdict is not None:
-        name, search = summary.verdict.design, summary.optimisation
-        wished = None if search is None else search.deviation_wished
-        for told in (far_off_words(summary.designs, name, wished), spent_words(summary.designs, name)):
-            if told:
-                print(f"{told}.")
+        for note in shape_notes(summary, summary.verdict.design):
+            print(f"{note}.")
     found = summary.failure
     if found is not None:
         cables = f"; {', '.join(found.cables)} go slack" if found.cables else ""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from shellform.records.failures import RareRecord
-from shellform.records.summary import BuiltShapeRecord, DesignRecord, StandingRecord
+from shellform.records.summary import BuiltShapeRecord, DesignRecord, StandingRecord, Summary
 
 _SPENT = 1.25  # times the initial design's deviation as built, from which on it is worth a word
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
@@ -110,6 +110,13 @@ def driven_words(own: BuiltShapeRecord) -> str:
     """By which cause of error nodes are moved farthest; "" where none is known."""
     driver = max(own.causes, key=lambda name: own.causes[name], default="")
     return f", driven by {cause_title(driver)}" if driver else ""
+
+
+def shape_notes(summary: Summary, name: str) -> list[str]:
+    """What is to be noted of the design's shape, a sentence each, if anything is."""
+    wished = None if summary.optimisation is None else summary.optimisation.deviation_wished
+    notes = far_off_words(summary.designs, name, wished), spent_words(summary.designs, name)
+    return [each for each in notes if each]
 
 
 def spent_words(designs: Mapping[str, DesignRecord], name: str) -> str:

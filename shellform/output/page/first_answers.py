@@ -16,7 +16,7 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import critical_words, driven_words, far_off_words, number, spent_words
+from shellform.records.words import critical_words, driven_words, number, shape_notes
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 
@@ -55,9 +55,7 @@ def answers(
     of the catalogue that its rods would be rounded to."""
     row = summary.designs.get(name)
     main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
-    wished = None if summary.optimisation is None else summary.optimisation.deviation_wished
-    notes = far_off_words(summary.designs, name, wished), spent_words(summary.designs, name)
-    found = [] if main is None else [_how_far(main, [each for each in notes if each])]
+    found = [] if main is None else [_how_far(main, shape_notes(summary, name))]
     cables = shell.cables(design)
     pull = cables.tension(states["design"]) if "design" in states else np.zeros(len(cables.ends))
     found.append(
