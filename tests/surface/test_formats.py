@@ -18,6 +18,7 @@ from shellform.errors import InputError
 from shellform.surface import cad
 from shellform.surface.readers import rhino
 from shellform.surface.readers.meshes import write_mesh
+from shellform.surface.readers.network_faces import faces_in_plan
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.reading import read_surface
 from tests.surface.brought import rhino_mesh
@@ -137,6 +138,74 @@ def test_what_has_vertices_and_no_faces_in_a_compas_file_is_no_mesh(tmp_path):
     file = tmp_path / "session.json"
     file.write_text(json.dumps({"network": network, "mesh": compas_mesh(POINTS, QUADS)}), encoding="utf-8")
     assert read_surface(file).size == pytest.approx(np.ptp(POINTS, axis=0))
+
+
+def compas_network(points, faces):
+    """The lines of a mesh as force density programs write them, each once, with a line that ends in nothing."""
+    lines = sorted(
+        {tuple(sorted(pair)) for face in faces for pair in zip(face, np.roll(face, 1), strict=True)}
+    )
+    places = np.vstack([points, points[0] - [1.0, 0.5, 0.0]])
+    edges = {str(number): {} for number in range(len(places))}
+    for a, b in [*lines, (0, len(points))]:
+        edges[str(a)][str(b)] = {"q": -1.0}
+    nodes = {str(k): dict(zip("xyz", map(float, place), strict=True)) for k, place in enumerate(places)}
+    return {"dtype": "jax_fdm.datastructures/FDNetwork", "data": {"node": nodes, "edge": edges}}
+
+
+def test_a_network_of_form_finding_gives_the_faces_between_its_lines(tmp_path):
+    (tmp_path / "a.json").write_text(json.dumps(compas_network(POINTS, QUADS)))
+    surface = read_surface(tmp_path / "a.json")
+    same_shell(surface)
+    assert surface.normals[:, 2].min() > 0.0
+    assert any("between the lines of FDNetwork" in note for note in surface.mended)
+
+
+def test_the_walk_round_a_network_is_no_face_of_it_nor_is_one_round_each_of_two():
+    square = np.array([[0.0, 0, 1], [2, 0, 1], [2, 2, 1], [0, 2, 1], [1, 1, 2]])
+    lines = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4], [4, 3]])
+    faces = faces_in_plan(square, lines, "here")
+    assert sorted(map(sorted, faces)) == [[0, 1, 4], [0, 3, 4], [1, 2, 4], [2, 3, 4]]
+    both = faces_in_plan(
+        np.vstack([square, square + np.array([5, 0, 0])]), np.vstack([lines, lines + 5]), "here"
+    )
+    assert len(both) == 8
+
+
+def test_a_network_whose_lines_cross_or_lie_on_each_other_in_plan_is_refused(tmp_path):
+    square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+    crossing = np.array([[0, 1], [1, 2], [2, 3], [3, 0], [0, 2], [1, 3]])
+    with pytest.raises(InputError, match="cross or touch in plan"):
+        faces_in_plan(square, crossing, "here")
+    tree = compas_network(
+        np.vstack([POINTS, POINTS + np.array([0, 0, 1])]), np.vstack([QUADS, QUADS + len(POINTS)])
+    )
+    (tmp_path / "a.json").write_text(json.dumps(tree))
+    mesh = read_surface(tmp_path / "a.json", piece=2)  # one above the other: two pieces, each told by itself
+    same_shell(mesh)
+    bowtie = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [2, 2, 0]])
+    with pytest.raises(InputError, match="cross or touch in plan"):
+        faces_in_plan(bowtie, np.array([[0, 1], [1, 2], [2, 3], [3, 0]]), "here")
+
+
+def test_of_several_networks_one_has_to_be_named_and_a_damaged_one_is(tmp_path):
+    network = compas_network(POINTS, QUADS)
+    two = [{**network, "name": "shell"}, {**network, "name": "other"}]
+    (tmp_path / "two.json").write_text(json.dumps(two))
+    with pytest.raises(InputError, match=r"2 networks.*shell, other"):
+        read_surface(tmp_path / "two.json")
+    network["data"]["edge"]["0"]["nowhere"] = {}
+    (tmp_path / "bad.json").write_text(json.dumps(network))
+    with pytest.raises(InputError, match="its network FDNetwork is damaged"):
+        read_surface(tmp_path / "bad.json")
+
+
+def test_a_network_that_encloses_nothing_holds_no_faces(tmp_path):
+    nodes = {str(k): {"x": float(k), "y": 0.0, "z": 1.0} for k in range(3)}
+    tree = {"data": {"node": nodes, "edge": {"0": {"1": {}}, "1": {"2": {}}, "2": {}}}}
+    (tmp_path / "a.json").write_text(json.dumps(tree))
+    with pytest.raises(InputError, match="holds no faces"):
+        read_surface(tmp_path / "a.json")
 
 
 def test_faces_without_load_in_a_compas_mesh_are_openings(tmp_path):

@@ -2,20 +2,24 @@
 
 A file is one mesh, or a session with a scene of several; each is found by its `vertex` and `face` tables, in
 the layouts of COMPAS 1 (`dva`, faces as lists) and 2 (`default_vertex_attributes`, `facedata`). Of a
-RHINOVault session the `ThrustDiagram` is the shell; its faces marked as without load are openings.
+RHINOVault session the `ThrustDiagram` is the shell; its faces marked as without load are openings. A file without a mesh
+may hold a network (`node` and `edge` tables, as force density programs write): the faces between its lines are
+the shell.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
+from shellform.surface.readers.network_faces import faces_in_plan
 
 _SHELL = "ThrustDiagram"
 
@@ -28,62 +32,65 @@ def read_compas(file: Path, choice: Choice) -> Draft:
         data = json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"isn't whole JSON: {error}", where=str(file), remedy="Save it anew.") from error
-    found = list(_meshes(data, ""))
-    if not found:
+    found = list(_tables(data, "", "vertex", "face"))
+    networks = [] if found else list(_tables(data, "", "node", "edge"))
+    if not found and not networks:
         raise InputError(
             "holds no COMPAS mesh",
             where=str(file),
             remedy="Save a compas.datastructures.Mesh, or a RHINOVault session.",
         )
+    kind, read = ("network", _between_lines) if networks else ("mesh", _part)
+    found = found or networks
     named = [(name, table) for name, table in found if name == _SHELL]
     if not choice.name and not choice.layer and named:
         found = named[-1:]
     elif not choice.name and len(found) > 1:
         raise InputError(
-            f"holds {len(found)} meshes",
+            f"holds {len(found)} {'meshes' if kind == 'mesh' else 'networks'}",
             where=str(file),
             remedy=f"Choose by surface.object (--object) among {', '.join(n for n, _ in found)}.",
         )
     parts, openings = [], 0
     for name, table in found:
         try:
-            part, left_out = _part(name, table)
+            part, left_out = read(name, table, str(file))
+        except InputError:
+            raise
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
             raise InputError(
-                f"its mesh {name} is damaged: {error!r}", where=str(file), remedy="Save it anew."
+                f"its {kind} {name} is damaged: {error!r}", where=str(file), remedy="Save it anew."
             ) from error
         parts.append(part)
         openings += left_out
     draft = joined(parts, choice, str(file))
     notes = [f"the mesh {found[0][0]} was taken"] if len(found) == 1 and found[0][0] else []
+    if networks:
+        notes = [f"the faces between the lines of {found[0][0] or 'a network'} were taken"]
     if openings:
         notes.append(f"{openings} faces without load were left out as openings")
     return Draft(draft.points, draft.triangles, notes=tuple(notes))
 
 
-def _meshes(data: Any, name: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The tables that look like a mesh, with the name or the kind of the object around each."""
+def _tables(data: Any, name: str, points: str, joins: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """The tables that hold one of `points` and one of what `joins` them, with the name or the kind of the object around each."""
     if isinstance(data, list):
         for each in data:
-            yield from _meshes(each, name)
+            yield from _tables(each, name, points, joins)
     elif isinstance(data, dict):
         kind = str(data.get("dtype") or data.get("datatype") or "").replace("/", ".").rsplit(".", 1)[-1]
         called = str(data.get("name") or kind or name)
-        if isinstance(data.get("vertex"), dict) and isinstance(data.get("face"), dict):
+        if isinstance(data.get(points), dict) and isinstance(data.get(joins), dict):
             yield called, data
         else:
             for each in data.values():
-                yield from _meshes(each, called)
+                yield from _tables(each, called, points, joins)
 
 
-def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
+def _part(name: str, table: dict[str, Any], where: str) -> tuple[MeshObject, int]:
     """The mesh, and how many of its faces are openings."""
-    default = {"x": 0.0, "y": 0.0, "z": 0.0} | dict(
-        table.get("default_vertex_attributes") or table.get("dva") or {}
-    )
-    number = {str(key): row for row, key in enumerate(table["vertex"])}
-    points = np.array(
-        [[float(each.get(axis, default[axis])) for axis in "xyz"] for each in table["vertex"].values()]
+    number, points = _places(
+        table["vertex"], table.get("default_vertex_attributes") or table.get("dva") or {}
     )
     shared = table.get("facedata") or {}
     whole = dict(table.get("default_face_attributes") or table.get("dfa") or {})
@@ -99,5 +106,26 @@ def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
         if len(corners) > 1 and corners[0] == corners[-1]:
             corners.pop()
         blocks.setdefault(len(corners), []).append(corners)
-    faces = tuple(np.array(each, dtype=np.int64) for size, each in blocks.items() if size > 2)
-    return MeshObject(name, "", points.reshape(-1, 3), faces), openings
+    return MeshObject(name, "", points, _arrays(blocks)), openings
+
+
+def _between_lines(name: str, table: dict[str, Any], where: str) -> tuple[MeshObject, int]:
+    """The mesh of the faces between a network's lines, none of them known as an opening."""
+    number, points = _places(table["node"], table.get("default_node_attributes") or table.get("dna") or {})
+    lines = [(number[str(a)], number[str(b)]) for a, others in table["edge"].items() for b in others]
+    blocks: dict[int, list[list[int]]] = {}
+    for corners in faces_in_plan(points, np.array(lines, dtype=np.int64).reshape(-1, 2), where):
+        blocks.setdefault(len(corners), []).append(corners)
+    return MeshObject(name, "", points, _arrays(blocks)), 0
+
+
+def _places(table: dict[str, Any], others: Mapping[str, Any]) -> tuple[dict[str, int], Reals]:
+    """The row of each key, and the points (v, 3); `others` are what holds where a point has no coordinate."""
+    default = {"x": 0.0, "y": 0.0, "z": 0.0, **others}
+    points = [[float(each.get(axis, default[axis])) for axis in "xyz"] for each in table.values()]
+    return {str(key): row for row, key in enumerate(table)}, np.array(points).reshape(-1, 3)
+
+
+def _arrays(blocks: Mapping[int, list[list[int]]]) -> tuple[Indices, ...]:
+    """The faces of each number of corners (f, k)."""
+    return tuple(np.array(each, dtype=np.int64) for size, each in blocks.items() if size > 2)
