@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from shellform.run.first_edges import EdgeChoice, edge_choices
 from shellform.run.first_net import Allowance
-from shellform.run.first_trial import DRAWN, FirstDesign, Followed, drawn_standing, followed
+from shellform.run.first_trial import DRAWN, NEEDED, FirstDesign, Followed, drawn_standing, followed
 from shellform.run.next_trial import fails_by
 from shellform.run.sizes import Placed, RodChoice, may_come_off, thicker
 from shellform.run.unbuildable import Obstacle
@@ -66,4 +66,7 @@ def with_room(design: FirstDesign, surface: Surface, say: Callable[[str], None])
 def came_to(placed: Placed, tried: Followed) -> str:
     """What a design came to, in words."""
     off = f", edges {tried.sag_told} off" if placed.net.edges else ""
-    return f"stands up to {tried.factor:.2f} × its load, rods at {tried.stress:.0%} of their strength{off}"
+    told = f"stands up to {tried.factor:.2f} × its load, rods at {tried.stress:.0%} of their strength"
+    if tried.factor >= NEEDED and tried.pull > 1.0:
+        told += f", cables at {tried.pull:.0%} of theirs"
+    return told + off
