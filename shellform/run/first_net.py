@@ -9,9 +9,8 @@ more likely to take a net than another attempt on this one.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from shellform.net.chebyshev import NetTuning, pull_net
@@ -29,45 +28,50 @@ ANGLES = (45.0, 0.0, 22.5, 67.5)  # degrees
 _ALIKE = 0.05  # of curvature: nets that bend rods alike are told apart by their cost
 _PULL, _BRIEF = 110, 70  # factorisations of one pull
 _PULLS, _USUAL_CROSSINGS = 450, 300  # factorisations of failed pulls, for so many crossings
-_LARGEST = 20.0  # times the usual crossings: one and a half hours of a processor before a design must have been found
-_FACTORS = 1.5  # with which power of the crossings the time of a factorisation grows
+_LARGEST = 20.0  # times the usual crossings: hours of a processor before a design must have been found
+WORK = 37_500  # crossings pulled and solved, ways out included: about one and a half minutes of an idle processor
 _STALLED = 4  # times the work of a pull that ends, one that stalls
 Say = Callable[[str], None]
 
 
 @dataclass
 class Allowance:
-    """How much work a search may still do: crossings of the nets that were pulled and of the designs that were
-    solved, so that the same surface is given up at the same place on any machine; and, for machines on which
-    that would take too long, `until` when of this process's processor time, s, it may begin anything new.
+    """How much `work` a search may do, in crossings of the nets that are pulled and of the designs that are solved; and how much
+    is `left` of it. Seconds aren't asked, so that a surface ends at the same place on any machine, however busy. What a
+    part spends the `whole` spends too, and where that is over so is the part.
     Whether it is `thorough`: climbs the ladder where no angle gives a net, and tries finer spacings where no section
     stands; whether it `thins` concrete then. The `angle`, degrees, of the net found last."""
 
-    left: int = 25_000  # about a minute of one processor
-    until: float = math.inf
+    work: int = WORK
     thorough: bool = True
     thins: bool = True
     angle: float | None = None
+    whole: Allowance | None = None
+    left: int = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.left = self.work
 
     @property
     def over(self) -> bool:
         """Whether nothing new may begin."""
-        return self.left <= 0 or time.process_time() > self.until
+        return self.left <= 0 or (self.whole is not None and self.whole.over)
 
     @classmethod
-    def for_size(cls, surface: Surface, spacing: float | None, seconds: float) -> Allowance:
-        """The usual allowance from now on, `seconds` of this process's processor time; so many times more as the `spacing`, m,
-        that was asked for makes more crossings than a first design has by itself, which each trial then takes."""
-        times = larger(surface, spacing)
-        return cls(round(times * cls.left), time.process_time() + times**_FACTORS * seconds)
+    def for_size(cls, surface: Surface, spacing: float | None) -> Allowance:
+        """The usual one; so many times more work as the `spacing`, m, that was asked for makes more crossings than a first
+        design has by itself, which each trial then takes."""
+        return cls(round(larger(surface, spacing) * WORK))
 
-    def share(self, share: float) -> Allowance:
-        """Another one, of a `share` of the work that is left."""
-        return replace(self, left=round(share * self.left))
+    def part(self, share: float, *, thorough: bool = True, thins: bool = True) -> Allowance:
+        """Another one, that may spend a `share` of this one's work."""
+        return Allowance(round(share * self.work), thorough, thins, whole=self)
 
     def spend(self, crossings: float, times: int = 1) -> None:
         """Takes what a pull or a trial on a net of so many `crossings` costs."""
         self.left -= times * round(crossings)
+        if self.whole is not None:
+            self.whole.spend(crossings, times)
 
 
 def larger(surface: Surface, spacing: float | None) -> float:

@@ -3,8 +3,7 @@
 Three are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
 round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a rounded surface,
 where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as much concrete as these
-bear, where no rounded surface helps. None is begun later than so many seconds of a processor after the surface was
-read.
+bear, where no rounded surface helps. None is begun once the work is done that a surface is worth.
 """
 
 from __future__ import annotations
@@ -28,8 +27,8 @@ _FLAT_SHARES = (1.0, 1.8)  # of a radius that makes a vault of flat pieces
 _WELL_COVERED = 1.4 * COVERED  # spacings: of COVERED itself half the nets are bent a little too much
 _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
-_WORK = 0.4  # of what a search may do: on rounded surfaces, and on these again on walls
-_WALLED = 0.6  # on walls, with which large nets are tried once
+_WORK = 0.27  # of what a surface is worth: on rounded ones, and on these again on walls
+_WALLED = 0.4  # on walls, with which large nets are tried once
 _WALLS = "--edges wall"
 _TAKEN = "--way-out"
 Refusal = InputError | NotConverged
@@ -78,17 +77,17 @@ def with_ways_out(
 ) -> Refused:
     """The refusal with the first way out that leads to a design; without one, saying that none was found or tried. What is
     offered as a surface is written into a folder beside `output`. `say` hears what is tried; each kind of way out has its
-    share of the `allowance`, that of a whole search."""
+    share of the `allowance`, of which the search has taken its own."""
     whole = allowance or Allowance()
     way_out: WayOut | None = None
     if _walls_may_help(refusal, surface, wish):
-        way_out = _on_walls(surface, wish, say, whole.share(_WALLED))
+        way_out = _on_walls(surface, wish, say, whole.part(_WALLED))
     if way_out is None and isinstance(refusal, Unbuildable) and not wish.rod:
-        again = _Rounded(wish, whole.share(_WORK), say)
+        again = _Rounded(wish, whole, say)
         way_out = _to_nearest(refusal, surface, output, again, say)
         if way_out is None:
             refusal = refusal.untried() if again.too_late else refusal.in_vain()
-            way_out = _poured_first(refusal, surface, wish, say, whole.share(_WORK))
+            way_out = _poured_first(refusal, surface, wish, say, whole.part(_WORK))
     return Refused(refusal, way_out)
 
 
@@ -125,14 +124,14 @@ class _Rounded:
     """All of the search on a rounded surface, within the work of all such trials; on walls too where a net covers it
     that falls on edge beams."""
 
-    def __init__(self, wish: DesignWish, allowance: Allowance, say: Say) -> None:
+    def __init__(self, wish: DesignWish, whole: Allowance, say: Say) -> None:
         self.wish = wish  # with which the last surface went on
         self.options = ""  # of the command, that stand for it
         self.too_late = False  # whether not even the first was begun in time
         self._begun = False
         self._say = say
-        self._brief = replace(allowance, thorough=False, thins=False)
-        self._walled = replace(allowance, thorough=False)
+        self._brief = whole.part(_WORK, thorough=False, thins=False)
+        self._walled = whole.part(_WORK, thorough=False)
 
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""

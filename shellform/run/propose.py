@@ -43,8 +43,7 @@ from shellform.written import write_text
 
 _SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
-# s of a processor after which no design, and no way out, is begun any more at usual sizes
-_SEARCH, _WAYS_OUT = 60.0, 90.0
+_SEARCH = 2 / 3  # of the work that a surface is worth: the search for a design of it as it is
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 
@@ -141,13 +140,13 @@ def _proposed(
     times = larger(surface, wish.spacing)
     if times > 1.0:
         asked.say(f"{times:.2g} times the usual work is allowed, for so many crossings")
-    search, ways = (Allowance.for_size(surface, wish.spacing, each) for each in (_SEARCH, _WAYS_OUT))
+    worth = Allowance.for_size(surface, wish.spacing)
     try:
-        design = first_design(surface, wish, asked.say, search)
+        design = first_design(surface, wish, asked.say, worth.part(_SEARCH))
     except (InputError, NotConverged) as error:
         refused = Refused(error)
         if ways_out:
-            refused = with_ways_out(error, surface, wish, asked.output, asked.say, ways)
+            refused = with_ways_out(error, surface, wish, asked.output, asked.say, worth)
         return _Without(refused, error, told)
     edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}

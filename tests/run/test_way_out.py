@@ -1,7 +1,6 @@
 """What can't be built is said with the nearest surface that can be, and that one can."""
 
 import re
-import time
 import tomllib
 from pathlib import Path
 
@@ -169,33 +168,53 @@ def test_of_a_radius_that_nobody_asked_for_no_remedy_is_told(tmp_path):
     assert told.endswith("it would be another one")
 
 
-def test_no_way_out_is_begun_once_its_time_is_over(tmp_path, monkeypatch):
+def test_no_way_out_is_begun_once_the_work_is_done_that_a_surface_is_worth(tmp_path, monkeypatch):
     def search(surface, wish, say, allowance):
         raise AssertionError("too late")
 
     monkeypatch.setattr(first_refusal, "first_design", search)
     refusal = Unbuildable("no", why=Why.NET, where="net", remedy="Round it.", spacing=0.4, radius=1.7)
-    heard = []
+    heard, worth = [], Allowance()
+    worth.part(1.0).spend(worth.work)
     told = first_refusal.with_ways_out(
-        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, Allowance(until=0.0)
+        refusal, sheet(gable), DesignWish(), tmp_path / "case.toml", heard.append, worth
     ).offered
     assert "rounder surfaces were left untried" in told.what, "none was found wanting"
     assert told.remedy == "Round it."
     assert any("left untried" in each for each in heard)
 
 
-def test_a_shell_of_more_crossings_than_usual_is_asked_for_gets_more_work_and_more_time():
+def test_what_a_part_of_the_work_spends_the_whole_has_spent_and_neither_goes_on_without_the_other():
+    whole = Allowance(1000)
+    search, walls = whole.part(0.5, thins=False), whole.part(0.6)
+    assert (search.left, search.thins, search.thorough, walls.left, walls.thins) == (
+        500,
+        False,
+        True,
+        600,
+        True,
+    )
+    search.spend(100.4, times=2)
+    assert (search.left, walls.left, whole.left) == (300, 600, 800)
+    search.spend(300)
+    assert search.over
+    assert not walls.over
+    walls.spend(499)
+    assert not walls.over
+    walls.spend(1)
+    assert walls.over, "its own share isn't spent, but the whole is"
+    assert walls.left == 100
+
+
+def test_a_shell_of_more_crossings_than_usual_is_asked_for_is_worth_more_work():
     surface = sheet(gable)
-    now = time.process_time()
-    usual, fine = (Allowance.for_size(surface, spacing, 60.0) for spacing in (None, 0.1))
+    usual, fine = (Allowance.for_size(surface, spacing) for spacing in (None, 0.1))
     times = surface.area / 0.1**2 / MOST_CROSSINGS
     assert 2.0 < times < 20.0
-    assert (usual.left, fine.left) == (Allowance.left, pytest.approx(times * Allowance.left, rel=1e-4))
-    assert usual.until - now == pytest.approx(60.0, abs=5.0)
-    assert fine.until - now == pytest.approx(60.0 * times**1.5, rel=0.01)
-    assert Allowance.for_size(surface, 2.0, 60.0).left == Allowance.left, "coarse nets are no reason for less"
+    assert (usual.left, fine.left) == (Allowance.work, pytest.approx(times * Allowance.work, rel=1e-4))
+    assert Allowance.for_size(surface, 2.0).left == Allowance.work, "coarse nets are no reason for less"
     for absurd in (1e-3, 1e-200):
-        assert Allowance.for_size(surface, absurd, 60.0).left == 20 * Allowance.left
+        assert Allowance.for_size(surface, absurd).left == 20 * Allowance.work
 
 
 @pytest.mark.slow
