@@ -80,6 +80,7 @@ _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
 _STEPS = 4  # sections tried on one net
 _EASED = 5  # times that cables are eased, by less prestrain or thicker strands
+_STRONGER = 3  # times that strands are made stronger for rods that break
 _SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
@@ -337,6 +338,14 @@ class _Search:
                 if fell or tried.stress > before[1].stress:
                     parts, tried = before
                 break
+        for _ in range(_STRONGER):
+            stronger = parts.stronger(tried)
+            if stronger is None:
+                break
+            held = self._followed(placed, stronger, thickness)
+            if held.factor < NEEDED or held.stress >= tried.stress:
+                break
+            parts, tried = stronger, held
         why = fails_by(tried)
         if why is None:
             return parts, tried, None

@@ -38,6 +38,7 @@ ADDITIONAL = 1.2  # times the load: the case "additional", a share of whose path
 DRAWN, SEED, ENLARGED = 40, 1, 1.25
 STRESSED = 0.95  # of the strength, at the most, under the additional load
 PULLED = 0.85  # of the cables' limit, at the most: a search that begins beyond it takes no cables away
+_RELIEVED = 1.5  # with which power of the force in excess a section has to grow: stiffer strands bear more of the load
 _SMALLEST = 1.0 / 16.0  # of the load, by which a path is followed here
 _TOGETHER = 2  # structures drawn, until one falls: what falls takes ten times as long as what stands
 _SETTLED = 1e-3  # residual: rods too thin for the load are not solved with twice the digits to be told so
@@ -74,6 +75,15 @@ class FirstParts:
             eased = replace(self, rest_ratio=max(slacker, self.rest_ratio), swivels=True)
             return None if eased == self else eased
         return self.eased(tried.pull) if tried.edge <= STRESSED and tried.pull > most else None
+
+    def stronger(self, tried: Followed) -> FirstParts | None:
+        """What to try after a design that bears its load, `tried`, with rods that are stressed too much and cables beyond their
+        limit: the same with strands that bear what pulls these. Where soft ones let the shell move, that is what breaks
+        both. Else None."""
+        if tried.factor < NEEDED or tried.stress <= STRESSED or tried.pull <= 1.0:
+            return None
+        rope = thicker(self.rope, (tried.pull / PULLED) ** _RELIEVED)
+        return None if rope is None else replace(self, rope=rope)
 
     def eased(self, pull: float) -> FirstParts | None:
         """The same with so much less prestrain that cables whose largest force is `pull` times their limit

@@ -1,6 +1,7 @@
 """What the search for a first design calls a failure, and how much less concrete it tries next. What a design came to
 is stood in for, so that each case is the one that is meant."""
 
+import itertools
 from collections import namedtuple
 from types import SimpleNamespace
 
@@ -15,7 +16,7 @@ from shellform.run.next_trial import bears_most
 from shellform.run.unbuildable import Obstacle, Why
 
 Choice = namedtuple("Choice", "section")
-PARTS = SimpleNamespace(easier=lambda tried, most: None, choice=None)
+PARTS = SimpleNamespace(easier=lambda tried, most: None, stronger=lambda tried: None, choice=None)
 
 
 def came_to(factor, stress, edge, pull):
@@ -118,14 +119,35 @@ def test_concrete_is_thinned_for_the_rods_that_bear_most_of_it_not_for_those_tha
 )
 def test_what_is_eased_is_kept_only_where_it_bears_the_load_and_spares_rods(factor, stress, kept):
     """Joints that turn and slacker cables stiffen the shell less."""
-    eased = SimpleNamespace(easier=lambda tried, most: None, choice=None)
-    before = SimpleNamespace(easier=lambda tried, most: eased, choice=None)
+    eased = SimpleNamespace(**vars(PARTS))
+    before = SimpleNamespace(**vars(PARTS) | {"easier": lambda tried, most: eased})
     found = {id(before): came_to(1.5, 1.2, 0.1, 0.1), id(eased): came_to(factor, stress, 0.1, 0.1)}
     search = SimpleNamespace(_followed=lambda placed, parts, thickness: found[id(parts)])
     parts, tried, failure = _Search._solved(search, None, before, 0.5, 0.05)
     assert parts is (before if kept == "as before" else eased)
     assert tried is found[id(parts)]
     assert failure.why is Why.STRENGTH
+
+
+@pytest.mark.parametrize(
+    ("after", "kept", "why"),
+    [
+        ([(1.5, 0.9, 0.1, 0.8)], 1, None),
+        ([(1.5, 1.1, 0.1, 1.6), (1.5, 1.0, 0.1, 1.2), (1.5, 0.94, 0.1, 0.99)], 3, None),
+        ([(1.5, 1.1, 0.1, 1.6), (1.5, 1.1, 0.1, 1.2), (1.5, 0.9, 0.1, 0.9)], 1, Why.STRENGTH),  # spares none
+        ([(1.4, 0.9, 0.1, 0.8)], 0, Why.STRENGTH),  # falls
+        ([(1.5, 1.19 - 0.01 * k, 0.1, 2.0) for k in range(9)], 3, Why.STRENGTH),  # no more attempts
+    ],
+)
+def test_strands_become_stronger_while_that_spares_rods_and_the_shell_bears_its_load(after, kept, why):
+    ladder = [(1.5, 1.2, 0.1, 2.4), *after]
+    parts = [SimpleNamespace(**vars(PARTS), number=k) for k in range(len(ladder))]
+    for each, following in itertools.pairwise(parts):
+        each.stronger = lambda tried, following=following: following if tried.stress > 0.95 else None
+    search = SimpleNamespace(_followed=lambda placed, each, thickness: came_to(*ladder[each.number]))
+    found, tried, failure = _Search._solved(search, None, parts[0], 0.5, 0.05)
+    assert (found.number, tried.stress) == (kept, ladder[kept][1])
+    assert (failure and failure.why) is why
 
 
 def test_where_rods_would_break_without_any_concrete_less_deep_ones_are_tried_with_as_much(monkeypatch):

@@ -33,6 +33,7 @@ from shellform.run.sizes import (
     STRAINED,
     DesignWish,
     Placed,
+    Rope,
     choices,
     curvature_shown,
     curvature_usual,
@@ -305,6 +306,24 @@ def test_cables_pulled_too_much_with_the_least_prestrain_become_thicker_as_far_a
         parts = parts.eased(1.2)
     assert diameters == [0.006, 0.008, 0.010, 0.012, 0.014, 0.016]
     assert rope_for(2.0).diameter == 0.008, "none begins with more"
+
+
+def test_rods_that_break_beside_cables_that_give_get_strands_that_bear_what_pulls_them():
+    parts = FirstParts(
+        wished("gfrp_rods/6 mm")[0],
+        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
+        0.998,
+        rope_for(1.0),
+        swivels=True,
+    )
+    breaks = Followed(NEEDED, 1.05, 0.5, 0.0, 1.2, np.zeros(3), np.zeros(3))
+    assert parts.stronger(breaks) == replace(parts, rope=Rope(0.008))
+    assert parts.stronger(replace(breaks, pull=2.5)).rope.diameter == 0.014, "5 times the section, not 2.9"
+    assert parts.stronger(replace(breaks, pull=20.0)).rope.diameter == 0.016, "the largest in stock"
+    assert replace(parts, rope=Rope(0.016)).stronger(breaks) is None
+    assert parts.stronger(replace(breaks, stress=0.95)) is None
+    assert parts.stronger(replace(breaks, pull=1.0)) is None, "strands that hold are no reason"
+    assert parts.stronger(replace(breaks, factor=0.99 * NEEDED)) is None
 
 
 def test_of_failures_that_bear_the_load_the_least_stressed_came_nearest():
