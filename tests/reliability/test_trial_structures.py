@@ -1,13 +1,18 @@
 """The judge within a search: which structures it draws, and how many may fall."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
+from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability import trial_structures
+from shellform.reliability.drawing import PERFECT
 from shellform.reliability.safety import Safety
 from shellform.reliability.trial_structures import (
+    FRESH,
     SEED,
     Demand,
     JudgedTrial,
@@ -118,3 +123,270 @@ def test_enlarged_errors_are_larger_by_the_factor_as_far_as_shares_go():
     found = enlarged(Tolerances(cable_length=1e-3, supports=2e-3, marks=0.4, rod_bow=1e-3, load_all=0.4), 1.5)
     assert (found.cable_length, found.supports, found.marks) == pytest.approx((1.5e-3, 3e-3, 0.6))
     assert (found.rod_bow, found.load_all, found.shape) == (pytest.approx(1.5e-3), 0.5, 0.0)
+
+
+def asked_of(may, *, first=0, loads=None, **entries):
+    safety = Safety(ROUGH, **{"critical_factor": None, "tried": 6, "drawn": 20, "seed": 3, **entries})
+    return Required(safety, LOADS if loads is None else loads, "wet", may, first)
+
+
+DOWN = np.full((2, 6), -1.0)
+LOADS = {"wet": DOWN, "wetter": 1.25 * DOWN}
+
+
+class Tried:
+    """Structures that bear factors of the largest load on a path, by number; each takes ten factorisations and one
+    for each of its number."""
+
+    def __init__(self, factors, monkeypatch):
+        self.factors, self.loaded, self.looked = factors, [], []
+        for name, fake in [
+            (
+                "perfect",
+                lambda *given, step: SimpleNamespace(members=given[2].sum(), known_to=lambda f: ("to", f)),
+            ),
+            ("Workshop", self),
+            ("drawn", lambda members, tolerances, seed, number: (number, members)),
+        ]:
+            monkeypatch.setattr(trial_structures, name, fake)
+
+    def __call__(self, _nominal):
+        return self
+
+    def rests(self, errors, *, resolution, marks):
+        number, load = errors
+        self.loaded.append((load, number, resolution, marks))
+        return SimpleNamespace(factor=self.factors[number], factorisations=10 + number)
+
+    def limit(self, errors, **how):
+        self.looked.append((errors, how))
+        return SimpleNamespace(factor=self.factors[PERFECT], factorisations=100)
+
+    def judged(self, asked, **how):
+        return tried(None, None, asked, **how)
+
+
+def test_structures_fall_under_the_loads_that_they_do_not_bear_and_refuse_where_more_do_than_may(monkeypatch):
+    factors = {0: 1.0, 1: 0.9, 2: 0.8, 3: 0.7999, 4: 1.0, 5: 0.2}
+    made = Tried(factors, monkeypatch)
+    found = made.judged(asked_of({"wet": 2, "wetter": 4}))
+    assert found.fallen == {"wet": (3, 5), "wetter": (1, 2, 3, 5)}
+    assert (found.stands, found.critical, found.factorisations) == (True, True, 75)
+    assert found.factors == factors
+    assert {each[::2] for each in made.loaded} == {(-15.0, 1 / 32)}
+    assert made.loaded[0][3] == (1.0, pytest.approx(0.8))
+    for may in ({"wet": 1, "wetter": 4}, {"wet": 2, "wetter": 3}):
+        assert not made.judged(asked_of(may)).stands
+
+
+def test_no_more_structures_are_loaded_than_it_takes_to_refuse_but_where_the_whole_sample_is_asked_for(
+    monkeypatch,
+):
+    made, heard = Tried({0: 0.9, 1: 0.9, **dict.fromkeys(range(2, 10), 1.0)}, monkeypatch), []
+    asked = asked_of({"wet": 0, "wetter": 1}, tried=10)
+    found = made.judged(asked, judging=lambda *told: heard.append(told))
+    assert (found.fallen, found.stands, found.factorisations) == ({"wet": (), "wetter": (0, 1)}, False, 46)
+    assert heard == [(4, 10)]
+    assert set(found.factors) == {0, 1, 2, 3}
+    whole = made.judged(asked, whole=True)
+    assert (set(whole.factors), whole.stands, whole.factorisations) == (set(range(10)), False, 145)
+    late = Tried({**dict.fromkeys(range(8), 1.0), 8: 0.9, 9: 0.9}, monkeypatch)
+    found = late.judged(asked, first=(9, 8))
+    assert (found.fallen["wetter"], set(found.factors)) == ((9, 8), {9, 8, 0, 1})
+
+
+def test_structures_of_other_samples_count_under_the_design_load_alone(monkeypatch):
+    made = Tried({**dict.fromkeys(range(6), 1.0), 900: 0.9, 901: 0.1}, monkeypatch)
+    loads = {**LOADS, "wind": DOWN * [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]}
+    asked = asked_of({"wet": 1, "wetter": 0, "wind": 0}, loads=loads)
+    found = made.judged(asked, first=(900, 2, 901))
+    assert found.fallen == {"wet": (901,), "wetter": (), "wind": ()}
+    assert found.stands
+    assert found.factors[900] == 0.9
+    assert [number for load, number, *_ in made.loaded if load == -15.0] == [900, 2, 901, 0, 1, 3, 4, 5]
+    assert [number for load, number, *_ in made.loaded if load == -2.0] == [2, 0, 1, 3, 4, 5]
+    assert not made.judged(asked_of({"wet": 0, "wetter": 0}), first=(901,)).stands
+
+
+@pytest.mark.parametrize(("bears", "kept"), [(1.01, True), (1.0099, False)])
+def test_the_perfect_structure_is_to_bear_a_hundredth_more_than_its_critical_factor(monkeypatch, bears, kept):
+    """Of the load of which the design load is 0.8 the factor 1.25 is one time the largest load."""
+    made = Tried({PERFECT: bears, **dict.fromkeys(range(6), 1.0)}, monkeypatch)
+    asked = asked_of({"wet": 0, "wetter": 0}, critical_factor=1.25)
+    found = made.judged(asked)
+    assert (found.critical, found.stands) == (kept, kept)
+    assert found.factorisations == (175 if kept else 100 + 10 + 11 + 12)
+    assert PERFECT not in found.factors
+    (errors, how) = made.looked[0]
+    assert errors == (PERFECT, -15.0)
+    assert how["most"] == pytest.approx(1.01)
+    assert (how["begin"], how["tell"], how["resolution"]) == (("to", how["most"]), False, 1 / 32)
+    aimed = aims(asked, found)
+    assert aimed == ({} if kept else {PERFECT: pytest.approx(1.01)})
+    assert made.judged(asked, critical=False).stands, "where it isn't asked for"
+    assert len(made.looked) == 1
+
+
+def test_larger_errors_let_as_many_fall_as_their_share_of_a_normal_distribution_says():
+    """P(P⁻¹(0.99) / 1.5) = 0.93952, P(P⁻¹(0.9) / 1.5) = 0.80355."""
+    for tried_, times, may in (
+        (100, 1.5, (6, 19)),
+        (40, 1.5, (2, 7)),
+        (12, 1.5, (0, 2)),
+        (100, 1.0, (1, 10)),
+    ):
+        safety = Safety(ROUGH, probability_additional=0.9, tried=tried_, enlarged=times)
+        known = tuple(trial_structures._known(safety, name, "wet") for name in ("wet", "wetter"))
+        assert known == may
+        alike = replace(safety, probability_additional=None)
+        assert trial_structures._known(alike, "wetter", "wet") == may[0]
+
+
+def test_where_the_start_shows_more_falls_than_the_probability_allows_as_many_may(monkeypatch):
+    safety = Safety(ROUGH, critical_factor=None, tried=40)
+    for shown, additional, may in (
+        ((5, 9), None, {"wet": 5, "wetter": 9}),
+        ((1, 0), None, {"wet": 2, "wetter": 2}),
+        ((5, 9), 0.9, {"wet": 5, "wetter": 7}),
+    ):
+        fell = {name: tuple(range(count)) for name, count in zip(LOADS, shown, strict=True)}
+        heard = []
+        monkeypatch.setattr(
+            trial_structures,
+            "tried",
+            lambda _shell, _start, asked, heard=heard, fell=fell, **how: (
+                heard.append((asked, how)) or JudgedTrial(fell, True, True, 0)
+            ),
+        )
+        given = replace(safety, probability_additional=additional)
+        loads = {**LOADS, "none": 0.0 * DOWN}
+        found = trial_structures.required(None, None, loads, given, design_load="wet", first=70)
+        assert (found.fallen, found.first) == (may, 70)
+        (asked, how), *_ = heard
+        assert asked.fallen == {"wet": 40, "wetter": 40}, "none is refused"
+        assert not how["critical"]
+
+
+def test_a_closer_trial_takes_at_least_forty_structures_and_lets_as_large_a_share_fall():
+    for tried_, additional, may, closer_may in (
+        (12, None, {"wet": 1, "wetter": 5}, {"wet": 2, "wetter": 16}),
+        (12, 0.9, {"wet": 1, "wetter": 5}, {"wet": 2, "wetter": 7}),
+        (12, None, {"wet": 0, "wetter": 0}, {"wet": 2, "wetter": 2}),
+        (100, None, {"wet": 9, "wetter": 9}, {"wet": 6, "wetter": 9}),
+    ):
+        trial = asked_of(may, tried=tried_, probability_additional=additional)
+        found = trial_structures.closer(Demand(trial, None, trusted=False))
+        assert found.trial.fallen == closer_may
+        assert found.trial.safety.tried == max(40, tried_)
+        assert not found.trusted
+        assert found.confirmed is None
+
+
+def test_samples_follow_one_another_without_a_structure_in_two_of_them():
+    fresh = asked_of({"wet": 3, "wetter": 4}, first=FRESH, tried=6, enlarged=1.5)
+    demand = Demand(fresh, fresh)
+    assert demand.sample(0).numbers == range(FRESH, FRESH + 6)
+    assert demand.sample(2).numbers == range(FRESH + 12, FRESH + 18)
+    assert demand.after(3).sample(1).numbers == range(FRESH + 24, FRESH + 30)
+    lone = Demand(fresh, None)
+    assert lone.after(3) is lone
+    assert fresh.tolerances(FRESH - 1).supports == pytest.approx(1.5e-4)
+    assert fresh.tolerances(FRESH) == ROUGH, "whose errors are as they are"
+
+
+def test_a_fresh_sample_spares_nothing_below_none_and_no_further_than_the_probability(monkeypatch):
+    for may, spared in (
+        ({"wet": 0, "wetter": 0}, (0, 0)),
+        ({"wet": 3, "wetter": 3}, (3, 2)),
+        ({"wet": 2, "wetter": 10}, (1, 6)),
+    ):
+        fresh = asked_of(may, tried=40, enlarged=1.0, probability_design=0.95)
+        assert tuple(Demand(fresh, fresh).sample(0).fallen.values()) == spared
+
+
+class Bearing:
+    """A start that bears its loads with errors enlarged so many times and no more, of which so many fall else."""
+
+    def __init__(self, monkeypatch, times, fallen=(0, 0)):
+        self.times, self.fell, self.heard = times, dict(zip(LOADS, map(range, fallen), strict=True)), []
+        monkeypatch.setattr(trial_structures, "tried", self)
+
+    def __call__(self, _shell, _start, asked, **_how):
+        self.heard.append((asked.safety.enlarged, asked.safety.tried, asked.safety.seed, dict(asked.fallen)))
+        fallen = {name: tuple(own) for name, own in self.fell.items()}
+        return JudgedTrial(fallen, True, asked.safety.enlarged <= self.times, 0)
+
+
+@pytest.mark.parametrize(
+    ("times", "enlarged_by", "tried_", "trusted"),
+    [(1.5, 1.5, 12, True), (1.25, 1.25, 40, False), (1.0, 1.0, 40, False)],
+)
+def test_errors_are_enlarged_as_far_as_the_start_bears_them_and_numbers_make_up_for_what_they_are_not(
+    monkeypatch, times, enlarged_by, tried_, trusted
+):
+    start = Bearing(monkeypatch, times)
+    safety = Safety(ROUGH, critical_factor=None, tried=12, drawn=150, seed=3, enlarged=1.5)
+    found = trial_structures.demand(None, None, LOADS, safety, design_load="wet")
+    assert (found.trial.safety.enlarged, found.trial.safety.tried, found.trusted) == (
+        enlarged_by,
+        tried_,
+        trusted,
+    )
+    expected = [(1.5, 12, 3, {"wet": 0, "wetter": 12}), (1.25, 40, 3, {"wet": 1, "wetter": 40})]
+    expected += [(1.0, 40, 3, {"wet": 40, "wetter": 40})]
+    assert start.heard == expected[: [1.5, 1.25, 1.0].index(times) + 1]
+    fresh = found.confirmed
+    assert (fresh.safety.enlarged, fresh.safety.tried, fresh.safety.seed, fresh.first) == (1.0, 150, 3, FRESH)
+    assert fresh.fallen == {"wet": 1, "wetter": 1}
+
+
+def test_trials_without_enlarged_errors_are_not_trusted_though_the_start_bears_them(monkeypatch):
+    Bearing(monkeypatch, 3.0)
+    safety = Safety(ROUGH, critical_factor=None, tried=12, drawn=60, enlarged=1.0)
+    assert not trial_structures.demand(None, None, LOADS, safety, design_load="wet").trusted
+
+
+def test_where_as_many_may_fall_as_of_the_start_those_are_counted_that_a_finished_design_is_judged_by(
+    monkeypatch,
+):
+    start = Bearing(monkeypatch, 1.5, fallen=(0, 7))
+    safety = Safety(ROUGH, critical_factor=None, tried=12, drawn=60, seed=3)
+    found = trial_structures.demand(None, None, LOADS, safety, design_load="wet")
+    assert found.trial.fallen == {"wet": 0, "wetter": 7}
+    assert start.heard[-1] == (1.0, 60, 3 - SEED, {"wet": 60, "wetter": 60})
+    fresh = found.confirmed
+    assert (fresh.fallen, fresh.first, fresh.safety.seed) == ({"wet": 0, "wetter": 7}, FRESH, 3)
+    assert found.trusted
+
+
+def test_a_design_without_unloaded_equilibrium_does_not_stand_and_tells_what_was_spent(monkeypatch):
+    def none(*_, **__):
+        raise NotConverged("no equilibrium", iterations=17)
+
+    monkeypatch.setattr(trial_structures, "tried", none)
+    found = trial_structures.stands(None, None, asked_of({"wet": 1, "wetter": 1}))
+    assert found == JudgedTrial({"wet": (), "wetter": ()}, False, False, 17)
+
+
+@pytest.mark.parametrize(("bears", "kept"), [(1.25, True), (1.2499, False)])
+def test_a_design_is_confirmed_where_its_critical_factor_is_kept_on_the_halved_mesh_too(
+    monkeypatch, bears, kept
+):
+    asked, sought = asked_of({"wet": 1, "wetter": 1}, critical_factor=1.25), []
+
+    def halved(_shell, _design, load, factor):
+        sought.append((load.sum(), factor))
+        return SimpleNamespace(factor=bears, factorisations=30)
+
+    monkeypatch.setattr(trial_structures, "critical_on_halved", halved)
+    trial = JudgedTrial({"wet": ()}, True, True, 12)
+    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: trial)
+    found = trial_structures.confirm(None, None, asked)
+    assert (found.critical, found.stands, found.factorisations) == (kept, kept, 42)
+    assert sought == [(-12.0, 1.25)]
+    assert trial_structures.confirm(None, None, asked_of({"wet": 1})) == trial, "where no factor is asked for"
+    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: replace(trial, stands=False))
+    assert trial_structures.confirm(None, None, asked).factorisations == 12, (
+        "what falls is looked at no further"
+    )
+    assert len(sought) == 1
