@@ -1,17 +1,20 @@
 """Cables counted for what they are worth, and the guide made of them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from shellform.gridshell.tolerances import default_tolerances
+from shellform.gridshell.tolerances import Tolerances, default_tolerances
+from shellform.reliability import guide as guide_module
 from shellform.reliability.expected_cables import ExpectedCables
-from shellform.reliability.guide import PathStiffness, expected_stiffness, guide
+from shellform.reliability.guide import PathStiffness, expected_stiffness, guide, stretch_deviation
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
+from shellform.structure.solve.factorisation import NotPositiveDefinite
 
 PLACES = np.array([[0.0, 0.0, 0.0], [1.0, 0.2, 0.1], [0.3, 0.9, 0.2], [0.1, 0.3, 1.1]])
 ENDS = [[0, 1], [1, 2], [2, 3], [0, 3]]
@@ -136,6 +139,9 @@ def test_both_derivatives_of_a_modes_stiffness_are_exact_for_cables_that_are_str
     by_rest = expected(taut).stiffness_by_rest_length(state, mode) * rate
     found = orders(lambda h: quadratic(expected(longer(taut, h, rate)), state, mode), by_rest)
     assert found == pytest.approx(2.0, abs=0.15)
+    force = expected(taut).force_by_rest_length(state) * rate[:, None]
+    found = orders(lambda h: expected(longer(taut, h, rate)).evaluate(state, tangent=False).force, force)
+    assert found == pytest.approx(2.0, abs=0.15)
 
 
 def test_a_shell_whose_cables_are_taut_by_a_hair_is_told_to_be_softer_than_the_sharp_law_says(nominal):
@@ -161,3 +167,45 @@ def test_up_to_a_share_of_the_load_the_guide_takes_the_least_on_the_way_and_at_i
     dipping = PathStiffness(np.array([0.0, 0.5, 1.0]), np.array([4.0, 1.0, 3.0]))
     assert dipping.least_to(0.75) == 1.0
     assert dipping.least_to(1.0) == dipping.least == 1.0
+
+
+def test_a_stretch_is_off_by_its_ends_motion_less_the_cable_s_own_error_and_by_that_at_least(monkeypatch):
+    """One cable along x, 0.5 m; in two structures its ends part by 3 and -1 mm, and it is made longer by 1 and 3 mm."""
+    cables = make_cables([[0, 1]], rest_length=np.array([0.5]), stiffness=187.0)
+    state = at_rest(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]))
+    network = SimpleNamespace(cables=cables)
+    nominal = SimpleNamespace(
+        network=network, unloaded=state, load=np.ones((2, 6)), members=None, present=None
+    )
+    moved = np.array([[[0.001, 7.0, 0.0], [0.004, 0.0, 9.0]], [[0.002, 0.0, 0.0], [0.001, 5.0, 0.0]]])
+    seen = []
+
+    def moved_from(_assembly, there, load, _present, some, shapes):
+        seen.append((there is state, load.any(), some, shapes))
+        return SimpleNamespace(translations=moved)
+
+    monkeypatch.setattr(guide_module, "variables", lambda _members, seed, number: (seed, number))
+    monkeypatch.setattr(guide_module, "errors_of", lambda _members, _tolerances, z: z)
+    monkeypatch.setattr(guide_module, "moved_from", moved_from)
+    longer = {(4, 0): 0.001, (4, 1): 0.003}
+    monkeypatch.setattr(
+        guide_module,
+        "built_cables",
+        lambda _cables, _present, errors: SimpleNamespace(rest_length=0.5 + longer[errors]),
+    )
+
+    def deviation(own, drawn=2):
+        return stretch_deviation(nominal, Tolerances(cable_length=own), None, seed=4, drawn=drawn).tolist()
+
+    assert deviation(1e-4) == pytest.approx([np.sqrt((0.002**2 + 0.004**2) / 2)])
+    assert deviation(5e-3) == [5e-3]
+    assert seen[0] == (True, False, [(4, 0), (4, 1)], None)
+    moved[:], longer[(4, 0)], longer[(4, 1)] = 0.0, 0.0, 0.0
+    assert deviation(0.0) == [1e-6], "a millionth of a metre at least"
+
+    def unstable(*_):
+        raise NotPositiveDefinite
+
+    monkeypatch.setattr(guide_module, "moved_from", unstable)
+    assert deviation(2e-4) == [2e-4]
+    assert deviation(0.0) == [1e-6]

@@ -1,11 +1,13 @@
 """Rare failures of structures, by subset simulation and by counting."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.perfect import perfect
-from shellform.reliability.rare import rare_failure
+from shellform.reliability.rare import _shares, rare_failure
 from shellform.reliability.standing import Workshop
 
 ERRORS = Tolerances(supports=3e-4, load_each=0.1, load_all=0.05)
@@ -49,3 +51,21 @@ def test_the_cause_that_alone_matters_has_the_largest_share(dome, nominal):
     found = rare_failure(workshop, errors, seed=0, count=60, most=1.5)
     assert found.found.probability > 0.0
     assert found.shares["load_all"] > 0.8
+
+
+def test_causes_share_the_squared_distance_of_the_failures_mean_less_what_chance_leaves_of_each_variable():
+    """The median of the squares is that of one normal variable of deviation 1, so that each holds 1 by chance."""
+    chance = 0.4549**0.5
+    mean = np.array([3.0, -chance, chance, -2.0, chance])
+    aside = np.array([1.0, -2.0, 0.5, 0.3, 0.0])
+    found = SimpleNamespace(failed=np.array([mean + aside, mean - aside]))
+    parts = np.array([9.0 + 0.4549 - 2.0, 4.0 + 2 * 0.4549 - 3.0])
+    expected = parts / parts.sum()
+    assert _shares(found, ["marks", "supports"], [2, 3]) == pytest.approx(
+        {"marks": expected[0], "supports": expected[1]}
+    )
+    less = SimpleNamespace(failed=np.array([[3.0, chance, chance, 0.5, chance]]))
+    assert _shares(less, ["marks", "supports"], [2, 3]) == pytest.approx({"marks": 1.0, "supports": 0.0})
+    nothing = SimpleNamespace(failed=np.full((1, 5), 1.0))
+    assert _shares(nothing, ["marks", "supports"], [2, 3]) == {"marks": 0.0, "supports": 0.0}
+    assert _shares(SimpleNamespace(failed=np.zeros((0, 5))), ["marks", "supports"], [2, 3]) == {}

@@ -39,6 +39,18 @@ def test_a_halved_model_has_twice_the_rod_elements_on_the_same_joints(dome, nomi
     assert finer.network.beams.rest_length.sum() == pytest.approx(model.network.beams.rest_length.sum())
     assert finer.network.cables == model.network.cables
     assert finer.loads["load"].sum() == nominal.load.sum()
+    beams, nodes, count = model.network.beams, model.network.nodes, len(nominal.load)
+    own = np.flatnonzero(beams.kind == 0)
+    first, second = own, len(beams.ends) + np.arange(len(own))
+    middle = finer.network.beams.ends[first, 1]
+    np.testing.assert_array_equal(middle, count + np.arange(len(own)))
+    np.testing.assert_array_equal(finer.network.beams.ends[second, 0], middle)
+    np.testing.assert_array_equal(finer.network.beams.ends[second, 1], beams.ends[own, 1])
+    np.testing.assert_allclose(finer.network.nodes[middle], nodes[beams.ends[own]].mean(axis=1))
+    for half in (first, second):
+        np.testing.assert_allclose(finer.network.beams.rest_length[half], 0.5 * beams.rest_length[own])
+    assert not finer.network.fixed[count:].any()
+    assert not finer.loads["load"][count:].any()
 
 
 def test_the_deviation_moves_by_a_quarter_as_much_when_rods_are_halved_again(dome, nominal):

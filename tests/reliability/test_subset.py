@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import chi2, norm
 
 from shellform.errors import InputError
-from shellform.reliability.subset import _level, subset_simulation
+from shellform.reliability.subset import _level, _square, subset_simulation
 
 
 def plane(beta, size):
@@ -97,3 +97,23 @@ def test_chains_step_farther_where_most_trials_are_taken_and_less_far_where_few_
         assert spent == 900
         changes = (1.0 / np.sqrt([1, 2, 3, 4])).sum()  # after 2, 4, 6 and 8 of the chains' states
         assert step == pytest.approx(0.6 * np.exp((0.56 if farther else -0.44) * changes))
+
+
+@pytest.mark.parametrize(
+    ("inside", "share", "square"),
+    [
+        # one chain of two stays inside: as two samples of their own, (1 - p) / (2 p)
+        ([[1, 1, 1], [0, 0, 0]], 1 / 2, 1 / 2),
+        ([[1, 1], [0, 0], [0, 0]], 1 / 3, 2 / 3),
+        # one that turns round is told no better than six samples of their own
+        ([[1, 1, 0], [0, 0, 1]], 1 / 2, 1 / 6),
+        # of neighbours 1/2 are both inside, of those two apart 1/3, by chance 25/81: 31/40 and 1/10 of the variance
+        ([[1, 1, 0], [1, 1, 1], [0, 0, 0]], 5 / 9, 4 / 45 * (1 + 2 * (2 / 3 * 31 / 40 + 1 / 3 * 1 / 10))),
+        ([[1, 1], [1, 1]], 1.0, 0.0),
+    ],
+)
+def test_a_chain_s_samples_tell_less_than_as_many_of_their_own(inside, share, square):
+    """The square of the coefficient of variation, (1 - p) / (p N) (1 + gamma), gamma the sum of 2 (1 - lag / length)
+    times the correlation over each lag."""
+    chains = np.arange(np.size(inside)).reshape(np.shape(inside))
+    assert _square(np.array(inside, dtype=bool).ravel(), chains, share) == pytest.approx(square)
