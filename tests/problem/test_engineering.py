@@ -16,6 +16,7 @@ from shellform.problem.engineering import (
     RodUtilisation,
     Thrust,
     Uplift,
+    _smooth,
 )
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.terms import LoadedDesign
@@ -25,6 +26,20 @@ from shellform.structure.elements.state import moved
 @pytest.fixture(scope="module")
 def wet(shell):
     return shell.point_load(3.0, every=2)
+
+
+def smooth_largest(values, sharpness):
+    """Kreisselmeier and Steinhauser's."""
+    return np.log(np.exp(sharpness * (values - values.max())).sum()) / sharpness + values.max()
+
+
+def test_the_smooth_largest_of_three_values_and_its_derivatives_by_hand():
+    """e^0, e^-1 and e^-3 over their sum; 1.4177 above the largest over the sharpness."""
+    shares = np.exp([-1.0, 0.0, -3.0])
+    weight, value = _smooth(np.array([4.5, 5.0, 3.5]), 2.0)
+    assert weight == pytest.approx(shares / shares.sum())
+    assert value == pytest.approx(5.0 + np.log(shares.sum()) / 2.0)
+    assert _smooth(np.array([-7.0]), 2.0)[1] == -7.0
 
 
 def limited(shell, wet, term):
@@ -171,6 +186,9 @@ def test_the_largest_cable_force_is_told_little_above_and_cables_let_out_are_not
     least = LeastTension("wet", 0.5).measure(LoadedDesign(shell, design, state, wet)).value[0]
     assert others >= least - 1e-12
     assert pull.min() - 0.5 * np.log(len(pull)) / 10.0 <= least <= pull.min()
+    assert (pull > 0.0).all()
+    assert told == pytest.approx(smooth_largest(pull, 200.0 / 5.0), rel=1e-9)
+    assert least == pytest.approx(-smooth_largest(-pull, 10.0 / 0.5), rel=1e-9)
     none = shell.unbraced()
     assert LargestCableForce("wet", 5.0).measure(LoadedDesign(shell, none, state, wet)).value[0] == 0.0
     assert LeastTension("wet", 0.5).measure(LoadedDesign(shell, none, state, wet)).value[0] == 1.0

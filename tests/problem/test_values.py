@@ -5,15 +5,16 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import shellform as sf
 from shellform.errors import InputError
 from shellform.gridshell.reactions import reactions
 from shellform.problem.constraints import count, residual_rows, residuals
-from shellform.problem.engineering import ConnectorTurn, LargestCableForce, Thrust, Uplift
+from shellform.problem.engineering import ConnectorTurn, LargestCableForce, ModalStiffness, Thrust, Uplift
 from shellform.problem.evaluation import Evaluator
-from shellform.problem.terms import LoadedDesign
-from shellform.problem.variables import Blocks
+from shellform.problem.terms import LoadedDesign, Measurement
+from shellform.problem.variables import Blocks, Rates, Variable
 
 
 @pytest.fixture
@@ -196,3 +197,137 @@ def test_a_problem_uses_the_loads_of_its_terms_and_looks_at_the_largest(dome):
         with pytest.raises(InputError, match="must add up to 1"):
             replace(problem, minimise=[shares[0], sf.Share(wrong, sf.CableForce("less"))])
     replace(problem, minimise=[shares[0], sf.Share(0.3 + 5e-10, sf.CableForce("less"))])
+
+
+@pytest.mark.parametrize(
+    ("least", "most"), [(1.0, np.inf), (-np.inf, 1.0), (np.nan, 1.0), (2.0, 2.0), (3.0, 2.0)]
+)
+def test_limits_on_two_sides_are_finite_and_in_order(least, most):
+    with pytest.raises(InputError, match="must lie below"):
+        sf.Between(least, most, sf.RodRadius())
+
+
+def test_a_limit_on_one_side_is_positive_or_says_of_what_its_violations_are_a_share():
+    term = sf.RodRadius()
+    for limit, of in ((0.0, None), (-1.0, None), (np.nan, 1.0), (np.inf, None), (1.0, 0.0), (1.0, -2.0)):
+        for side in (sf.AtMost, sf.AtLeast):
+            with pytest.raises(InputError, match="constraints"):
+                side(limit, term, of)
+    assert (sf.AtMost(-3.0, term, of=2.0).scale, sf.AtLeast(1e-9, term).scale) == (2.0, 1e-9)
+    assert (sf.AtMost(3.0, term).lower, sf.AtLeast(3.0, term).upper) == (-np.inf, np.inf)
+
+
+def test_limits_are_kept_in_the_values_unit_where_that_is_another_one():
+    """Lengths for squares of lengths; stiffnesses for their squares with the sign."""
+    rms, soft = sf.RmsMisfit("wet"), ModalStiffness("wet", 1.0)
+    limit = sf.Between(0.003, 0.005, rms)
+    assert (limit.lower, limit.upper, limit.scale) == pytest.approx((9e-6, 2.5e-5, 1.6e-5))
+    assert (sf.AtMost(0.005, rms).upper, sf.AtMost(0.005, rms).scale) == pytest.approx((2.5e-5, 2.5e-5))
+    assert [soft.at_limit(each) for each in (3.0, -3.0)] == [9.0, -9.0]
+
+
+class Knob(Variable):
+    """Two variables of the user's own, the second of which lengthens cable 1 by half as much and the rods' radius."""
+
+    def __init__(self, unit=None, rates=None):
+        self.own_unit, self.own_rates = unit, rates
+
+    def size(self, shell):
+        return 2
+
+    def values(self, shell, design):
+        return np.array([3.0, design.rest_length[1]])
+
+    def applied(self, shell, design, values):
+        return design
+
+    def bounds(self, shell, start):
+        return np.array([1.0, 2.0]), np.array([5.0, 10.0])
+
+    def unit(self, shell, start):
+        return super().unit(shell, start) if self.own_unit is None else self.own_unit
+
+    def rates(self, shell, design):
+        if self.own_rates is not None:
+            return self.own_rates
+        lengths = sp.lil_array((len(shell.cable_ends), 2))
+        lengths[1, 1] = 0.5
+        return Rates(sp.csc_array(lengths), np.array([0.0, 2.0]))
+
+
+def test_variables_of_one_s_own_count_in_the_distance_of_their_bounds_and_step_by_a_tenth_of_it(dome):
+    start = dome.design()
+    blocks = Blocks([Knob()], dome, start)
+    assert blocks.unit.tolist() == [4.0, 8.0]
+    assert blocks.step(start).tolist() == pytest.approx([0.4, 0.8])
+    assert np.array(blocks.bounds()).tolist() == [[0.25, 0.25], [1.25, 1.25]]
+    assert (blocks.moves_radius, blocks.each_cable, blocks.size) == (True, None, 2)
+    rates = blocks.rates(start).toarray()
+    assert (rates[1].tolist(), rates[-1].tolist()) == ([0.0, 0.5], [0.0, 2.0])
+    assert np.count_nonzero(rates) == 2
+
+
+def test_blocks_that_change_the_same_cable_or_radius_or_have_no_units_are_refused(dome):
+    start, cables = dome.design(), len(dome.cable_ends)
+    for other in (sf.RestLengths(), sf.FreeRadius(), Knob()):
+        with pytest.raises(InputError, match="two blocks change the same"):
+            Blocks([Knob(), other], dome, start)
+    for unit in ([1.0, 0.0], [1.0, -1.0], [np.inf, 1.0], [np.nan, 1.0], [1.0], [1.0, 1.0, 1.0]):
+        with pytest.raises(InputError, match="positive unit"):
+            Blocks([Knob(np.array(unit))], dome, start)
+    for rates in (
+        Rates(sp.csc_array((cables, 3))),
+        Rates(sp.csc_array((cables + 1, 2))),
+        Rates(radius=np.zeros(3)),
+    ):
+        with pytest.raises(InputError, match="rates must have the shapes"):
+            Blocks([Knob(rates=rates)], dome, start)
+
+
+def test_rest_lengths_bounds_are_positive():
+    for wrong in ({"least": 0.0}, {"most": 0.0}, {"least": -0.01}):
+        with pytest.raises(InputError, match=r"variables\.rest_lengths"):
+            sf.RestLengths(**wrong)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"value": np.zeros(3)},
+        {"by_radius": np.zeros(1)},
+        {"by_dof": sp.csr_array((2, 23))},
+        {"by_rest_length": sp.csr_array((1, 5))},
+    ],
+)
+def test_a_measurement_of_other_shapes_than_its_term_says_is_refused_by_name(wrong):
+    """Of 2 values, 4 nodes and 5 cables."""
+    right = {"value": np.array([1.0, 2.0])}
+    whole = Measurement(**right).completed(2, 4, 5, "own")
+    assert (whole.by_dof.shape, whole.by_rest_length.shape) == ((2, 24), (2, 5))
+    assert whole.by_radius.tolist() == [0.0, 0.0]
+    with pytest.raises(InputError) as told:
+        Measurement(**{**right, **wrong}).completed(2, 4, 5, "own")
+    assert told.value.where == f"own.{next(iter(wrong))}"
+
+
+def test_load_cases_and_problems_that_cannot_be_meant_are_refused(dome):
+    force = dome.point_load(2.0, every=2)
+    with pytest.raises(InputError, match="needs a name"):
+        sf.LoadCase("", force)
+    wet, shares = sf.LoadCase("wet", force), [sf.Share(1.0, sf.Misfit("wet"))]
+    for further, changes, said in (
+        ([sf.LoadCase("wet", 1.2 * force)], {}, "the same name"),
+        ([], {"decisive": "dry"}, "no load case 'dry'"),
+        ([], {"built_under": ["wet", "dry"]}, "no load case 'dry'"),
+        ([], {"constraints": [sf.AtMost(1.0, sf.Misfit("dry"))]}, "no load case 'dry'"),
+        ([], {"variables": []}, "nothing is varied"),
+    ):
+        with pytest.raises(InputError, match=said):
+            sf.Problem(dome, wet, shares, further=further, **changes)
+    found = sf.Problem(
+        dome, wet, [*shares[:0], sf.Share(0.4, sf.RodRadius()), sf.Share(0.6, sf.Misfit("wet"))]
+    )
+    assert found.column(sf.RodRadius()) == "rod_radius"
+    assert (found.column(sf.Misfit("wet")), found.column(sf.Misfit("wetter"))) == ("misfit", "misfit.wetter")
+    with pytest.raises(InputError, match="minimise"):
+        sf.Share(0.0, sf.RodRadius())
