@@ -237,14 +237,17 @@ def test_models_and_guards_are_dense_up_to_many_cables_or_where_they_have_to_be(
     monkeypatch, count, whole, each, dense
 ):
     made = []
-    monkeypatch.setattr(search_state, "step_model", lambda evaluator, point, *, whole: ("model", whole))
+    monkeypatch.setattr(search_state, "step_model", lambda *_, whole: ("model", *[whole]))
     for name, own in (("whole_guard", True), ("solved_guard", False)):
         monkeypatch.setattr(search_state, name, lambda *given, own=own: made.append((own, given)) or own)
     evaluator = Modelled(each=slice(0, 5) if each else None)
     models = Models(evaluator, sf.SequentialConvex(many=3), 0.7, whole=whole)
     point, other = point_of(count), point_of(count)
     assert models.at(point) == ("model", dense)
-    assert models.at(point) is models.at(point)
+    first = models.at(point)
+    assert models.at(point) is first
+    assert models.at(other) is not first, "of another point"
+    assert models.at(point) is not first, "of which the last one's alone is kept"
     assert models.guards(point) == [dense, dense]
     assert models.guards(point) is models.guards(point)
     assert [given for _, given in made] == [

@@ -218,6 +218,35 @@ def test_a_stage_is_looked_for_from_half_the_load_on_and_as_finely_as_the_margin
     assert given == [(("wet", 1.0), "all of it", {"step": 0.5, "smallest": min(0.2, margin), "stay": True})]
 
 
+def test_without_further_loads_the_whole_of_them_is_borne():
+    alone = SimpleNamespace(base="wet", problem=SimpleNamespace(used=lambda: ["wet"]))
+    assert trials.reach(alone, None, None, 0.0, 0.15) == 1.0
+
+
+def test_a_design_is_sound_in_the_states_of_its_whole_loads(monkeypatch):
+    def follow(shell, design, loads, *, stay):
+        return {
+            name: SimpleNamespace(
+                on_branch=True, factorisations=2, equilibrium=SimpleNamespace(state=f"under {name}")
+            )
+            for name in loads
+        }
+
+    monkeypatch.setattr(trials, "follow", follow)
+    monkeypatch.setattr(trials, "violation", lambda *_: 0.0)
+    design = Design(np.ones(2), np.ones(2, dtype=bool), 0.1)
+    evaluator = SimpleNamespace(
+        factorisations=0,
+        problem=SimpleNamespace(used=lambda: ["wet", "wetter"]),
+        seed=lambda design, states, stage: SimpleNamespace(objective=0.4, given=(design, states, stage)),
+    )
+    problem = SimpleNamespace(shell=None, loads={"wet": 1, "wetter": 2, "idle": 3})
+    search = searching(evaluator=evaluator, problem=problem)
+    found = trials.sound(search, Accepted(design, np.array([True, False]), 0.0, 0.5))
+    assert found.given == (design, {"wet": "under wet", "wetter": "under wetter"}, 1.0)
+    assert evaluator.factorisations == 6
+
+
 def test_states_at_a_stage_are_reached_from_the_design_load_s(monkeypatch):
     given = []
 

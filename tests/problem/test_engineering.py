@@ -1,12 +1,14 @@
 """The engineer's limits against re-solved neighbours."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.problem import engineering
 from shellform.problem.engineering import (
     SHARPNESS,
     ConnectorTurn,
@@ -192,3 +194,21 @@ def test_the_largest_cable_force_is_told_little_above_and_cables_let_out_are_not
     none = shell.unbraced()
     assert LargestCableForce("wet", 5.0).measure(LoadedDesign(shell, none, state, wet)).value[0] == 0.0
     assert LeastTension("wet", 0.5).measure(LoadedDesign(shell, none, state, wet)).value[0] == 1.0
+
+
+def test_the_softest_modes_count_by_the_squares_of_their_stiffness_with_its_sign(monkeypatch):
+    """In the square of the scale: a mode at 3 N/m beside one at 2 N/m counts for little on a scale of 2."""
+    stiffness = np.array([2.0, 2.1, 3.0, -0.5])
+    monkeypatch.setattr(
+        engineering, "modes", lambda *_: SimpleNamespace(stiffness=stiffness, shapes=np.ones((4, 2, 6)))
+    )
+    monkeypatch.setattr(
+        engineering.residual, "ResidualNorm", lambda _: SimpleNamespace(mass_shape=np.ones(12))
+    )
+    at = LoadedDesign(None, None, None, None, SimpleNamespace(free=np.arange(12)))
+    for last, scale in ((-0.5, 2.0), (2.0, 2.0), (2.0, 20.0)):
+        stiffness[3] = last
+        squares = stiffness * np.abs(stiffness)
+        value = ModalStiffness("wet", scale).measure(at).value
+        assert value == pytest.approx([-smooth_largest(-squares, 200.0 / scale**2)])
+    assert value[0] < 4.0 - 0.5, "on a large scale they aren't told apart"

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import shellform as sf
 from shellform.errors import NotConverged
 from shellform.problem import evaluation
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch, start_weights
@@ -283,3 +284,46 @@ def test_terms_are_weighted_to_their_shares_of_1_at_the_start_whatever_their_sig
     found = start_weights(problem, "start", paths)
     assert found == pytest.approx([0.4 / 4.0, 0.3 / 0.5, 0.2 / 2.0, 0.1 / 9.0])
     assert taken == ["wet", "wetter", "wet", "wet"]
+
+
+def test_what_needs_no_equilibrium_is_kept_of_the_last_sixteen_designs(evaluator, monkeypatch):
+    measured = []
+
+    def measure(term, at):
+        measured.append(at.design)
+        return f"{term.load} of {at.design}"
+
+    monkeypatch.setattr(evaluation, "measured", measure)
+    own, soft = SimpleNamespace(load=""), SimpleNamespace(load="wet")
+    states = {"wet": None}
+    designs = [f"design {k}" for k in range(17)]
+    for design in designs[:16]:
+        evaluator._measured(own, design, states, 1.0, None)
+    for design in designs[:16]:
+        assert evaluator._measured(own, design, states, 1.0, None) == f" of {design}"
+    assert measured == designs[:16]
+    for design in (designs[16], designs[1], designs[0]):
+        evaluator._measured(own, design, states, 1.0, None)
+    assert measured[16:] == [designs[16], designs[0]], "the first of them is forgotten"
+    for _ in range(2):
+        evaluator._measured(soft, designs[0], states, 1.0, None)
+    assert measured[18:] == [designs[0]] * 2
+
+
+def test_the_objective_s_slope_is_the_sum_of_its_terms_slopes_by_their_weights(dome):
+    """Of the radius alone, whose unit is the start's."""
+    problem = sf.Problem(
+        dome,
+        sf.LoadCase("wet", dome.point_load(2.0, every=2)),
+        [sf.Share(0.25, sf.RodRadius()), sf.Share(0.75, sf.RodRadius())],
+        [sf.AtMost(0.002, sf.RodRadius())],
+        variables=[sf.FreeRadius()],
+    )
+    design = dome.design()
+    evaluator = Evaluator(problem, design)
+    evaluator.weights = np.array([3.0, 5.0])
+    point = evaluator.linearised(evaluator.seed(design, {"wet": dome.target}, 1.0))
+    assert point.objective == pytest.approx(8.0 * design.radius)
+    assert point.objective_by_variables == pytest.approx([8.0 * design.radius])
+    assert point.constraints_by_variables == pytest.approx(np.array([[design.radius / 0.002]]))
+    assert point.constraints == pytest.approx([design.radius / 0.002 - 1.0])
