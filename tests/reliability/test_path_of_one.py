@@ -1,0 +1,434 @@
+"""One structure's way under its load, with states that are told: snaps, marks, ends, and whether it stands."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shellform.errors import NotConverged
+from shellform.reliability import path_of_one, standing
+from shellform.reliability.path_of_one import (
+    BIFURCATION,
+    BORNE,
+    ENDED,
+    LIMIT_POINT,
+    UNLOADED,
+    Limit,
+    Loading,
+    Snap,
+)
+from shellform.reliability.standing import Workshop
+from shellform.structure.elements.state import at_rest
+
+SPAN = 2.0
+PLACES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 0.5, 0.3]])
+
+
+def away(distance):
+    """A state of which one node is so far, m, from where the perfect structure's is, as 3 to 4 along two axes."""
+    return at_rest(PLACES + np.array([[0.0] * 3, [0.0] * 3, [0.6 * distance, 0.0, -0.8 * distance]]))
+
+
+def here(state):
+    return SimpleNamespace(state=state)
+
+
+def loading_of(*, bears=True, **own):
+    """A structure whose steps are told."""
+    loading = object.__new__(Loading)
+    loading.number, loading.spent, loading.snaps, loading.span = 7, 20, [], SPAN
+    loading.load, loading.assembly = np.full((3, 6), 2.0), "assembly"
+    loading.nominal = SimpleNamespace(
+        unloaded="unloaded", bears=bears, states=(None, away(0.0)), members=SimpleNamespace(span=SPAN)
+    )
+    for name, value in own.items():
+        setattr(loading, name, value)
+    return loading
+
+
+@pytest.mark.parametrize(
+    ("ended", "factor", "bears", "stands", "far"),
+    [
+        (0.0, 1.0, True, True, 0.0),
+        (0.0999, 1.0, True, True, 0.0999),  # a twentieth of 2 m at the most
+        (0.1001, 1.0, True, False, 0.1001),
+        (0.0, 0.999, True, False, np.inf),
+        (0.0, 1.0, False, False, np.inf),  # there is none to be near to
+    ],
+)
+def test_a_structure_stands_that_bears_its_load_within_a_twentieth_of_the_span_of_the_perfect_one(
+    ended, factor, bears, stands, far
+):
+    end = here(away(ended))
+    asked = []
+
+    def borne(most, step, smallest, *, marks):
+        asked.append((most, step, smallest, marks))
+        return end, factor
+
+    loading = loading_of(bears=bears, borne=borne, snaps=[Snap(0.4, 0.01)])
+    found = loading.outcome(0.5, 1 / 64, (0.8,))
+    assert asked == [(1.0, 0.5, 1 / 64, (0.8,))]
+    assert (found.number, found.factor, found.stands, found.factorisations) == (7, factor, stands, 20)
+    assert found.far == pytest.approx(far)
+    assert (found.state, found.snaps) == (end.state, (Snap(0.4, 0.01),))
+
+
+def test_a_structure_without_an_unloaded_state_bears_nothing():
+    found = loading_of(borne=lambda *_, **__: (None, 0.0)).outcome(1.0, 1 / 64)
+    assert (found.factor, found.stands, found.far, found.state) == (0.0, False, np.inf, "unloaded")
+
+
+def outcome(factor, *snaps):
+    return path_of_one.DrawnOutcome(
+        7, factor, True, 0.0, "end", 20, tuple(Snap(each, 0.01) for each in snaps)
+    )
+
+
+def test_at_rest_under_a_share_a_structure_goes_back_along_its_branch_or_from_nothing_where_it_has_snapped():
+    ways = []
+
+    def step(there, share, *, last):
+        ways.append(("back", there, share, last))
+        return here("back at rest")
+
+    def borne(share, step, smallest):
+        ways.append(("from nothing", share, step, smallest, list(loading.snaps)))
+        return here("from nothing"), share
+
+    loading = loading_of(at=lambda state: f"at {state}", step=step, borne=borne, snaps=["snapped"])
+    assert loading.rested(outcome(1.0), 0.7, 0.5, 1 / 64).resting == "back at rest"
+    assert loading.rested(outcome(1.0, 0.3), 0.7, 0.5, 1 / 64).resting == "back at rest", "it snaps before"
+    assert ways == [("back", "at end", 0.7, True)] * 2
+    ways.clear()
+    found = loading.rested(outcome(1.0, 0.3, 0.7), 0.7, 0.5, 1 / 64)
+    assert (found.resting, found.factorisations) == ("from nothing", 20)
+    assert ways == [("from nothing", 0.7, 0.5, 1 / 64, [])]
+    ways.clear()
+    loading.at = lambda state: here(state)
+    assert loading.rested(outcome(0.7), 0.7, 0.5, 1 / 64).resting == "end", "where it is already"
+    assert loading.rested(outcome(0.69), 0.7, 0.5, 1 / 64).resting is None
+    assert ways == []
+    loading.at = lambda state: None
+    loading.borne = lambda share, *_: (here("too soon"), 0.6)
+    assert loading.rested(outcome(1.0), 0.7, 0.5, 1 / 64).resting is None
+
+
+def snapping(ends, rests, **own):
+    """A structure whose branches end at these factors, and where it rests beyond each, None where it falls."""
+    ends, rests, asked = list(ends), list(rests), []
+
+    def followed(most, step, smallest, *, begin=None, marks=()):
+        asked.append((begin, marks))
+        return here(away(0.001 * len(asked))), ends.pop(0)
+
+    def rested(there, goal):
+        asked.append(goal)
+        return rests.pop(0)
+
+    return loading_of(followed=followed, _rested=rested, **own), asked
+
+
+def test_a_structure_goes_on_from_where_it_has_come_to_rest_two_resolutions_beyond_its_snap():
+    at_rest_there = here(away(0.011))
+    loading, asked = snapping([0.5, 1.0], [at_rest_there])
+    _, factor = loading.borne(1.0, 0.5, 1 / 64, marks=(0.8,))
+    assert factor == 1.0
+    assert loading.snaps == [Snap(0.5, pytest.approx(0.01))]
+    goal = 0.5 + 2 / 64
+    assert asked == [(None, (0.8,)), goal, ((goal, at_rest_there.state), (0.8,))]
+    loading, asked = snapping([0.99, 1.0], [at_rest_there])
+    loading.borne(1.0, 0.5, 1 / 64)
+    assert asked[1] == 1.0, "and no farther than is asked for"
+
+
+def test_a_structure_falls_where_it_comes_to_no_rest_or_has_snapped_three_times():
+    loading, _ = snapping([0.5], [None])
+    assert loading.borne(1.0, 0.5, 1 / 64)[1] == 0.5
+    assert loading.snaps == []
+    loading, _ = snapping([0.2, 0.3, 0.4, 0.6], [here(away(0.01))] * 4)
+    assert loading.borne(1.0, 0.5, 1 / 64)[1] == 0.6
+    assert len(loading.snaps) == 3
+    loading, asked = snapping([1.0], [])
+    assert loading.borne(1.0, 0.5, 1 / 64)[1] == 1.0
+    assert len(asked) == 1
+    unloaded = loading_of(followed=lambda *_, **__: (None, 0.0))
+    assert unloaded.borne(1.0, 0.5, 1 / 64) == (None, 0.0)
+
+
+def relaxing(monkeypatch, looks):
+    """Relaxations that end as told: at rest so far off, or not yet."""
+    looks, asked = list(looks), []
+
+    def find(assembly, state, load, *, limit):
+        asked.append((load[0, 0], limit))
+        distance, done = looks.pop(0)
+        if done:
+            return SimpleNamespace(state=away(distance), factorisations=3)
+        raise NotConverged("not yet", state=None if distance is None else away(distance), iterations=8)
+
+    monkeypatch.setattr(path_of_one, "find_equilibrium", find)
+    return asked
+
+
+@pytest.mark.parametrize(
+    ("looks", "rests", "spent"),
+    [
+        ([(0.0199, True)], True, 23),  # a hundredth of 2 m at the most
+        ([(0.0201, True)], False, 23),
+        ([(0.01, False), (0.015, False), (0.012, True)], True, 39),
+        ([(0.01, False), (0.0201, False), (0.01, True)], False, 36),  # it has gone too far on the way
+        ([(None, False), (0.01, True)], False, 28),
+        ([(0.01, False)] * 8 + [(0.01, True)], False, 84),  # and longer isn't looked
+    ],
+)
+def test_a_snap_is_local_where_no_node_goes_farther_than_a_hundredth_of_the_span(
+    monkeypatch, looks, rests, spent
+):
+    asked, settled = relaxing(monkeypatch, looks), []
+
+    def newton(state, load, *, limit, tolerance):
+        settled.append((load[0, 0], limit, tolerance))
+        return "at rest"
+
+    loading = loading_of(newton=newton)
+    found = loading._rested(here(away(0.0)), 0.6)
+    assert (found == "at rest") == rests
+    assert loading.spent == spent
+    assert set(asked) == {(1.2, 8)}
+    assert settled == ([(1.2, 2, path_of_one.ON_THE_WAY)] if rests else [])
+
+
+@pytest.mark.parametrize(
+    ("ends", "marks", "asked"),
+    [
+        # next to a mark it counts on which side of it a structure falls: within two resolutions beyond the end
+        ([0.79, 0.795], (0.8,), [(1.0, 0.5, 1 / 64), (0.8, pytest.approx(0.01), 1 / 512)]),
+        ([0.768], (0.8,), [(1.0, 0.5, 1 / 64)]),
+        ([0.8], (0.8,), [(1.0, 0.5, 1 / 64)]),
+        ([0.9], (0.8,), [(1.0, 0.5, 1 / 64)]),
+        (
+            [0.79, 0.8, 0.805],
+            (0.81, 0.8),
+            [(1.0, 0.5, 1 / 64), (0.8, pytest.approx(0.01), 1 / 512), (0.81, pytest.approx(0.01), 1 / 512)],
+        ),
+        ([0.99], (1.01,), [(1.0, 0.5, 1 / 64)]),  # beyond what is asked for
+        ([0.99, 1.0], (1.0,), [(1.0, 0.5, 1 / 64), (1.0, pytest.approx(0.01), 1 / 512)]),
+    ],
+)
+def test_the_end_of_a_branch_is_known_more_closely_next_to_marks(ends, marks, asked):
+    ends, heard, first = list(ends), [], ends[-1]
+
+    def along(there, factor, most, step, smallest):
+        heard.append((most, step, smallest))
+        return there, ends.pop(0)
+
+    loading = loading_of(along=along, at=lambda state: f"at {state}", _unloaded=lambda: "unloaded")
+    assert loading.followed(1.0, 0.5, 1 / 64, marks=marks) == ("unloaded", first)
+    assert heard == asked
+
+
+def test_a_path_begins_at_a_known_state_or_at_the_unloaded_one_which_there_may_not_be():
+    loading = loading_of(
+        along=lambda there, factor, *_: (there, factor),
+        at=lambda state: f"at {state}",
+        _unloaded=lambda: None,
+    )
+    assert loading.followed(1.0, 0.5, 1 / 64, begin=(0.3, "known")) == ("at known", 0.3)
+    assert loading.followed(1.0, 0.5, 1 / 64) == (None, 0.0)
+    loading.at = lambda state: None
+    assert loading.followed(1.0, 0.5, 1 / 64, begin=(0.3, "known")) == (None, 0.3)
+
+
+@pytest.mark.parametrize(
+    ("onward", "kind"),
+    [
+        # of masses 1, 4 and 1 the softest mode (1, 1, 0) weighs 5
+        ([1.0, 1.0, 0.0], LIMIT_POINT),
+        ([-3.0, -3.0, 0.0], LIMIT_POINT),
+        ([0.0, 0.0, 2.0], BIFURCATION),
+        ([4.0, -1.0, 0.0], BIFURCATION),
+        # cosines: 5 / sqrt(5 (5 + c²)), a half at c² = 15
+        ([1.0, 1.0, 3.8], LIMIT_POINT),
+        ([1.0, 1.0, 3.95], BIFURCATION),
+        # 1 / sqrt(5) is less than a half, 4 / sqrt(5 4) more
+        ([1.0, 0.0, 0.0], BIFURCATION),
+        ([0.0, 1.0, 0.0], LIMIT_POINT),
+    ],
+)
+def test_a_branch_ends_at_a_limit_point_where_its_tangent_turns_into_the_softest_mode(
+    monkeypatch, onward, kind
+):
+    """Within sixty degrees by the masses that motions are weighed with."""
+    shape = np.zeros((3, 6))
+    shape[1, :3] = [1.0, 1.0, 0.0]
+    shape[0, 0] = 99.0  # at a support
+    free = np.array([6, 7, 8])
+    factor = SimpleNamespace(solve=lambda load: np.array(onward))
+    loading = loading_of(
+        assembly=SimpleNamespace(free=free, factor=lambda state: factor),
+        measure=SimpleNamespace(mass_shape=np.array([1.0, 4.0, 1.0])),
+    )
+    monkeypatch.setattr(path_of_one, "modes", lambda *_: SimpleNamespace(shapes=[shape]))
+    assert loading.kind(here("end")) == kind
+
+
+class Beside:
+    """A workshop's structure that ends so."""
+
+    def __init__(self, end, factor, beside=None):
+        self.end, self.factor, self.near, self.asked, self.spent = end, factor, beside, [], 9
+
+    def beside(self):
+        return self.near
+
+    def borne(self, *given, **how):
+        self.asked.append(("borne", given, how))
+        return self.end, self.factor
+
+    def followed(self, *given, **how):
+        self.asked.append(("followed", given, how))
+        return self.end, self.factor
+
+    def kind(self, end):
+        return f"kind of {end.state}"
+
+
+@pytest.fixture
+def workshop(monkeypatch):
+    """One whose structures are told."""
+    made = object.__new__(Workshop)
+    made.nominal = SimpleNamespace(unloaded="unloaded", members="members")
+
+    def limit(way, structure, *given, **how):
+        monkeypatch.setattr(made, "with_structure", lambda errors, work: work(structure), raising=False)
+        return getattr(made, way)("errors", *given, **how)
+
+    return made, limit
+
+
+@pytest.mark.parametrize(("way", "path"), [("limit", "followed"), ("fall", "borne")])
+def test_a_structure_s_limit_is_the_end_of_its_branch_and_its_fall_where_snaps_end(workshop, way, path):
+    _, limit = workshop
+    structure = Beside(here("end"), 0.8)
+    how = {"step": 0.5, "resolution": 1 / 128, "begin": "known", "marks": (0.9,)}
+    assert limit(way, structure, most=1.5, **how) == Limit(0.8, "kind of end", "end", 9)
+    assert structure.asked == [(path, (1.5, 0.5, 1 / 128), {"begin": "known", "marks": (0.9,)})]
+    assert limit(way, structure, most=0.8).kind == BORNE
+    assert structure.asked[-1] == (path, (0.8, 1.0, 1 / 64), {"begin": None, "marks": ()})
+    assert limit(way, structure, most=0.9, tell=False).kind == ENDED
+    assert limit(way, Beside(None, 0.0), most=0.9) == Limit(0.0, UNLOADED, "unloaded", 9)
+
+
+def test_a_structure_that_rests_beside_the_perfect_one_is_not_loaded_from_nothing(workshop):
+    _, limit = workshop
+    structure = Beside(here("end"), 0.8, here("beside"))
+    assert limit("rests", structure, resolution=1 / 32) == Limit(1.0, BORNE, "beside", 9)
+    assert structure.asked == []
+    structure.near = None
+    assert limit("rests", structure, resolution=1 / 32, marks=(0.7,)) == Limit(0.8, ENDED, "end", 9)
+    assert structure.asked == [("borne", (1.0, 1.0, 1 / 32), {"marks": (0.7,)})]
+
+
+def test_drawn_structures_are_loaded_number_by_number_and_counted(monkeypatch, workshop):
+    made, _ = workshop
+    heard = []
+
+    def load(errors, **how):
+        heard.append((errors, how))
+        return SimpleNamespace(stands=how["number"] % 3 != 0)
+
+    monkeypatch.setattr(made, "load", load)
+    monkeypatch.setattr(standing, "variables", lambda members, seed, number: (members, seed, number))
+    monkeypatch.setattr(standing, "errors_of", lambda members, tolerances, z: (tolerances, z))
+    made.drawn("rough", seed=4, numbers=[5, 2], step=0.5, marks=(0.8,), resting=0.3)
+    assert heard == [
+        (("rough", ("members", 4, k)), {"number": k, "step": 0.5, "marks": (0.8,), "resting": 0.3})
+        for k in (5, 2)
+    ]
+    monkeypatch.setattr(standing, "perfect", lambda *given: given)
+    monkeypatch.setattr(standing, "Workshop", lambda nominal: made)
+    found = standing.sample("shell", "design", "load", "rough", count=7, seed=4, confidence=0.9)
+    assert (found.standing.drawn, found.standing.standing, found.standing.seed) == (7, 4, 4)
+    assert (found.standing.confidence, len(found.outcomes)) == (0.9, 7)
+
+
+@pytest.mark.parametrize(("resting", "end"), [(None, "found"), (0.3, ("rested", "found", 0.3, 0.5, 1 / 128))])
+def test_where_a_structure_rests_under_a_share_is_looked_for_where_it_is_asked(
+    monkeypatch, workshop, resting, end
+):
+    made, _ = workshop
+    structure = SimpleNamespace(
+        outcome=lambda step, smallest, marks: (
+            "found" if (step, smallest, marks) == (0.5, 1 / 128, (0.8,)) else None
+        ),
+        rested=lambda *given: ("rested", *given),
+    )
+    monkeypatch.setattr(made, "with_structure", lambda errors, work, *, number: (work(structure), number))
+    found = made.load("errors", number=3, step=0.5, smallest=1 / 128, marks=(0.8,), resting=resting)
+    assert found == (end, 3)
+
+
+@pytest.mark.parametrize(("distance", "near"), [(0.0199, True), (0.0201, False)])
+def test_an_equilibrium_is_beside_within_a_hundredth_of_the_span_of_where_its_tangent_leads(distance, near):
+    asked = []
+
+    def newton(begin, load, **how):
+        asked.append((load[0, 0], how))
+        return here(away(distance))
+
+    loading = loading_of(
+        bench=SimpleNamespace(loaded="factor"),
+        _taken_along=lambda start, load, factor: (away(0.0), "foreseen"),
+        newton=newton,
+    )
+    assert (loading.beside() is not None) == near
+    assert asked == [(2.0, {"limit": 10, "tolerance": path_of_one.ON_THE_WAY, "foreseen": "foreseen"})]
+    loading.newton = lambda *_, **__: None
+    assert loading.beside() is None
+    loading.bench.loaded = None
+    assert loading.beside() is None
+
+
+def test_an_unloaded_state_that_newton_s_steps_do_not_find_is_relaxed_from_there_or_from_the_target(
+    monkeypatch,
+):
+    start = at_rest(PLACES)
+    supports = np.zeros((3, 6))
+    supports[0, 0] = 0.01
+    found = ["direct"]
+    asked, settled = [], []
+
+    def newton(state, load, *, limit, tolerance, foreseen=None):
+        settled.append((load.any(), limit, foreseen))
+        return found.pop(0)
+
+    def find(assembly, near, load, *, limit):
+        asked.append((near if isinstance(near, str) else near.positions[0, 0], load.any(), limit))
+        if lost:
+            lost.pop()
+            raise NotConverged("lost", iterations=40)
+        return SimpleNamespace(state="relaxed", factorisations=5)
+
+    monkeypatch.setattr(path_of_one, "find_equilibrium", find)
+    loading = loading_of(
+        bench=SimpleNamespace(unloaded="factor"),
+        errors=SimpleNamespace(supports=supports),
+        _taken_along=lambda state, load, factor: ("taken along", "foreseen"),
+        newton=newton,
+    )
+    loading.nominal.start = start
+    lost = []
+    assert loading._unloaded() == "direct"
+    assert (asked, settled) == ([], [(False, 15, "foreseen")])
+    found[:] = [None, "relaxed at last"]
+    assert loading._unloaded() == "relaxed at last"
+    assert asked == [("taken along", False, 150)]
+    assert (settled[-1], loading.spent) == ((False, 2, None), 25)
+    found[:], lost[:] = [None, "from the target"], ["once"]
+    assert loading._unloaded() == "from the target"
+    assert asked[-1] == (pytest.approx(0.01), False, 150), "with its supports where they are"
+    assert loading.spent == 25 + 40 + 5
+    found[:], lost[:] = [None], ["once", "twice"]
+    assert loading._unloaded() is None
+    assert loading.spent == 70 + 80
