@@ -39,7 +39,10 @@ def loading_of(*, bears=True, **own):
     loading.number, loading.spent, loading.snaps, loading.span = 7, 20, [], SPAN
     loading.load, loading.assembly = np.full((3, 6), 2.0), "assembly"
     loading.nominal = SimpleNamespace(
-        unloaded="unloaded", bears=bears, states=(None, away(0.0)), members=SimpleNamespace(span=SPAN)
+        unloaded="unloaded",
+        bears=bears,
+        states=(None, "on the way", away(0.0)),
+        members=SimpleNamespace(span=SPAN),
     )
     for name, value in own.items():
         setattr(loading, name, value)
@@ -377,9 +380,14 @@ def test_an_equilibrium_is_beside_within_a_hundredth_of_the_span_of_where_its_ta
         asked.append((load[0, 0], how))
         return here(away(distance))
 
+    def taken_along(start, load, factor):
+        assert start is loading.nominal.states[-1]
+        assert (load[0, 0], factor) == (2.0, "factor")
+        return away(0.0), "foreseen"
+
     loading = loading_of(
         bench=SimpleNamespace(loaded="factor"),
-        _taken_along=lambda start, load, factor: (away(0.0), "foreseen"),
+        _taken_along=taken_along,
         newton=newton,
     )
     assert (loading.beside() is not None) == near
@@ -432,3 +440,63 @@ def test_an_unloaded_state_that_newton_s_steps_do_not_find_is_relaxed_from_there
     found[:], lost[:] = [None], ["once", "twice"]
     assert loading._unloaded() is None
     assert loading.spent == 70 + 80
+
+
+@pytest.mark.parametrize("moved_supports", [True, False])
+def test_errors_take_the_perfect_structure_along_by_its_own_tangent_and_its_supports(moved_supports):
+    """K is 4 N/m: 2 N are borne by 0.5 N, less 1 N by what the supports pull, where they have moved."""
+    offset = np.zeros((3, 6))
+    offset[0, 1] = 0.25 if moved_supports else 0.0
+    free = np.array([12, 13, 14])
+    force, pulled = np.full((3, 6), 0.5), np.zeros((3, 6))
+    pulled[2, :3] = [1.0, 0.0, -1.0]
+    corrected = []
+
+    def along(start, given):
+        assert given is offset
+        return pulled
+
+    loading = loading_of(
+        errors=SimpleNamespace(supports=offset),
+        assembly=SimpleNamespace(
+            evaluate=lambda state, tangent: SimpleNamespace(force=force, turned=0.1),
+            free=free,
+            chords=SimpleNamespace(corrected=lambda state, change: corrected.append(change) or change),
+        ),
+        bench=SimpleNamespace(assembly=SimpleNamespace(force_along=along)),
+        _as_perfect=lambda start, turned, change: ("foreseen", turned, change),
+    )
+    start, factor = at_rest(PLACES), SimpleNamespace(solve=lambda right: right / 4.0)
+    begin, (_, turned, change) = loading._taken_along(start, loading.load, factor)
+    less = np.array([1.0, 0.0, -1.0]) if moved_supports else np.zeros(3)
+    expected = offset.copy()
+    expected[2, :3] = (2.0 - 0.5 - less) / 4.0
+    assert change == pytest.approx(expected)
+    assert corrected[0] is change
+    assert turned == 0.1
+    assert begin.positions == pytest.approx(PLACES + expected[:, :3])
+    begin, _ = loading._taken_along(start, loading.load, None)
+    assert begin.positions == pytest.approx(PLACES + offset[:, :3]), "without a tangent the supports alone"
+
+
+def test_elements_of_a_built_structure_take_on_the_forces_that_the_perfect_one_s_would():
+    """One is longer by a half and as stiff, the other as long and four times as stiff."""
+    states = {True: np.array([[3.0, 5.0], [7.0, 2.0]]), False: np.array([[1.0, 2.0], [3.0, 6.0]])}
+    lost = []
+
+    def foreseen(start, turned, change):
+        return None if change.any() in lost else (states[bool(change.any())],)
+
+    loading = loading_of(
+        foreseen=foreseen,
+        assembly=SimpleNamespace(parts=[SimpleNamespace(rest_length=np.array([3.0, 2.0]))]),
+        errors=SimpleNamespace(beam_stiffness=np.array([1.0, 4.0])),
+    )
+    loading.nominal.network = SimpleNamespace(beams=SimpleNamespace(rest_length=np.array([2.0, 2.0])))
+    (found,) = loading._as_perfect("start", 0.1, np.ones((3, 6)))
+    assert found == pytest.approx(
+        np.array([[1.0 + 1.5 * 2.0, 2.0 + 1.5 * 3.0], [3.0 + 4.0 / 4, 6.0 - 4.0 / 4]])
+    )
+    for way in (True, False):
+        lost[:] = [way]
+        assert loading._as_perfect("start", 0.1, np.ones((3, 6))) is None

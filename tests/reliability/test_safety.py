@@ -151,7 +151,8 @@ def judged(monkeypatch, made, safety, *, loads, critical=1.25, **how):
     return judge(None, None, loads, safety, **how), followed
 
 
-DOWN = np.full((2, 6), -1.0)
+DOWN = np.array([[0.0, 0.0, -6.0, 0.0, 0.0, 0.0]] * 2)
+ASIDE = np.array([[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]] * 2)
 BOTH = {"none": 0.0 * DOWN, "wet": DOWN, "wetter": 1.25 * DOWN}
 
 
@@ -199,7 +200,7 @@ def test_the_initial_design_s_share_is_asked_for_under_other_loads_alone(monkeyp
     )
     assert (found.loads["wet"].required, found.loads["wetter"].required) == (0.75, 0.25)
     assert found.failed == ("under the load 'wet' 2 of 4 drawn structures stand, and 3 are required",)
-    lone = {"wet": DOWN, "wind": DOWN * [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]}
+    lone = {"wet": DOWN, "wind": ASIDE}
     found, followed = judged(
         monkeypatch, Drawn([1.0] * 4), asked, loads=lone, design_load="wet", initial=before
     )
@@ -264,6 +265,8 @@ def test_what_lies_beyond_it_is_refused(entries):
 def test_a_load_that_is_off_another_s_line_by_a_millionth_has_a_path_of_its_own():
     across = np.zeros((2, 6))
     across[1, 0] = 1.0
+    heavy = {"wet": 1e4 * DOWN, "beside": 5e3 * DOWN + 1e-6 * across}  # a share of 1e-11 across
+    assert list(paths(heavy)) == ["wet"]
     beside = 0.5 * DOWN + 1e-6 * across
     assert paths({"wet": DOWN, "beside": beside}) == {"wet": {"wet": 1.0}, "beside": {"beside": 1.0}}
     assert paths({"wet": DOWN, "beside": 0.5 * DOWN + 1e-12 * across}) == {

@@ -130,7 +130,8 @@ def asked_of(may, *, first=0, loads=None, **entries):
     return Required(safety, LOADS if loads is None else loads, "wet", may, first)
 
 
-DOWN = np.full((2, 6), -1.0)
+DOWN = np.array([[0.0, 0.0, -6.0, 0.0, 0.0, 0.0]] * 2)
+ASIDE = np.array([[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]] * 2)
 LOADS = {"wet": DOWN, "wetter": 1.25 * DOWN}
 
 
@@ -197,7 +198,7 @@ def test_no_more_structures_are_loaded_than_it_takes_to_refuse_but_where_the_who
 
 def test_structures_of_other_samples_count_under_the_design_load_alone(monkeypatch):
     made = Tried({**dict.fromkeys(range(6), 1.0), 900: 0.9, 901: 0.1}, monkeypatch)
-    loads = {**LOADS, "wind": DOWN * [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]}
+    loads = {**LOADS, "wind": ASIDE}
     asked = asked_of({"wet": 1, "wetter": 0, "wind": 0}, loads=loads)
     found = made.judged(asked, first=(900, 2, 901))
     assert found.fallen == {"wet": (901,), "wetter": (), "wind": ()}
@@ -390,3 +391,19 @@ def test_a_design_is_confirmed_where_its_critical_factor_is_kept_on_the_halved_m
         "what falls is looked at no further"
     )
     assert len(sought) == 1
+
+
+def test_what_falls_under_several_loads_is_to_bear_the_largest_before_thinning_and_the_smallest_at_the_end(
+    monkeypatch,
+):
+    asked = asked_of({"wet": 0, "wetter": 0})
+    found = JudgedTrial({"wet": (4,), "wetter": (4, 2)}, True, False, 0, {4: 0.3, 2: 0.9})
+    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: found)
+    assert to_bear(None, None, asked) == {4: 1.0, 2: 1.0}
+    assert aims(asked, found) == {4: pytest.approx(0.8), 2: 1.0}
+
+
+def test_of_those_that_fall_the_ones_that_bear_most_are_aimed_for_and_of_unknown_factors_nothing_is_expected():
+    fell = JudgedTrial({"wet": (1, 2, 3, 4, 5, 6)}, True, False, 0, {1: 0.5, 2: 0.1, 3: 0.9, 4: 0.7, 5: 0.3})
+    for may, nearest in ((0, (6, 2, 5, 1, 4, 3)), (3, (6, 2, 5, 1, 4, 3)), (4, (2, 5, 1, 4, 3)), (8, (3,))):
+        assert trial_structures._nearest(fell, "wet", may) == nearest
