@@ -161,10 +161,10 @@ def test_a_cable_counts_for_the_most_that_a_structure_misses_without_it_as_a_sha
     blocks = SimpleNamespace(each_cable=slice(1, 5), unit=np.array([7.0, 2.0, 1.0, 4.0, 5.0]))
     search = SimpleNamespace(evaluator=SimpleNamespace(blocks=blocks))
     model = SimpleNamespace(
-        point=SimpleNamespace(constraints_by_variables=rows), length=np.array([1.2, 2.4, 4.5])
+        point=SimpleNamespace(constraints_by_variables=rows), length=np.array([1.2, 3.2, 4.25])
     )
     it = SimpleNamespace(mind=mind_of({3: 1.0, 4: 1.0}), point=SimpleNamespace(design=design))
-    longer = np.array([0.1, 0.1, 0.1])
+    longer = np.array([0.1, 0.3, 0.05])
     misses = np.array([2.0, 4.0, 1.0]) * longer
     assert minding.missed_without(search, it, model) == pytest.approx(misses / misses.sum())
     model.point.constraints_by_variables = -np.abs(rows)

@@ -181,14 +181,14 @@ def restiffening(monkeypatch):
 def test_another_stiffness_is_asked_for_where_designs_are_judged_as_built_and_it_is_another_one(monkeypatch):
     asked = restiffening(monkeypatch)
     search = searching(asked="asked", solver=sf.SequentialConvex(stiffness=0.25))  # of 2 N/m
-    it = iterate(stiffness=1.0)
-    for wanted, kept in ((1.3, 1.3), (0.7, 0.7), (0.3, 0.5), (1.0 + 5e-7, 1.0), (1.0 + 2e-6, 1.0 + 2e-6)):
+    it = iterate(stiffness=10.0)
+    for wanted, kept in ((13.0, 13.0), (7.0, 7.0), (0.3, 0.5), (10.000008, 10.0), (10.000015, 10.000015)):
         found = phases._aiming_for(search, it, wanted)
         assert (found.stiffness, found.window) == (kept, 0.2)
     assert len(asked) == 4
     alone = searching(solver=search.solver)
     assert phases._aiming_for(alone, it, 1.3) is it
-    none = iterate(stiffness=0.0)
+    none = iterate(stiffness=0.0)  # nothing is asked of it
     assert phases._aiming_for(search, none, 1.3) is none
 
 
@@ -314,7 +314,9 @@ def thinning(monkeypatch):
     monkeypatch.setattr(phases, "attempt_without", lambda *_: told.trial)
     monkeypatch.setattr(phases, "_made_to_stand", made)
     monkeypatch.setattr(phases, "_repaired", repaired)
-    monkeypatch.setattr(phases, "noted", lambda search, it, trial, kept: told.noted.append(kept) or it)
+    monkeypatch.setattr(
+        phases, "noted", lambda search, it, trial, kept: told.noted.append((trial, kept)) or it
+    )
     monkeypatch.setattr(
         phases, "accepted", lambda search, it, found: replace(it, accepted=(*it.accepted, found))
     )
@@ -339,7 +341,7 @@ def test_batches_grow_while_cables_go_and_are_cut_where_they_do_not_until_single
     assert {(budget.objective, budget.deviation) for *_, budget in thinning.seen} == {(0.6, 0.01)}
     assert (end.failures, end.needed.tolist()) == (2, [False, False, True, True, True])
     assert end.status == "settled, and no further cable can be taken away"
-    assert thinning.noted == [False] * 4
+    assert thinning.noted == [(thinning.trial, False)] * 4
     assert len(end.accepted) == 3
     assert thinning.aims == pytest.approx([0.95 * 2.0] * 2)
 
@@ -400,6 +402,7 @@ def test_a_trial_off_the_branch_is_no_trial_to_judge(thinning):
     thinning.trial, thinning.batches, thinning.go = None, [[1]], [False]
     end = thinned(searching(asked="asked", solver=sf.SequentialConvex(failures=1)))
     assert (len(thinning.repaired), end.failures) == (0, 1)
+    assert thinning.noted == [(end.point, False)], "in the place of one"
 
 
 @pytest.mark.parametrize(("idle", "left"), [(0.2, False), (0.3, True)])
@@ -414,7 +417,7 @@ def test_cables_leave_the_search_that_pull_under_no_load_once_they_are_a_fifth(m
     design = Design(np.ones(6), np.array([True, False, True, True, True, True]), 0.1)
     begun = iterate(
         SimpleNamespace(design=design, states={name: name for name in pulls}),
-        accepted=("first", "last"),
+        accepted=("first", "second", "last"),
         tensioned=np.array([True, False, False, True, False]),
         needed=np.array([False, True, False, False, True]),
     )
@@ -425,7 +428,7 @@ def test_cables_leave_the_search_that_pull_under_no_load_once_they_are_a_fifth(m
     assert found.point.design.present.tolist() == [True, False, True, True, False, True]
     assert found.tensioned.tolist() == [True, False, False, False]
     assert found.needed.tolist() == [False, True, False, True]
-    assert found.accepted == ("first", "without")
+    assert found.accepted == ("first", "second", "without")
 
 
 @pytest.mark.parametrize(("window", "after"), [(0.3, 0.2), (1.0, 0.4), (9.0, 3.6), (40.0, 4.0)])
@@ -560,3 +563,77 @@ def test_half_of_the_evaluations_left_to_thinning_are_kept_only_under_the_whole_
         monkeypatch.setattr(phases, "noted", lambda search, it, point, kept: it)
         phases._descend(search, iterate(broken, stage=stage), least=3)
         assert search.evaluator.evaluations == spent
+
+
+@pytest.fixture
+def descending(monkeypatch):
+    """Descents of one trial, whose objective is told."""
+    told = SimpleNamespace(predicted=-0.5, trial=None, broken=0.0)
+    monkeypatch.setattr(phases, "violation", lambda *_: told.broken)
+    monkeypatch.setattr(phases, "tell", lambda *_: None)
+    monkeypatch.setattr(phases, "task", lambda *_: None)
+    monkeypatch.setattr(phases, "merit", lambda search, point: point.objective)
+    monkeypatch.setattr(phases, "noted", lambda search, it, point, kept: it)
+    monkeypatch.setattr(phases, "accepted", lambda search, it, trial: replace(it, point=trial))
+
+    def attempt(search, it, model, y):
+        search.evaluator.evaluations += 1
+        return told.trial, it
+
+    monkeypatch.setattr(phases, "propose", lambda *_: (None, told.predicted))
+    monkeypatch.setattr(phases, "attempt", attempt)
+    return told
+
+
+@pytest.mark.parametrize(
+    ("predicted", "gained", "factor"),
+    [(-0.5, 0.36, 1.6), (-0.5, 0.34, 1.0), (-0.5, 0.16, 1.0), (-0.5, 0.14, 0.4), (0.0, 0.01, 1.6)],
+)
+def test_what_came_true_of_a_prediction_decides_on_the_next_window(descending, predicted, gained, factor):
+    """More than seven tenths of a half, or less than three; of nothing that was predicted any gain is more."""
+    descending.predicted, descending.trial = predicted, point(2.0 - gained)
+    found = phases._descend(searching(1), iterate(point(2.0), window=0.5))
+    assert found.window == pytest.approx(factor * 0.5)
+
+
+def test_a_search_settles_by_shares_of_its_objective_and_of_mean_tensions(descending):
+    """A thousandth of 0.4 in a window of 4 N; the smallest window is 0.03 of that."""
+
+    def settled(predicted, **changes):
+        return phases._settled(searching(), iterate(point(0.4), **changes), predicted)
+
+    assert "less than 0.1% improvement" in settled(-0.39e-3, window=4.0)
+    assert settled(-0.41e-3, window=4.0) == settled(-0.39e-3, window=3.9) == ""
+    assert "no better design within the smallest" in settled(-1.0, window=0.119)
+    assert settled(-1.0, window=0.121) == ""
+    descending.broken = 0.1
+    assert "breaks its limits less" in settled(-0.39e-3, window=0.119)
+
+
+def test_a_climb_ends_where_the_further_loads_are_borne_whole(monkeypatch):
+    search = searching(first_window=0.8, always_guarded=False, base="wet")
+    search.evaluator.problem.constraints = [SimpleNamespace(term=SimpleNamespace(stabilises=True))]
+    search.evaluator.seed = lambda design, states, stage: f"{design} at {stage}"
+    noted, reached = [], [0.5, 0.75, 1.0, 1.0]
+
+    def attempt(search, it, model, y):
+        return SimpleNamespace(design="design", states={"wet": "rest"}), it
+
+    monkeypatch.setattr(phases, "tell", lambda *_: None)
+    monkeypatch.setattr(phases, "task", lambda *_: None)
+    monkeypatch.setattr(phases, "propose", lambda *_: (None, 0.0))
+    monkeypatch.setattr(phases, "attempt", attempt)
+    monkeypatch.setattr(
+        phases, "reach", lambda *given: reached.pop(0) if given[2:] == ("rest", 0.0, 0.15) else None
+    )
+    monkeypatch.setattr(phases, "staged", lambda *_: {})
+    monkeypatch.setattr(phases, "accepted_design", lambda search, point: point)
+    monkeypatch.setattr(phases, "noted", lambda search, it, point, kept: noted.append((point, kept)) or it)
+    end = phases._climb(search, iterate("start", stage=0.5, window=0.8))
+    assert (end.stage, reached) == (1.0, [1.0])
+    assert noted[0][0].design == "design", "the trial that was refused"
+    assert noted[1:] == [("design at 0.75", True), ("design at 1.0", True)]
+    assert end.accepted == ("first", "design at 0.75", "design at 1.0")
+    assert (end.window, end.guarded) == (0.8, False)
+    whole = iterate("start", stage=1.0)
+    assert phases._climb(search, whole) is whole
