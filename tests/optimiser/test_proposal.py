@@ -8,8 +8,10 @@ import pytest
 from scipy.optimize import minimize
 
 from shellform.optimiser import proposal
+from shellform.optimiser.guards import WholeGuard
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.proposal import propose
+from shellform.optimiser.quadratic import LowRank
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.trials import task
 from tests.problems import misfit_and_force
@@ -134,3 +136,208 @@ def test_a_dead_cable_s_slope_is_that_of_its_tension_under_the_design_load():
     )
     slope = proposal._exact_in_tension(np.array([0.1, 0.2, 0.3]), model)
     assert slope.tolist() == [0.1, 2.0 * 7.0, 0.3]
+
+
+def model_of(**changes):
+    """Of two tensions and a radius, to which its parameters answer by A = [[1, 2, 0], [0, -1, 3]]."""
+    answers = SimpleNamespace(
+        by_parameters=lambda rows: rows @ np.array([[1.0, 2.0, 0.0], [0.0, -1.0, 3.0]]),
+        parameters_changed=lambda change: np.array([[1.0, 2.0, 0.0], [0.0, -1.0, 3.0]]) @ change,
+        by_variables=lambda rows: 10.0 * rows,
+    )
+    given = {
+        "tensions": 2,
+        "origin": np.array([2.0, 0.5, 0.1]),
+        "lower": np.array([0.0, 0.0, 0.05]),
+        "upper": np.array([9.0, 6.0, 0.2]),
+        "step": np.array([0.04]),
+        "answers": answers,
+    }
+    return SimpleNamespace(**{**given, **changes})
+
+
+def task_of(**changes):
+    given = {
+        "solver": SequentialConvex(),
+        "model": model_of(),
+        "window": 0.5,
+        "tension": 2.0,
+        "bounded": (),
+        "tensioned": np.array([True, False]),
+        "guards": [],
+        "climbing": False,
+        "groups": None,
+        "excess": np.zeros(1),
+        "least": 0.3,
+        "aims": 0,
+    }
+    return SimpleNamespace(**{**given, **changes})
+
+
+def test_tensions_are_bounded_by_the_least_that_cables_keep_and_the_most_that_each_limit_lets_them_have():
+    limits = [SimpleNamespace(upper=7.0), SimpleNamespace(upper=8.0)]
+    lower, upper = proposal._box(task_of(bounded=limits))
+    assert (lower.tolist(), upper.tolist()) == ([0.3, 0.0, 0.05], [7.0, 6.0, 0.2])
+    lower, upper = proposal._box(task_of())
+    assert upper.tolist() == [9.0, 6.0, 0.2]
+    none = model_of(tensions=0)
+    assert proposal._box(task_of(model=none))[0].tolist() == [0.0, 0.0, 0.05]
+    assert none.lower.tolist() == [0.0, 0.0, 0.05], "the model's own stay"
+
+
+GUARD = WholeGuard(np.array([0.25, 0.9, 4.0]), np.array([[1.0, 0.0], [1.0, 2.0], [0.5, 0.0]]))
+WIDTH = np.array([0.5, 0.5, 0.01])
+
+
+def test_a_guarded_cable_s_fall_is_told_in_what_a_whole_window_can_change_of_its_tension():
+    """Of the first 1.5 N and of the second 0.5 + 0 + 0.06: below its 0.3 N it regains 0.05 N, no more than a tenth."""
+    falls, scale, asked = proposal._falls(task_of(), GUARD, np.array([0, 1]), WIDTH)
+    assert falls == pytest.approx(-np.array([[0.5, 1.0, 0.0], [0.5, 0.0, 0.06]]))
+    assert scale == pytest.approx([1.5, 0.56])
+    assert asked == pytest.approx([0.05 / 1.5, -0.6 / 0.56])
+    assert proposal._falls(task_of(least=1.0), GUARD, np.array([0]), WIDTH)[2].tolist() == [0.1]
+
+
+def test_the_nearest_cables_are_guarded_that_a_step_could_let_go_slack():
+    """The second could fall by 0.56 N to 0.34, not to 0.3; with 0.35 N it is guarded, too, and the third never."""
+    rows, values = proposal._guarding(task_of(guards=[GUARD]), WIDTH)
+    assert rows == pytest.approx(-np.array([[0.5, 1.0, 0.0]]) / 1.5)
+    assert values == pytest.approx([0.05 / 1.5])
+    task = task_of(guards=[GUARD, GUARD], least=0.35)
+    rows, values = proposal._guarding(task, WIDTH)
+    assert values == pytest.approx([0.1 / 1.5, -0.55 / 0.56] * 2)
+    assert rows[1] == pytest.approx(-np.array([0.5, 0.0, 0.06]) / 0.56)
+    task.solver = SequentialConvex(guards=1)
+    assert proposal._guarding(task, WIDTH)[1] == pytest.approx([0.1 / 1.5] * 2)
+    rows, values = proposal._guarding(task_of(), WIDTH)
+    assert (rows.shape, values.shape) == ((0, 3), (0,))
+
+
+def test_cables_join_the_guarded_ones_that_a_step_lets_fall_the_farthest_first():
+    """The least may be missed by a thousandth."""
+    held = SimpleNamespace(
+        tension=np.array([1.0, 1.0, 1.0, 1.0, 1.0]),
+        changed=lambda change: np.array([-0.9, -0.7, -0.8, -0.7004, -0.7002]),
+    )
+    none = np.zeros(0, dtype=np.int64)
+    assert proposal._let_fall(task_of(), held, none, None).tolist() == [0, 2, 3]
+    assert proposal._let_fall(task_of(), held, np.array([0]), None).tolist() == [2, 3]
+    few = task_of(solver=SequentialConvex(guards=2))
+    assert proposal._let_fall(few, held, none, None).tolist() == [0, 2]
+    assert proposal._let_fall(few, held, np.array([4]), None).tolist() == [0]
+
+
+def test_steps_are_solved_for_with_more_guarded_cables_until_none_falls():
+    """The first step takes the first cable to nothing; the second one leaves it."""
+    steps, asked = [np.array([-0.5, 0.0, 0.0]), np.array([0.1, 0.0, 0.0])], []
+
+    def solved(rows, values):
+        asked.append((rows, values))
+        return steps[len(asked) - 1]
+
+    u = proposal._guarded_in_turn(task_of(guards=[GUARD]), WIDTH, solved)
+    assert u is steps[1]
+    assert asked[0][0].shape == (0, 3)
+    assert asked[1][0] == pytest.approx(-np.array([[0.5, 1.0, 0.0]]) / 1.5)
+    assert asked[1][1] == pytest.approx([0.05 / 1.5])
+
+
+def test_curvatures_are_summed_by_their_weights_in_windows():
+    def model(*hessians):
+        quadratics = [None if each is None else SimpleNamespace(hessian=each) for each in hessians]
+        return SimpleNamespace(
+            evaluator=SimpleNamespace(weights=np.array([2.0, 4.0, 5.0])[: len(hessians)]),
+            quadratics=quadratics,
+        )
+
+    one, other = np.array([[1.0, 2.0], [2.0, 5.0]]), np.array([[3.0, 0.0], [0.0, 1.0]])
+    width = np.array([0.5, 0.1])
+    found = proposal._curvature(model(one, None, other), width)
+    assert found == pytest.approx((2.0 * one + 5.0 * other) * np.outer(width, width))
+    few = LowRank(np.array([[1.0], [3.0]])), LowRank(np.array([[0.5], [-1.0]]))
+    found = proposal._curvature(model(*few), width)
+    u = np.array([7.0, -2.0])
+    whole = 2.0 * few[0].columns @ few[0].columns.T + 4.0 * few[1].columns @ few[1].columns.T
+    assert found @ u == pytest.approx((whole * np.outer(width, width)) @ u)
+    assert (proposal._curvature(model(None), width) @ u).tolist() == [0.0, 0.0]
+
+
+def test_a_climb_goes_along_each_constraint_on_stability_by_its_own_size():
+    parts = [SimpleNamespace(term=SimpleNamespace(stabilises=each)) for each in (True, False, True)]
+    rows = np.array([[3.0, 4.0], [9.0, 9.0], [0.0, -0.2], [5.0, 12.0]])
+    problem = SimpleNamespace(constraints=parts, places=lambda: [slice(0, 1), slice(1, 2), slice(2, 4)])
+    model = model_of(
+        evaluator=SimpleNamespace(problem=problem), point=SimpleNamespace(constraints_by_variables=rows)
+    )
+    found = proposal._slope(task_of(model=model, climbing=True))
+    assert found == pytest.approx(10.0 * np.array([0.6 + 5.0 / 13.0, 0.8 - 1.0 + 12.0 / 13.0]))
+
+
+def test_aims_that_are_missed_have_a_price_and_limits_that_are_broken_do_not():
+    values = np.array([0.5, -0.1, 0.2])
+    assert proposal._at_their_price(task_of(aims=1), values)
+    assert not proposal._at_their_price(task_of(aims=0), values)
+    assert not proposal._at_their_price(task_of(aims=1), np.array([0.5, 0.2, 0.0]))
+    assert proposal._at_their_price(task_of(aims=2), np.array([0.5, 0.2, -0.1]))
+
+
+def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_steps(monkeypatch):
+    """Of half a newton where the start's mean is 2 N, so that the radius goes a quarter of its step; a cable below its
+    least goes there as far as the window lets it, and one whose tension is next to nothing has none."""
+    seen = []
+
+    def quadratic(curvature, slope, rows, values, low, high):
+        seen.append((curvature, slope, rows, values, low, high))
+        return np.array([0.5, -0.999, 1.0])
+
+    monkeypatch.setattr(proposal, "minimise_quadratic", quadratic)
+    monkeypatch.setattr(proposal, "_from_there", lambda evaluate, u, low, high, evaluations: u)
+    monkeypatch.setattr(proposal, "_slope", lambda task: np.array([2.0, 3.0, 100.0]))
+    monkeypatch.setattr(proposal, "_curvature", lambda model, width: np.diag([8.0, 2.0, 4.0]))
+    model = model_of(
+        point=SimpleNamespace(constraints=np.array([-0.4])), constraints_by_y=np.array([[1.0, -2.0, 5.0]])
+    )
+    task = task_of(model=model, excess=np.array([0.15]))
+    y, predicted = propose(task)
+    curvature, slope, rows, values, low, high = seen[0]
+    assert slope == pytest.approx([1.0, 1.5, 1.0])
+    assert rows == pytest.approx(np.array([[0.5, -1.0, 0.05]]))
+    assert values == pytest.approx([-0.25])
+    assert low == pytest.approx([-1.0, -1.0, -1.0])
+    assert high == pytest.approx([1.0, 1.0, 1.0])
+    assert y == pytest.approx([2.25, 0.0, 0.11]), "0.0005 N is less than a thousandth of 2 N"
+    u = np.array([0.5, -0.999, 1.0])
+    assert predicted == pytest.approx(slope @ u + 0.5 * u @ curvature @ u)
+    propose(task_of(model=model, window=6.0))
+    low, high = seen[1][4:]
+    assert low == pytest.approx([(0.3 - 2.0) / 6.0, -0.5 / 6.0, -1.0])
+    assert high == pytest.approx([1.0, 5.5 / 6.0, 1.0]), "and no more than its whole step"
+    model.origin = np.array([-0.4, 0.5, 0.1])
+    propose(task_of(model=model))
+    assert (seen[2][4][0], seen[2][5][0]) == (1.0, 1.0)
+    grouped = task_of(model=model, groups=np.array([0, 1]))
+    monkeypatch.setattr(proposal, "_equal_steps", lambda *_: np.array([0.0, -0.999, 0.0]))
+    assert propose(grouped)[0][1] == pytest.approx(0.0005), "of cables alike none goes alone"
+
+
+def test_cables_alike_change_their_lengths_by_the_same():
+    """Rest lengths l of three cables answer to tensions by l = y / k; the first and the last are alike."""
+    k = np.array([1.0, 2.0, 4.0])
+    answers = object.__new__(proposal.WholeAnswers)
+    object.__setattr__(answers, "of_rest_lengths", lambda member: k[:, None] * member)
+    task = task_of(model=model_of(answers=answers), groups=np.array([0, 1, 0]))
+    width = np.array([0.5, 0.5, 0.5])
+
+    none, nothing = np.zeros((0, 3)), np.zeros(0)
+
+    def step(slope, low=-1.0, high=1.0, rows=none, values=nothing):
+        return proposal._equal_steps(
+            task, width, np.diag([1e-6] * 3), np.array(slope), rows, values, np.full(3, low), np.full(3, high)
+        )
+
+    assert step([-1.0, 1.0, 0.0]) == pytest.approx([0.25, -1.0, 1.0], abs=1e-4)
+    assert step([-1.0, 1.0, 0.0], low=-0.2, high=0.4) == pytest.approx([0.1, -0.2, 0.4], abs=1e-4)
+    held = step([-1.0, 1.0, 0.0], rows=np.array([[0.0, 0.0, 1.0]]), values=np.array([-0.6]))
+    assert held == pytest.approx([0.15, -1.0, 0.6], abs=1e-4)
+    broken = step([-1.0, 1.0, 0.0], rows=np.array([[0.0, 0.0, 1.0]]), values=np.array([0.3]))
+    assert broken == pytest.approx([0.0, -1.0, 0.0], abs=1e-4), "what is broken may stay so"
