@@ -5,11 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import built_beams, built_cables, built_load, errors_of, variables
-from shellform.reliability.members import _chains
+from shellform.reliability.drawing import (
+    PERFECT,
+    Imperfections,
+    built_beams,
+    built_cables,
+    built_load,
+    drawn,
+    errors_of,
+    sizes,
+    variables,
+)
+from shellform.reliability.members import Member, Members, _chains
 from shellform.structure.elements.beam import make_beams
-from shellform.structure.elements.state import from_vectors
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.state import at_rest, from_vectors
 
 
 @pytest.fixture(scope="module")
@@ -108,3 +120,109 @@ def test_a_rod_s_elements_are_told_with_the_sense_in_which_each_runs_along_it():
     rod = make_beams(places, [[1, 2], [1, 0], [3, 2]], axial=1e5, torsion=1.0, bending_y=1.0, bending_z=1.0)
     ((elements, sense),) = _chains(rod, np.arange(3), 4)
     assert (elements.tolist(), sense.tolist()) == ([1, 0, 2], [-1.0, 1.0, -1.0])
+
+
+def two_rods():
+    """A rod of three elements that is marked at its ends and after two, whose last one runs against it, and one of one with a
+    lock; two connectors; three cables; a support held in two directions; four nodes in two zones."""
+    rods = (
+        Member(np.array([0, 2, 1]), np.array([1.0, 1.0, -1.0]), np.array([0, 2, 3])),
+        Member(np.array([3]), np.array([1.0]), np.array([0, 1]), np.array([6])),
+    )
+    places = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 2.0, 0.0], [0.0, 2.0, 1.0]])
+    lengths = np.array([1.0, 2.0, 3.0, 4.0, 0.1, 0.1, 4.0])
+    return Members(rods, np.array([4, 5]), 3, np.array([6, 8]), np.array([0, 1, 1, 0]), 2, places, lengths)
+
+
+def test_marks_lengthen_the_elements_between_them_in_proportion_and_leave_each_a_fifth_of_its_length():
+    members = two_rods()
+    none = {name: np.zeros(count) for name, count in sizes(members).items()}
+    assert {name: len(z) for name, z in none.items()} == {
+        "cable_length": 3, "cable_stiffness": 3, "supports": 2, "marks": 5, "rod_stiffness": 2, "rod_bow": 4,
+        "connectors": 2, "load_each": 2, "load_all": 1, "load_uneven": 2, "shape": 3, "cable_stiffness_all": 1,
+        "connectors_all": 1,
+    }  # fmt: skip
+    z = none | {"marks": np.array([1.0, 3.0, -2.0, 5.0, 1.0])}
+    found = errors_of(members, Tolerances(marks=0.1), z).beam_length
+    # the first two elements, 1 and 3 m, by 0.2 m together, the last of 2 m by -0.5 m; the other rod by -0.4 m
+    assert found == pytest.approx([0.05, -0.5, 0.15, -0.4, 0.0, 0.0, 0.0])
+    found = errors_of(members, Tolerances(marks=0.6), z).beam_length
+    assert found == pytest.approx([0.3, -1.6, 0.9, -2.4, 0.0, 0.0, 0.0])
+
+
+def test_rods_bow_and_stiffen_with_their_locks_and_connectors_each_and_all_together():
+    members = two_rods()
+    none = {name: np.zeros(count) for name, count in sizes(members).items()}
+    z = none | {"rod_bow": np.array([1.0, 2.0, -3.0, 0.5])}
+    found = errors_of(members, Tolerances(rod_bow=0.01), z).beam_curvature
+    one, other = 8.0 * 0.01 / 6.0, 8.0 * 0.01 / 4.0
+    assert found == pytest.approx(
+        np.array(
+            [
+                [one, 2.0 * one], [one, -2.0 * one], [one, 2.0 * one], [-3.0 * other, 0.5 * other],
+                [0.0, 0.0], [0.0, 0.0], [0.0, 0.0],
+            ]
+        )
+    )  # fmt: skip
+    z = none | {
+        "rod_stiffness": np.array([1.0, -2.0]),
+        "connectors": np.array([0.5, 1.5]),
+        "connectors_all": np.ones(1),
+    }
+    stiff = Tolerances(rod_stiffness=0.1, connectors=0.2, connectors_all=0.3)
+    logs = np.log(errors_of(members, stiff, z).beam_stiffness)
+    assert logs == pytest.approx([0.1, 0.1, 0.1, -0.2, 0.1 + 0.3, 0.3 + 0.3, -0.2])
+    z = none | {"cable_stiffness": np.array([1.0, 0.0, -1.0]), "cable_stiffness_all": np.array([2.0])}
+    logs = np.log(
+        errors_of(members, Tolerances(cable_stiffness=0.1, cable_stiffness_all=0.05), z).cable_stiffness
+    )
+    assert logs == pytest.approx([0.2, 0.1, 0.0])
+    z = none | {"supports": np.array([1.0, -2.0]), "shape": np.array([1.0, 0.0, -1.0])}
+    found = errors_of(members, Tolerances(supports=0.01, shape=0.001), z)
+    assert found.supports[1].tolist() == pytest.approx([0.01, 0.0, -0.02, 0.0, 0.0, 0.0])
+    assert found.shape == pytest.approx([0.004, 0.0, -0.004]), "of the longest side, 4 m"
+
+
+def test_loads_of_zones_halves_and_the_whole_multiply():
+    members = two_rods()
+    none = {name: np.zeros(count) for name, count in sizes(members).items()}
+    z = none | {"load_each": np.array([1.0, -2.0]), "load_all": np.array([3.0])}
+    found = errors_of(members, Tolerances(load_each=0.1, load_all=0.05), z).load
+    assert found == pytest.approx(1.15 * np.array([1.1, 0.8, 0.8, 1.1]))
+    uneven = errors_of(
+        members, Tolerances(load_uneven=0.2), none | {"load_uneven": np.array([1.0, 0.0])}
+    ).load
+    assert uneven == pytest.approx([0.8, 1.2, 1.2, 0.8])
+    both = errors_of(
+        members, Tolerances(load_each=0.1, load_uneven=0.2), z | {"load_uneven": np.array([1.0, 0.0])}
+    )
+    assert both.load == pytest.approx(np.array([1.1, 0.8, 0.8, 1.1]) * uneven)
+
+
+def test_a_cable_keeps_a_twentieth_of_its_length_and_goes_along_with_the_shape():
+    cables = make_cables([[0, 1], [1, 2]], rest_length=np.array([1.0, 2.0]), stiffness=10.0)
+    members = two_rods()
+    none = {name: np.zeros(count) for name, count in sizes(members).items()}
+    present = np.array([True, False, True])
+    short = errors_of(
+        members, Tolerances(cable_length=1.0), none | {"cable_length": np.array([-0.94, 0.0, -1.96])}
+    )
+    assert built_cables(cables, present, short).rest_length == pytest.approx([0.06, 0.1])
+    state = at_rest(members.places)
+    sideways = np.zeros((1, 4, 6))
+    sideways[0, 1, 0] = 1.0  # the middle node along the first cable and across the second
+    shaped = replace(errors_of(members, Tolerances(), none), shape=np.array([0.3]))
+    found = built_cables(cables, present, shaped, Imperfections(state, sideways)).rest_length
+    assert found == pytest.approx([1.3, 2.0 + np.hypot(2.0, 0.3) - 2.0])
+
+
+def test_the_perfect_structure_has_no_errors_and_numbers_are_no_less_than_nothing():
+    members = two_rods()
+    found = drawn(members, Tolerances(marks=0.1, load_all=0.1, supports=0.1), 5, PERFECT)
+    assert not found.beam_length.any()
+    assert not found.supports.any()
+    assert (found.load == 1.0).all()
+    assert drawn(members, Tolerances(supports=0.1), 5, 0).supports.any()
+    for wrong in ({"seed": -1, "number": 0}, {"seed": 0, "number": -1}):
+        with pytest.raises(InputError, match="must"):
+            variables(members, **wrong)

@@ -1,6 +1,7 @@
 """How much of a load drawn structures bear, and its derivatives by what the design varies."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from shellform.reliability import borne
 from shellform.reliability import scenarios as scenarios_module
 from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.perfect import perfect
-from shellform.reliability.scenarios import borne_factors, remembered, scenarios
+from shellform.reliability.scenarios import FactorsAsBuilt, Scenario, borne_factors, remembered, scenarios
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.sensitivity import stiffness_rate
 
@@ -176,3 +177,95 @@ def test_a_structure_that_leads_nowhere_from_its_end_is_given_up_and_said(dome, 
 def test_without_a_stiffness_that_is_left_there_is_no_end_of_the_branch(asked):
     with pytest.raises(InputError, match="positive"):
         replace(asked, left=0.0)
+
+
+def told_scenarios(least):
+    case = LoadCase("wet", np.full((2, 6), -1.0))
+    own = tuple(Scenario(number, f"errors {number}", factor) for number, factor in least.items())
+    return FactorsAsBuilt(case, own, "imperfections", 0.5, 1.7, 1e-3)
+
+
+def test_factors_are_told_over_what_each_is_to_bear_with_their_derivatives(monkeypatch):
+    """Of three candidate cables the second is absent."""
+    found = [
+        SimpleNamespace(factor=1.2, factor_by_rest_length=np.array([3.0, -2.0]), factor_by_rate=[5.0]),
+        SimpleNamespace(factor=0.9, factor_by_rest_length=np.array([1.0, 4.0]), factor_by_rate=[-6.0]),
+    ]
+    shell = SimpleNamespace(cable_ends=[0] * 3, beams_by_radius=lambda radius: ("rate", radius))
+    design = SimpleNamespace(present=np.array([True, False, True]), radius=0.1)
+    asked = told_scenarios({4: 0.8, 7: 1.25})
+    monkeypatch.setattr(
+        scenarios_module, "borne_factors", lambda *given, rates: found if rates == (("rate", 0.1),) else None
+    )
+    told = asked.measure(SimpleNamespace(shell=shell, design=design))
+    assert told.value == pytest.approx([1.2 / 0.8, 0.9 / 1.25])
+    np.testing.assert_allclose(told.by_rest_length.toarray(), [[3.75, 0.0, -2.5], [0.8, 0.0, 3.2]])
+    assert told.by_radius == pytest.approx([6.25, -4.8])
+    assert asked.size(shell) == 2
+
+
+def test_scenarios_keep_a_tenth_of_the_unloaded_structure_s_softest_stiffness(monkeypatch):
+    nominal = SimpleNamespace(
+        network="network", unloaded="unloaded", members="members", imperfections="shapes"
+    )
+    monkeypatch.setattr(scenarios_module, "perfect", lambda *_: nominal)
+    monkeypatch.setattr(scenarios_module, "assemble", lambda network: network)
+    monkeypatch.setattr(
+        scenarios_module,
+        "modes",
+        lambda assembly, state, count: SimpleNamespace(stiffness=[6.0] if state == "unloaded" else None),
+    )
+    monkeypatch.setattr(scenarios_module, "drawn", lambda *given: given)
+    case = LoadCase("wet", np.ones((2, 6)))
+    found = scenarios(
+        None,
+        None,
+        case,
+        lambda number: f"rough {number}",
+        seed=5,
+        least={3: 1.0, 8: 0.9},
+        most=1.4,
+        exact=0.01,
+    )
+    assert (found.left, found.most, found.exact) == (pytest.approx(0.6), 1.4, 0.01)
+    assert [(each.number, each.least, each.errors) for each in found.scenarios] == [
+        (3, 1.0, ("members", "rough 3", 5, 3)),
+        (8, 0.9, ("members", "rough 8", 5, 8)),
+    ]
+
+
+def test_a_scenario_is_remembered_at_nine_tenths_of_what_it_bears(monkeypatch):
+    """The second has no such state, and of the third no end is found."""
+    seen = []
+
+    def end(workshop, asked, scenario):
+        if scenario.number == 9:
+            raise NotConverged("lost")
+        return SimpleNamespace(factor=0.5 + 0.1 * scenario.number)
+
+    class Making:
+        def with_structure(self, errors, work, *, number):
+            def followed(*given):
+                seen.append((errors, number, given))
+                return (None if number == 2 else SimpleNamespace(state="near")), 0.7
+
+            return work(SimpleNamespace(followed=followed))
+
+    monkeypatch.setattr(scenarios_module, "_end", end)
+    monkeypatch.setattr(scenarios_module, "_workshop", lambda *_: Making())
+    found = remembered(None, None, told_scenarios({1: 1.0, 2: 1.0, 9: 1.0}))
+    assert [(each.number, each.near) for each in found.scenarios] == [(1, (0.7, "near")), (2, None)]
+    assert seen == [
+        ("errors 1", 1, (pytest.approx(0.54), borne.CAREFUL, 1 / 16)),
+        ("errors 2", 2, (pytest.approx(0.63), borne.CAREFUL, 1 / 16)),
+    ]
+    with pytest.raises(NotConverged, match="lost"):
+        remembered(None, None, told_scenarios({9: 1.0}))
+    assert remembered(None, None, told_scenarios({})).scenarios == ()
+
+
+@pytest.mark.parametrize("name", ["left", "most", "exact"])
+def test_what_bounds_a_scenario_is_positive(name):
+    for wrong in (0.0, -1.0, np.nan):
+        with pytest.raises(InputError, match=rf"factors_as_built\.{name}"):
+            replace(told_scenarios({}), **{name: wrong})
