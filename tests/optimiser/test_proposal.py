@@ -74,6 +74,12 @@ def test_mma_s_answer_counts_only_where_it_is_lower_and_keeps_the_constraints(mo
         monkeypatch.setattr(proposal, "minimise", lambda *_, u=there, **__: (np.array([u]), "told"))
         assert proposal._from_there(one, here, *bounds, 10)[0] == (there if kept else 0.8)
 
+    def two(u):
+        return float(u[0]), np.array([1.0]), np.array([0.5 - u[0], -1.0]), np.array([[-1.0], [0.0]])
+
+    monkeypatch.setattr(proposal, "minimise", lambda *_, **__: (np.array([0.4]), "told"))
+    assert proposal._from_there(two, here, *bounds, 10)[0] == 0.8, "each of them"
+
 
 def test_a_dual_problem_is_left_after_the_evaluations_that_it_may_take():
     rows = np.array([[1.0, 2.0, 0.5], [-3.0, 1.0, 1.0]])
@@ -136,6 +142,11 @@ def test_a_dead_cable_s_slope_is_that_of_its_tension_under_the_design_load():
     )
     slope = proposal._exact_in_tension(np.array([0.1, 0.2, 0.3]), model)
     assert slope.tolist() == [0.1, 2.0 * 7.0, 0.3]
+    model.quadratics = (SimpleNamespace(slope=np.array([9.0, -4.0, 9.0])), None)
+    slope = proposal._exact_in_tension(np.array([0.1, 0.2, 0.3]), model)
+    assert slope.tolist() == [0.1, 2.0 * -4.0, 0.3], "that of a sum of squares is the model's"
+    model.origin = np.array([1.0, 0.1, 0.0])
+    assert proposal._exact_in_tension(np.array([0.1, 0.2, 0.3]), model).tolist() == [0.1, 0.2, 0.3]
 
 
 def model_of(**changes):
@@ -315,6 +326,21 @@ def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_s
     model.origin = np.array([-0.4, 0.5, 0.1])
     propose(task_of(model=model))
     assert (seen[2][4][0], seen[2][5][0]) == (1.0, 1.0)
+    model.origin = np.array([2.0, 0.503, 0.1])
+    beyond = []
+    monkeypatch.setattr(proposal, "minimise_quadratic", lambda *_: np.array([0.5, -1.0, 1.0]))
+    monkeypatch.setattr(proposal, "_from_there", lambda evaluate, u, *_: beyond.append(u) or u)
+    assert propose(task_of(model=model))[0][1] == pytest.approx(0.003), "3 mN are some"
+    assert len(beyond) == 1
+    propose(task_of(model=model, guards=[WholeGuard(np.array([9.0]), np.zeros((1, 2)) + 1e-9)]))
+    many = model_of(point=SimpleNamespace(constraints=np.full(9, -0.4)), constraints_by_y=np.ones((9, 3)))
+    propose(task_of(model=many, excess=np.zeros(9)))
+    assert len(beyond) == 1, "MMA doesn't go on with guards, nor with more than eight constraints"
+    few = model_of(point=SimpleNamespace(constraints=np.full(8, -0.4)), constraints_by_y=np.ones((8, 3)))
+    propose(task_of(model=few, excess=np.zeros(8)))
+    assert len(beyond) == 2
+    model.origin = np.array([2.0, 0.5, 0.1])
+    monkeypatch.setattr(proposal, "minimise_quadratic", quadratic)
     grouped = task_of(model=model, groups=np.array([0, 1]))
     monkeypatch.setattr(proposal, "_equal_steps", lambda *_: np.array([0.0, -0.999, 0.0]))
     assert propose(grouped)[0][1] == pytest.approx(0.0005), "of cables alike none goes alone"

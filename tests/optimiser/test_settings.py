@@ -9,9 +9,9 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design
-from shellform.optimiser import comparison, convex, moving_asymptotes
+from shellform.optimiser import comparison, convex, moving_asymptotes, solver
 from shellform.optimiser.comparison import Plain
-from shellform.optimiser.solver import POLISHING, SequentialConvex
+from shellform.optimiser.solver import SequentialConvex
 from shellform.problem.evaluation import OffBranch
 
 MAY_BE_ZERO = {
@@ -39,8 +39,8 @@ def test_windows_shrink_and_grow():
 
 
 def test_polishing_thins_nothing_in_steps_a_tenth_as_small_and_uses_up_a_fifth_of_the_stiffness():
-    assert (POLISHING.thin, POLISHING.stiffness) == (False, 0.8)
-    assert POLISHING.smallest == pytest.approx(0.1 * SequentialConvex().smallest)
+    assert (solver.POLISHING.thin, solver.POLISHING.stiffness) == (False, 0.8)
+    assert solver.POLISHING.smallest == pytest.approx(0.1 * SequentialConvex().smallest)
 
 
 def test_a_start_beyond_its_bounds_is_refused_with_the_variable_s_number_and_one_on_them_is_not():
@@ -56,6 +56,24 @@ def test_a_start_beyond_its_bounds_is_refused_with_the_variable_s_number_and_one
     assert best == pytest.approx(lower, abs=1e-6)
     assert reason in ("the objective stopped improving", "the design stopped changing", "converged")
     assert convex.minimise(line, upper, lower, upper, constraints=0, evaluations=1)[1].endswith("was reached")
+
+
+def test_with_caution_the_first_steps_are_short():
+    def parabola(x):
+        return float((x - 0.7) @ (x - 0.7)), 2.0 * (x - 0.7), np.zeros(0), np.zeros((0, 2))
+
+    def went(**how):
+        asked = []
+
+        def noted(x):
+            asked.append(np.array(x))
+            return parabola(x)
+
+        convex.minimise(noted, np.zeros(2), -np.ones(2), np.ones(2), constraints=0, evaluations=2, **how)
+        return np.linalg.norm(asked[1] - asked[0])
+
+    assert went() == went(caution=1.0)
+    assert went(caution=1e3) < 0.1 * went()
 
 
 def test_each_point_is_evaluated_once_though_objective_and_limits_are_asked_for_by_themselves():
@@ -292,3 +310,151 @@ def test_the_last_accepted_design_comes_back_whose_path_bears_the_design_load(mo
     with pytest.raises(NotConverged, match="carries all loads") as told:
         finished(monkeypatch, {0}, stage=0.99)
     assert (told.value.state, told.value.iterations) == ("best", 99)
+
+
+@pytest.fixture
+def direct(monkeypatch):
+    """A direct search whose runs spend what is told and whose stages rise as told."""
+    told = SimpleNamespace(spends=[], stages=[], log=[], stage=0.5)
+
+    def run(search):
+        told.log.append(("run", search.stage))
+        search.evaluator.evaluations += told.spends.pop(0)
+
+    def raised(search):
+        told.log.append("raised")
+        search.stage = told.stages.pop(0)
+
+    def begun(*given):
+        evaluator = SimpleNamespace(evaluations=0)
+        return SimpleNamespace(
+            evaluator=evaluator, stage=told.stage, left=lambda: given[3] - evaluator.evaluations
+        )
+
+    monkeypatch.setattr(moving_asymptotes, "_begun", begun)
+    monkeypatch.setattr(
+        moving_asymptotes, "_resume", lambda search, point: told.log.append(("resume", point))
+    )
+    monkeypatch.setattr(moving_asymptotes, "_run", run)
+    monkeypatch.setattr(moving_asymptotes, "_raise_stage", raised)
+    monkeypatch.setattr(moving_asymptotes, "_finished", lambda search: search.evaluator.evaluations)
+    told.ends = lambda evaluations, resume=None: moving_asymptotes.minimise_directly(
+        None, None, None, evaluations=evaluations, resume=resume
+    )
+    return told
+
+
+def test_runs_follow_stage_by_stage_until_the_whole_load_the_evaluations_end_or_none_is_spent(direct):
+    direct.spends, direct.stages = [8, 8, 5, 9], [0.7, 1.0]
+    assert direct.ends(40, resume="there") == 21
+    assert direct.log == [("resume", "there"), ("run", 0.5), "raised", ("run", 0.7), "raised", ("run", 1.0)]
+    direct.log.clear()
+    direct.spends, direct.stages = [8, 0, 5], [0.7]
+    assert direct.ends(40) == 8
+    assert direct.log == [("run", 0.5), "raised", ("run", 0.7)]
+    direct.spends, direct.stages = [8, 8, 5], [0.7, 0.8]
+    assert direct.ends(16) == 16
+    direct.log.clear()
+    direct.stage, direct.spends = 1.0, [8, 8]
+    assert direct.ends(40) == 8, "at the whole load MMA ends by itself"
+
+
+@pytest.mark.parametrize(("stage", "asked"), [(1.0, 3 + 20), (0.5, 9), (0.9, 9)])
+def test_a_run_is_told_again_what_it_was_told_and_goes_on_as_far_as_its_stage_may(monkeypatch, stage, asked):
+    given = []
+
+    def minimise(evaluate, first, lower, upper, **how):
+        given.append((first, lower, upper, how, [evaluate(k)[0] for k in range(5)]))
+        return None, "converged"
+
+    def told(value):
+        return SimpleNamespace(variables=f"x {value}", objective=value, slope=0, rows=[1, 2], row_slopes=0)
+
+    monkeypatch.setattr(moving_asymptotes, "minimise", minimise)
+    monkeypatch.setattr(moving_asymptotes, "_tried", lambda search, x: told(100 + x))
+    search = SimpleNamespace(
+        told=[told(0), told(1), told(2)],
+        evaluator=SimpleNamespace(blocks=SimpleNamespace(bounds=lambda: ("lower", "upper"))),
+        left=lambda: 20,
+        stage=stage,
+        until=9,
+        solver=sf.MovingAsymptotes(tolerance=1e-3),
+        caution=7.0,
+        status="so far",
+    )
+    moving_asymptotes._run(search)
+    first, lower, upper, how, values = given[0]
+    assert (first, lower, upper) == ("x 0", "lower", "upper")
+    assert how == {"constraints": 2, "evaluations": asked, "tolerance": 1e-3, "caution": 7.0}
+    assert values == [0, 1, 2, 103, 104]
+    assert len(search.told) == 5
+    assert search.status == ("converged" if stage == 1.0 else "so far")
+    search.left = lambda: 2
+    moving_asymptotes._run(search)
+    assert given[1][3]["evaluations"] == 7, "no more than are left"
+
+
+@pytest.mark.parametrize("on_branch", [True, False])
+def test_a_direct_search_begins_as_far_as_its_start_bears_the_further_loads(monkeypatch, on_branch):
+    seeded = []
+
+    class Begun:
+        def __init__(self, problem, start):
+            pass
+
+        def begin(self):
+            return {
+                name: SimpleNamespace(
+                    on_branch=on_branch or name != "wetter", equilibrium=SimpleNamespace(state=name)
+                )
+                for name in ("wet", "wetter")
+            }
+
+        def seed(self, start, states, stage):
+            return states, stage
+
+    def reach(evaluator, start, state, least, margin, smallest):
+        assert (state, least, margin, smallest) == ("wet", 0.0, 0.15, 0.125)
+        return 0.6
+
+    monkeypatch.setattr(moving_asymptotes, "Evaluator", Begun)
+    monkeypatch.setattr(moving_asymptotes, "reach", reach)
+    monkeypatch.setattr(
+        moving_asymptotes, "staged", lambda evaluator, start, state, stage: f"{state} at {stage}"
+    )
+    monkeypatch.setattr(moving_asymptotes._Search, "begin", lambda search, point: seeded.append(point))
+    problem = SimpleNamespace(used=lambda: ["wet", "wetter"], design_load=SimpleNamespace(name="wet"))
+    search = moving_asymptotes._begun(problem, "start", sf.MovingAsymptotes(), 40, None, None)
+    assert seeded == [({"wet": "wet", "wetter": "wetter"}, 1.0) if on_branch else ("wet at 0.6", 0.6)]
+    assert (search.stage, search.margin, search.evaluations) == (1.0 if on_branch else 0.6, 0.15, 40)
+
+
+def test_a_direct_search_s_trial_is_told_with_its_pulling_cables(monkeypatch):
+    parts = [SimpleNamespace(term=name) for name in ("misfit", "cable_force")]
+    pull = np.array([2.0, 0.0, 1.0])
+    search = SimpleNamespace(
+        problem=SimpleNamespace(
+            shell=SimpleNamespace(cables=lambda design: SimpleNamespace(tension=lambda state: pull)),
+            minimise=parts,
+            constraints=parts,
+            column=lambda term: term,
+            places=lambda: [slice(0, 2), slice(2, 2)],
+        ),
+        evaluator=SimpleNamespace(evaluations=6),
+        base="wet",
+        stage=0.5,
+        began=1.5,
+    )
+    monkeypatch.setattr(moving_asymptotes.time, "perf_counter", lambda: 4.0)
+    given = SimpleNamespace(
+        design=None,
+        states={"wet": None},
+        objective=0.9,
+        terms=np.array([0.6, 0.3]),
+        constraints=np.array([-0.5, 0.25]),
+    )
+    step = moving_asymptotes._step(search, given, True)
+    assert (step.evaluation, step.objective, step.cables, step.stage) == (6, 0.9, 2, 0.5)
+    assert (step.accepted, step.seconds) == (True, 2.5)
+    assert step.terms == {"misfit": 0.6, "cable_force": 0.3}
+    assert step.constraints == {"misfit": 0.25, "cable_force": -np.inf}

@@ -6,12 +6,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_array
+from scipy.sparse import csr_array, lil_array
 
 import shellform as sf
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.step_model import StepModel, _distinct, _of_terms
-from shellform.optimiser.step_setting import setting
+from shellform.optimiser.step_setting import _forces, setting
 from shellform.problem.evaluation import Evaluator
 from shellform.problem.terms import Squares
 
@@ -33,7 +33,7 @@ def model_of(variables, *, tensions=2):
         "point": SimpleNamespace(design=start, constraints=np.array([0.5, -0.5])),
         "tensions": tensions,
         "shortest": np.full(2, 0.95),
-        "longest": np.array([1.2, 2.4]),
+        "longest": np.array([1.2, 2.5]),
         "origin": origin,
         "length": np.array([1.04, 2.2]),
         "answers": SimpleNamespace(lengthened=lambda change: np.array([0.01, -0.02]) * change[:2].sum()),
@@ -52,7 +52,7 @@ def test_a_design_is_read_off_tensions_and_other_values_in_whichever_order_their
     assert made.rest_length == pytest.approx([1.05 / 1.05, 7.0, 2.18 / 1.1])
     assert made.radius == pytest.approx(0.13)
     made = model.design(np.array([30.0, 0.99e-4, 0.13]))
-    assert made.rest_length[2] == 2.4, "less than a millionth of the stiffness is no tension"
+    assert made.rest_length[2] == 2.5, "less than a millionth of the stiffness is no tension"
     assert made.rest_length[0] == 0.95, "and no cable is shorter than may be"
     made = model.design(np.array([4.0, 1.01e-4, 0.13]))
     assert made.rest_length[2] == pytest.approx(2.2 + 0.2, abs=1e-3)
@@ -134,3 +134,38 @@ def test_sums_of_squares_under_the_design_load_are_told_apart_by_their_residuals
     assert list(map(id, found)) == list(map(id, [same, longer, steeper, wide]))
     told = _of_terms(evaluator, point, found, ["same", "longer", "steeper", "wide"])
     assert told == ("same", None, "same", "longer", None, "steeper", "wide")
+
+
+def test_values_that_change_lengths_and_radius_pull_by_what_they_do_to_both(dome, begun):
+    """One makes the third cable and the sixth longer, the last cable that is present among them twice as much, and one the rods
+    thicker; a cable that is absent changes nothing."""
+    evaluator, design = begun
+    last = int(np.flatnonzero(design.present)[-1])
+    assert design.present[[3, 6]].all()
+    assert not design.present[4]
+    rate = lil_array((len(dome.cable_ends) + 1, 2))
+    for cable, by in ((3, 1.0), (6, 1.0), (last, 2.0), (4, 50.0)):
+        rate[cable, 0] = by
+    rate[3, 1], rate[len(dome.cable_ends), 1] = -1.0, 0.1
+    rate = csr_array(rate)
+    assembly = evaluator.assembly(design)
+    point = SimpleNamespace(design=design)
+    found = _forces(evaluator, assembly, dome.target, point, rate).toarray()
+    for column in range(2):
+        change = rate[:, [column]].toarray()[:, 0]
+        forces = [
+            evaluator.assembly(
+                replace(
+                    design,
+                    rest_length=design.rest_length + h * change[:-1],
+                    radius=design.radius + h * change[-1],
+                )
+            )
+            .evaluate(dome.target, tangent=False)
+            .force.ravel()[assembly.free]
+            for h in (1e-6, -1e-6)
+        ]
+        slope = (forces[0] - forces[1]) / 2e-6
+        np.testing.assert_allclose(found[:, column], slope, rtol=1e-4, atol=1e-5 * np.abs(slope).max())
+    alone = _forces(evaluator, assembly, dome.target, point, csr_array(rate[:, [0]])).toarray()
+    np.testing.assert_allclose(alone[:, 0], found[:, 0])
