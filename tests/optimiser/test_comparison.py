@@ -1,11 +1,15 @@
 """The same problem handed to SciPy, on a coarse vault of 28 candidate cables."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
+from shellform.optimiser import comparison
 from shellform.optimiser.comparison import METHODS, Plain, compare
+from shellform.problem.evaluation import OffBranch
 
 
 @pytest.fixture(scope="module")
@@ -137,3 +141,108 @@ def test_what_can_t_be_compared_is_refused(coarse):
     short = compare(asked, coarse.design(), method="SLSQP", evaluations=3)
     assert short.evaluations == 3
     assert short.status == "the number of evaluations was reached"
+
+
+def point(place, objective, violation=0.0):
+    return SimpleNamespace(
+        variables=np.array([float(place)]),
+        objective=objective,
+        violation=violation,
+        rank=(violation, objective),
+        design=SimpleNamespace(present=f"present {place}"),
+        states=f"states {place}",
+        constraints=np.array([violation - 0.5]),
+        objective_by_variables=np.array([objective + 1.0]),
+        constraints_by_variables=np.array([[violation + 2.0]]),
+    )
+
+
+@pytest.fixture
+def plain(monkeypatch):
+    """Designs of one variable, whose objective is it plus 1; beyond 10 it isn't on the branch."""
+    made = object.__new__(Plain)
+    begun, tried = point(0, 1.0), []
+
+    def evaluate(design, states, stage, *, lead):
+        tried.append((design, states, stage, lead))
+        evaluator.evaluations += 1
+        if design[0] > 10.0:
+            raise OffBranch
+        return design[0]
+
+    evaluator = SimpleNamespace(
+        evaluations=0,
+        blocks=SimpleNamespace(design=lambda x, present: (float(x[0]), present)),
+        evaluate=evaluate,
+        linearised=lambda place: (
+            point(place, 1.0 + abs(place - 3.0)) if place <= 7.0 else point(place, 0.1, 0.3)
+        ),
+    )
+    made.evaluator, made.points, made.best = evaluator, [begun], begun
+    made.history, made._at = [(0, 1.0, 0.0)], (begun.variables.tobytes(), begun, True)
+    made.tried = tried
+    return made
+
+
+def test_a_trial_starts_from_the_nearest_design_known_and_off_the_branch_is_infinitely_bad(plain):
+    assert plain.value(np.array([0.0])) == 1.0
+    assert plain.tried == [], "which is known"
+    assert plain.value(np.array([5.0])) == 3.0
+    assert plain.value(np.array([11.0])) == np.inf
+    assert plain.gradient(np.array([11.0])).tolist() == [4.0], "that of the nearest on the branch"
+    assert plain.constraints(np.array([11.0])).tolist() == [-0.5]
+    assert plain.jacobian(np.array([11.0])).tolist() == [[2.0]]
+    assert plain.tried == [
+        ((5.0, "present 0"), "states 0", 1.0, True),
+        ((11.0, "present 5.0"), "states 5.0", 1.0, True),
+    ], "each once"
+    assert plain.history == [(0, 1.0, 0.0), (1, 3.0, 0.0)]
+
+
+def test_the_best_design_is_remembered_beside_the_last_eleven(plain):
+    plain.best = plain.points[0] = point(0, 9.0)
+    plain.value(np.array([3.0]))
+    assert plain.best.objective == 1.0
+    best = plain.best
+    for k in range(20):
+        plain.value(np.array([4.0 + 0.01 * k]))
+    assert plain.best is best
+    places = [float(each.variables[0]) for each in plain.points]
+    assert places[-2:] == [3.0, pytest.approx(4.19)]
+    assert sorted(places)[0] == 3.0
+    assert len(places) == 12
+    plain.value(np.array([8.0]))
+    assert plain.best is best, "a lower objective that breaks a limit is no better"
+
+
+@pytest.mark.parametrize(("on_branch", "refused"), [(True, False), (False, True)])
+def test_a_start_is_compared_that_bears_all_its_loads(monkeypatch, on_branch, refused):
+    class Begun:
+        def __init__(self, problem, start):
+            pass
+
+        def begin(self):
+            return {
+                name: SimpleNamespace(
+                    on_branch=on_branch or name != "wetter",
+                    equilibrium=SimpleNamespace(state=name),
+                    share=0.4,
+                )
+                for name in ("wet", "wetter", "idle")
+            }
+
+        def seed(self, start, states, stage):
+            assert (states, stage) == ({"wet": "wet", "wetter": "wetter"}, 1.0)
+            return point(0, 1.0)
+
+        def linearised(self, found):
+            return found
+
+    monkeypatch.setattr(comparison, "Evaluator", Begun)
+    problem = SimpleNamespace(used=lambda: ["wet", "wetter"])
+    if refused:
+        with pytest.raises(NotConverged, match=r"'wetter': it loses stability at 0\.40") as told:
+            Plain(problem, "start")
+        assert "by stages" in told.value.remedy
+    else:
+        assert Plain(problem, "start").history == [(0, 1.0, 0.0)]

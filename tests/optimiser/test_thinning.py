@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.optimiser import phases, trials
+from shellform.optimiser import phases, thinning, trials
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _made_to_stand, _repaired, _thin
 from shellform.optimiser.proposal import _as_far_as_can_be
@@ -180,3 +180,36 @@ def test_stiff_strands_that_can_be_spared_go_though_each_holds_most_of_the_stiff
     if share is not None:
         search = replace(search, solver=replace(search.solver, kept=share))
     assert (len(phases._leaving(search, it, search.models.at(it.point))) > 0) == go
+
+
+@pytest.mark.parametrize(
+    ("objective", "far", "covered"),
+    [(0.5, 0.01, True), (0.5, 0.0101, False), (0.501, 0.01, False), (0.501, 0.0101, False)],
+)
+def test_a_budget_covers_what_costs_no_more_of_the_objective_and_of_the_shape(
+    monkeypatch, objective, far, covered
+):
+    trial = SimpleNamespace(objective=objective)
+    monkeypatch.setattr(thinning, "farthest", lambda search, trial: far)
+    assert Budget(0.5, 0.01).covers(None, trial) == covered
+    assert Budget(0.5).covers(None, trial) == (objective <= 0.5)
+    assert Budget(deviation=0.01).covers(None, trial) == (far <= 0.01)
+
+
+def test_cables_may_take_the_shape_as_far_off_as_it_may_be_or_is_already(monkeypatch):
+    monkeypatch.setattr(
+        thinning, "deviations", lambda shell, state: {"rest": np.array([0.002, 0.006, 0.001])}[state]
+    )
+    it = SimpleNamespace(point=SimpleNamespace(states={"wet": "rest", "wetter": "farther"}))
+    for most, goes in ((None, np.inf), (0.01, 0.01), (0.004, 0.006)):
+        assert (
+            thinning.allowed(
+                SimpleNamespace(
+                    solver=sf.SequentialConvex(deviation=most),
+                    base="wet",
+                    problem=SimpleNamespace(shell=None),
+                ),
+                it,
+            )
+            == goes
+        )

@@ -8,9 +8,8 @@ import pytest
 
 import shellform as sf
 from shellform.gridshell.gridshell import Design
-from shellform.optimiser import thinning, trials
+from shellform.optimiser import trials
 from shellform.optimiser.search_state import Accepted, Iterate
-from shellform.optimiser.thinning import Budget
 from shellform.problem.evaluation import OffBranch
 from shellform.reliability.trial_structures import FRESH, JudgedTrial
 
@@ -266,29 +265,6 @@ def test_states_at_a_stage_are_reached_from_the_design_load_s(monkeypatch):
     assert found == {"wet": "known", "wetter": "under 0.4 of wetter", "wind": "under 0.4 of wind"}
     assert {each[:3] for each in given} == {("of design", "known", "1.0 of wet")}
     assert evaluator.factorisations == 7
-
-
-@pytest.mark.parametrize(
-    ("objective", "far", "covered"),
-    [(0.5, 0.01, True), (0.5, 0.0101, False), (0.501, 0.01, False), (0.501, 0.0101, False)],
-)
-def test_a_budget_covers_what_costs_no_more_of_the_objective_and_of_the_shape(
-    monkeypatch, objective, far, covered
-):
-    trial = SimpleNamespace(objective=objective)
-    monkeypatch.setattr(thinning, "farthest", lambda search, trial: far)
-    assert Budget(0.5, 0.01).covers(None, trial) == covered
-    assert Budget(0.5).covers(None, trial) == (objective <= 0.5)
-    assert Budget(deviation=0.01).covers(None, trial) == (far <= 0.01)
-
-
-def test_cables_may_take_the_shape_as_far_off_as_it_may_be_or_is_already(monkeypatch):
-    monkeypatch.setattr(
-        thinning, "deviations", lambda shell, state: {"rest": np.array([0.002, 0.006, 0.001])}[state]
-    )
-    it = SimpleNamespace(point=SimpleNamespace(states={"wet": "rest", "wetter": "farther"}))
-    for most, goes in ((None, np.inf), (0.01, 0.01), (0.004, 0.006)):
-        assert thinning.allowed(searching(solver=sf.SequentialConvex(deviation=most)), it) == goes
 
 
 def test_an_accepted_trial_is_kept_at_the_stage_that_it_reaches(monkeypatch):

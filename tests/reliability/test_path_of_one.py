@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 
 from shellform.errors import NotConverged
-from shellform.reliability import path_of_one, standing
+from shellform.reliability import path_of_one
 from shellform.reliability.path_of_one import (
     BIFURCATION,
-    BORNE,
-    ENDED,
     LIMIT_POINT,
-    UNLOADED,
-    Limit,
     Loading,
     Snap,
 )
-from shellform.reliability.standing import Workshop
 from shellform.structure.elements.state import at_rest
 
 SPAN = 2.0
@@ -274,102 +269,6 @@ def test_a_branch_ends_at_a_limit_point_where_its_tangent_turns_into_the_softest
     )
     monkeypatch.setattr(path_of_one, "modes", lambda *_: SimpleNamespace(shapes=[shape]))
     assert loading.kind(here("end")) == kind
-
-
-class Beside:
-    """A workshop's structure that ends so."""
-
-    def __init__(self, end, factor, beside=None):
-        self.end, self.factor, self.near, self.asked, self.spent = end, factor, beside, [], 9
-
-    def beside(self):
-        return self.near
-
-    def borne(self, *given, **how):
-        self.asked.append(("borne", given, how))
-        return self.end, self.factor
-
-    def followed(self, *given, **how):
-        self.asked.append(("followed", given, how))
-        return self.end, self.factor
-
-    def kind(self, end):
-        return f"kind of {end.state}"
-
-
-@pytest.fixture
-def workshop(monkeypatch):
-    """One whose structures are told."""
-    made = object.__new__(Workshop)
-    made.nominal = SimpleNamespace(unloaded="unloaded", members="members")
-
-    def limit(way, structure, *given, **how):
-        monkeypatch.setattr(made, "with_structure", lambda errors, work: work(structure), raising=False)
-        return getattr(made, way)("errors", *given, **how)
-
-    return made, limit
-
-
-@pytest.mark.parametrize(("way", "path"), [("limit", "followed"), ("fall", "borne")])
-def test_a_structure_s_limit_is_the_end_of_its_branch_and_its_fall_where_snaps_end(workshop, way, path):
-    _, limit = workshop
-    structure = Beside(here("end"), 0.8)
-    how = {"step": 0.5, "resolution": 1 / 128, "begin": "known", "marks": (0.9,)}
-    assert limit(way, structure, most=1.5, **how) == Limit(0.8, "kind of end", "end", 9)
-    assert structure.asked == [(path, (1.5, 0.5, 1 / 128), {"begin": "known", "marks": (0.9,)})]
-    assert limit(way, structure, most=0.8).kind == BORNE
-    assert structure.asked[-1] == (path, (0.8, 1.0, 1 / 64), {"begin": None, "marks": ()})
-    assert limit(way, structure, most=0.9, tell=False).kind == ENDED
-    assert limit(way, Beside(None, 0.0), most=0.9) == Limit(0.0, UNLOADED, "unloaded", 9)
-
-
-def test_a_structure_that_rests_beside_the_perfect_one_is_not_loaded_from_nothing(workshop):
-    _, limit = workshop
-    structure = Beside(here("end"), 0.8, here("beside"))
-    assert limit("rests", structure, resolution=1 / 32) == Limit(1.0, BORNE, "beside", 9)
-    assert structure.asked == []
-    structure.near = None
-    assert limit("rests", structure, resolution=1 / 32, marks=(0.7,)) == Limit(0.8, ENDED, "end", 9)
-    assert structure.asked == [("borne", (1.0, 1.0, 1 / 32), {"marks": (0.7,)})]
-
-
-def test_drawn_structures_are_loaded_number_by_number_and_counted(monkeypatch, workshop):
-    made, _ = workshop
-    heard = []
-
-    def load(errors, **how):
-        heard.append((errors, how))
-        return SimpleNamespace(stands=how["number"] % 3 != 0)
-
-    monkeypatch.setattr(made, "load", load)
-    monkeypatch.setattr(standing, "variables", lambda members, seed, number: (members, seed, number))
-    monkeypatch.setattr(standing, "errors_of", lambda members, tolerances, z: (tolerances, z))
-    made.drawn("rough", seed=4, numbers=[5, 2], step=0.5, marks=(0.8,), resting=0.3)
-    assert heard == [
-        (("rough", ("members", 4, k)), {"number": k, "step": 0.5, "marks": (0.8,), "resting": 0.3})
-        for k in (5, 2)
-    ]
-    monkeypatch.setattr(standing, "perfect", lambda *given: given)
-    monkeypatch.setattr(standing, "Workshop", lambda nominal: made)
-    found = standing.sample("shell", "design", "load", "rough", count=7, seed=4, confidence=0.9)
-    assert (found.standing.drawn, found.standing.standing, found.standing.seed) == (7, 4, 4)
-    assert (found.standing.confidence, len(found.outcomes)) == (0.9, 7)
-
-
-@pytest.mark.parametrize(("resting", "end"), [(None, "found"), (0.3, ("rested", "found", 0.3, 0.5, 1 / 128))])
-def test_where_a_structure_rests_under_a_share_is_looked_for_where_it_is_asked(
-    monkeypatch, workshop, resting, end
-):
-    made, _ = workshop
-    structure = SimpleNamespace(
-        outcome=lambda step, smallest, marks: (
-            "found" if (step, smallest, marks) == (0.5, 1 / 128, (0.8,)) else None
-        ),
-        rested=lambda *given: ("rested", *given),
-    )
-    monkeypatch.setattr(made, "with_structure", lambda errors, work, *, number: (work(structure), number))
-    found = made.load("errors", number=3, step=0.5, smallest=1 / 128, marks=(0.8,), resting=resting)
-    assert found == (end, 3)
 
 
 @pytest.mark.parametrize(("distance", "near"), [(0.0199, True), (0.0201, False)])
