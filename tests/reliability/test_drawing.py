@@ -214,6 +214,15 @@ def test_a_cable_keeps_a_twentieth_of_its_length_and_goes_along_with_the_shape()
     shaped = replace(errors_of(members, Tolerances(), none), shape=np.array([0.3]))
     found = built_cables(cables, present, shaped, Imperfections(state, sideways)).rest_length
     assert found == pytest.approx([1.3, 2.0 + np.hypot(2.0, 0.3) - 2.0])
+    two = Imperfections(state, np.vstack([sideways, sideways]))
+    shaped = replace(shaped, shape=np.array([0.3, 0.0]))
+    assert built_cables(cables, present, shaped, two).rest_length == pytest.approx(found)
+    beams = make_beams(members.places, [[0, 1], [1, 2]], axial=1e5, torsion=1.0, bending_y=1.0, bending_z=1.0)
+    straight = replace(
+        shaped, beam_length=np.zeros(2), beam_stiffness=np.ones(2), beam_curvature=np.zeros((2, 2))
+    )
+    assert built_beams(beams, straight, two).rest_length == pytest.approx([4.3, np.hypot(2.0, 0.3)])
+    assert built_beams(beams, straight).rest_length == pytest.approx([4.0, 2.0])
 
 
 def test_the_perfect_structure_has_no_errors_and_numbers_are_no_less_than_nothing():

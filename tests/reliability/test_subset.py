@@ -117,3 +117,11 @@ def test_a_chain_s_samples_tell_less_than_as_many_of_their_own(inside, share, sq
     times the correlation over each lag."""
     chains = np.arange(np.size(inside)).reshape(np.shape(inside))
     assert _square(np.array(inside, dtype=bool).ravel(), chains, share) == pytest.approx(square)
+
+
+def test_a_level_s_bound_lies_halfway_between_the_tenth_that_goes_on_and_the_next_one():
+    """Of twenty samples between the second and the third."""
+    z = np.random.Generator(np.random.Philox(3)).standard_normal((20, 2))
+    ordered = np.sort(5.0 - z[:, 0])
+    found = subset_simulation(lambda z: 5.0 - z[:, 0], 2, count=20, seed=3)
+    assert found.levels[0] == pytest.approx(0.5 * (ordered[1] + ordered[2]), rel=1e-12)
