@@ -246,3 +246,47 @@ def test_a_start_is_compared_that_bears_all_its_loads(monkeypatch, on_branch, re
         assert "by stages" in told.value.remedy
     else:
         assert Plain(problem, "start").history == [(0, 1.0, 0.0)]
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("limited", [True, False])
+def test_scipy_s_methods_are_asked_in_units_of_two_thousandths_from_the_start(monkeypatch, method, limited):
+    """An interior point begins a millionth of the bounds' distance away from them."""
+    asked = {}
+
+    def minimize(value, begin, **given):
+        asked.update(given, value=value, begin=begin)
+        return SimpleNamespace(message="done")
+
+    monkeypatch.setattr("scipy.optimize.minimize", minimize)
+    made = SimpleNamespace(
+        start=np.array([0.5, 1.0]),
+        bounds=lambda: (np.array([0.5, 0.8]), np.array([1.5, 1.0])),
+        best=SimpleNamespace(constraints=np.zeros(2 if limited else 0)),
+        value=lambda x: x,
+        gradient=lambda x: np.array([3.0, 4.0]),
+        constraints=lambda x: np.array([0.25, -0.5]),
+        jacobian=lambda x: np.array([[1.0, 0.0], [0.0, 2.0]]),
+    )
+    status = comparison._minimised(made, lambda function: function, method, 60, 1e-5)
+    assert status == "done"
+    assert asked["bounds"].lb == pytest.approx([0.0, -100.0])
+    assert asked["bounds"].ub == pytest.approx([500.0, 0.0])
+    assert np.all(asked["bounds"].keep_feasible)
+    assert asked["jac"](None) == pytest.approx([0.006, 0.008])
+    assert (asked["method"], asked["options"]["maxiter"]) == (method, 60)
+    if method == "SLSQP":
+        assert asked["begin"].tolist() == [0.0, 0.0]
+        assert (asked["hess"], asked["options"]["ftol"]) == (None, 1e-5)
+        if limited:
+            assert asked["constraints"]["fun"](None).tolist() == [-0.25, 0.5], "theirs are at least nothing"
+            assert asked["constraints"]["jac"](None).tolist() == [[-0.002, 0.0], [0.0, -0.004]]
+    else:
+        assert asked["begin"] == pytest.approx([500.0 * 1e-6, -100.0 * 1e-6])
+        assert asked["hess"] is not None
+        assert [asked["options"][name] for name in ("gtol", "xtol", "barrier_tol")] == [1e-5] * 3
+        if limited:
+            assert (asked["constraints"].lb, asked["constraints"].ub) == (-np.inf, 0.0)
+            assert asked["constraints"].fun(None).tolist() == [0.25, -0.5]
+    if not limited:
+        assert asked["constraints"] == ()

@@ -251,6 +251,10 @@ def test_steps_are_solved_for_with_more_guarded_cables_until_none_falls():
     assert asked[0][0].shape == (0, 3)
     assert asked[1][0] == pytest.approx(-np.array([[0.5, 1.0, 0.0]]) / 1.5)
     assert asked[1][1] == pytest.approx([0.05 / 1.5])
+    asked.clear()
+    high = WholeGuard(np.array([9.0]), np.array([[1.0, 0.0]]))
+    assert proposal._guarded_in_turn(task_of(guards=[high, GUARD]), WIDTH, solved) is steps[1]
+    assert len(asked) == 2, "under one of two loads is enough"
 
 
 def test_curvatures_are_summed_by_their_weights_in_windows():
@@ -302,7 +306,13 @@ def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_s
         return np.array([0.5, -0.999, 1.0])
 
     monkeypatch.setattr(proposal, "minimise_quadratic", quadratic)
-    monkeypatch.setattr(proposal, "_from_there", lambda evaluate, u, low, high, evaluations: u)
+    problems = []
+
+    def from_there(evaluate, u, low, high, evaluations):
+        problems.append(evaluate(np.array([1.0, -2.0, 0.5])))
+        return u
+
+    monkeypatch.setattr(proposal, "_from_there", from_there)
     monkeypatch.setattr(proposal, "_slope", lambda task: np.array([2.0, 3.0, 100.0]))
     monkeypatch.setattr(proposal, "_curvature", lambda model, width: np.diag([8.0, 2.0, 4.0]))
     model = model_of(
@@ -317,6 +327,11 @@ def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_s
     assert low == pytest.approx([-1.0, -1.0, -1.0])
     assert high == pytest.approx([1.0, 1.0, 1.0])
     assert y == pytest.approx([2.25, 0.0, 0.11]), "0.0005 N is less than a thousandth of 2 N"
+    value, steeper, left, told = problems[0]
+    assert value == pytest.approx(1.0 - 3.0 + 0.5 + 0.5 * (8.0 + 8.0 + 1.0))
+    assert steeper == pytest.approx([1.0 + 8.0, 1.5 - 4.0, 1.0 + 2.0])
+    assert left == pytest.approx([-0.25 + 0.5 + 2.0 + 0.025])
+    assert told is rows or told == pytest.approx(rows)
     u = np.array([0.5, -0.999, 1.0])
     assert predicted == pytest.approx(slope @ u + 0.5 * u @ curvature @ u)
     propose(task_of(model=model, window=6.0))
@@ -352,7 +367,7 @@ def test_cables_alike_change_their_lengths_by_the_same():
     answers = object.__new__(proposal.WholeAnswers)
     object.__setattr__(answers, "of_rest_lengths", lambda member: k[:, None] * member)
     task = task_of(model=model_of(answers=answers), groups=np.array([0, 1, 0]))
-    width = np.array([0.5, 0.5, 0.5])
+    width = np.array([0.5, 0.5, 0.25])
 
     none, nothing = np.zeros((0, 3)), np.zeros(0)
 
@@ -361,9 +376,9 @@ def test_cables_alike_change_their_lengths_by_the_same():
             task, width, np.diag([1e-6] * 3), np.array(slope), rows, values, np.full(3, low), np.full(3, high)
         )
 
-    assert step([-1.0, 1.0, 0.0]) == pytest.approx([0.25, -1.0, 1.0], abs=1e-4)
-    assert step([-1.0, 1.0, 0.0], low=-0.2, high=0.4) == pytest.approx([0.1, -0.2, 0.4], abs=1e-4)
+    assert step([-1.0, 1.0, 0.0]) == pytest.approx([0.125, -1.0, 1.0], abs=1e-4)
+    assert step([-1.0, 1.0, 0.0], low=-0.2, high=0.4) == pytest.approx([0.05, -0.2, 0.4], abs=1e-4)
     held = step([-1.0, 1.0, 0.0], rows=np.array([[0.0, 0.0, 1.0]]), values=np.array([-0.6]))
-    assert held == pytest.approx([0.15, -1.0, 0.6], abs=1e-4)
+    assert held == pytest.approx([0.075, -1.0, 0.6], abs=1e-4)
     broken = step([-1.0, 1.0, 0.0], rows=np.array([[0.0, 0.0, 1.0]]), values=np.array([0.3]))
     assert broken == pytest.approx([0.0, -1.0, 0.0], abs=1e-4), "what is broken may stay so"

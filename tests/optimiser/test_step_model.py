@@ -59,6 +59,20 @@ def test_a_design_is_read_off_tensions_and_other_values_in_whichever_order_their
     assert model.constraints_at(model.origin + np.array([0.1, 0.2, 0.3])) == pytest.approx([1.0, 0.2])
 
 
+class Thinner(sf.FreeRadius):
+    """A value by which the radius is divided."""
+
+    def applied(self, shell, design, values):
+        return replace(design, radius=design.radius / float(values[0]))
+
+
+def test_other_values_are_taken_one_block_after_the_other():
+    model = replace(
+        model_of([sf.FreeRadius(), sf.RestLengths(), Thinner()]), origin=np.array([4.0, 10.0, 0.1, 1.0])
+    )
+    assert model.design(np.array([4.0, 10.0, 0.12, 4.0])).radius == pytest.approx(0.03)
+
+
 def test_where_no_block_is_the_cables_lengths_the_values_are_taken_as_they_are():
     model = model_of([sf.FreeRadius()], tensions=0)
     made = model.design(np.array([0.17]))
