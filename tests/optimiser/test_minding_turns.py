@@ -209,13 +209,16 @@ def test_a_search_is_led_from_the_design_that_stands_by_what_falls_in_the_other_
     found = minding.ready_to_lead(search, iterate(), "fell")
     assert kept.minds == [("built 1.0", {3: 1.03})]
     assert (found.phase, found.stood, found.until) == ("lead", 1, 10)
+    more = iterate(accepted=(accepted_one(1.0), accepted_one(0.9), accepted_one(0.8)))
+    assert minding.ready_to_lead(search, more, "fell").stood == 3
+    assert kept.minds[-1] == ("built 0.8", {3: 1.03}), "the last one that stands"
     assert minding.ready_to_lead(search, iterate(), "stands") is None
 
 
 @pytest.fixture
 def turns(search, monkeypatch):
     """Turns of ten evaluations, each of which ends at a design of a told objective that stands or doesn't."""
-    told = SimpleNamespace(ends=[], log=[])
+    told = SimpleNamespace(ends=[], log=[], judged=[])
 
     def descend(fine, it):
         assert fine.solver.window == 0.05
@@ -234,7 +237,9 @@ def turns(search, monkeypatch):
 
     monkeypatch.setattr(minding, "sound", sound)
     monkeypatch.setattr(minding, "accepted_design", lambda search, found: accepted_one(found.objective))
-    monkeypatch.setattr(minding, "standing", lambda search, it, built: (told.stands, it))
+    monkeypatch.setattr(
+        minding, "standing", lambda search, it, built: told.judged.append(built) or (told.stands, it)
+    )
     monkeypatch.setattr(minding, "joined", lambda search, it, built: told.log.append(("joined", built)) or it)
     monkeypatch.setattr(minding, "remembering", lambda search, it: told.log.append("remembering") or it)
     monkeypatch.setattr(minding, "last_sound", lambda search, it: it)
@@ -253,6 +258,7 @@ def test_turns_follow_as_long_as_each_gains_three_hundredths_and_its_design_stan
     assert [each.objective for each in found.accepted] == [1.0, 0.9, 0.85, 0.83]
     assert (found.stood, found.led_to, found.mind) == (4, 0.83, "some")
     assert turns.log == ["remembering"] * 3
+    assert turns.judged == ["built 0.9", "built 0.85", "built 0.83"]
     assert len(turns.ends) == 1
 
 
