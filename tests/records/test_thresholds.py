@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shellform.records.as_built import AsBuilt, critical_checks, falls, guide_checks, standing_checks
-from shellform.records.check import SLACK, below, share_of
+from shellform.records.check import SLACK, Cell, Check, below, share_of
 from shellform.records.checks import Bounds, checks
 from shellform.records.optimisation import CableCountRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow
@@ -185,6 +185,59 @@ def test_the_guide_is_held_against_the_share_that_stands_however_many_were_drawn
     }
     (check,) = guide_checks(rows, list(rows), ["design"], {"design": 1.0})
     assert "orders 1 of 1 pairs" in check.limit
+
+
+def test_the_guide_is_held_against_designs_that_have_been_drawn_and_have_a_guide_both():
+    rows = {
+        "a": design("design", stands=standing(20, 20), expected_stiffness=9.0),
+        "b": design("design", stands=standing(20, 10), expected_stiffness=4.0),
+        "undrawn": design("design", expected_stiffness=2.0),
+        "unguided": design("design", stands=standing(20, 5)),
+    }
+    (check,) = guide_checks(rows, list(rows), ["design"], {"design": 1.0})
+    assert "orders 1 of 1 pairs" in check.limit
+    assert [cell.found for cell in check.cells.values()] == ["9 N/m", "4 N/m", "2 N/m", "–"]
+
+
+def test_the_guide_is_told_under_every_load_but_none(shell, designs):
+    title = "Softest mode as built under {}"
+    made = found(shell, designs, "additional", expected_stiffness=41.0)
+    assert made[title.format("1.2 × the load")].found == "41 N/m"
+    assert title.format("no load") not in found(shell, designs, "none", expected_stiffness=41.0)
+
+
+def test_a_share_that_stands_is_told_of_how_many_were_drawn():
+    for drawn, standing_ones, holds in ((40, 30, False), (40, 39, None), (200, 199, True)):
+        (check,) = standing_checks(
+            {"one": design("design", stands=standing(drawn, standing_ones))}, {"one": RODS}, ["design"],
+            {"design": 1.0}, AsBuilt(0.99, None, 200),
+        )  # fmt: skip
+        cell = check.cells["one"]
+        assert (cell.holds, cell.share) == (holds, pytest.approx(standing_ones / drawn))
+
+
+def test_where_the_initial_design_was_not_drawn_as_much_is_asked_for_as_under_the_design_load():
+    loads = ["additional", "wind"]  # a load that it has, and one that it has not
+    made = standing_checks(
+        {"initial": design()}, {"initial": RODS}, loads, {"additional": 1.2, "wind": 1.0},
+        AsBuilt(0.95, None, 200),
+    )  # fmt: skip
+    assert [check.limit for check in made] == ["at least 190 of 200"] * 2
+
+
+def test_nothing_is_asked_of_a_design_under_a_load_or_by_a_record_that_it_has_not(shell, designs):
+    loads = {name: load(name) for name in ("none", "design")}
+    given = summary(["initial"]).with_design("polished", design(loads=loads))
+    every = {"initial": None, "polished": None, "unrecorded": None}
+    own = dict.fromkeys(every, designs["polished"])
+    made = {each.name: each for each in checks(dict.fromkeys(every, shell), own, given, BOUNDS)}
+    cells = made["Stands under 1.2 × the load"].cells
+    assert {name: (cell.asked, cell.holds) for name, cell in cells.items()} == {
+        "initial": (True, True),
+        "polished": (False, None),
+        "unrecorded": (False, None),
+    }
+    assert made["Stands under the design load"].cells["polished"].holds
 
 
 @pytest.mark.parametrize(("error", "told"), [(0.0004, "4 mm"), (-0.0004, "4.3 mm"), (None, "4 mm")])
@@ -372,6 +425,31 @@ def test_the_headline_counts_the_checks_that_fail(shell, designs):
     assert (
         headline(verdict(made, "polished")) == "The polished design is not examined: 2 checks are still open."
     )
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "best"),
+    [
+        ((0.8, 0.8), (0.7, 0.9), "optimised"),  # worse in one, though better in the other
+        ((0.8, 0.8), (0.9, 0.7), "optimised"),
+        ((0.8, 0.8), (0.8, 0.8), "polished"),
+        ((0.8, 0.8), (0.8, 0.9), "polished"),
+        ((0.8, None), (0.8, 0.9), "optimised"),  # fails in what held before
+    ],
+)
+def test_of_designs_that_fail_the_later_one_is_built_where_no_check_has_become_worse(first, then, best):
+    found = [
+        Check(
+            name,
+            "all",
+            {
+                design: Cell("some", share is None, share=share)
+                for design, share in (("optimised", before), ("polished", after))
+            },
+        )
+        for name, before, after in zip(("one load", "another"), first, then, strict=True)
+    ]
+    assert to_build(found, ["initial", "optimised", "polished"]) == best
 
 
 def test_before_anything_is_optimised_the_initial_design_is_to_be_built_or_the_last_there_is():
