@@ -360,6 +360,11 @@ def test_how_it_fails_is_explained_of_the_median_one_under_the_smallest_load_und
     assert desk.path(examination.FAILURE).is_file()
 
 
+def test_of_a_design_that_was_not_drawn_no_failure_is_explained(monkeypatch, tmp_path):
+    monkeypatch.setattr(examination, "_drawn", lambda *_: None)
+    assert examination._failure(Desk(tmp_path), examined(), 12) is None
+
+
 def test_how_rarely_it_falls_is_told_of_every_load_that_weighs(monkeypatch, tmp_path):
     desk = Desk(tmp_path, rare=20)
 
@@ -392,6 +397,8 @@ def test_how_rarely_it_falls_is_told_of_every_load_that_weighs(monkeypatch, tmp_
             ("unbraced", "initial", "optimised", "polished"), (), ("polished",), 0.95,
             ["polished", "optimised"], "optimised",
         ),
+        # one that is seen to fail once it is drawn doesn't end it either
+        (("initial", "optimised", "polished"), ("polished!",), (), 0.95, ["polished", "optimised"], "optimised"),
         # no fewer are to stand than of the initial design, which then is drawn too
         (("initial", "optimised"), (), (), None, ["bar", "optimised"], "optimised"),
         (("unbraced", "initial"), (), (), 0.95, ["initial"], "initial"),
@@ -413,6 +420,9 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
             compared.append(each.name)
         return so_far
 
+    def fails(found, name):
+        return name in failing or (f"{name}!" in failing and name in asked)
+
     monkeypatch.setattr(examination, "read_run", lambda folder: run)
     monkeypatch.setattr(examination, "_of_run", lambda run, name: examined(name))
     monkeypatch.setattr(examination, "side_by_side", lambda call, every: [call(each) for each in every])
@@ -424,7 +434,7 @@ def test_designs_are_drawn_in_full_from_the_last_on_until_one_holds(
         examination, "_bar", lambda desk, initial, so_far, clock: asked.append("bar") or so_far
     )
     monkeypatch.setattr(examination, "run_checks", lambda run: "checks")
-    monkeypatch.setattr(examination, "failed", lambda found, name: name in failing)
+    monkeypatch.setattr(examination, "failed", fails)
     monkeypatch.setattr(examination, "open_checks", lambda found, name: name in open_ones)
     monkeypatch.setattr(examination, "to_build", lambda found, every: best)
     monkeypatch.setattr(examination, "_failure", lambda desk, each, count: (each.name, count))
