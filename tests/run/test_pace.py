@@ -77,3 +77,46 @@ def test_times_are_told_no_finer_than_they_are_known():
         "90 min",
         "2 h",
     ]
+
+
+def test_each_phase_counts_for_what_it_took_and_for_five_evaluations_at_the_pace_before(at):
+    """Two evaluations in 6 s, then one note without and three with an evaluation, in 20 s."""
+    search = Pace(20, afterwards=10)
+    at(1.0)
+    search.left(1, "descend")
+    at(7.0)
+    assert search.left(3, "descend") == pytest.approx(3.0 * 17 + 3.0 * 10)
+    for seconds, done in ((9.0, 3), (15.0, 4), (21.0, 5), (27.0, 6)):
+        at(seconds)
+        left = search.left(done, "thin")
+    pace_now, between = (20.0 + 15.0) / (3 + 5), (20.0 + 15.0) / (4 + 5)
+    assert left == pytest.approx(pace_now * 14 + between + 3.0 * 10)
+    at(37.0)
+    third = search.left(8, "polish")
+    between, pace_now = ((10.0 + 5 * pace_now) / (count + 5) for count in (1, 2))
+    assert third == pytest.approx(pace_now * 12 + between + 3.0 * 10)
+
+
+def test_where_time_has_passed_without_an_evaluation_nothing_is_known_of_what_is_left(at):
+    search = Pace(20)
+    at(1.0)
+    assert search.left(0, "descend") is None
+    at(4.0)
+    assert search.left(0, "descend") is None
+    at(5.0)
+    assert search.left(0, "thin") is None
+
+
+@pytest.mark.parametrize(
+    ("seconds", "words"),
+    [(99.4, "99 s"), (100.0, "2 min"), (5999.0, "100 min"), (6000.0, "2 h"), (36000.0, "10 h"), (0.0, "0 s")],
+)
+def test_times_are_told_in_seconds_and_minutes_up_to_a_hundred_of_them(seconds, words):
+    assert time_words(seconds) == words
+
+
+def test_evaluations_that_took_no_time_leave_none(at):
+    search = Pace(20)
+    at(3.0)
+    search.left(1)
+    assert search.left(2) == 0.0
