@@ -1,0 +1,174 @@
+"""Which section, and how much concrete, comes after a failure: by hand-computed shares."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.run import next_trial
+from shellform.run.first_edges import edge_choices
+from shellform.run.first_trial import FirstParts, Followed
+from shellform.run.sizes import RodChoice, Rope
+from shellform.run.unbuildable import Obstacle, Why
+
+THIN, MIDDLE, THICK = (
+    RodChoice("some", sf.Rod.round(young=40e9, radius=radius, strength=255e6, density=2000.0).section)
+    for radius in (0.008, 0.01, 0.02)
+)
+SOME = [THIN, MIDDLE, THICK]
+
+
+def failed(why, factor=1.6, stress=0.5, choice=MIDDLE, thickness=0.05):
+    return Obstacle(why, 0.5, thickness, factor, choice, SimpleNamespace(net="net"), stress=stress)
+
+
+@pytest.mark.parametrize(
+    ("why", "factor", "times"),
+    [
+        (Why.STRENGTH, 1.6, 0.0),
+        (Why.STABILITY, 1.5, 1.3),
+        (Why.STABILITY, 0.75, 2.2**1.3),
+        (Why.STABILITY, 0.01, 16.5**1.3),
+        (Why.SCATTER, 1.6, 1.3),  # as if it bore nine tenths of what is needed: 1.22 to the 1.3 is less
+        (Why.EDGES, 1.2, 1.375**1.3),
+    ],
+)
+def test_after_a_shell_that_falls_comes_a_section_stiffer_by_more_than_what_it_lacks(
+    monkeypatch, why, factor, times
+):
+    asked = []
+    monkeypatch.setattr(next_trial, "next_choice", lambda *how: asked.append(how) or 2)
+    assert next_trial.next_section("net", SOME, 1, failed(why, factor, 0.7)) == 2
+    assert asked == [("net", SOME, 1, 0.7, pytest.approx(times), 0.95)]
+
+
+def test_where_only_deeper_sections_are_left_rods_give_way_to_less_deep_ones_for_the_stress_that_they_may_have():
+    """Of 1.4 times their strength 0.92 of 0.95 are left by rods of 0.62 of the depth, of 1.05 by such of 0.83."""
+    assert next_trial.thinner_rods(SOME, THICK, failed(Why.STRENGTH, stress=1.4)) is MIDDLE
+    assert next_trial.thinner_rods(SOME, MIDDLE, failed(Why.STRENGTH, stress=1.05)) is THIN
+    assert next_trial.thinner_rods(SOME, MIDDLE, failed(Why.STRENGTH, stress=1.15)) is MIDDLE, (
+        "none is so thin"
+    )
+    other = RodChoice("another", THICK.section)
+    assert next_trial.thinner_rods(SOME, other, failed(Why.STRENGTH, stress=1.4)) is other
+
+
+@pytest.mark.parametrize(
+    ("last", "found", "then"),
+    [
+        (Why.STABILITY, 2, 2),
+        (Why.STABILITY, 1, 1),  # tried before: the end
+        (Why.STRENGTH, 2, 2),
+        (Why.STRENGTH, 1, 0),  # less deep than the one that is stressed least
+    ],
+)
+def test_what_was_tried_before_gives_way_to_less_deep_rods_where_rods_break(monkeypatch, last, found, then):
+    monkeypatch.setattr(next_trial, "next_section", lambda *_: found)
+    tried = {0: failed(Why.STRENGTH, stress=2.0), 1: failed(last, stress=1.05)}
+    if then == 0:
+        tried = {2: failed(Why.STRENGTH, stress=2.0), 1: failed(last, stress=1.05)}
+    assert next_trial.after("net", SOME, tried) == then
+
+
+@pytest.mark.parametrize(
+    ("why", "factor", "borne", "share"),
+    [
+        (Why.STABILITY, 0.6, None, 0.38),  # 0.95 of 0.6 over 1.5
+        (Why.STABILITY, 1.4, None, 0.8),
+        (Why.SCATTER, 1.6, None, 0.8),
+        (Why.STRENGTH, 1.6, 0.7, 0.7),
+        (Why.STRENGTH, 1.6, 0.3, 0.5),
+        (Why.STRENGTH, 1.6, 0.95, 0.9),
+    ],
+)
+def test_so_much_less_concrete_is_poured_as_a_trial_says_but_no_less_than_half(
+    monkeypatch, why, factor, borne, share
+):
+    asked = []
+    monkeypatch.setattr(next_trial, "load_borne", lambda *how: asked.append(how) or borne)
+    assert next_trial._borne(failed(why, factor, 1.2), MIDDLE) == pytest.approx(share)
+    assert asked == ([] if borne is None else [("net", MIDDLE, 1.2, 0.92)])
+
+
+def test_of_the_failures_with_as_much_concrete_and_spacing_the_one_that_bears_most_is_thinned(monkeypatch):
+    monkeypatch.setattr(next_trial, "load_borne", lambda net, choice, stress, most: 2.0 - stress)
+    nearest = failed(Why.STRENGTH, 1.6, 1.5)
+    falls = failed(Why.STABILITY, 0.9)
+    gives_way = failed(Why.EDGES, 1.5, 1.6)
+    assert next_trial.bears_most([nearest, falls, gives_way], nearest) is gives_way, "0.5, 0.6 and 0.625"
+    assert next_trial.bears_most([nearest, falls], nearest) is falls
+    early = failed(Why.STRENGTH, 0.3, 1.1)
+    assert next_trial.bears_most([early], nearest) is nearest, "it stands up to a fifth of its load only"
+    other = failed(Why.STABILITY, 1.4, thickness=0.04)
+    none = Obstacle(Why.NET, 0.5, 0.05, 1.4)
+    assert next_trial.bears_most([other, none], nearest) is nearest
+
+
+@pytest.mark.parametrize(
+    ("factor", "tried", "may"),
+    [
+        (1.21, Why.STABILITY, True),
+        (1.19, Why.STABILITY, False),
+        (1.0, Why.EDGES, True),
+        (1.6, Why.STRENGTH, False),
+    ],
+)
+def test_stronger_edge_beams_may_help_from_four_fifths_of_what_is_needed_on(factor, tried, may):
+    assert next_trial.edges_may_help(failed(tried, factor)) is may
+
+
+def parts(ratio=0.996, swivels=False, diameter=0.006):
+    return FirstParts(MIDDLE, edge_choices(MIDDLE)[0], ratio, Rope(diameter), swivels)
+
+
+def came_to(factor=1.5, stress=0.5, edge=0.5, pull=0.5):
+    return Followed(factor, stress, edge, 0.0874, pull, np.zeros(3), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    ("pull", "ratio", "diameter"),
+    [
+        (1.25, 0.9983, 0.006),
+        (1.3, 0.9986, 0.006),
+        (0.86, 0.9961, 0.006),
+        (9.0, 0.999, 0.006),
+        (0.8, 0.996, 0.008),
+    ],
+)
+def test_cables_are_eased_to_85_percent_of_their_limit_by_less_prestrain_or_thicker_strands(
+    pull, ratio, diameter
+):
+    """A strand under its limit is strained by 0.00575."""
+    eased = parts().eased(pull)
+    assert (eased.rest_ratio, eased.rope.diameter) == (pytest.approx(ratio, abs=1e-9), diameter)
+    assert parts(0.999, diameter=0.016).eased(2.0) is None, "there is no thicker one"
+
+
+@pytest.mark.parametrize(
+    ("came", "ratio", "swivels"),
+    [
+        (came_to(stress=0.96), 0.998, True),
+        (came_to(stress=0.95), None, None),
+        (came_to(factor=1.49, stress=2.0), None, None),
+        (came_to(pull=0.95), 0.9966, False),
+        (came_to(pull=0.9), None, None),
+        (came_to(edge=0.95, pull=0.95), 0.9966, False),
+        (came_to(edge=0.96, pull=0.95), None, None),
+    ],
+)
+def test_what_is_tried_after_a_design_that_bears_its_load_spares_rods_first_and_then_cables(
+    came, ratio, swivels
+):
+    found = parts().easier(came, 0.9)
+    if ratio is None:
+        assert found is None
+        return
+    assert (found.rest_ratio, found.swivels) == (pytest.approx(ratio, abs=1e-9), swivels)
+    assert came.sag_told == "87 mm"
+
+
+def test_prestrain_is_halved_no_further_than_the_least():
+    assert parts(0.9985).easier(came_to(stress=1.2), 0.9).rest_ratio == 0.999
+    assert parts(0.9995).easier(came_to(stress=1.2), 0.9).rest_ratio == 0.9995, "it has less already"
+    assert parts(0.999, swivels=True).easier(came_to(stress=1.2), 0.9) is None
