@@ -96,3 +96,22 @@ def test_what_a_design_came_to_tells_of_edges_where_it_has_any(lines, told):
     tried = Followed(1.5, 0.5, 0.3, 0.3686, 0.8, np.zeros(3), np.zeros(3))
     placed = Placed(SimpleNamespace(edges=lines), 45.0, (0.0, 0.0))
     assert came_to(placed, tried) == "stands up to 1.50 × its load, rods at 50% of their strength" + told
+
+
+@pytest.mark.parametrize(
+    ("factor", "pull", "told"),
+    [
+        (1.5, 1.01, ", cables at 101% of theirs"),
+        (1.5, 1.0, ""),
+        (1.49, 1.8, ""),
+        (1.6, 1.8, ", cables at 180% of theirs"),
+    ],
+)
+def test_of_cables_is_told_where_they_are_pulled_beyond_their_limit_by_a_design_that_stands(
+    factor, pull, told
+):
+    tried = Followed(factor, 0.5, 0.3, 0.0, pull, np.zeros(3), np.zeros(3))
+    placed = Placed(SimpleNamespace(edges=()), 45.0, (0.0, 0.0))
+    assert (
+        came_to(placed, tried) == f"stands up to {factor:.2f} × its load, rods at 50% of their strength{told}"
+    )

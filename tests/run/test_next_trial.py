@@ -67,7 +67,11 @@ def test_what_was_tried_before_gives_way_to_less_deep_rods_where_rods_break(monk
     monkeypatch.setattr(next_trial, "next_section", lambda *_: found)
     tried = {0: failed(Why.STRENGTH, stress=2.0), 1: failed(last, stress=1.05)}
     if then == 0:
-        tried = {2: failed(Why.STRENGTH, stress=2.0), 1: failed(last, stress=1.05)}
+        tried = {
+            2: failed(Why.STRENGTH, stress=1.6),
+            1: failed(Why.STRENGTH, stress=1.05),
+            0: failed(last, stress=9.0),
+        }
     assert next_trial.after("net", SOME, tried) == then
 
 
@@ -102,7 +106,8 @@ def test_of_the_failures_with_as_much_concrete_and_spacing_the_one_that_bears_mo
     assert next_trial.bears_most([early], nearest) is nearest, "it stands up to a fifth of its load only"
     other = failed(Why.STABILITY, 1.4, thickness=0.04)
     none = Obstacle(Why.NET, 0.5, 0.05, 1.4)
-    assert next_trial.bears_most([other, none], nearest) is nearest
+    unplaced = Obstacle(Why.STABILITY, 0.5, 0.05, 1.4, MIDDLE)
+    assert next_trial.bears_most([other, none, unplaced], nearest) is nearest
 
 
 @pytest.mark.parametrize(
