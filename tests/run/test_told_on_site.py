@@ -1,0 +1,188 @@
+"""What the site is told after a survey, a replay and an erection: numbers by hand, from results that are stood in for."""
+
+import csv
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError
+from shellform.run import onsite
+from shellform.run.onsite import Survey
+
+POSITIONS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 1.0, 0.5], [4.0, 4.0, 1.0]])
+SHELL = SimpleNamespace(
+    net=SimpleNamespace(spacing=0.4, grid=SimpleNamespace(crossing_nodes=np.array([[0, 1], [2, 3], [2, 4]]))),
+    cable_ends=np.zeros((3, 2)),
+)
+STATE = SimpleNamespace(positions=POSITIONS, quaternions=np.ones((5, 4)))
+
+
+def moved(by):
+    return SimpleNamespace(positions=POSITIONS + by, quaternions=np.ones((5, 4)))
+
+
+@pytest.fixture
+def run(monkeypatch, tmp_path):
+    own = SimpleNamespace(
+        folder=tmp_path, best="polished", designs={"initial": "first", "polished": "last"},
+        states={"polished": {"none": moved([0.0, 0.0, 0.01]), "wet": moved([0.0, 0.02, 0.0])}},
+        loads={"none": "no load", "wet": "concrete"}, shell_of=lambda name: SHELL,
+    )  # fmt: skip
+    monkeypatch.setattr(onsite, "read_run", lambda folder: own)
+    return own
+
+
+@pytest.mark.parametrize(
+    ("turns", "halved", "second", "lines"),
+    [
+        ([2, 0, -3], 0, "2 cables to turn, 5 turns of 0.5 mm; afterwards 3.000 mm are predicted", 2),
+        ([0, 0, 0], 0, "no turn is worth taking", 2),
+        ([0, 0, 1], 2, "1 cables to turn, 1 turns of 0.5 mm", 3),
+    ],
+)
+def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
+    monkeypatch, run, tmp_path, turns, halved, second, lines
+):
+    options = Survey(step=0.5e-3, largest=0.002, cables=20, noise=0.2e-3, load="wet")
+    belief = SimpleNamespace(state=STATE)
+    learnt = SimpleNamespace(state=moved([0.003, 0.0, 0.0]))
+    now = SimpleNamespace(
+        design=SimpleNamespace(
+            rest_length=np.array([1.0, 2.0, 3.0]), present=np.array([1, 1, 1]), radius=0.01
+        ),
+        covariance=np.eye(3),
+        state=moved([0.0, 0.02, 0.004]),
+    )
+    step = SimpleNamespace(
+        turns=np.array(turns), misfit_before=5 * 0.005**2, misfit_after=5 * 0.003**2, halved=halved, belief=now,
+        schedule=lambda shell: "turns",
+    )  # fmt: skip
+    asked = []
+    monkeypatch.setattr(onsite, "_believed", lambda *_: ("polished", SHELL, belief))
+    monkeypatch.setattr(onsite, "_surveyed", lambda *_: ([1, 3], [0, 0], ["One point is far."]))
+    monkeypatch.setattr(onsite.retensioning, "learn", lambda *how, noise: asked.append(noise) or learnt)
+
+    def adjust(shell, belief, goal, crew, *, noise):
+        asked.append((crew, noise))
+        np.testing.assert_array_equal(goal, run.states["polished"]["wet"].positions)
+        return step
+
+    monkeypatch.setattr(onsite.retensioning, "adjust", adjust)
+    found = onsite.survey(tmp_path, tmp_path / "survey.csv", options)
+    assert found.lines[0] == "One point is far."
+    assert "2 nodes were seen; the grid lies 5.000 mm from" in found.lines[1]
+    assert found.lines[2].startswith(second)
+    assert len(found.lines) == lines + 1
+    if halved:
+        assert "halved 2 times" in found.lines[3]
+    assert asked[0] == 0.2e-3
+    assert (asked[1][0].step, asked[1][0].largest, asked[1][0].cables) == (0.5e-3, 0.002, 20)
+    with (tmp_path / "schedules/predicted.csv").open(encoding="utf-8", newline="") as file:
+        first, _, last = csv.DictReader(file)
+    assert (first["node"], first["x"], last["z"]) == ("1", "1.000000", "1.004000")
+    assert float(first["distance before [mm]"]) == pytest.approx(np.hypot(3.0, 20.0), abs=1e-3)
+    assert float(first["distance after [mm]"]) == pytest.approx(4.0)
+    with np.load(tmp_path / "schedules/belief.npz") as kept:
+        assert str(kept["origin"]) == "polished/wet"
+        np.testing.assert_array_equal(kept["positions"], now.state.positions)
+
+
+@pytest.mark.parametrize(("unit", "metre"), [("m", 1.0), ("mm", 1e3)])
+def test_named_nodes_are_taken_as_far_as_they_were_seen_and_refused_beyond_half_a_spacing(
+    monkeypatch, tmp_path, unit, metre
+):
+    def read(by):
+        places = POSITIONS[[1, 2, 4]] + [[0.0, 0.0, 0.0], [0.0, 0.0, by], [np.nan, 0.0, 0.0]]
+        return lambda path, shell: (np.array([1, 2, 4]), metre * places)
+
+    monkeypatch.setattr(onsite.measurements, "has_column", lambda path, name: name == "crossing")
+    monkeypatch.setattr(onsite.measurements, "read_places", read(-0.199))
+    nodes, places, doubts = onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit=unit))
+    assert (nodes.tolist(), doubts) == ([1, 2], [])
+    np.testing.assert_allclose(places, [[1.0, 0.0, 0.0], [2.0, 0.0, -0.199]])
+    monkeypatch.setattr(onsite.measurements, "read_places", read(-0.201))
+    with pytest.raises(InputError, match=r"node 2 lies 201\.0 mm from"):
+        onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit=unit))
+    with pytest.raises(InputError, match="isn't a known unit"):
+        onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit="mile"))
+    nowhere = np.full((1, 3), np.nan)
+    monkeypatch.setattr(onsite.measurements, "read_places", lambda *_: (np.array([1]), nowhere))
+    with pytest.raises(InputError, match="no node was seen"):
+        onsite._surveyed(tmp_path, SHELL, STATE, Survey())
+
+
+def test_points_without_names_are_laid_onto_the_crossings_within_half_a_spacing(monkeypatch, tmp_path):
+    asked = []
+
+    def match(points, expected, *, reach):
+        asked.append((points, expected.tolist(), reach))
+        places = np.array([[1.0, 2.0, 3.0], [np.nan, 0.0, 0.0], [4.0, 5.0, 6.0]])
+        return SimpleNamespace(places=lambda points: places, doubts=("far",))
+
+    monkeypatch.setattr(onsite.measurements, "has_column", lambda path, name: False)
+    monkeypatch.setattr(onsite, "read_points", lambda path, *, unit: unit)
+    monkeypatch.setattr(onsite, "match", match)
+    nodes, places, doubts = onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit="cm"))
+    assert asked == [("cm", POSITIONS[[1, 3, 4]].tolist(), 0.2)]
+    assert (nodes.tolist(), places.tolist(), doubts) == ([1, 4], [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], ["far"])
+
+
+def test_a_replay_tells_what_is_left_after_each_round_and_draws_lengths_of_the_error_that_is_given(
+    monkeypatch, run, tmp_path
+):
+    asked = {}
+
+    def replay(shell, belief, errors, goal, nodes, crew, **how):
+        asked.update(how, errors=errors, nodes=nodes.tolist())
+        turns = [SimpleNamespace(turns=np.array([1, -2, 0])), SimpleNamespace(turns=np.array([0, 0, 4]))]
+        misfits = [5 * 0.01**2, 5 * 0.004**2, 5 * 0.002**2]
+        return SimpleNamespace(misfits=misfits, adjustments=turns, removed=0.96)
+
+    monkeypatch.setattr(onsite, "_believed", lambda *_: ("polished", SHELL, None))
+    monkeypatch.setattr(onsite.retensioning, "replay", replay)
+    options = Survey(length_error=0.002, noise=0.3e-3)
+    found = onsite.replay(tmp_path, options, rounds=2, seed=4, slip=0.05)
+    assert [each.split(",") for each in found.lines[1:4]] == [
+        ["0", "10.000", "0", "0"], ["1", "4.000", "2", "3"], ["2", "2.000", "1", "4"],
+    ]  # fmt: skip
+    assert found.lines[-1] == "96 % of the misfit are gone after 2 rounds"
+    np.testing.assert_allclose(asked["errors"], 0.002 * np.random.default_rng(4).normal(size=3))
+    assert (asked["nodes"], asked["noise"], asked["rounds"], asked["seed"], asked["slip"]) == (
+        [1, 3, 4], 0.3e-3, 2, 5, 0.05,
+    )  # fmt: skip
+
+
+def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, run, tmp_path):
+    def step(stage, share, stress, tension, reaction):
+        return SimpleNamespace(
+            stage=stage, share=share, stress=stress, tension=tension, reaction=reaction, state=STATE
+        )
+
+    steps = [
+        step("moving", 0.5, 80e6, 1.0, 40.0), step("moving", 1.0, 120e6, 7.5, 30.0), step("loading", 1.0, 60e6, 2.0, 9.0)
+    ]  # fmt: skip
+    asked = []
+
+    def erect(shell, own, **how):
+        asked.append((own, how["load"], how["weight"], how["lift"], how["step"]))
+        return SimpleNamespace(steps=steps, worst=steps[1], strength=240e6, table=lambda: "table")
+
+    monkeypatch.setattr(onsite.erection, "erect", erect)
+    found = onsite.erect(tmp_path, load="wet", lift="none", step=0.125)
+    assert asked == [("last", "concrete", None, "no load", 0.125)]
+    assert list(found.lines) == [
+        "3 steps: moving, loading",
+        "largest rod stress 120 MPa, 0.50 of the strength, at 1.00 of moving; 60 MPa in the end",
+        "largest cable tension 7.5 N, largest force on a support 40 N",
+    ]
+
+
+def test_a_design_and_a_load_are_those_named_or_the_usual_and_there(run):
+    assert onsite._design(run, None, "polished") == "polished"
+    assert onsite._design(run, "initial", "polished") == "initial"
+    with pytest.raises(InputError, match=r"isn't there.*initial, polished"):
+        onsite._design(run, "rounded", "polished")
+    assert onsite._load("wet", SHELL, run.loads) == "concrete"
+    with pytest.raises(InputError, match=r"there is no such load case.*none, wet"):
+        onsite._believed(run, Survey(load="snow"))
