@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
+from shellform.gridshell.gridshell import Design
 from shellform.run import onsite
 from shellform.run.onsite import Survey
 
@@ -186,3 +187,42 @@ def test_a_design_and_a_load_are_those_named_or_the_usual_and_there(run):
     assert onsite._load("wet", SHELL, run.loads) == "concrete"
     with pytest.raises(InputError, match=r"there is no such load case.*none, wet"):
         onsite._believed(run, Survey(load="snow"))
+
+
+def test_the_round_after_goes_on_from_what_was_believed_of_the_same_design_and_load(
+    monkeypatch, run, tmp_path
+):
+    drawn = Design(np.array([1.0, 2.0, 3.0]), np.array([True, False, True]), 0.01)
+    run.designs["polished"] = drawn
+    kept = {
+        "rest_length": np.array([1.1, 2.1, 3.1]), "present": drawn.present, "radius": np.array(0.02),
+        "covariance": np.eye(3), "positions": POSITIONS, "quaternions": np.ones((5, 4)), "origin": "polished/wet",
+    }  # fmt: skip
+
+    def believed(load="wet", **changes):
+        file = tmp_path / "belief.npz"
+        np.savez(file, **{**kept, **changes})
+        return onsite._believed(run, Survey(load=load, after=file))
+
+    name, shell, belief = believed()
+    assert (name, shell, belief.load) == ("polished", SHELL, "concrete")
+    assert (belief.design.rest_length.tolist(), belief.design.radius) == ([1.1, 2.1, 3.1], 0.02)
+    np.testing.assert_array_equal(belief.state.positions, POSITIONS)
+    for changes in ({"origin": "initial/wet"}, {"present": np.array([True, True, True])}, {"load": "none"}):
+        with pytest.raises(InputError, match="another design or load case"):
+            believed(**changes)
+    del kept["radius"], kept["covariance"]
+    with pytest.raises(InputError, match=r"lacks what a belief has.*covariance, radius"):
+        believed()
+    monkeypatch.setattr(
+        onsite.retensioning,
+        "drawn",
+        lambda shell, own, state, load, *, length_error: (own, load, length_error),
+    )
+    assert onsite._believed(run, Survey(load="wet", length_error=0.003))[2] == (drawn, "concrete", 0.003)
+
+
+@pytest.mark.parametrize("slip", [-0.01, 1.01, np.nan])
+def test_a_turn_s_error_is_a_share_of_it(run, tmp_path, slip):
+    with pytest.raises(InputError, match="--slip"):
+        onsite.replay(tmp_path, Survey(), rounds=1, seed=0, slip=slip)
