@@ -169,3 +169,24 @@ def test_a_design_ends_with_3_where_it_fails_or_was_to_be_examined_and_is_not(
     assert (asked["case"], asked["output"], asked["until"]) == ((Path("a.toml"), ()), Path("run"), until)
     first = "figures/sketch.png" if sketch else "report.html"
     assert (f"look at {Path('run') / first} first" in capsys.readouterr().out) == (until == "report")
+
+
+def test_what_is_watched_is_the_case_with_its_settings(monkeypatch):
+    import shellform.case.case
+    import shellform.cli.watching
+
+    asked = []
+    monkeypatch.setattr(shellform.case.case, "load_case", lambda file, settings: asked.append(list(settings)))
+    monkeypatch.setattr(
+        shellform.cli.watching, "case_files", lambda file, settings: asked.append(list(settings))
+    )
+
+    def watched(files, once):
+        files()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(shellform.cli.watching, "watched", watched)
+    for settings in (None, ["net.spacing=0.4"]):
+        with pytest.raises(KeyboardInterrupt):
+            commands.design(Path("a.toml"), Path("run"), watch=True, settings=settings)
+    assert asked == [[], [], ["net.spacing=0.4"], ["net.spacing=0.4"]]
