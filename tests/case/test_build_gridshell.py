@@ -87,14 +87,14 @@ def test_edge_beams_are_of_the_rods_material_or_their_own():
 
 
 def one(force):
-    load = np.zeros((2, 6))
-    load[:, 2] = -force, -2.0 * force
+    load = np.zeros((3, 6))
+    load[:2, 2] = -force, -2.0 * force
     return load
 
 
 @pytest.fixture
 def parts(monkeypatch):
-    """What each kind of part weighs: its own amount, N, on the first node, twice that on the second."""
+    """What each kind of part weighs: its own amount, N, on the first node, twice that on the second, none on the third."""
     found = []
 
     def concrete(net, surface, *, thickness, density, region):

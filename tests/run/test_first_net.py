@@ -1,0 +1,134 @@
+"""Which of several nets is taken, and what trying them costs, with nets that are stood in for."""
+
+import math
+from types import SimpleNamespace
+
+import pytest
+
+from shellform.net.refusal import Stalled
+from shellform.run import first_net
+from shellform.run.first_net import Allowance, bends_to, larger, least_bent_net
+from shellform.run.sizes import MOST_CROSSINGS, Placed
+
+SURFACE = SimpleNamespace(area=100.0)
+
+
+def net(curvature, cost=1.0):
+    return SimpleNamespace(
+        quality=SimpleNamespace(curvature_max=curvature), grid=None, target=None, cost=cost, edges=()
+    )
+
+
+class Pulls:
+    """Nets by angle, in degrees, and by whether they are shifted; what isn't there stalls."""
+
+    def __init__(self, **nets):
+        self.nets, self.asked = nets, []
+
+    def __call__(self, surface, *, spacing, gap, elements, angle, offset, tuning):
+        name = f"a{math.degrees(angle):.0f}" + ("s" if offset == (0.5, 0.5) else "")
+        self.asked.append((name, tuning.limit))
+        if name not in self.nets:
+            raise Stalled("stalls", residual=0.1, iterations=60)
+        return self.nets[name]
+
+
+@pytest.fixture
+def pulled(monkeypatch):
+    def found(allowance, angles, shifted=False, **nets):
+        pulls, said, told = Pulls(**nets), [], []
+        monkeypatch.setattr(first_net, "pull_net", pulls)
+        monkeypatch.setattr(first_net, "refuse_nearness", lambda *_: None)
+        monkeypatch.setattr(first_net, "cost", lambda own: own.cost)
+        placed, near = least_bent_net(
+            SURFACE, 0.5, 0.02, angles, said.append, allowance, shifted=shifted, tell=told.append
+        )
+        return placed, near, pulls.asked, (said, told)
+
+    return found
+
+
+def test_the_least_bent_net_is_taken_of_those_alike_the_cheapest_and_angles_nearly_as_good_are_told(pulled):
+    allowance = Allowance(5000)
+    nets = {"a45": net(1.0, 9.0), "a0": net(1.049, 3.0), "a23": net(1.06, 1.0), "a67": net(1.2, 0.5)}
+    placed, near, asked, (said, told) = pulled(allowance, (45.0, 0.0, 23.0, 67.0), **nets)
+    assert placed == Placed(nets["a0"], 0.0, (0.0, 0.0))
+    assert near == [45.0, 0.0], "two of the three within a tenth of the one that is taken"
+    assert [name for name, _ in asked] == ["a45", "a0", "a23", "a67"]
+    assert {limit for _, limit in asked} == {110}
+    assert allowance.left == 5000 - 4 * 400
+    assert said == []
+    assert told[0] == "net at 45°, 0.5 m: rods bend to a radius of 1 m"
+
+
+@pytest.mark.parametrize(
+    ("curvature", "cost", "moved"), [(0.9, 5.0, True), (1.1, 0.1, False), (1.02, 0.1, True)]
+)
+def test_the_best_net_is_tried_half_a_spacing_off_too(pulled, curvature, cost, moved):
+    placed, _, asked, _ = pulled(
+        Allowance(5000), (45.0, 0.0), True, a45=net(2.0), a0=net(1.0), a0s=net(curvature, cost)
+    )
+    assert asked[-1][0] == "a0s"
+    assert placed.offset == ((0.5, 0.5) if moved else (0.0, 0.0))
+    still, *_ = pulled(Allowance(5000), (0.0,), True, a0=net(1.0))
+    assert still.offset == (0.0, 0.0), "the other stalls"
+
+
+def test_a_pull_that_stalls_costs_four_that_end_and_none_is_begun_once_the_work_is_done(pulled):
+    allowance = Allowance(1700)
+    placed, _, asked, (said, _) = pulled(allowance, (45.0, 0.0, 23.0), a0=net(1.0), a23=net(0.5))
+    assert (placed.angle, len(asked)) == (0.0, 2)
+    assert allowance.left == 1700 - 4 * 400 - 400
+    assert said[0].startswith("net at 45°, 0.5 m: ")
+    brief = Allowance(1700, thorough=False)
+    assert {limit for _, limit in pulled(brief, (0.0,), a0=net(1.0))[2]} == {70}
+    over = Allowance(0)
+    assert len(pulled(over, (0.0, 45.0), a0=net(1.0))[2]) == 1, "the first in any case"
+
+
+@pytest.mark.parametrize(
+    ("allowance", "climbs"),
+    [(Allowance(50_000), True), (Allowance(50_000, thorough=False), False), (Allowance(3200), False)],
+)
+def test_where_no_angle_gives_a_net_the_ladder_is_climbed_from_the_first_with_the_work_that_is_left(
+    monkeypatch, pulled, allowance, climbs
+):
+    """Of 450 · 300 / 400 = 338 factorisations two pulls of 60 are spent, of which the first counts for the ladder."""
+    climbed, asked = net(1.0), []
+
+    def climb(surface, settings, *, angle, most, failed, near, progress):
+        asked.append((settings["spacing"], math.degrees(angle), most, near))
+        return climbed, SimpleNamespace(angle=math.radians(40.0), offset=(0.25, 0.0))
+
+    monkeypatch.setattr(first_net, "climbed_net", climb)
+    if not climbs:
+        with pytest.raises(Stalled):
+            pulled(allowance, (45.0, 0.0))
+        assert asked == []
+        return
+    placed, near, *_ = pulled(allowance, (45.0, 0.0))
+    assert (placed.net, placed.angle, placed.offset, near) == (climbed, pytest.approx(40.0), (0.25, 0.0), [])
+    assert asked == [(0.5, pytest.approx(45.0), 338 - 120 + 60, False)]
+    assert allowance.left == 50_000 - 3 * 1600
+
+
+def test_a_net_is_pulled_anew_with_another_gap_and_stands_on_its_edges(monkeypatch):
+    asked = []
+
+    def climb(surface, settings, *, angle, offset, most, near, progress):
+        asked.append((settings["gap"], round(math.degrees(angle), 9), offset, most, near))
+        return "net", SimpleNamespace(angle=math.radians(22.5), offset=(0.5, 0.0))
+
+    monkeypatch.setattr(first_net, "climbed_net", climb)
+    monkeypatch.setattr(first_net, "stand", lambda own, surface, edges: (own, edges))
+    placed = first_net.with_gap(SURFACE, Placed(None, 30.0, (0.5, 0.5)), 0.5, 0.07, "edges", print)
+    assert asked == [(0.07, 30.0, (0.5, 0.5), 338, False)]
+    assert (placed.net, placed.angle, placed.offset) == (("net", "edges"), pytest.approx(22.5), (0.5, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("spacing", "times"), [(None, 1.0), (1.0, 1.0), (0.25, 1600 / MOST_CROSSINGS), (0.01, 20.0)]
+)
+def test_more_crossings_than_usual_are_worth_so_many_times_more_work_up_to_twenty(spacing, times):
+    assert larger(SURFACE, spacing) == pytest.approx(times)
+    assert bends_to(net(0.25)) == 4.0
