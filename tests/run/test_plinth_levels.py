@@ -43,6 +43,8 @@ def test_plinths_reach_up_to_a_level_of_two_digits_below_a_fiftieth_of_the_exten
 
 def test_plinths_are_for_feet_bent_to_two_spacings_that_are_the_reason(feet):
     assert feet(1.0, 1.41) is not None
+    assert feet(0.8, 1.13) is not None
+    assert feet(0.8, 1.11) is None
     assert feet(1.01, 9.0) is None, "rods follow that"
     assert feet(1.0, 1.39) is None, "it is bent as sharply elsewhere"
     assert feet(1.0, 9.0, can_be_cut=False) is None
