@@ -10,6 +10,7 @@ from shellform.case import build_net as module
 from shellform.case.build_gridshell import RodLimits
 from shellform.case.build_net import (
     counted_from,
+    distant_origin,
     edge_records,
     edges_of,
     net_of,
@@ -131,3 +132,19 @@ def test_records_of_edges_and_rods_keep_their_levels_and_amounts():
         found, rod_radius_max=NET.rod_radius_max, curvature_limit=None, curvature_utilisation=None
     ) == (replace(NET, curvature_limit=None, curvature_utilisation=None))
     assert size_text((12.0, 0.5, 3.14159)).startswith("12 × 0.5 × 3.142 m")
+
+
+@pytest.mark.parametrize(
+    ("size", "corner", "origin"),
+    [(10.0, (4312.5, -819.0, 41.0), (4310.0, -820.0, 40.0)), (0.1, (43.125, -8.19, 0.0), (43.1, -8.2, 0.0))],
+)
+def test_an_origin_near_a_surface_has_the_last_digit_that_counts_of_its_size(size, corner, origin):
+    """Sides of 30 and of 0.3 m."""
+    given = replace(plate(), vertices=size * FLAT + np.array(corner))
+    assert distant_origin(given, 100.0) == pytest.approx(origin)
+
+
+def test_beyond_a_hundred_of_its_sides_a_surface_is_distant():
+    assert module.FAR == 100.0
+    assert distant_origin(plate((297.0, 0.0, 0.0)), module.FAR) is None
+    assert distant_origin(plate((297.1, 0.0, 0.0)), module.FAR) == pytest.approx((297.0, 0.0, 0.0))
