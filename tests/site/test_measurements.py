@@ -1,0 +1,146 @@
+"""Tables that come from a site, cell by cell, for a net of six nodes and two crossings."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError
+from shellform.site import measurements
+from shellform.site.measurements import (
+    MeasuredRow,
+    check_noise,
+    has_column,
+    read_groups,
+    read_loads,
+    read_nodes,
+    read_places,
+    read_table,
+    read_way,
+)
+
+SHELL = SimpleNamespace(
+    node_count=6,
+    net=SimpleNamespace(
+        grid=SimpleNamespace(crossing_nodes=np.array([[0, 3], [1, 5]])), supports=np.array([4, 2])
+    ),
+)
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text):
+        file = tmp_path / "table.csv"
+        file.write_text(text, encoding="utf-8")
+        return file
+
+    return write
+
+
+def test_rows_keep_the_numbers_of_their_lines_and_columns_come_in_any_order_and_case(written):
+    file = written("# from site\n\n Y ; X;note\n1.5; 2;a\n  # a remark\n;3\n")
+    rows = read_table(file, ("x",), ("y", "z"), empty=("y",))
+    assert [row.line for row in rows] == [4, 6]
+    assert rows[0] == MeasuredRow(4, {"x": 2.0, "y": 1.5})
+    assert rows[1].values["x"] == 3.0
+    assert math.isnan(rows[1].values["y"])
+
+
+@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
+def test_cells_are_parted_by_the_mark_that_the_first_line_has(written, delimiter):
+    text = f"x{delimiter}y\n1{delimiter}-2.5e-3\n"
+    assert read_table(written(text), ("x", "y")) == [MeasuredRow(2, {"x": 1.0, "y": -0.0025})]
+    assert has_column(written("# z\n\n" + text), "y")
+    assert not has_column(written("# z\n" + text), "z")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", r"is empty. Columns: x, y; if wanted z"),
+        ("x\n1\n", r"has no column 'y' in its first line \(found 'x'\)"),
+        ("x,y,X\n1,2,3\n", "has two columns 'x'"),
+        ("x,y\n", "has no rows below its first line"),
+        ("x,y\n1,2\n1,2,3\n", "line 3: has 3 cells for 2 columns"),
+        ("x,y\n1,2\n1\n", "line 3: y: must be a number"),
+        ("x,y\n1,\n", "line 2: y: must be a number"),
+        ("x,y\n,2\n", "line 2: x: must be a number"),
+        ("x,y\n1,inf\n", "line 2: y: must be finite"),
+    ],
+)
+def test_a_table_that_lacks_something_is_refused_by_line_and_column(written, text, said):
+    with pytest.raises(InputError, match=said):
+        read_table(written(text), ("x", "y"), ("z",), empty=("z",))
+
+
+def test_nodes_are_named_by_their_number_or_by_a_crossing_whose_upper_rod_s_they_are(written):
+    assert read_nodes(written("node\n5\n0\n"), SHELL).tolist() == [5, 0]
+    assert read_nodes(written("crossing\n1\n0\n"), SHELL).tolist() == [5, 3]
+    for text, said in [
+        ("node\n6\n", r"line 2: node: must be a whole number from 0 to 5 \(found 6"),
+        ("node\n-1\n", "line 2: node: must be a whole number from 0 to 5"),
+        ("node\n0.5\n", "line 2: node: must be a whole number"),
+        ("crossing\n2\n", "line 2: crossing: must be a whole number from 0 to 1"),
+        ("node\n3\n1\n3\n", r"line 4: node: is there twice \(found 3\)"),
+        ("crossing\n1\n1\n", r"line 3: crossing: is there twice \(found 1\)"),
+        ("number\n1\n", "has no column 'node' or 'crossing'"),
+    ]:
+        with pytest.raises(InputError, match=said):
+            read_nodes(written(text), SHELL)
+
+
+def test_loads_stand_at_their_node_and_axis_and_those_left_out_are_nothing(written):
+    load = read_loads(written("fz,node,fx\n-12.5,4,3\n2,0,-1\n"), SHELL)
+    wanted = np.zeros((6, 6))
+    wanted[4, :3], wanted[0, :3] = (3.0, 0.0, -12.5), (-1.0, 0.0, 2.0)
+    np.testing.assert_array_equal(load, wanted)
+    assert read_loads(written("crossing,fy\n1,7\n"), SHELL)[5].tolist() == [0.0, 7.0, 0.0, 0.0, 0.0, 0.0]
+    with pytest.raises(InputError, match="no column fx, fy or fz"):
+        read_loads(written("node,x\n1,2\n"), SHELL)
+
+
+def test_places_of_nodes_that_were_not_seen_are_no_numbers(written):
+    nodes, places = read_places(written("x,y,z,crossing\n1,2,3,1\n,,,0\n"), SHELL)
+    assert nodes.tolist() == [5, 3]
+    np.testing.assert_array_equal(places, [[1.0, 2.0, 3.0], [np.nan] * 3])
+    with pytest.raises(InputError, match="line 2: node: must be a number"):
+        read_places(written("x,y,z,node\n1,2,3,\n"), SHELL)
+
+
+def test_groups_come_by_rising_number_and_count_the_design_s_own_cables(written):
+    design = SimpleNamespace(present=np.array([True, False, True, True, False]))
+    first, second = read_groups(written("cable,group\n2,10\n0,2.5\n1,10\n"), design)
+    assert (first.tolist(), second.tolist()) == ([0], [3, 2])
+    with pytest.raises(InputError, match="line 2: cable: must be a whole number from 0 to 2"):
+        read_groups(written("cable,group\n3,1\n"), design)
+
+
+def test_supports_on_their_way_come_in_the_order_of_the_net_s_stop_after_stop(written):
+    head = "stop,node,x,y,z\n"
+    way = read_way(written(head + "2,2,1,2,3\n1,4,0.5,0,0\n2,4,4,5,6\n1,2,0,0.5,0\n"), SHELL)
+    assert [stop.tolist() for stop in way] == [
+        [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
+        [[4.0, 5.0, 6.0], [1.0, 2.0, 3.0]],
+    ]
+    for text, said in [
+        ("1,3,0,0,0\n", r"line 2: node: is no support \(found 3\). Supports: 4, 2"),
+        ("1,4,0,0,0\n1,4,0,0,0\n", r"line 3: node: is there twice in one stop \(found 4\)"),
+        ("1,2,0,0,0\n", r"stop 1 lacks 1 supports \(found 4\)"),
+    ]:
+        with pytest.raises(InputError, match=said):
+            read_way(written(head + text), SHELL)
+
+
+def test_noise_is_between_a_nanometre_and_a_kilometre():
+    for noise in (1e-9, 0.0005, 1e3):
+        check_noise(noise)
+    for noise in (0.99e-9, 1.01e3, math.nan):
+        with pytest.raises(InputError, match=r"--noise.*such as 0\.0005"):
+            check_noise(noise)
+
+
+def test_an_open_quotation_mark_is_told_by_its_line(tmp_path):
+    with pytest.raises(InputError, match="line 7: can't be parted"):
+        measurements.cells_of(tmp_path / "a.csv", [(3, "1,2"), (7, '"4,5')], ",")
+    assert measurements.cells_of(tmp_path / "a.csv", [(3, '1; "a;b"')], ";") == [["1", "a;b"]]
