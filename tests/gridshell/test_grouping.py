@@ -2,6 +2,8 @@
 number.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
@@ -46,6 +48,43 @@ def test_a_round_net_s_cables_come_in_groups_of_four_that_lie_on_each_other(dome
     for group in range(groups.max() + 1):
         folded = np.abs(middle[groups == group])
         np.testing.assert_allclose(folded, np.broadcast_to(folded[0], folded.shape), atol=0.02 * 0.2)
+
+
+def placed(middles, spacing=1.0):
+    """A shell with a cable about each of the places (x, y) and crossings in a box 6 by 10 about (20, -3)."""
+    ends = np.arange(2 * len(middles)).reshape(-1, 2)
+    offset = np.array([0.3, 0.1, 0.0])
+    middle = np.array([[20.0 + x, -3.0 + y, 5.0 + x**2 + 2.0 * y**2] for x, y in middles])
+    positions = np.hstack([middle - offset, middle + offset]).reshape(-1, 3)
+    crossings = np.array([[17.0, -3.0, 0.0], [23.0, 2.0, 0.0], [18.0, -8.0, 0.0]])
+    return SimpleNamespace(
+        target=SimpleNamespace(positions=positions), cable_ends=ends, net=SimpleNamespace(crossings=crossings, spacing=spacing)
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("middles", "groups"),
+    [
+        ([(1, 2), (2, 1), (-1, 2), (-2, 1), (0, 3)], [0, 1, 0, 1, 2]),  # mirrored in x alone
+        ([(1, 2), (2, 1), (1, -2), (2, -1), (3, 0)], [0, 1, 0, 1, 2]),  # in y alone
+        ([(1, 2), (2, 1), (-2, -1), (-1, -2), (0, 0)], [0, 1, 1, 0, 2]),  # turned by half a turn alone
+        ([(1, 2), (-1, 2), (1, -2), (-1, -2), (0, 3), (0, -3)], [0, 0, 0, 0, 1, 1]),
+    ],
+)
+def test_cables_that_a_mirror_or_the_half_turn_lays_on_each_other_are_one_group(middles, groups):
+    assert symmetric_groups(placed(middles)).tolist() == groups
+
+
+@pytest.mark.parametrize(("off", "alike"), [(0.038, True), (0.042, False)])
+def test_middles_lie_on_each_other_within_a_fiftieth_of_the_spacing(off, alike):
+    """Of 2 m."""
+    shell = placed([(1, 2), (-1, 2)], spacing=2.0)
+    shell.target.positions[2:, 1] += off
+    if alike:
+        assert symmetric_groups(shell).tolist() == [0, 0]
+    else:
+        with pytest.raises(InputError, match="within 40 mm"):
+            symmetric_groups(shell)
 
 
 def test_only_present_cables_get_their_group_s_mean_even_where_whole_groups_are_absent():

@@ -231,6 +231,31 @@ def test_point_loads_go_on_the_crossings_that_are_chosen(flat):
     np.testing.assert_array_equal(chosen + rest, loads.points(net, 2.0))
 
 
+def test_points_lie_in_a_polygon_whose_sides_slant_and_that_is_hollow():
+    """Against the winding of its sides round each point."""
+    polygon = np.array([[0.0, 0.0], [5.0, -1.0], [7.0, 4.0], [3.5, 1.5], [1.0, 6.0], [-2.0, 3.0]])
+    x, y = np.meshgrid(np.linspace(-3.05, 8.1, 23), np.linspace(-2.03, 7.07, 19))
+    points = np.column_stack([x.ravel(), y.ravel()])
+    around = polygon - points[:, None]
+    angles = np.arctan2(around[..., 1], around[..., 0])
+    steps = np.diff(np.column_stack([angles, angles[:, 0]]), axis=1)
+    winding = np.rint(((steps + np.pi) % (2.0 * np.pi) - np.pi).sum(axis=1) / (2.0 * np.pi))
+    np.testing.assert_array_equal(loads.inside(points, polygon), winding == 1.0)
+    np.testing.assert_array_equal(loads.inside(points, polygon[::-1]), winding == 1.0)
+    assert 50 < winding.sum() < 200
+
+
+def test_points_inside_one_of_two_polygons_are_loaded_once_and_none_of_an_opening(flat):
+    net, _ = flat
+    left, right = ([[a, 0.0], [b, 0.0], [b, 1.0], [a, 1.0]] for a, b in ((0.0, 0.4), (0.3, 0.6)))
+    low = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.3], [0.0, 0.3]]
+    assert loads.points(net, 2.0, inside=[left, right])[:, 2].sum() == pytest.approx(-2.0 * 60)
+    assert loads.points(net, 2.0, inside=[left, right], openings=[low])[:, 2].sum() == pytest.approx(
+        -2.0 * 42
+    )
+    assert loads.points(net, -2.0, openings=[low, left])[:, 2].sum() == pytest.approx(2.0 * 42)
+
+
 def test_cases_are_sums_of_factors_times_parts(flat):
     parts = {"concrete": loads.concrete(*flat, thickness=0.05), "joints": loads.joints(flat[0], 0.1)}
     case = loads.combined(parts, {"concrete": 1.2, "joints": 1.0})

@@ -1,11 +1,19 @@
 """What a gridshell as built is off by."""
 
 from dataclasses import fields
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.gridshell.tolerances import SOURCES, Tolerances, default_tolerances, tolerances_of_size
+from shellform.gridshell.tolerances import (
+    SOURCES,
+    Tolerances,
+    default_tolerances,
+    span_of,
+    tolerances_of_size,
+)
 
 
 def test_every_cause_has_a_source_and_a_default_above_zero_but_for_doubts_about_means(shell):
@@ -70,3 +78,22 @@ def test_a_share_given_in_percent_is_refused():
 def test_a_size_without_extent_is_refused():
     with pytest.raises(InputError, match="span"):
         tolerances_of_size(0.0, longest_rod=1.0, longest_cable=1.0)
+
+
+def test_a_shell_s_own_span_longest_rod_and_longest_cable_tell_its_tolerances():
+    """The longer side of the box, wherever it stands; without cables their length is nothing."""
+    places = np.array([[30.0, 5.0, 1.0], [36.0, 9.0, 4.0], [31.0, 23.0, -2.0]])
+    rods = [SimpleNamespace(length=length) for length in (12.0, 25.0, 7.0)]
+    shell = SimpleNamespace(
+        target=SimpleNamespace(positions=places),
+        net=SimpleNamespace(grid=SimpleNamespace(rods=rods)),
+        cable_lengths=np.array([1.0, 3.5, 2.0]),
+    )
+    assert span_of(shell) == 18.0
+    found = default_tolerances(shell)
+    assert found == tolerances_of_size(18.0, longest_rod=25.0, longest_cable=3.5)
+    assert found.cable_length == pytest.approx(2.7e-3)
+    shell.cable_lengths = np.zeros(0)
+    assert default_tolerances(shell).cable_length == pytest.approx(2e-3)
+    shell.target.positions = 0.1 * places
+    assert default_tolerances(shell).cable_length == 1e-4, "a model of 1.8 m"
