@@ -1,12 +1,14 @@
 """Rods of any section, catalogues, and rounding to them (operation 4)."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.gridshell import catalogue as module
 from shellform.gridshell.catalogue import (
     allowed,
     label,
@@ -18,7 +20,7 @@ from shellform.gridshell.catalogue import (
     shipped_catalogues,
     with_section,
 )
-from shellform.gridshell.gridshell import erection_stress, max_radius
+from shellform.gridshell.gridshell import TooCurved, erection_stress, max_radius
 from shellform.problem.engineering import RodUtilisation
 from shellform.problem.terms import LoadedDesign
 from shellform.structure.elements.sections import Rectangle, Round, Tube, isotropic, stiffness
@@ -247,6 +249,33 @@ def test_unknown_catalogues_and_sections_are_answered_with_the_known_ones(mine):
         read_catalogue("bamboo")
     with pytest.raises(InputError, match=r"'3 mm'.*Known: ⌀ 2 mm, ⌀ 2.2 mm"):
         named(mine, "3 mm")
+
+
+def test_where_all_sections_break_the_one_that_is_stressed_least_tells_how_far_it_could_be_bent(mine):
+    """E r κ = 40 GPa · 1 mm · 10 / m = 400 MPa of 255; at 255 MPa it is bent to E r / f = 0.157 m."""
+    bent = np.zeros((3, 2, 2))
+    bent[1, 0, 0] = 10.0
+    net = SimpleNamespace(quality=SimpleNamespace(curvature=bent, curvature_max=10.0))
+    with pytest.raises(TooCurved, match="⌀ 2 mm would be stressed to 400 of 255 MPa") as told:
+        allowed(mine, net)
+    assert told.value.radius == pytest.approx(40e9 * 0.001 / 255e6)
+    bent[1, 0, 0] = 6.0
+    assert [label(section) for section in allowed(mine, net)] == ["⌀ 2 mm"]
+
+
+def test_a_section_is_stiff_enough_only_where_it_is_so_about_both_axes():
+    """Of 3 × 1 mm one of two is stiffer than of 1.5 × 1.5 mm, of 2 × 2 mm both."""
+    wide, high, square = (Rectangle(1e-3 * a, 1e-3 * b, GLASS) for a, b in ((3, 1), (1, 3), (2, 2)))
+    least = Rectangle(0.0015, 0.0015, GLASS)
+    assert module._stiff_enough((wide, high, square), least) == 2
+    assert module._stiff_enough((square, wide), least) == 0
+    assert module._stiff_enough((wide, high), least) == 2, "none"
+    assert module._stiff_enough((square,), square) == 0, "as stiff is stiff enough"
+
+
+def test_a_catalogue_without_a_title_is_called_by_its_file(tmp_path, mine):
+    assert mine.title == "Mine"
+    assert read_catalogue(small(tmp_path, MINE.replace('title = "Mine"', ""))).title == "mine"
 
 
 @pytest.mark.parametrize("section", SECTIONS, ids=label)

@@ -2,12 +2,14 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.gridshell import edge_beams as module
 from shellform.gridshell.edge_beams import Bundle, EdgeBeam, lengths, mass, weight
 from shellform.gridshell.reactions import Reactions, Support, reactions
 from shellform.net.edges import stand
@@ -16,7 +18,7 @@ from shellform.output.workshop.edge_schedule import edge_table
 from shellform.problem.paths import follow
 from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.elements.sections import Material, Rectangle, isotropic
-from shellform.structure.elements.state import moved
+from shellform.structure.elements.state import at_rest, moved
 from shellform.structure.model import Model, read_model, write_model
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -301,3 +303,62 @@ def test_bundles_that_are_none_are_refused():
         with pytest.raises(InputError) as caught:
             Bundle(radius, count, composite, Material(1e9, 4e8))
         assert caught.value.where == f"edges.beam.{where}"
+
+
+def test_rods_of_a_bundle_are_packed_about_their_middle_up_to_a_hexagon_of_twelve_rings():
+    """Two lie r off their middle, three 2 r / √3; of 469 the farthest 24 r."""
+    for count, squares, farthest in ((1, 0.0, 0.0), (2, 2.0, 1.0), (3, 4.0, 2.0 / 3**0.5)):
+        bundle = Bundle(0.003, count, 1.0, GFRP)
+        own, area = 0.25 * np.pi * 0.003**4, np.pi * 0.003**2
+        assert bundle.constants[2] == pytest.approx(count * own + 0.5 * area * squares * 0.003**2)
+        assert bundle.fibres == pytest.approx((0.003 * (farthest + 1.0),) * 2)
+    whole = Bundle(0.003, 469, 0.5, GFRP)
+    assert whole.fibres[0] == pytest.approx(0.003 * 13.0)
+    places = whole._places / 0.003
+    assert places.mean(axis=0) == pytest.approx([0.0, 0.0], abs=1e-9)
+    apart = np.linalg.norm(places[:, None] - places, axis=2) + 9.0 * np.eye(469)
+    assert apart.min(axis=1) == pytest.approx(np.full(469, 2.0)), (
+        "each touches another and none lies in another"
+    )
+    with pytest.raises(InputError, match="a number of rods up to 469"):
+        Bundle(0.003, 470, 0.5, GFRP)
+
+
+def test_a_clamp_is_as_stiff_as_the_edge_beam_but_no_stiffer_between_its_ends_than_a_rod_half_the_gap_long():
+    """EA and GJ go with the length, EI with its cube: of clamps as long, three times and ten times as long."""
+    reach = np.array([[0.0, 0.0, 0.2], [0.0, 0.6, 0.0], [1.2, 1.6, 0.0]])
+    found = module._no_stiffer((100.0, 200.0, 300.0, 400.0), (10.0, 5.0, 2.0, 1.0), reach, 0.2)
+    wanted = [[10.0, 30.0, 100.0], [5.0, 15.0, 50.0], [2.0, 54.0, 300.0], [1.0, 27.0, 400.0]]
+    assert np.array(found) == pytest.approx(np.array(wanted))
+
+
+LINE = SimpleNamespace(ends=np.array([[0, 1], [1, 2]]), clamps=np.array([[3, 1]]))
+NET = SimpleNamespace(
+    edges=(LINE,),
+    target=at_rest([[9.0, 5.0, 1.0], [12.0, 5.0, 1.0], [12.0, 7.0, 1.0], [12.0, 5.0, 1.3]]),
+    grid=SimpleNamespace(gap=0.2, flat=np.zeros((4, 3))),
+)
+
+
+def test_edge_beams_come_with_their_clamps_and_weigh_half_an_element_on_each_node():
+    """Elements of 3 and 2 m, and a clamp of 0.3 m, three times half the gap."""
+    rod = (10.0, 5.0, 2.0, 1.0)
+    made = module.edge_beams(NET, EdgeBeam(Rectangle(0.05, 0.03, isotropic(young=1e9))), rod)
+    assert [made.kinds[k] for k in made.kind] == ["edge", "edge", "clamp"]
+    assert made.ends.tolist() == [[0, 1], [1, 2], [3, 1]]
+    assert made.rest_length == pytest.approx([3.0, 2.0, 0.3])
+    assert made.axial == pytest.approx([1.5e6, 1.5e6, 30.0])
+    assert made.bending_y == pytest.approx([112.5, 112.5, 54.0])
+    assert made.bending_z == pytest.approx([312.5, 312.5, 27.0])
+    assert made.frames[:2, 0, :, 2] == pytest.approx(np.array([[0.0, 0.0, 1.0]] * 2)), (
+        "z stands across the surface"
+    )
+    heavy = EdgeBeam(Rectangle(0.05, 0.03, isotropic(young=1e9, density=800.0)))  # 1.2 kg/m
+    assert lengths(NET).tolist() == [5.0]
+    assert mass(NET, heavy) == pytest.approx(6.0)
+    down = weight(NET, heavy)
+    assert down[:, 2] == pytest.approx(-9.81 * 1.2 * np.array([1.5, 2.5, 1.0, 0.0]))
+    assert not down[:, [0, 1, 3, 4, 5]].any()
+    assert module.edge_beams(SimpleNamespace(edges=()), None, rod) is None
+    with pytest.raises(InputError, match="edge beams"):
+        module.edge_beams(NET, None, rod)

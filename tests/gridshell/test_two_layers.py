@@ -2,16 +2,28 @@
 
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import shellform as sf
 from shellform.errors import InputError
+from shellform.gridshell import layers
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import erection_stress
-from shellform.gridshell.layers import TwoLayers, locked_bending, locks_along, rod_stress
+from shellform.gridshell.layers import (
+    LOCK,
+    TwoLayers,
+    locked_bending,
+    locks,
+    locks_along,
+    rod_bending_stress,
+    rod_forces,
+    rod_stress,
+)
 from shellform.gridshell.tolerances import Tolerances
+from shellform.net.grid import ROD
 from shellform.output.workshop.block_schedule import block_marks, block_table
 from shellform.output.workshop.nesting import cut
 from shellform.problem.engineering import RodUtilisation
@@ -22,8 +34,8 @@ from shellform.reliability.refinement import rods_halved
 from shellform.site.erection import erect
 from shellform.structure.elements.beam import joined, make_beams
 from shellform.structure.elements.cable import make_cables
-from shellform.structure.elements.sections import Material, Rectangle, mass_per_length, stiffness
-from shellform.structure.elements.state import from_vectors
+from shellform.structure.elements.sections import Material, Rectangle, Round, mass_per_length, stiffness
+from shellform.structure.elements.state import at_rest, from_vectors
 from shellform.structure.model import Model, read_model, write_model
 from shellform.structure.network import Network, assemble
 from shellform.structure.solve.equilibrium import find_equilibrium
@@ -72,6 +84,73 @@ def test_laths_bear_what_bending_them_cost_and_then_the_load_s_share():
     found = find_equilibrium(assemble(network), state, load).state
     assert found.rotations[-1, 1] / 3.0 == pytest.approx(0.142841, rel=1e-4)
     assert rod_stress(pair, beams, beams.local_forces(found)) == pytest.approx(34.794e6, rel=1e-4)
+
+
+def test_two_laths_have_twice_the_constants_of_one_and_bear_half_of_the_moments_each():
+    pair, moments = TwoLayers(LATH), (np.array([300.0, -40.0]), np.array([-20.0, 500.0]))
+    assert pair.composite == layers.TOGETHER == 0.5, "where nothing is known of the blocks"
+    assert pair.constants == pytest.approx([2.0 * each for each in LATH.constants])
+    assert pair.constants_by_size == pytest.approx(2.0 * LATH.constants_by_size)
+    # W = b h² / 6 about either axis
+    of_y, of_z = 0.05 * 0.035**2 / 6.0, 0.035 * 0.05**2 / 6.0
+    assert pair.bending(*moments) == pytest.approx([150.0 / of_y + 10.0 / of_z, 20.0 / of_y + 250.0 / of_z])
+    by_y, by_z = pair.bending_by_moment(*moments)
+    assert by_y == pytest.approx([0.5 / of_y, -0.5 / of_y])
+    assert by_z == pytest.approx([-0.5 / of_z, 0.5 / of_z])
+    rods = TwoLayers(Round(0.02, LARCH))
+    for k, found in enumerate(rods.bending_by_moment(*moments)):
+        plus, minus = (rods.bending(*(moments + s * np.eye(2)[k][:, None])) for s in (1e-3, -1e-3))
+        assert found == pytest.approx((plus - minus) / 2e-3, rel=1e-5)
+    step = 1e-7
+    for k, found in enumerate(pair.bending_by_size(*moments)):
+        sizes = np.array(LATH.sizes)
+        wider, thinner = (pair.with_sizes(sizes + s * step * np.eye(2)[k]) for s in (1.0, -1.0))
+        assert wider.composite == 0.5
+        slope = (wider.bending(*moments) - thinner.bending(*moments)) / (2.0 * step)
+        assert found == pytest.approx(slope, rel=1e-5)
+
+
+def test_what_blocks_lock_and_how_it_stresses_the_laths_follows_from_their_distance():
+    """a = 70 mm, A = 1750 mm²: B = 0.6 · 12 GPa · 1750 mm² · (70 mm)² / 2."""
+    pair = TwoLayers(LATH, 0.6)
+    assert pair.apart == pytest.approx(0.07)
+    assert pair.locking == pytest.approx(30870.0)
+    assert pair.couple_stress(np.array([245.0, -122.5])) == pytest.approx([2e6, 1e6])
+    assert pair.couple_stress_by_moment(np.array([3.0, -5.0, 0.0])) == pytest.approx(
+        [1.0 / 1.225e-4, -1.0 / 1.225e-4, 0.0]
+    )
+
+
+def test_only_two_layers_that_blocks_hold_are_locked_with_the_axes_of_their_rods():
+    """A rod along x on the other side of the origin."""
+    place = np.array([[-10.0, -3.0, 1.0], [-9.0, -3.0, 1.0]])
+    net = SimpleNamespace(grid=SimpleNamespace(rod_ends=np.array([[0, 1]]), flat=place))
+    pair = TwoLayers(LATH, 0.6)
+    assert locks(net, LATH, at_rest(place)) is None
+    assert locks(net, TwoLayers(LATH, 0.0), at_rest(place)) is None
+    made = locks(net, pair, at_rest(place))
+    assert made.kinds == (LOCK,)
+    assert made.bending_y == pytest.approx([pair.locking])
+    assert not np.hstack([made.axial, made.torsion, made.bending_z]).any()
+    np.testing.assert_allclose(made.frames[0], [np.eye(3)] * 2, atol=1e-12)
+
+
+def test_what_locks_bear_is_added_to_the_forces_and_the_stress_of_their_rods():
+    """Of a connector between two elements of rods, whose locks come last."""
+    kinds = np.array([ROD, "connector", ROD, LOCK, LOCK])
+    beams = SimpleNamespace(of_kind=lambda kind: kinds == kind)
+    forces = np.arange(35.0).reshape(5, 7) - 9.0
+    found = rod_forces(beams, forces)
+    np.testing.assert_array_equal(found, forces[[0, 2]] + forces[[3, 4]])
+    pair, own, locked = TwoLayers(LATH, 0.6), forces[[0, 2]], forces[[3, 4]]
+    of_y, of_z = 0.05 * 0.035**2 / 3.0, 0.035 * 0.05**2 / 3.0  # of both laths
+    alone = np.abs(own[:, [2, 5]]) / of_y + np.abs(own[:, [3, 6]]) / of_z
+    couple = np.abs(locked[:, [2, 5]]) / 1.225e-4
+    assert rod_bending_stress(pair, beams, forces) == pytest.approx(alone + couple)
+    assert rod_bending_stress(LATH, beams, forces) == pytest.approx(2.0 * alone), "in one layer"
+    loose = SimpleNamespace(of_kind=lambda kind: kinds[:3] == kind)
+    assert rod_bending_stress(pair, loose, forces[:3]) == pytest.approx(alone)
+    np.testing.assert_array_equal(rod_forces(loose, forces[:3]), own)
 
 
 @pytest.fixture(scope="module")
@@ -260,4 +339,4 @@ def test_each_rod_takes_two_laths_of_stock(shells):
 
 def test_blocks_that_lock_more_than_glue_are_refused():
     with pytest.raises(InputError, match="between 0 and 1"):
-        TwoLayers(LATH, 1.2)
+        TwoLayers(LATH, 1.01)
