@@ -155,6 +155,14 @@ def test_a_lift_acts_from_before_the_supports_move_until_they_have_arrived(monke
     assert steps == wanted
 
 
+def test_supports_that_go_by_a_way_point_under_a_lift_are_one_stage(monkeypatch):
+    lift = NONE.copy()
+    lift[2, 2] = 8.0
+    _, steps = drives(monkeypatch, way=[np.zeros((3, 3))], lift=lift)
+    moving = [step.share for step in steps if step.stage == "moving supports"]
+    assert moving == pytest.approx([0.0, 0.25, 0.5, 0.75, 1.0])
+
+
 def test_a_path_that_snaps_is_told_by_the_share_of_its_stage_that_building_reaches(monkeypatch):
     """Of the second of two parts, which is the first on the way down, three tenths are left: 1 - 0.7 / 2."""
     with pytest.raises(NotConverged, match=r"snaps at 0\.65 of the stage 'moving supports'"):
@@ -202,6 +210,16 @@ def test_cables_are_tightened_from_where_they_hang_straight_and_those_too_long_s
     assert [step[2] for step in steps] == pytest.approx([0.95, 0.9])
 
 
+@pytest.mark.parametrize(("widest", "shares"), [(0.3, [0.3, 0.6, 0.9, 1.0]), (0.1, 0.1 * np.arange(1, 11))])
+def test_tightening_goes_on_in_equal_steps_and_ends_with_the_whole(monkeypatch, widest, shares):
+    """Ten tenths are one but for rounding."""
+    tried, now, _, steps = tightened(monkeypatch, lambda _: True, widest=widest)
+    assert [step[1] for step in steps] == pytest.approx(shares)
+    assert steps[-1][1] == 1.0
+    assert len(tried) == len(shares)
+    assert now.rest_length[0] == 0.9
+
+
 @pytest.mark.parametrize("answer", [None, False])
 def test_steps_of_tightening_that_leave_the_branch_are_halved_and_end_below_a_256th(monkeypatch, answer):
     tries = []
@@ -225,3 +243,83 @@ def test_groups_hold_every_present_cable_once():
     for groups in ([[0, 2]], [[0, 2], [3, 0]], [[0, 1, 2, 3]], []):
         with pytest.raises(InputError, match=r"every cable of the design once.*There are 3 cables"):
             erection._teams(design, groups)
+
+
+def erected(monkeypatch, *, groups=None, load=None, borne=True, section=None, **how):
+    """What a shell of three cables, of 1, 2 and 3 m, is tightened from, in which stages, and what is told."""
+    seen = SimpleNamespace(stages=[], slack=None, steps=None, sections=[])
+    rod = SimpleNamespace(
+        resized=lambda radius: SimpleNamespace(section=radius), section=section, strength=5e6
+    )
+    given = shell(
+        rod=rod, node_count=4, cable_lengths=np.array([1.0, 2.0, 3.0]), target="target", beams=lambda radius: None,
+        cables=lambda design: None,
+    )  # fmt: skip
+    given.net.edges = ()
+
+    class Site:
+        def __init__(self, _shell, design, assembly=None):
+            self.design, self.assembly = design, SimpleNamespace(with_parts=lambda parts: "braced")
+
+        def step(self, stage, share, state, load):
+            return stage, share, state, load[2, 2]
+
+    def down(_site, _state, _way, _lift, _weight, step):
+        seen.steps = step
+        return [("down",)]
+
+    def tighten(_site, now, design, state, team, load, stage, widest):
+        seen.slack = now.rest_length.copy() if seen.slack is None else seen.slack
+        seen.stages.append((stage, team.tolist(), load[2, 2], widest))
+        return design, state + 1, []
+
+    def advance(assembly, state, drive, *, step, stay, report):
+        assert (assembly, state, stay) == ("braced", len(seen.stages), True)
+        report(0.4, SimpleNamespace(state="loaded"))
+        assert (drive.at(0.0)[2, 2], drive.at(0.4)[2, 2]) == (-2.0, -5.2)
+        return SimpleNamespace(on_branch=borne, share=0.4, equilibrium=SimpleNamespace(state="loaded"))
+
+    monkeypatch.setattr(erection, "_Site", Site)
+    monkeypatch.setattr(erection, "_taken_down", down)
+    monkeypatch.setattr(erection, "_tightened", tighten)
+    monkeypatch.setattr(erection, "advance", advance)
+    monkeypatch.setattr(erection, "locks", lambda *_: None)
+    monkeypatch.setattr(erection, "find_equilibrium", lambda *_: SimpleNamespace(state=0))
+    weight = NONE.copy()
+    weight[2, 2] = -2.0
+    design = sf.Design([0.9, 3.5, 2.9], np.ones(3, dtype=bool), 0.01)
+    done = erection.erect(given, design, groups=groups, weight=weight, load=load, **how)
+    return done, seen
+
+
+def test_cables_hang_half_as_long_again_as_they_are_and_are_tightened_in_a_stage_or_group_after_group(
+    monkeypatch,
+):
+    """One is longer at rest."""
+    done, seen = erected(monkeypatch)
+    assert seen.slack == pytest.approx([1.5, 3.5, 4.5])
+    assert seen.stages == [("tightening", [0, 1, 2], -2.0, 0.1)]
+    assert seen.steps == 0.1
+    assert done.steps == (("down",),)
+    assert done.strength == 5e6
+    _, seen = erected(monkeypatch, groups=[[2, 0], [1]], step=0.25)
+    assert seen.stages == [
+        ("tightening group 1", [2, 0], -2.0, 0.25), ("tightening group 2", [1], -2.0, 0.25)
+    ]  # fmt: skip
+
+
+def test_a_load_follows_on_top_of_the_weight_as_far_as_the_shell_bears_it(monkeypatch):
+    load = NONE.copy()
+    load[2, 2] = -8.0
+    done, _ = erected(monkeypatch, load=load)
+    assert done.steps[-1] == ("loading", 0.4, "loaded", pytest.approx(-5.2))
+    with pytest.raises(NotConverged, match=r"bears 0\.40 of the load only"):
+        erected(monkeypatch, load=load, borne=False)
+
+
+def test_a_step_is_a_ten_thousandth_of_a_stage_to_all_of_it(monkeypatch):
+    for step in (1.5e-4, 1.0):
+        assert erected(monkeypatch, step=step)[1].steps == step
+    for step in (0.9e-4, 1.1):
+        with pytest.raises(InputError, match=r"erect\.step.*such as 0\.1"):
+            erected(monkeypatch, step=step)

@@ -60,7 +60,8 @@ def test_cables_are_believed_to_be_as_long_as_drawn_with_their_usual_error():
     for error in (0.9e-9, 1.1):
         with pytest.raises(InputError, match=r"--length-error.*such as 0\.0001"):
             drawn(SHELL, DESIGN, STATE, LOAD, length_error=error)
-    assert drawn(SHELL, DESIGN, STATE, LOAD, length_error=1.0).covariance[0, 0] == 1.0
+    for error in (1.5e-9, 1.0):
+        assert drawn(SHELL, DESIGN, STATE, LOAD, length_error=error).covariance[0, 0] == error**2
 
 
 def test_a_survey_teaches_what_the_formula_of_the_filter_says(linear):
@@ -190,6 +191,68 @@ def test_a_replay_plays_errors_surveys_and_turns_on_and_tells_what_is_left(linea
     moved = (1.0 + 0.2 * chance.normal(size=4)) * steps[0]
     there = at(np.array([1.002, 1.999, 3.0]) + moved[PRESENT]).positions
     assert slipped.misfits[1] == pytest.approx(((there - PLACES) ** 2).sum())
+
+
+def test_surveys_of_a_replay_have_their_noise(linear, monkeypatch):
+    surveys = []
+
+    def teach(_shell, belief, _nodes, survey, *, noise):
+        surveys.append(survey)
+        return belief
+
+    monkeypatch.setattr(retensioning, "learn", teach)
+    nothing = Adjustment(np.zeros(4, dtype=int), np.zeros(4), PLACES, belief(), 0.0, 0.0, 0.0, 0)
+    monkeypatch.setattr(retensioning, "adjust", lambda *_, **__: nothing)
+    replay(
+        SHELL, belief(), np.zeros(4), PLACES, np.array([1, 2]), Crew(0.5e-3, 5e-3, 3), noise=0.25, rounds=2, seed=6
+    )  # fmt: skip
+    chance = np.random.default_rng(6).normal(size=(2, 3))
+    np.testing.assert_allclose(surveys, [PLACES[[1, 2]] + 0.25 * chance])
+
+
+@pytest.mark.parametrize(
+    ("change", "step", "bears", "kept", "halved"),
+    [
+        ([0.8, -0.4, 0.1], 0.0, 1.0, [0.8, -0.4, 0.1], 0),
+        ([0.8, -0.4, 0.1], 0.0, 0.25, [0.2, -0.1, 0.025], 2),
+        ([0.8, -0.4, 0.1], 0.0, 0.026, [0.025, -0.0125, 0.003125], 5),
+        ([0.7, -0.3, 0.1], 0.1, 0.35, [0.3, -0.1, 0.0], 1),
+        ([0.7, -0.3, 0.1], 0.1, 0.15, [0.1, 0.0, 0.0], 2),
+        ([0.8, -3.0, 0.1], 0.0, 9.0, [0.4, -1.5, 0.05], 1),
+    ],
+)
+def test_changes_are_halved_to_whole_steps_if_there_are_any_until_a_stable_state_follows(
+    monkeypatch, change, step, bears, kept, halved
+):
+    """Those that leave no length of a cable aren't tried: the second is 2 m long, and absent ones don't count."""
+
+    def solve(parts, start, _load, *, limit, on_branch):
+        assert start is STATE or start == "foreseen"
+        away = np.abs(parts[1] - DESIGN.rest_length[PRESENT]).max()
+        assert away < 2.0
+        return SimpleNamespace(stable=away <= bears, state="there")
+
+    shell = SimpleNamespace(beams=lambda radius: None, cables=lambda design: design.rest_length[PRESENT])
+    monkeypatch.setattr(retensioning, "find_equilibrium", solve)
+    monkeypatch.setattr(retensioning, "by_rest_length", lambda *_: None)
+    monkeypatch.setattr(retensioning, "respond", lambda *_: None)
+    monkeypatch.setattr(retensioning, "predicted", lambda *_: "foreseen")
+
+    def lost(*_, **__):
+        raise NotConverged("lost", state=None)
+
+    def follow():
+        assembly = SimpleNamespace(with_parts=lambda parts: parts)
+        return retensioning._followed(shell, assembly, DESIGN, STATE, LOAD, np.array(change), step=step)
+
+    then, state, times = follow()
+    assert state == "there"
+    assert times == halved
+    assert then.rest_length[PRESENT] - DESIGN.rest_length[PRESENT] == pytest.approx(kept)
+    assert then.rest_length[1] == 9.0
+    monkeypatch.setattr(retensioning, "find_equilibrium", lost)
+    with pytest.raises(NotConverged, match="however small"):
+        follow()
 
 
 def test_a_replay_whose_true_grid_leaves_its_branch_says_at_which_of_both_changes(linear, monkeypatch):
