@@ -299,7 +299,7 @@ def test_cables_hang_half_as_long_again_as_they_are_and_are_tightened_in_a_stage
     done, seen = erected(monkeypatch)
     assert seen.slack == pytest.approx([1.5, 3.5, 4.5])
     assert seen.stages == [("tightening", [0, 1, 2], -2.0, 0.1)]
-    assert seen.steps == 0.1
+    assert seen.steps == erection.STEP == 0.1
     assert done.steps == (("down",),)
     assert done.strength == 5e6
     _, seen = erected(monkeypatch, groups=[[2, 0], [1]], step=0.25)
