@@ -7,7 +7,7 @@ import pytest
 
 from shellform.net import edges as module
 from shellform.net.edges import Edges, Place
-from shellform.net.rims import End, Rim, _along, _chains, _reached, rim_of
+from shellform.net.rims import End, Rim, _along, _chains, _reached, ends_of, rim_of
 from shellform.structure.elements.rotation import matrices
 
 
@@ -74,6 +74,8 @@ def test_an_edge_beam_is_carried_down_on_either_side_as_far_as_the_edge_falls_st
         sorted_out([0.0, 0.9, 1.4, 0.9, 0.0, 0.0, 0.0], low=low).kinds
         == ["ground"] + ["beam"] * 3 + ["ground"] * 3
     )
+    late = sorted_out([0.0, 0.0, 0.0, 0.0, 0.0, 0.9, 1.4, 0.9, 0.0], low=low)
+    assert late.kinds == ["ground"] * 5 + ["beam"] * 3 + ["ground"]
     gentle = sorted_out([0.0, 0.09, 1.0, 1.1, 1.0, 0.95, 0.0], low=low, step=20.0)
     assert gentle.kinds == ["ground"] * 3 + ["beam"] + ["ground"] * 3
     assert module._falls(np.array([0.0, 0.0, 0.51]), np.array([3.0, 4.0, 0.0]))
@@ -95,6 +97,9 @@ def test_places_come_before_the_kind_of_all_edges_and_that_before_the_geometry_a
         "wall",
         "free",
     ]
+    high = Edges((Place("wall", height=(1.9, 2.1)),))
+    kept = sorted_out([2.0, 0.9, 0.5, 0.0, 0.0, 0.5, 0.9], high, low=1.0)
+    assert kept.kinds == ["wall"] + ["ground"] * 6, "only edge beams are carried down"
     both = Edges(outer="free", openings="pin")
     assert sorted_out(levels, both, low=1.0).kinds == ["free"] * 5
     assert sorted_out(levels, both, low=1.0, opening=True).kinds == ["pin"] * 5
@@ -119,6 +124,8 @@ def test_stretches_reach_to_where_the_next_one_begins_and_one_all_round_is_whole
     assert [(each.kind, each.whole) for each in (first, second)] == [("ground", False), ("beam", False)]
     assert first.points[:, 0].tolist() == [0.0, 1.0, 2.0]
     assert second.points[:, 0].tolist() == [2.0, 3.0, 4.0, 0.0]
+    made.kinds = ["pin", "ground", "ground", "ground", "pin"]
+    assert [each.whole for each in module._stretches(made)] == [False, False]
     made.kinds = ["free"] * 5
     (only,) = module._stretches(made)
     assert only.whole
@@ -174,6 +181,66 @@ def test_an_edge_beam_between_two_feet_has_a_node_for_each_end_and_others_half_a
     wanted = np.array([[np.interp(at, along, track[:, k]) for k in range(3)] for at in arcs])
     np.testing.assert_allclose([place[node] for node in path], wanted, atol=1e-12)
     assert line.clamps.tolist() == [[path[1], 8], [path[3], 7]]
+
+
+LOPSIDED = np.array([[0.0, 0, 0], [4.0, 0, 0], [4.0, 3.0, 0], [1.0, 3.0, 0]])
+
+
+@pytest.mark.parametrize(("second", "shared"), [(6.75, True), (6.85, False)])
+def test_ends_within_a_fifth_of_the_spacing_share_a_node_at_their_mean_and_the_way_is_counted_from_the_first_foot(
+    second, shared
+):
+    """From vertex 1, at 4 m of 10 + 10 ** 0.5 m, by vertices 2 and 3 to vertex 0; ends at 6, 6.75 or 6.85 and 9 m."""
+    builder = built(["ground", "ground", "beam", "beam"], [(9.0, 3), (second, 2), (6.0, 2)], (2, 3), LOPSIDED)
+    (line,) = builder.lines
+    place = {100 + k: each for k, each in enumerate(builder.places)}
+    path = [line.ends[0, 0], *line.ends[:, 1]]
+    assert [place[node].tolist() for node in builder.feet] == [[4.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    assert [path[0], path[-1]] == builder.feet
+    track, along = np.vstack([LOPSIDED, LOPSIDED[:1]]), np.array([0.0, 4.0, 7.0, 10.0, 10.0 + 10.0**0.5])
+    first, total = 0.5 * (6.0 + second), along[-1]
+    arcs = [4.0, 0.5 * (4.0 + first), first] if shared else [4.0, 6.0, second]
+    arcs += [0.5 * (arcs[-1] + 9.0), 9.0, *(9.0 + (total - 9.0) * np.arange(1, 4) / 3.0)]
+    wanted = np.array([[np.interp(at, along, track[:, k]) for k in range(3)] for at in arcs])
+    np.testing.assert_allclose([place[node] for node in path], wanted, atol=1e-12)
+    pairs = {int(end): int(node) for node, end in line.clamps}
+    assert pairs == {9: path[2 if shared else 1], 8: path[2], 7: path[arcs.index(9.0)]}
+
+
+def square(low, high):
+    return [[low, low, 0.0], [high, low, 0.0], [high, high, 0.0], [low, high, 0.0]]
+
+
+def test_rods_ends_lie_on_the_nearest_edge_half_a_gap_below_or_above_it_unless_they_were_cut_off():
+    """On a square of 10 m with an opening from 4 to 6 m; the last three ends are farther than half a spacing from either."""
+    middles = np.array(
+        [[3, 0, 0], [10, 7, 0], [6, 5.5, 0], [4, 4.5, 0], [9.55, 1, 0], [2, 2, 0], [2, 3, 0], [0.55, 4, 0]]
+    )
+    layer = np.array([0.05, -0.05] * 4)
+    surface = SimpleNamespace(
+        vertices=np.array([*square(0.0, 10.0), *square(4.0, 6.0)]), boundary=[np.arange(4), np.arange(4, 8)]
+    )
+    net = SimpleNamespace(
+        rod_ends=np.arange(8)[::-1],
+        target=SimpleNamespace(
+            positions=(middles + layer[:, None] * [0.0, 0.0, 1.0])[::-1],
+            quaternions=np.tile([1.0, 0, 0, 0], (8, 1)),
+        ),
+        grid=SimpleNamespace(layer=layer[::-1], scale=1.0),
+    )
+    ends, loops = ends_of(net, surface, None)
+    assert [(each.opening, each.cut) for each in loops] == [(False, False), (True, False), (False, True)]
+    assert [each.node for each in ends] == list(range(8))[::-1]
+    np.testing.assert_allclose([each.middle for each in ends], middles, atol=1e-12)
+    on_edges = [(each.loop, each.at, each.vertex) for each in ends[:5]]
+    assert on_edges == [(0, 3.0, 0), (0, 17.0, 2), (1, 3.5, 2), (1, 7.5, 0), (0, pytest.approx(11.0), 1)]
+    cut = loops[2]
+    assert len(cut.points) == 5
+    for each in ends[5:]:
+        assert each.loop == 2
+        np.testing.assert_allclose(cut.points[each.vertex], each.middle, atol=1e-12)
+        assert each.at == cut.along[each.vertex]
+    assert sorted(each.vertex for each in ends[5:]) == [1, 2, 3]
 
 
 def test_an_edge_beam_that_runs_past_the_loop_s_first_point_keeps_its_order_and_has_no_foot_where_it_is_free():
