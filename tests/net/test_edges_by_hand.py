@@ -301,3 +301,26 @@ def test_a_rim_s_arc_lengths_go_all_round():
     assert rim_of(SQUARE, True).along == pytest.approx(
         [0.0, 4.0, 4.0 + 13**0.5, 8.0 + 13**0.5, 8.0 + 2 * 13**0.5]
     )
+
+
+def test_ends_that_were_cut_off_are_chained_up_to_two_and_a_half_spacings_and_reach_edges_as_near():
+    """A spacing of 2 m: of five ends two lie 7 m from the other three, the outermost of which lie 2.8 and 3.4 m from a
+    corner."""
+    middles = 2.0 * np.array([[0.8, 1.5, 0], [2, 3, 0], [3, 3, 0], [6.5, 2.5, 0], [6.5, 2, 0], [9.55, 1, 0]])
+    surface = SimpleNamespace(
+        vertices=2.0 * np.array([*square(0.0, 10.0), *square(4.0, 6.0)]),
+        boundary=[np.arange(4), np.arange(4, 8)],
+    )
+    net = SimpleNamespace(
+        rod_ends=np.arange(6),
+        target=SimpleNamespace(positions=middles, quaternions=np.tile([1.0, 0, 0, 0], (6, 1))),
+        grid=SimpleNamespace(layer=np.zeros(6), scale=2.0),
+    )
+    ends, loops = ends_of(net, surface, None)
+    assert ends[5].loop == 0, "less than half a spacing from the edge"
+    assert ends[0].loop == ends[1].loop == ends[2].loop
+    assert ends[3].loop == ends[4].loop != ends[0].loop
+    assert len(loops) == 4
+    points = loops[ends[0].loop].points.tolist()
+    points = points if points[1] == middles[0].tolist() else points[::-1]
+    assert points == [[0.0, 0.0, 0.0], *middles[:3].tolist(), [8.0, 8.0, 0.0]]
