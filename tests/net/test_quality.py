@@ -2,6 +2,7 @@
 
 import contextlib
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -144,6 +145,58 @@ def test_parts_of_a_net_lie_on_one_another_nearer_than_two_fifths_of_the_smaller
             quality.refuse_folds(Locator(plane), strip, at_rest(apart))
     else:
         quality.refuse_folds(Locator(plane), strip, at_rest(apart))
+
+
+def test_the_farthest_crossing_and_the_sharpest_one_tell_a_net_s_distance_and_shear(plane, grid):
+    place, turned = grid.flat.copy(), at_rest(grid.flat).quaternions.copy()
+    place[grid.crossing_nodes[7], 2] += 0.05
+    turned[grid.rods[-1].nodes] = [np.cos(0.2), 0.0, 0.0, -np.sin(0.2)]
+    bent, pull = np.zeros((len(grid.rod_ends), 2, 2)), np.zeros(grid.node_count)
+    found = quality.measure(plane, Locator(plane), grid, State(place, turned), bent, pull, 5)
+    assert found.distance_max == pytest.approx(0.05)
+    assert found.distance_mean == pytest.approx(0.05 / len(grid.lattice))
+    assert found.shear_angle_min == pytest.approx(0.5 * np.pi - 0.4)
+    assert found.factorisations == 5
+
+
+def test_a_cell_is_folded_where_one_of_its_corners_is_turned_over(plane):
+    """A square whose corner is pushed in beyond the diagonal."""
+    cell = lattice_grid(np.array([(0, 0), (1, 0), (0, 1), (1, 1)]), spacing=(0.3, 0.3), gap=0.0, elements=1)
+    for share, refused in ((0.55, False), (0.45, True)):
+        pushed = cell.flat.copy()
+        pushed[np.abs(pushed - [0.3, 0.3, 0.0]).max(axis=1) < 1e-9, :2] = 0.3 * share
+        told = pytest.raises(NoNet, match="in 1 cells") if refused else contextlib.nullcontext()
+        with told:
+            quality.refuse_folds(Locator(plane), cell, at_rest(pushed))
+
+
+def test_crossings_that_lie_nearer_or_farther_than_their_spacing_by_half_a_percent_are_told_with_their_place(
+    grid,
+):
+    error = np.zeros(60)
+    error[3] = 0.001
+    for worst, said in ((-0.0049, ""), (0.0049, ""), (-0.0061, "0.6% nearer"), (0.0071, "0.7% farther")):
+        error[8] = worst
+        made = SimpleNamespace(spacing_error=error, spacing_error_max=abs(worst))
+        told = quality.nearness(made, grid, at_rest(grid.flat))
+        assert bool(told) == bool(said)
+        assert said in told
+    pair = quality.neighbours(grid)[0][8]
+    place = quality.crossing_points(grid, at_rest(grid.flat))[pair].mean(axis=0).round(3).tolist()
+    assert f"crossings at {place} lie" in told
+
+
+def test_what_is_bare_is_sampled_a_quarter_of_the_spacing_apart(monkeypatch):
+    """Of a triangle of 2 m² in 144 parts those whose middle lies beyond 0.75 m along x: 28 that stand and 28 that hang;
+    with half the spacing in 529 those beyond half as far."""
+    corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    surface = SimpleNamespace(vertices=corners, triangles=np.array([[0, 1, 2]]))
+    monkeypatch.setattr(
+        quality, "Tree", lambda _pieces: SimpleNamespace(nearest=lambda points: (None, None, points[:, 0]))
+    )
+    for scale, bare in ((1.0, 2.0 * 56 / 144), (0.5, 2.0 * 361 / 529)):
+        made = SimpleNamespace(rod_ends=np.array([[0, 1]]), scale=scale)
+        assert quality.uncovered(surface, made, at_rest(corners)) == pytest.approx(bare)
 
 
 def test_the_resultant_curvature_is_made_of_its_two_parts(net):
