@@ -1,0 +1,172 @@
+"""What a network is refused or doubted for: drifting parts, and stiffnesses, lengths and spins that are rarely meant."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError
+from shellform.structure.elements.beam import make_beams
+from shellform.structure.elements.cable import make_cables
+from shellform.structure.network import Network, check_restrained, doubts
+
+ALL = [True] * 6
+STIFF = (3.0e6, 1.0, 2.0, 3.0)  # EA, GJ, EI_y, EI_z
+
+
+def network(nodes, rods=(), cables=(), held=(), *, stiffness=STIFF, rest=None, tie=(0.5, 187.0)):
+    place = np.asarray(nodes, dtype=float)
+    values = np.broadcast_to(np.asarray(stiffness, dtype=float), (len(rods), 4))
+    ends = np.array(rods, dtype=int).reshape(-1, 2)
+    beams = make_beams(
+        place, ends, axial=values[:, 0], torsion=values[:, 1], bending_y=values[:, 2], bending_z=values[:, 3],
+        rest_length=rest,
+    )  # fmt: skip
+    ties = make_cables(np.array(cables, dtype=int).reshape(-1, 2), rest_length=tie[0], stiffness=tie[1])
+    fixed = np.zeros((len(place), 6), dtype=bool)
+    for node, how in dict(held).items():
+        fixed[node] = how
+    return Network(place, beams, ties, fixed, np.zeros((len(place), 6)))
+
+
+def along(*places):
+    """Nodes on a rod of no global direction, away from the origin."""
+    return np.array([3.0, -2.0, 1.0]) + np.outer(places, [1.0, 2.0, 0.0])
+
+
+def test_an_element_to_a_node_that_isn_t_there_is_named_with_both_its_ends():
+    sound = network(along(0, 1, 2), [[0, 1], [1, 2]], [[0, 1], [0, 2]])
+    for name in ("beams", "cables"):
+        part = getattr(sound, name)
+        with pytest.raises(InputError, match="out of range") as told:
+            replace(sound, **{name: replace(part, ends=np.array([[0, 2], [0, 3]]))})
+        assert (told.value.where, told.value.value) == (f"{name}[1]", [0, 3])
+
+
+def test_a_node_that_nothing_touches_is_named_unless_it_is_held_along_all_axes():
+    nodes = [*along(0, 1), [7.0, 7.0, 7.0]]
+    for how in ([True, True, False, True, True, True], [False] * 6):
+        with pytest.raises(InputError, match="no element touches") as told:
+            check_restrained(network(nodes, [[0, 1]], held={0: ALL, 2: how}))
+        assert told.value.where == "nodes[2]"
+    check_restrained(network(nodes, [[0, 1]], held={0: ALL, 2: [True] * 3 + [False] * 3}))
+
+
+def test_a_part_that_could_drift_off_is_told_with_its_size_its_first_node_and_the_axis():
+    nodes = [*along(0, 1), *(along(0, 1, 2) + 9.0)]
+    rods, cables = [[0, 1], [3, 2]], [[3, 4]]
+    with pytest.raises(InputError, match="part of 3 nodes around this node along y") as told:
+        check_restrained(
+            network(nodes, rods, cables, {0: ALL, 3: [True, False, True, True, True, True], 1: ALL})
+        )
+    assert told.value.where == "nodes[2]"
+    with pytest.raises(InputError, match="part of 2 nodes around this node along x") as told:
+        check_restrained(network(nodes, rods, cables, {1: [False] + [True] * 5, 3: ALL}))
+    assert told.value.where == "nodes[0]"
+    check_restrained(network(nodes, rods, cables, {0: ALL, 3: [True] * 3 + [False] * 3}))
+
+
+def test_nodes_in_one_place_are_counted_and_the_first_pair_named():
+    nodes = [[0, 0, 0], [1, 0, 0], [1, 2, 0], [1, 0, 0], [0, 2, 1]]
+    beside = network(nodes, [[0, 1], [1, 2], [0, 3], [0, 4]], held={0: ALL})
+    (told,) = [each for each in doubts(beside) if "where another one does" in each]
+    assert told.startswith("1 nodes lie where another one does, nodes[1] and nodes[3] the first")
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "tie", "stiff", "soft", "most", "ratio"),
+    [  # rods of 2 m: EA/l = EA/2, 12 EI/l³ = 1.5 EI; the cable's is EA/l0
+        ([STIFF, (1.0, 1.0, 2.0, 1e-7)], (0.5, 187.0), "beams[0]", "beams[1]", 1.5e6, 1e13),
+        ([(3e6, 1, 1e-7, 2.0), STIFF], (0.5, 187.0), "beams[0]", "beams[0]", 1.5e6, 1e13),
+        ([STIFF, (1e-7, 1, 2.0, 2.0)], (0.5, 187.0), "beams[0]", "beams[1]", 1.5e6, 3e13),
+        ([(4.0, 1, 6e6, 2.0), STIFF], (0.25, 1e-7), "beams[0]", "cables[0]", 9e6, 2.25e13),
+        ([(4.0, 1, 2.0, 2.0), (4.0, 1, 2.0, 4.0)], (0.25, 1e13), "cables[0]", "beams[0]", 4e13, 2e13),
+        ([(1e-7, 1, 2.0, 2.0), (4.0, 1, 2.0, 4e5)], (0.25, 30.0), "beams[1]", "beams[0]", 6e5, 1.2e13),
+    ],
+)
+def test_stiffnesses_too_far_apart_are_told_with_both_elements_and_their_ratio(
+    stiffness, tie, stiff, soft, most, ratio
+):
+    nodes = [[0, 0, 0], [2, 0, 0], [2, 2, 0]]
+    (told,) = doubts(network(nodes, [[0, 1], [1, 2]], [[0, 2]], stiffness=stiffness, tie=tie))
+    assert told.startswith(f"{stiff} ({most:.1e} N/m) is {ratio:.1e} times as stiff as {soft};")
+
+
+def test_a_million_of_millions_between_stiffnesses_is_too_much_and_what_adds_nothing_isn_t_counted():
+    nodes = [[0, 0, 0], [2, 0, 0], [2, 2, 0]]
+
+    def built(ratio):
+        return network(
+            nodes, [[0, 1], [1, 2]], stiffness=[(3e6, 1, 2, 2), (3e6, 1, 2, 1e6 / ratio)], tie=(0.5, 187.0)
+        )
+
+    assert doubts(built(0.95e12)) == []
+    assert "times as stiff" in doubts(built(1.05e12))[0]
+    far = built(1.05e12)
+    none = replace(far, beams=replace(far.beams, bending_y=np.array([0.0, 2.0])))
+    assert doubts(none) == doubts(far)
+    near = built(0.95e12)
+    assert doubts(replace(near, beams=replace(near.beams, bending_y=np.array([0.0, 2.0])))) == []
+    assert doubts(network(nodes[:1])) == []
+
+
+@pytest.mark.parametrize(
+    ("rest", "told"),
+    [
+        ([2.9, 3.0], None),
+        ([3.0, 6.1], "beams[1] the first (6.1 m over 3 m)"),
+        ([3.0, 5.9], None),
+        ([1.45, 1.55], "beams[0] the first (1.45 m over 3 m)"),
+        ([1.55, 3.0], None),
+    ],
+)
+def test_a_rest_length_of_more_than_twice_or_less_than_half_the_distance_is_told(rest, told):
+    nodes = [[0, 0, 5], [3, 0, 5], [3, 3, 5]]
+    found = [each for each in doubts(network(nodes, [[0, 1], [1, 2]], rest=rest)) if "rest lengths" in each]
+    if told is None:
+        assert found == []
+    else:
+        assert found[0].startswith("1 beams have")
+        assert told in found[0]
+
+
+def spins(structure):
+    """How many rods are told to be free to spin, and where the first is."""
+    told = " ".join(doubts(structure))
+    found = re.search(r"(\d+) straight rods are free to spin .* nodes\[(\d+)\]", told)
+    return None if found is None else tuple(map(int, found.groups()))
+
+
+def test_straight_rods_that_nothing_keeps_from_spinning_are_counted_and_the_first_is_named():
+    """Of three rods the second is crooked; all lie askew, away from the origin."""
+    crooked = along(0, 1, 2, 3) + 9.0
+    crooked[3, 0] += 0.01
+    other = np.array([-4.0, 6.0, 2.0]) + np.outer([0, 1, 2], [-1.0, 0.5, 2.0])
+    nodes = [*crooked, *along(0, 1, 3, 4), *other]
+    rods = [[0, 1], [1, 2], [2, 3], [4, 5], [5, 6], [6, 7], [8, 9], [10, 9]]
+    assert spins(network(nodes, rods, [[0, 4]])) == (2, 4)
+    reversed_rods = [[b, a] for a, b in rods[::-1]]
+    assert spins(network(nodes, reversed_rods)) == (2, 7)
+    assert spins(network(nodes, rods[:3])) is None
+    assert spins(network(nodes, [], [[0, 4], [4, 8]])) is None
+
+
+@pytest.mark.parametrize(
+    ("held", "free"),
+    [
+        ([True, True, True, False, False, True], True),  # about z, square to the rod
+        ([True, True, True, True, False, False], False),
+        ([True, True, True, False, True, False], False),
+    ],
+)
+def test_a_held_turn_stops_the_spin_where_it_has_a_part_along_the_rod(held, free):
+    nodes = along(0, 1, 3)
+    assert spins(network(nodes, [[0, 1], [1, 2]], held={2: held})) == ((1, 0) if free else None)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_a_rod_is_straight_where_its_nodes_lie_off_its_axis_by_a_billionth_of_its_length(size):
+    for off, straight in ((0.8e-9, True), (1.2e-9, False)):
+        nodes = size * np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, off, 0.0]])
+        assert (spins(network(nodes, [[0, 1], [1, 2]])) is not None) == straight
