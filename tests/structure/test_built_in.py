@@ -279,6 +279,26 @@ def test_axes_that_are_none_are_refused_with_the_element():
         assert "beams[0]" in caught.value.where
 
 
+def test_axes_that_are_square_but_for_their_last_digits_are_made_square_and_those_that_are_stay():
+    written = np.round(matrices(from_vectors(np.zeros((1, 3)), [[0.4, -1.1, 0.7]]).quaternions)[0].T, 8)
+    once = parse_model(bar(axes=[UPRIGHT, written.tolist()])).network.beams.frames[0]
+    assert np.abs(written @ written.T - np.eye(3)).max() > 1e-9
+    np.testing.assert_allclose(once[1].T @ once[1], np.eye(3), atol=1e-15)
+    np.testing.assert_allclose(once[1].T, written, atol=1e-8)
+    exact = bar(axes=[UPRIGHT, once[1].T.tolist()])
+    exact["nodes"].append([2, 0, 0])
+    exact["beams"].append({**exact["beams"][0], "nodes": [1, 2], "axes": [UPRIGHT, written.tolist()]})
+    again = parse_model(exact).network.beams.frames
+    np.testing.assert_array_equal(again[0, 1], once[1])
+    np.testing.assert_array_equal(again[1, 1], once[1])
+    exact["beams"][1]["axes"][0] = [[1, 0, 0], [2e-6, 1, 0], [0, 0, 1]]
+    with pytest.raises(InputError, match="unit vectors") as caught:
+        parse_model(exact)
+    assert caught.value.where == "beams[1].axes"
+    exact["beams"][1]["axes"][0] = [[1, 0, 0], [0.5e-6, 1, 0], [0, 0, 1]]
+    parse_model(exact)
+
+
 def test_only_beams_with_axes_may_add_no_stiffness_of_a_kind():
     assert parse_model(bar(axes=[UPRIGHT, TILTED], EA=0)).network.beams.axial[0] == 0.0
     with pytest.raises(InputError, match="positive"):

@@ -257,3 +257,95 @@ def test_without_free_memory_a_small_model_is_solved_and_a_large_one_ends_with_a
     )
     assert found.returncode == status, found.stderr
     assert ("memory is full" in found.stderr) == (status == 3)
+
+
+def test_what_the_elements_of_a_model_are_given_is_what_they_have():
+    """Ends of a cable in one place ask for its rest length; where left out it is the distance of its nodes."""
+    model = bow()
+    model["nodes"] += [[3, 4, 1], [3, 4, 1]]
+    tie = {"EA": 187.0}
+    model["cables"] = [{"nodes": [0, 9], **tie}, {"nodes": [9, 10], **tie, "rest_length": 0.25}]
+    cables = parse_model(model).network.cables
+    assert cables.rest_length == pytest.approx([np.sqrt(26.0), 0.25])
+    model["cables"].append({"nodes": [10, 9], **tie})
+    with pytest.raises(InputError, match="must not coincide") as told:
+        parse_model(model)
+    assert (told.value.where, told.value.value) == ("cables[2]", [10, 9])
+    model["cables"][2]["nodes"] = [9, 9]
+    with pytest.raises(InputError, match="to itself"):
+        parse_model(model)
+
+
+def test_forces_on_one_node_add_up_and_a_load_on_a_node_beyond_the_last_is_refused():
+    model = bow()
+    model["loads"] = {
+        "gust": [
+            {"node": 8, "force": [1, 2, 3]},
+            {"node": 3, "moment": [0.5, 0, -0.25]},
+            {"node": 8, "force": [0, -5, 0.5], "moment": [7, 0, 0]},
+        ]
+    }
+    load = parse_model(model).loads["gust"]
+    assert load[8].tolist() == [1, -3, 3.5, 7, 0, 0]
+    assert load[3].tolist() == [0, 0, 0, 0.5, 0, -0.25]
+    assert np.flatnonzero(load.any(axis=1)).tolist() == [3, 8]
+    model["loads"]["gust"][2]["node"] = 9
+    with pytest.raises(InputError, match=r"loads\.gust\[2\]\.node.*Nodes run from 0 to 8"):
+        parse_model(model)
+
+
+def test_beams_with_axes_add_what_stiffness_they_are_given_beside_others_without():
+    model = bow()
+    model["start"] = None
+    tilted = [[0.6, 0, -0.8], [0, 1, 0], [0.8, 0, 0.6]]
+    straight = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    own = {"axes": [straight, tilted], "rest_length": 0.13}
+    model["beams"] += [
+        {"nodes": [0, 1], "EA": 5.0, "GJ": 0, "EIy": 0, "EIz": 2.0, **own},
+        {"nodes": [1, 2], "EA": 0, "GJ": 7.0, "EIy": 3.0, "EIz": 0, **own},
+    ]
+    beams = parse_model(model).network.beams
+    for values, wanted in (
+        (beams.axial, [1e5, 5.0, 0.0]),
+        (beams.torsion, [1.0, 0.0, 7.0]),
+        (beams.bending_y, [1.0, 0.0, 3.0]),
+        (beams.bending_z, [1.0, 2.0, 0.0]),
+    ):
+        assert values[7:].tolist() == wanted
+    assert beams.built_in.tolist() == [False] * 8 + [True] * 2
+    np.testing.assert_allclose(beams.frames[8, 1].T, tilted, err_msg="rows of the file, columns here")
+    del model["beams"][9]["axes"]
+    with pytest.raises(InputError, match=r"beams\[9\]\.EA.*positive.*newtons"):
+        parse_model(model)
+
+
+@pytest.mark.parametrize(
+    ("value", "refused"), [(0.6e-30, True), (1.4e-30, False), (0.9e30, False), (1.1e30, True)]
+)
+def test_numbers_beyond_what_can_be_calculated_with_are_refused_with_what_to_give(value, refused):
+    model = bow()
+    model["beams"][3]["GJ"] = value
+    if refused:
+        with pytest.raises(InputError, match=r"beams\[3\]\.GJ.*\(1e-30 to 1e\+30\).*N·m², such as 0\.03"):
+            parse_model(model)
+    else:
+        assert parse_model(model).network.beams.torsion[3] == value
+    place = bow()
+    place["nodes"][3][2] = -value
+    if value > 1e30:
+        with pytest.raises(InputError, match=r"nodes\[3\]: must be below 1e\+30"):
+            parse_model(place)
+    else:
+        parse_model(place)
+
+
+def test_a_remedy_says_what_to_write_where_that_is_known():
+    model = bow()
+    model["beams"][3]["EA"] = "much"
+    with pytest.raises(InputError, match=r"Write a number there") as told:
+        parse_model(model)
+    assert told.value.where == "beams[3].EA"
+    model = bow()
+    model["nodes"][2] = [1.0, 2.0]
+    with pytest.raises(InputError, match=r"nodes\[2\].*Write an array of length 3 there"):
+        parse_model(model)
