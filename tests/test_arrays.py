@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from shellform.arrays import indices, reals
-from shellform.errors import InputError
+from shellform.arrays import flags, indices, read_arrays, reals
+from shellform.errors import Damaged, InputError
 
 
 @pytest.mark.parametrize("wrong", [0.0, -1.0])
@@ -31,3 +31,64 @@ def test_one_number_stands_for_all_where_their_count_is_known_but_a_row_of_one_d
     np.testing.assert_array_equal(reals("EA", 2.0, (3,)), [2.0, 2.0, 2.0])
     with pytest.raises(InputError, match="EA has the wrong shape"):
         reals("EA", [2.0], (3,))
+
+
+def test_numbers_and_indices_that_are_none_are_refused_with_where_they_stand_and_what_is_wanted():
+    with pytest.raises(InputError, match=r"places\(1, 2\) is not finite \(found nan\)"):
+        reals("places", [[0.0, 1.0, 2.0], [3.0, 4.0, np.nan]], (None, 3))
+    with pytest.raises(InputError, match=r"places\(0, 1\) is not finite \(found -inf\)"):
+        reals("places", [[0.0, -np.inf, 2.0], [3.0, 4.0, np.nan]], (None, 3))
+    with pytest.raises(InputError, match=r"EA must be numbers.*an array of shape \(any, 3\)"):
+        reals("EA", "thick", (None, 3))
+    with pytest.raises(
+        InputError, match=r"nodes\(0, 1\) is out of range \(found 7\). Indices run from 0 to 6\."
+    ):
+        indices("nodes", [[0, 7], [-1, 2]], (None, 2), below=7)
+    with pytest.raises(InputError, match=r"nodes must be whole numbers \(found '\[1\.0\]'\)"):
+        indices("nodes", [1.0], (1,), below=7)
+    with pytest.raises(InputError, match=r"fixed must be true or false"):
+        flags("fixed", [1, 0], (2,))
+
+
+def test_what_was_found_is_told_up_to_sixty_letters():
+    for count, whole in ((57, True), (58, False), (90, False)):
+        text = "y" * count
+        with pytest.raises(InputError) as told:
+            reals("EA", text, (1,))
+        assert told.value.value == (repr(text) if whole else "'" + "y" * 56 + "...")
+
+
+def test_nothing_given_is_an_array_of_no_rows_where_their_count_is_free():
+    assert reals("places", [], (None, 3)).shape == (0, 3)
+    assert indices("ends", [], (None, 2), below=0).shape == (0, 2)
+    assert indices("ends", [], (None, 2), below=0).dtype == np.int64
+    assert flags("fixed", np.zeros((0, 6), dtype=bool), (None, 6)).shape == (0, 6)
+    for make in (lambda: reals("places", [], (2, 3)), lambda: flags("fixed", [True, False], (3,))):
+        with pytest.raises(InputError, match="wrong shape"):
+            make()
+
+
+def test_an_array_is_a_copy_that_nobody_can_write_to():
+    given = np.arange(6.0).reshape(2, 3)
+    kept = reals("places", given, (None, 3))
+    given[0, 0] = 9.0
+    assert kept[0, 0] == 0.0
+    for each in (kept, indices("a", [1], (1,), below=2), flags("b", [True], (1,))):
+        with pytest.raises(ValueError, match="read-only"):
+            each[...] = 1
+    assert flags("fixed", True, (2, 3)).tolist() == [[True] * 3] * 2
+
+
+def test_a_file_of_arrays_that_is_missing_broken_or_lacks_one_says_to_run_again(tmp_path):
+    file = tmp_path / "a.npz"
+    with pytest.raises(InputError, match=r"a\.npz: isn't there.*--fresh"):
+        read_arrays(file)
+    np.savez(file, places=np.eye(3))
+    with pytest.raises(Damaged, match=r"a\.npz: is damaged: lengths is missing"):
+        read_arrays(file)["lengths"]
+    file.write_bytes(file.read_bytes()[:100])
+    with pytest.raises(Damaged, match=r"a\.npz: is damaged: .*--fresh"):
+        read_arrays(file)
+    np.savez(file, places=np.array([{}], dtype=object))
+    with pytest.raises(Damaged, match="is damaged"):
+        read_arrays(file)

@@ -86,6 +86,34 @@ def test_arrays_networkx_and_compas_give_the_same_model():
     same(sf.networks.from_compas(anchored, rod=ROD, cable=187.0), wanted)
 
 
+def test_the_model_has_the_places_stiffnesses_lengths_supports_and_forces_that_were_given():
+    loads = {"wind": [[0.0, 3.0, -4.0], [0.0, 0.0, 0.0], [5.0, 0.0, 0.0]]}
+    made = sf.networks.from_arrays(
+        NODES, [[0, 1], [2, 1]], [[0, 2], [1, 0]], rod=ROD, cable=187.0, supports=[2], loads=loads
+    ).model
+    network = made.network
+    assert network.nodes.tolist() == NODES
+    assert network.beams.ends.tolist() == [[0, 1], [2, 1]]
+    found = network.beams.axial[1], network.beams.torsion[0], network.beams.bending_y[1]
+    assert (*found, network.beams.bending_z[0]) == ROD
+    assert network.cables.rest_length == pytest.approx([1.0, np.hypot(0.5, 0.3)])
+    assert network.cables.stiffness.tolist() == [187.0, 187.0]
+    assert network.fixed.tolist() == [[False] * 6, [False] * 6, [True] * 3 + [False] * 3]
+    assert made.loads["wind"].tolist() == [[*force, 0.0, 0.0, 0.0] for force in loads["wind"]]
+
+
+def test_a_rod_s_stiffnesses_are_told_apart():
+    made = sf.networks.from_arrays(NODES, [[0, 1]], rod=(5.0, 6.0, 7.0, 8.0)).model.network.beams
+    found = made.axial, made.torsion, made.bending_y, made.bending_z
+    assert [float(each[0]) for each in found] == [5.0, 6.0, 7.0, 8.0]
+
+
+def test_a_node_beyond_the_last_is_told_with_how_many_there_are():
+    with pytest.raises(InputError, match=r"rods: names a node that isn't there: there are 3 \(found 3\)"):
+        sf.networks.from_arrays(NODES, [[0, 1], [3, 2]], rod=ROD)
+    assert sf.networks.from_arrays(NODES, [[0, 2]], rod=ROD).model.network.beams.ends.tolist() == [[0, 2]]
+
+
 def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
     section = sf.Rod.round(young=40e9, radius=0.01, strength=255e6).section
     found = sf.networks.from_arrays(

@@ -1,0 +1,87 @@
+"""What refusals say: where, what was found, between which bounds it must be, and what to give instead."""
+
+import math
+
+import pytest
+
+from shellform.errors import InputError, NotConverged, not_installed, printable, require_count, require_number
+
+
+def refused(value, **bounds):
+    with pytest.raises(InputError) as told:
+        require_number(value, where="rod.radius", give="metres, such as 0.012", **bounds)
+    return str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("bounds", "good", "bad", "words"),
+    [
+        ({"above": 0.0}, [1e-300, 7.0], [0.0, -2.0, math.inf], "positive and finite"),
+        ({"above": -1.0}, [-0.99], [-1.0, -3.0], "above -1 and finite"),
+        ({"least": 0.0}, [0.0, 7.0], [-1e-300, math.nan], "0 or more and finite"),
+        ({"least": 2.5}, [2.5], [2.49], "at least 2.5 and finite"),
+        ({"below": 0.5}, [0.49, -7.0], [0.5, 3.0], "below 0.5"),
+        ({"most": 4.0}, [4.0], [4.01], "at most 4"),
+        ({"least": 2.0, "most": 4.0}, [2.0, 4.0], [1.99, 4.01], "between 2 and 4"),
+        ({"above": -1.0, "below": 0.5}, [0.0], [-1.0, 0.5], "above -1 and below 0.5"),
+        ({"above": 0.0, "most": 9.0}, [9.0], [0.0, 9.1], "positive and at most 9"),
+        ({"least": 0.0, "below": 9.0}, [0.0], [9.0, -1.0], "0 or more and below 9"),
+        ({}, [0.0, -7.0], [math.inf, -math.inf, math.nan], "finite"),
+    ],
+)
+def test_a_number_is_refused_beyond_its_bounds_which_are_said_with_what_to_give(bounds, good, bad, words):
+    for value in good:
+        require_number(value, where="rod.radius", give="metres", **bounds)
+    for value in bad:
+        assert refused(value, **bounds) == (
+            f"rod.radius: must be {words} (found {value!r}). Give metres, such as 0.012."
+        )
+
+
+def test_what_is_no_number_is_refused_as_such():
+    assert "must be a number (found 'thick'). Give metres" in refused("thick", above=0.0)
+    assert "must be a number. Give metres" in refused(None)
+
+
+def test_a_count_is_refused_below_and_beyond_its_bounds_and_where_it_is_no_whole_number():
+    for value, bounds, words in (
+        (0, {}, "at least 1"),
+        (2, {"least": 3}, "at least 3"),
+        (2, {"least": 3, "most": 7}, "between 3 and 7"),
+        (8, {"least": 3, "most": 7}, "between 3 and 7"),
+        (2.0, {}, "a whole number"),
+        ("2", {}, "a whole number"),
+    ):
+        with pytest.raises(InputError, match=f"^--limit: must be {words}.*Give a number of steps"):
+            require_count(value, where="--limit", give="a number of steps", **bounds)
+    for value, bounds in ((1, {}), (10**9, {}), (3, {"least": 3, "most": 7}), (7, {"least": 3, "most": 7})):
+        require_count(value, where="--limit", give="a number of steps", **bounds)
+
+
+def test_a_refusal_within_a_file_says_both_places_and_keeps_the_rest():
+    inner = InputError("is odd", where="beams[3]", value=0, remedy="Mend it.")
+    outer = inner.within("a\nb.json")
+    assert str(outer) == r"a\nb.json: beams[3]: is odd (found 0). Mend it."
+    assert (outer.what, outer.value, outer.remedy) == ("is odd", 0, "Mend it.")
+    assert str(InputError("is odd").within("m.json")) == "m.json: is odd"
+    assert printable("a\tø\u2028b") == r"a\tø\u2028b"
+
+
+def test_what_ended_without_a_result_carries_what_was_reached():
+    told = NotConverged("It stalled", state="here", residual=0.25, iterations=7, remedy="Go slower.")
+    assert (str(told), told.state, told.residual, told.iterations) == (
+        "It stalled. Go slower.",
+        "here",
+        0.25,
+        7,
+    )
+    bare = NotConverged("It stalled")
+    assert str(bare) == "It stalled"
+    assert math.isnan(bare.residual)
+
+
+def test_a_library_that_is_missing_is_named_with_the_command_that_installs_it():
+    told = str(not_installed("pictures", "render", ImportError("No module named 'vtk'", name="vtk")))
+    assert "pictures: the library vtk can't be loaded (No module named 'vtk')" in told
+    assert 'pip install "shellform[render]"' in told
+    assert "the library asked for can't" in str(not_installed("pictures", "render", ImportError("broken")))
