@@ -11,6 +11,7 @@ import pytest
 from shellform.errors import InputError
 from shellform.structure.answers.analysis import analyse
 from shellform.structure.answers.result_document import result
+from shellform.structure.elements.sections import Material, Round
 from shellform.structure.model import parse_model, read_model, write_model
 from shellform.structure.network import doubts
 
@@ -349,3 +350,34 @@ def test_a_remedy_says_what_to_write_where_that_is_known():
     model["nodes"][2] = [1.0, 2.0]
     with pytest.raises(InputError, match=r"nodes\[2\].*Write an array of length 3 there"):
         parse_model(model)
+
+
+def test_a_result_tells_how_far_nodes_moved_what_supports_bear_and_the_stresses_of_the_sections():
+    model = bow()
+    model["supports"][0]["displacement"] = [0.02, 0, 0, 0, 0, 0]
+    model["supports"][1]["displacement"] = [0.02, 0, 0, 0, 0, 0]
+    model["nodes"] = [[5 + x, y - 7, z] for x, y, z in model["nodes"]]
+    rod = Round(0.01, Material(40e9, 15e9, strength=2e8))
+    found = analyse(parse_model(model), load="push", factor=0.5)
+    told = result(found, sections={"rod": rod})
+    assert told["displacements"][0] == pytest.approx([0.01, 0.0, 0.0], abs=1e-12)
+    assert told["displacements"][4][0] == pytest.approx(0.01, abs=1e-9)
+    assert told["displacements"][8][2] < 0.0
+    bottom, top = told["reactions"]
+    assert (bottom["node"], top["node"]) == (0, 8)
+    assert bottom["force"][2] == pytest.approx(2.0, rel=1e-6)
+    assert bottom["force"][1] + top["force"][1] == pytest.approx(-0.005, rel=1e-6)
+    assert (bottom["moment"][0], top["force"][2], top["moment"][0]) == (0.0, 0.0, 0.0), "what isn't held"
+    worst = np.max(told["stresses"])
+    first = told["beam_forces"][3]
+    largest = (
+        abs(first["N"]) / rod.constants[0] + np.hypot(first["My_b"], first["Mz_b"]) * 0.01 / rod.constants[2]
+    )
+    assert told["stresses"][3][1] == pytest.approx(largest)
+    assert max(told["utilisation"]) == pytest.approx(worst / 2e8)
+    with pytest.raises(InputError, match=r"no beams of kind 'lath'.*It has: rod") as refused:
+        result(found, sections={"lath": rod})
+    assert refused.value.where == "--sections"
+    unknown = result(found, sections={})
+    assert unknown["stresses"][3] == [None, None]
+    assert unknown["utilisation"][3] is None

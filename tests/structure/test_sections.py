@@ -1,10 +1,20 @@
 """Cross-sections, their derivatives, stresses and the sensitivities that use them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.structure.answers.results import end_stress, end_stress_by_force, read_sections, utilisation
+from shellform.structure.answers.results import (
+    elongation,
+    end_stress,
+    end_stress_by_force,
+    energy_by_kind,
+    read_sections,
+    twist,
+    utilisation,
+)
 from shellform.structure.answers.sensitivity import (
     by_load,
     by_rest_length,
@@ -322,3 +332,70 @@ def test_tensions_by_rest_lengths_through_the_freedoms_they_touch_are_those_of_t
             direct(response, picked), whole, rtol=1e-9, atol=1e-10 * np.abs(whole).max()
         )
     np.testing.assert_allclose(direct(response, picked.toarray()), whole, rtol=1e-12)
+
+
+def test_a_material_of_one_kind_in_all_directions_has_g_of_e_and_poisson_s_ratio():
+    found = isotropic(young=42e9, poisson=0.4, density=1900.0, strength=255e6)
+    assert found.shear == pytest.approx(15e9)
+    assert (found.young, found.density, found.strength) == (42e9, 1900.0, 255e6)
+    assert isotropic(young=39e9).shear == pytest.approx(15e9)
+    assert isotropic(young=42e9, poisson=-0.5).shear == pytest.approx(42e9)
+    for wrong in (-1.0, 0.5, 0.7):
+        with pytest.raises(InputError, match=r"material\.poisson: must be above -1 and below 0\.5"):
+            isotropic(young=42e9, poisson=wrong)
+
+
+def test_a_strength_may_be_unknown_but_not_nothing_nor_less():
+    assert Material(40e9, 15e9).strength == np.inf
+    for wrong in (0.0, -1.0, np.nan, -np.inf):
+        with pytest.raises(InputError, match=r"material\.strength: must be positive.*such as 255e6"):
+            Material(40e9, 15e9, 1900.0, wrong)
+    with pytest.raises(InputError, match=r"material\.young: must be positive and finite"):
+        Material(np.inf, 15e9)
+    with pytest.raises(InputError, match=r"material\.shear.*such as 15e9"):
+        Material(40e9, -15e9)
+
+
+def test_sizes_of_more_than_a_kilometre_and_walls_without_a_hole_are_refused_in_metres():
+    with pytest.raises(InputError, match=r"section\.height: must be below 1000 m \(found 1001.0\)"):
+        Rectangle(999.0, 1001.0, GFRP)
+    assert Round(1000.0, GFRP).radius == 1000.0
+    with pytest.raises(InputError, match=r"section\.thickness: must be less than the radius.*below 0\.02;"):
+        Tube(0.02, 0.02, GFRP)
+
+
+def test_the_torsion_constant_of_a_lath_that_is_nearly_square_changes_with_its_sides_as_derived():
+    b, h, step = 0.02, 0.019, 1e-7
+    rates = Rectangle(b, h, GFRP).constants_by_size[:, 1]
+    for k, (db, dh) in enumerate([(step, 0.0), (0.0, step)]):
+        ahead, behind = (Rectangle(b + s * db, h + s * dh, GFRP).constants[1] for s in (1, -1))
+        assert rates[k] == pytest.approx((ahead - behind) / (2.0 * step), rel=1e-6)
+    # 0.14057701495515551 a⁴ of a square
+    assert Rectangle(0.02, 0.02, GFRP).constants[1] == pytest.approx(0.140577015 * 0.02**4, rel=1e-6)
+
+
+def test_twist_is_the_second_end_s_turn_less_the_first_s_and_elongation_is_of_the_rest_length():
+    assert twist(np.array([[9.0, 0.25, 9, 9, -0.5, 9, 9], [0, -0.1, 0, 0, 0.3, 0, 0]])) == pytest.approx(
+        [-0.75, 0.4]
+    )
+    nodes = np.array([[1.0, 2.0, 3.0], [4.0, 2.0, 7.0]])
+    cables = make_cables([[0, 1], [1, 0]], rest_length=[4.0, 8.0], stiffness=187.0)
+    assert elongation(cables, at_rest(nodes)) == pytest.approx([0.25, -0.375])
+
+
+def test_energies_of_kinds_are_half_the_work_of_their_forces_and_kinds_without_beams_are_left_out():
+    network, load, _ = frame()
+    network = replace(network, beams=replace(network.beams, kinds=("rod", "connector", "edge")))
+    state = solved(network, load)
+    found = energy_by_kind(network, state)
+    assert list(found) == ["rod", "connector", "cable"]
+    forces, moved_by = network.beams.local_forces(state), network.beams.local_deformations(state)
+    rods = [k for k in range(8) if k != 4]
+    for kind, own in (("rod", rods), ("connector", [4])):
+        for name, parts in (("axial", [0]), ("torsion", [1, 4]), ("bending", [2, 3, 5, 6])):
+            work = sum(0.5 * forces[k, part] * moved_by[k, part] for k in own for part in parts)
+            assert found[kind][name] == pytest.approx(work)
+            assert work > 0.0
+    longer = network.cables.lengths(state) - network.cables.rest_length
+    taut = np.maximum(longer, 0.0) ** 2 * 2000.0 / network.cables.rest_length
+    assert found["cable"]["axial"] == pytest.approx(0.5 * taut.sum())
