@@ -24,7 +24,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError, require_number
 
-_ODD = np.arange(1.0, 40.0, 2.0)  # terms of the series; the rest is below 1e-9 of the sum
+_ODD = np.arange(1.0, 40.0, 2.0)  # terms of the series; the rest is below 1e-7 of the sum
 
 
 @dataclass(frozen=True)
