@@ -84,3 +84,59 @@ def test_halves_of_a_bent_beam_go_on_with_its_moments_though_its_ends_are_bent_d
     largest = np.abs(one).max()
     assert first == pytest.approx([one[0], 0.5 * (one[1] - one[0])], abs=0.01 * largest)
     assert second == pytest.approx([0.5 * (one[0] - one[1]), one[1]], abs=0.01 * largest)
+
+
+def bend(*turns, lengths=(1.0, 1.5, 1.2, 2.0)):
+    """Nodes of a polygon in the x-z plane with these lengths and turns, degrees, between them."""
+    heading = np.radians(np.concatenate([[10.0], 10.0 + np.cumsum(turns)]))
+    steps = np.array(lengths)[:, None] * np.column_stack([np.cos(heading), 0.0 * heading, np.sin(heading)])
+    return np.vstack([np.zeros(3), np.cumsum(steps, axis=0)]), heading
+
+
+def test_a_new_node_lies_off_its_chord_by_the_smaller_curvature_of_both_ends_times_an_eighth_of_its_length_squared():
+    points, heading = bend(20.0, 28.0, 10.0)
+    finer = halved(model(points, {0: PIN, 4: PIN})).network.nodes[5:]
+    off = finer - 0.5 * (points[1:] + points[:-1])
+    outward = np.column_stack([np.sin(heading), 0.0 * heading, -np.cos(heading)])
+    first, last = (
+        np.sin(np.radians(20.0)) / 1.25,
+        np.sin(np.radians(10.0)) / 1.6,
+    )  # over the mean lengths there
+    by = np.array([1.0, 1.5, 1.2, 2.0]) ** 2 / 8.0 * [first, first, last, last]
+    np.testing.assert_allclose(off, by[:, None] * outward, atol=1e-12)
+
+
+@pytest.mark.parametrize(("corner", "straight"), [(29.0, False), (31.0, True)])
+def test_beams_that_meet_at_more_than_30_degrees_stand_for_no_curve(corner, straight):
+    points, _ = bend(20.0, corner, 10.0)
+    finer = halved(model(points, {0: PIN, 4: PIN})).network.nodes[5:]
+    off = np.linalg.norm(finer - 0.5 * (points[1:] + points[:-1]), axis=1)
+    assert (off < 1e-12).all() if straight else (off > 1e-3).all()
+
+
+def test_beams_that_bend_to_both_sides_are_cut_on_their_chords():
+    points, _ = bend(10.0, -15.0, 10.0)
+    finer = halved(model(points, {0: PIN, 4: PIN})).network.nodes[5:]
+    np.testing.assert_allclose(finer, 0.5 * (points[1:] + points[:-1]), atol=1e-12)
+
+
+def test_new_nodes_aren_t_held_where_any_node_is_moved():
+    network = in_plane(chain(line(2), (1e6, 0.8, 1.0, 1.0), {0: CLAMP, 2: CLAMP}))
+    imposed = np.zeros((3, 6))
+    imposed[1, 1] = 0.01
+    finer = halved(Model(replace(network, imposed=imposed), {}, None, (0, 2))).network
+    assert finer.fixed[3:].tolist() == [[False, False, False, True, False, True]] * 2
+    assert not finer.imposed[3:].any()
+    assert finer.imposed[:3].tolist() == imposed.tolist()
+
+
+def test_the_middle_of_a_bent_beam_is_turned_halfway_whichever_sign_its_quaternions_have():
+    points = line(1)
+    whole = model(points, {0: PIN, 1: PIN})
+    state = from_vectors(points, [[0.4, 0.0, 0.0], [0.7, 0.0, 0.0]])
+    for sign in (1.0, -1.0):
+        quaternions = state.quaternions * [[1.0], [sign]]
+        start = replace(state, quaternions=quaternions)
+        middle = halved(replace(whole, start=start)).start
+        assert np.abs(middle.rotations[2]) == pytest.approx([0.55, 0.0, 0.0], abs=1e-12)
+        assert middle.positions[2] == pytest.approx([0.5, 0.0, 0.0])

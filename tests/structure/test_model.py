@@ -164,6 +164,7 @@ def test_every_method_ends_in_the_same_state_and_tells_its_increments(method):
     assert told["increments"][-1]["negative_pivots"] == 0
     assert sum(each["iterations"] for each in told["increments"]) == told["iterations"]
     assert told["displacements"][4][1] == pytest.approx(3.484e-4, rel=0.015)  # PL³/48EI · 3 (tan 1 - 1), h²
+    assert 0.0 < told["seconds"]["assembly"] < told["seconds"]["total"] < 600.0
     json.dumps(told, allow_nan=False)
 
 
