@@ -5,7 +5,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.structure.elements.cable import make_cables
-from shellform.structure.elements.state import at_rest, moved
+from shellform.structure.elements.state import at_rest, extended, moved
 from shellform.verification import slack_pair
 from shellform.verification.models import line, ropes, solved
 
@@ -66,3 +66,38 @@ def test_a_straight_loose_rope_finds_its_sag_under_load(rest):
     # Statics: half of seven loads goes up at each end.
     first = found.positions[1] - found.positions[0]
     assert -tension[0] * first[2] / np.linalg.norm(first) == pytest.approx(3.5, rel=1e-6)
+
+
+def test_a_cable_pulls_by_its_stretch_over_its_rest_length_from_where_it_is_taut():
+    nodes = np.array([[1.0, 2.0, 3.0], [4.0, 2.0, 7.0], [4.0, 2.5, 7.0]])  # 5 m, and half a metre
+    cables = make_cables([[0, 1], [1, 0], [0, 1], [2, 1]], rest_length=[4.0, 5.0, 6.0, 0.4], stiffness=[80.0, 1e3, 1e3, 20.0])  # fmt: skip
+    state = at_rest(nodes)
+    assert cables.lengths(state) == pytest.approx([5.0, 5.0, 5.0, 0.5])
+    assert cables.tension(state) == pytest.approx([20.0, 0.0, 0.0, 5.0])
+    assert cables.stiffest() == pytest.approx([20.0, 200.0, 1e3 / 6.0, 50.0])
+    assert cables.tension_by_rest_length(state) == pytest.approx([-25.0, 0.0, 0.0, -62.5])
+    by_position = cables.tension_by_position(state)
+    assert by_position[0] == pytest.approx([-12.0, 0.0, -16.0, 12.0, 0.0, 16.0])
+    assert not by_position[1:3].any()
+    assert by_position[3] == pytest.approx([0.0, 50.0, 0.0, 0.0, -50.0, 0.0])
+    by_rest = cables.force_by_rest_length(state)
+    assert by_rest[0] == pytest.approx([15.0, 0.0, 20.0, -15.0, 0.0, -20.0])
+    assert not by_rest[1:3].any()
+    evaluated = cables.evaluate(state, tangent=False)
+    assert evaluated.energy == pytest.approx([10.0, 0.0, 0.0, 0.25])
+    assert evaluated.force[0] == pytest.approx([-12.0, 0.0, -16.0, 12.0, 0.0, 16.0])
+    unit, _ = cables.directions(state)
+    assert unit[1] == pytest.approx([-0.6, 0.0, -0.8])
+    assert cables.dofs()[3].tolist() == [12, 13, 14, 6, 7, 8]
+
+
+def test_tensions_with_twice_the_digits_are_those_of_double_precision():
+    nodes = np.array([[1.0, 2.0, 3.0], [4.0, 2.0, 7.0]])
+    cables = make_cables([[0, 1], [1, 0]], rest_length=[4.0, 5.5], stiffness=80.0)
+    assert cables.tension(extended(at_rest(nodes))) == pytest.approx([20.0, 0.0])
+
+
+def test_the_cable_that_joins_a_node_to_itself_is_named_with_the_node():
+    with pytest.raises(InputError) as told:
+        make_cables([[0, 1], [2, 2]], rest_length=1.0, stiffness=1.0)
+    assert (told.value.where, told.value.value) == ("cables[1]", 2)
