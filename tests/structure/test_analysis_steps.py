@@ -72,15 +72,15 @@ def test_a_relaxation_that_leaves_the_branch_says_at_which_factor(monkeypatch):
 
     monkeypatch.setattr(analysis, "advance", advance)
     told = []
-    walk = walking(limit=321, told=lambda *each: told.append(each))
+    walk = walking(limit=321, factor=6.0, told=lambda *each: told.append(each))
     walk.increments(3, "relaxation")
-    assert asked == [(0.0, 1.0, 1e-7, 321), (1.0, 2.0, 1e-7, 321), (2.0, 3.0, 1e-7, 321)]
-    assert (walk.on_branch, walk.left_at) == (False, 1.25)
-    assert "ends near load factor 1.25:" in walk.warnings()[0]
+    assert asked == [(0.0, 2.0, 1e-7, 321), (2.0, 4.0, 1e-7, 321), (4.0, 6.0, 1e-7, 321)]
+    assert (walk.on_branch, walk.left_at) == (False, 2.5)
+    assert "ends near load factor 2.5:" in walk.warnings()[0]
     assert [each["steps"] for each in walk.documented] == [
-        [{"factor": factor, "iterations": 3, "stable": True}] for factor in (0.5, 1.5, 2.5)
+        [{"factor": factor, "iterations": 3, "stable": True}] for factor in (1.0, 3.0, 5.0)
     ]
-    assert told == [(0.5, 3), (1.0, 8), (1.5, 11), (2.0, 16), (2.5, 19), (3.0, 24)]
+    assert told == [(1.0, 3), (2.0, 8), (3.0, 11), (4.0, 16), (5.0, 19), (6.0, 24)]
 
 
 MOMENT = (0.0, 0.0, 0.0, 2.0, 0.0, 5.0)

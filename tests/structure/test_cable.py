@@ -5,6 +5,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.structure.elements.cable import make_cables
+from shellform.structure.elements.eased_cables import EasedCables
 from shellform.structure.elements.state import at_rest, extended, moved
 from shellform.verification import slack_pair
 from shellform.verification.models import line, ropes, solved
@@ -94,10 +95,32 @@ def test_a_cable_pulls_by_its_stretch_over_its_rest_length_from_where_it_is_taut
 def test_tensions_with_twice_the_digits_are_those_of_double_precision():
     nodes = np.array([[1.0, 2.0, 3.0], [4.0, 2.0, 7.0]])
     cables = make_cables([[0, 1], [1, 0]], rest_length=[4.0, 5.5], stiffness=80.0)
-    assert cables.tension(extended(at_rest(nodes))) == pytest.approx([20.0, 0.0])
+    state = extended(at_rest(nodes))
+    assert cables.tension(state) == pytest.approx([20.0, 0.0])
+    assert cables.evaluate(state, tangent=False).energy == pytest.approx([10.0, 0.0])
+    assert cables.evaluate(state, tangent=True).tangent.shape == (2, 21), "a plain one where it is asked for"
 
 
 def test_the_cable_that_joins_a_node_to_itself_is_named_with_the_node():
     with pytest.raises(InputError) as told:
         make_cables([[0, 1], [2, 2]], rest_length=1.0, stiffness=1.0)
     assert (told.value.where, told.value.value) == ("cables[1]", 2)
+
+
+def test_cables_at_given_tensions_have_their_forces_but_no_stiffness_along_them():
+    nodes = np.array([[1.0, 2.0, 3.0], [4.0, 2.0, 7.0]])
+    cables = make_cables([[0, 1], [0, 1]], rest_length=[4.0, 6.0], stiffness=80.0)
+    eased, state = EasedCables(cables), at_rest(nodes)
+    found = eased.evaluate(state, tangent=True)
+    packed = np.zeros((6, 6))
+    packed[np.tril_indices(6)] = found.tangent[0]
+    whole = packed + np.tril(packed, -1).T
+    along = np.array([0.6, 0.0, 0.8])
+    geometric = 20.0 / 5.0 * (np.eye(3) - np.outer(along, along))
+    np.testing.assert_allclose(
+        whole, np.block([[geometric, -geometric], [-geometric, geometric]]), atol=1e-12
+    )
+    assert not found.tangent[1].any(), "the slack one"
+    np.testing.assert_array_equal(found.force, cables.evaluate(state, tangent=False).force)
+    assert eased.evaluate(state, tangent=False).tangent is None
+    assert eased.dofs().tolist() == cables.dofs().tolist()

@@ -140,3 +140,13 @@ def test_the_middle_of_a_bent_beam_is_turned_halfway_whichever_sign_its_quaterni
         middle = halved(replace(whole, start=start)).start
         assert np.abs(middle.rotations[2]) == pytest.approx([0.55, 0.0, 0.0], abs=1e-12)
         assert middle.positions[2] == pytest.approx([0.5, 0.0, 0.0])
+
+
+def test_the_middle_of_a_beam_bent_to_an_s_lies_on_its_chord_and_turns_back_against_its_ends():
+    """The cubic's tangent there is 3/2 of the chord less a quarter of both ends' directions times its length."""
+    points, turn = np.add(line(1, 2.5), [3.0, 1.0, 2.0]), 0.3
+    state = from_vectors(points, [[0.0, turn, 0.0]] * 2)
+    middle = halved(replace(model(points, {0: PIN, 1: PIN}), start=state)).start
+    back = np.arctan2(0.5 * np.sin(turn), 1.5 - 0.5 * np.cos(turn))
+    assert middle.rotations[2] == pytest.approx([0.0, -back, 0.0])
+    assert middle.positions[2] == pytest.approx([4.25, 1.0, 2.0])
