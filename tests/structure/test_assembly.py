@@ -52,6 +52,20 @@ def disturbed():
     return moved(at_rest(NODES), 0.1 * np.random.default_rng(4).normal(size=(4, 6)))
 
 
+def test_how_far_a_beam_is_turned_is_told_from_45_degrees_on_beside_cables():
+    assembly, turned = built(), []
+    for angle in (0.7, 1.2):
+        step = np.zeros((4, 6))
+        step[1, 5] = -angle
+        turned.append(assembly.evaluate(moved(at_rest(NODES), step), tangent=False).turned)
+    assert turned == [0.0, pytest.approx(1.2)]
+
+
+def test_nothing_to_put_together_is_no_error():
+    assembly = Assembly(2, (), np.ones((2, 6), dtype=bool))
+    assert (len(assembly.free), assembly.matrix.size) == (0, 0)
+
+
 def test_forces_begin_to_change_along_a_motion_as_differences_say():
     assembly, state = built(), disturbed()
     motion = np.random.default_rng(5).normal(size=(4, 6))
