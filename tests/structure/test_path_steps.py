@@ -1,0 +1,152 @@
+"""Paths of one spring whose load is known at every place: where they end, and which points they tell."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError, NotConverged
+from shellform.structure.elements.state import at_rest
+from shellform.structure.solve import path
+from shellform.structure.solve.equilibrium import Equilibrium
+from shellform.structure.solve.loading import forces
+from shellform.structure.solve.path import _Here, _Missed, _Path, follow
+
+
+class Curve:
+    """Stands in for `_Path`: one coordinate x, at which the load factor is f(x) and so many pivots are negative."""
+
+    def __init__(self, load, negative=lambda x: 0, *, most=np.inf, iterations=4):
+        self.load, self.negatives, self.most, self.iterations = load, negative, most, iterations
+        self.moving = np.array([True])
+        self.sizes, self.spent = [], 7
+
+    def point(self, state, factor, iterations):
+        return self.at(0.0)
+
+    def at(self, x):
+        rate = (self.load(x + 1e-6) - self.load(x - 1e-6)) / 2e-6
+        negative = self.negatives(x)
+        found = Equilibrium(x, 0.0, 1e-9, 1, negative == 0, negative)
+        return _Here(x, self.load(x), found, np.array([1.0 / rate]), rate, self.iterations, 0.0)
+
+    def step(self, here, size, led, last, direction):
+        self.sizes.append(size)
+        if abs(size) > self.most:
+            raise _Missed
+        onward = np.sign(last[0]) if last is not None else 1.0
+        return self.at(here.state + onward * abs(size))
+
+    def between(self, before, after):
+        return np.array([after - before])
+
+    def displacement(self, state, lead):
+        return state
+
+    def number(self, lead):
+        return 0
+
+    def at_factor(self, here, there, goal):
+        low, high = here.state, there.state
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            if (self.load(middle) - goal) * (self.load(low) - goal) > 0.0:
+                low = middle
+            else:
+                high = middle
+        found = self.at(high)
+        return _Here(high, goal, found.equilibrium, found.tangent, found.rate, 4, 0.0)
+
+    located = _Path.located
+    gave_up = _Path.gave_up
+
+
+def followed(monkeypatch, curve, **how):
+    monkeypatch.setattr(path, "_Path", lambda *_: curve)
+    monkeypatch.setattr(path, "with_twice_the_digits", lambda _: None)
+    monkeypatch.setattr(path, "ResidualNorm", lambda _: None)
+    start = at_rest(np.zeros((1, 3)))
+    return list(follow(None, start, forces(np.ones((1, 6))), **how))
+
+
+def arch(x):
+    """Rises to 1 at x = 1, falls to 0 at 2, and rises again."""
+    return x * (x - 2.0) ** 2 * 27.0 / 32.0
+
+
+TOP = 2.0 / 3.0
+
+
+def test_a_path_ends_where_the_factor_first_comes_to_its_goal(monkeypatch):
+    points = followed(monkeypatch, Curve(lambda x: 2.0 * x), goal=3.0)
+    assert points[0].factor == 0.0
+    assert points[-1].factor == 3.0
+    assert points[1].factor == pytest.approx(0.3), "a tenth of the goal at first"
+    assert [each.event for each in points] == [""] * len(points)
+    assert len(points) == 11
+
+
+def test_a_limit_point_is_located_where_the_load_turns_round_and_a_bifurcation_where_it_goes_on(monkeypatch):
+    curve = Curve(arch, lambda x: int(TOP < x < 2.0))
+    points = followed(monkeypatch, curve, goal=2.0)
+    events = [(each.event, each.equilibrium.state, each.factor) for each in points if each.event]
+    assert [each[0] for each in events] == ["limit point", "limit point"]
+    assert events[0][1] == pytest.approx(TOP, abs=1e-3)
+    assert events[0][2] == pytest.approx(arch(TOP), rel=1e-6)
+    assert events[1][1] == pytest.approx(2.0, abs=1e-2)
+    straight = Curve(lambda x: 2.0 * x, lambda x: int(x > 0.71))
+    (event,) = [each for each in followed(monkeypatch, straight, goal=3.0) if each.event]
+    assert event.event == "bifurcation"
+    assert event.equilibrium.state == pytest.approx(0.71, abs=1e-6)
+    assert event.equilibrium.state > 0.71, "where it isn't stable any more"
+    assert not [each for each in followed(monkeypatch, straight, goal=3.0, events=False) if each.event]
+
+
+def test_steps_grow_where_they_are_easy_and_shrink_where_they_are_not(monkeypatch):
+    for iterations, ratio in ((4, 1.0), (1, 2.0), (2, np.sqrt(2.0)), (9, 2.0 / 3.0), (100, 0.5)):
+        curve = Curve(lambda x: 2.0 * x, iterations=iterations)
+        with pytest.raises(NotConverged, match="within 3 points"):
+            followed(monkeypatch, curve, goal=1000.0, first=1e-4, most=3)
+        assert np.array(curve.sizes[1:]) / curve.sizes[:-1] == pytest.approx([ratio] * 2)
+
+
+def test_a_step_that_is_missed_is_cut_to_a_quarter_until_a_millionth_of_the_first(monkeypatch):
+    curve = Curve(lambda x: 2.0 * x, most=0.01)
+    points = followed(monkeypatch, curve, goal=0.5, first=0.2)
+    assert curve.sizes[:4] == pytest.approx([0.05, 0.0125, 0.003125, 0.003125])
+    assert points[-1].factor == 0.5
+    never = Curve(lambda x: 2.0 * x, most=-1.0)
+    with pytest.raises(NotConverged, match=r"could not be followed further \(load factor 0\)") as told:
+        followed(monkeypatch, never, goal=0.5, first=0.2)
+    assert len(never.sizes) == 10, "4^10 is more than a million"
+    assert told.value.iterations == 7
+
+
+def test_a_led_path_ends_at_its_displacement_with_a_last_step_that_goes_no_farther(monkeypatch):
+    curve = Curve(lambda x: 2.0 * x, iterations=1)
+    points = followed(monkeypatch, curve, lead=(0, 2, 0.75))
+    assert curve.sizes == pytest.approx([0.075, 0.15, 0.3, 0.225])
+    assert points[-1].equilibrium.state == pytest.approx(0.75)
+    back = Curve(lambda x: -2.0 * x)
+    with pytest.raises(NotConverged):
+        followed(monkeypatch, back, lead=(0, 2, -0.75), most=2)
+    assert back.sizes[0] == pytest.approx(-0.075)
+    with pytest.raises(InputError, match="must not be zero"):
+        followed(monkeypatch, Curve(lambda x: 2.0 * x), lead=(0, 2, 0.0))
+
+
+def test_the_goal_of_a_path_of_pulls_against_the_load_is_less_than_nothing(monkeypatch):
+    points = followed(monkeypatch, Curve(lambda x: -2.0 * x), goal=-0.5)
+    assert points[-1].factor == -0.5
+    assert points[1].factor == pytest.approx(-0.05)
+
+
+def test_only_a_free_displacement_leads_and_counts_from_the_start():
+    walk = SimpleNamespace(assembly=SimpleNamespace(free=np.array([1, 8, 14])))
+    assert _Path.number(walk, (1, 2, -0.5)) == 1
+    with pytest.raises(InputError, match="only a free displacement can lead") as told:
+        _Path.number(walk, (1, 1, -0.5))
+    assert told.value.value == (1, 1)
+    walk.start = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]))
+    there = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.25]]))
+    assert _Path.displacement(walk, there, (1, 2, -0.5)) == -0.75
