@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from shellform.structure.answers.sensitivity import by_load, element_columns, reaction_rows
+from shellform.structure.answers.third_derivatives import bilinear
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import State, at_rest, moved
@@ -72,6 +73,16 @@ def test_forces_begin_to_change_along_a_motion_as_differences_say():
     ahead, behind = (assembly.evaluate(moved(state, s * 1e-6 * motion)).force for s in (1.0, -1.0))
     slope = (ahead - behind) / 2e-6
     np.testing.assert_allclose(assembly.force_along(state, motion)[:, :3], slope[:, :3], rtol=1e-6, atol=1e-5)
+
+
+def test_stiffness_along_two_sets_of_motions_is_that_of_the_forces_they_change():
+    assembly, state = built(), disturbed()
+    left, right = np.random.default_rng(6).normal(size=(2, 24, 3))
+    found = sum(bilinear(part, state, left, right) for part in assembly.parts)
+    by_hand = sum(
+        float(left[:, k] @ assembly.force_along(state, right[:, k].reshape(4, 6)).ravel()) for k in range(3)
+    )
+    assert found == pytest.approx(by_hand, rel=1e-10)
 
 
 def test_reactions_change_with_the_free_degrees_of_freedom_as_differences_say():

@@ -181,3 +181,24 @@ def test_beams_without_length_or_with_bad_stiffness_or_axis_are_refused():
         make_beams(NODES, [[0, 1]], axial=1, torsion=1, bending_y=1, bending_z=1, z_axis=NODES[1:])
     with pytest.raises(InputError, match="out of range"):
         make_beams(NODES, [[0, 2]], axial=1, torsion=1, bending_y=1, bending_z=1)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_a_z_axis_is_along_the_beam_within_a_billionth_whatever_its_length(size):
+    nodes = np.array([[1.0, 2.0, 3.0], [1.0, 4.0, 3.0]])
+
+    def made(off):
+        return make_beams(
+            nodes,
+            [[0, 1]],
+            axial=1,
+            torsion=1,
+            bending_y=1,
+            bending_z=1,
+            z_axis=size * np.array([[0, 1.0, off]]),
+        )
+
+    with pytest.raises(InputError, match="zero or along the beam"):
+        made(0.8e-9)
+    frame = made(1.2e-9).frames[0, 0]
+    np.testing.assert_allclose(frame, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-6)

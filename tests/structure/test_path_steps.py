@@ -78,7 +78,7 @@ TOP = 2.0 / 3.0
 
 
 def test_a_path_ends_where_the_factor_first_comes_to_its_goal(monkeypatch):
-    points = followed(monkeypatch, Curve(lambda x: 2.0 * x), goal=3.0)
+    points = followed(monkeypatch, Curve(lambda x: 2.0 * x), goal=3.0, first=path.FIRST)
     assert points[0].factor == 0.0
     assert points[-1].factor == 3.0
     assert points[1].factor == pytest.approx(0.3), "a tenth of the goal at first"
@@ -100,6 +100,18 @@ def test_a_limit_point_is_located_where_the_load_turns_round_and_a_bifurcation_w
     assert event.equilibrium.state == pytest.approx(0.71, abs=1e-6)
     assert event.equilibrium.state > 0.71, "where it isn't stable any more"
     assert not [each for each in followed(monkeypatch, straight, goal=3.0, events=False) if each.event]
+
+
+def test_an_event_is_located_to_a_ten_millionth_of_its_factor_and_no_nearer(monkeypatch):
+    """Halves of a step of 0.15 m at 2/m: 0.3 / 2^n < 1e-7 · 1.42 from n = 22 on."""
+    curve = Curve(lambda x: 2.0 * x, lambda x: int(x > 0.71))
+    followed(monkeypatch, curve, goal=3.0)
+    assert sum(size < 0.149 for size in curve.sizes) == 22
+
+
+def test_a_step_that_ends_at_the_goal_itself_ends_the_path(monkeypatch):
+    points = followed(monkeypatch, Curve(lambda x: 2.0 * x), goal=2.0, first=0.5)
+    assert [each.factor for each in points] == [0.0, 1.0, 2.0]
 
 
 def test_steps_grow_where_they_are_easy_and_shrink_where_they_are_not(monkeypatch):
@@ -143,7 +155,7 @@ def test_the_goal_of_a_path_of_pulls_against_the_load_is_less_than_nothing(monke
 
 def test_only_a_free_displacement_leads_and_counts_from_the_start():
     walk = SimpleNamespace(assembly=SimpleNamespace(free=np.array([1, 8, 14])))
-    assert _Path.number(walk, (1, 2, -0.5)) == 1
+    assert (_Path.number(walk, (1, 2, -0.5)), _Path.number(walk, (2, 2, 1.0))) == (1, 2)
     with pytest.raises(InputError, match="only a free displacement can lead") as told:
         _Path.number(walk, (1, 1, -0.5))
     assert told.value.value == (1, 1)

@@ -89,3 +89,53 @@ def test_work_within_an_item_stays_on_its_thread(monkeypatch):
 
     threads.side_by_side(work, range(2))
     assert seen == [True, True]
+
+
+@pytest.mark.parametrize(("asked", "count"), [("3", 3), ("12", 12), ("0", 5), ("-2", 5), ("", 5), ("two", 5)])
+def test_as_many_cores_are_used_as_are_asked_for_or_granted(monkeypatch, asked, count):
+    monkeypatch.setenv("OMP_NUM_THREADS", asked)
+    monkeypatch.setattr(threads.os, "sched_getaffinity", lambda _: set(range(5)), raising=False)
+    assert threads.cores() == count
+
+
+@pytest.mark.parametrize(("told", "count"), [(6, 6), (None, 1)])
+def test_where_the_system_grants_none_by_number_all_that_there_are_count(monkeypatch, told, count):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    monkeypatch.delattr(threads.os, "sched_getaffinity", raising=False)
+    monkeypatch.setattr(threads.os, "cpu_count", lambda: told)
+    assert threads.cores() == count
+
+
+@pytest.mark.parametrize(
+    ("count", "parts"),
+    [
+        (999, [(0, 999)]),
+        (1000, [(0, 500), (500, 1000)]),
+        (1501, [(0, 500), (500, 1000), (1000, 1501)]),
+        (9000, [(0, 3000), (3000, 6000), (6000, 9000)]),
+        (0, [(0, 0)]),
+    ],
+)
+def test_a_loop_is_shared_in_equal_parts_from_500_elements_a_core_on(monkeypatch, count, parts):
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    done = []
+    threads.share(lambda start, stop, more: done.append((start, stop, more)), count, "more")
+    assert sorted(done) == [(*part, "more") for part in parts]
+
+
+def test_a_loop_within_an_item_that_has_a_core_to_itself_is_not_shared(monkeypatch):
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    done = []
+
+    def work(item):
+        threads.share(lambda start, stop: done.append((start, stop)), 9000)
+        return item
+
+    assert threads.side_by_side(work, [1, 2]) == [1, 2]
+    assert done == [(0, 9000)] * 2
+
+
+def test_an_error_in_any_part_of_a_loop_is_raised(monkeypatch):
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    with pytest.raises(ZeroDivisionError):
+        threads.share(lambda start, _: 1 // (start - 6000), 9000)
