@@ -202,3 +202,19 @@ def test_a_z_axis_is_along_the_beam_within_a_billionth_whatever_its_length(size)
         made(0.8e-9)
     frame = made(1.2e-9).frames[0, 0]
     np.testing.assert_allclose(frame, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-6)
+
+
+def test_the_one_beam_whose_nodes_coincide_is_named_with_them():
+    nodes = [[1.0, 2.0, 3.0], [1.0, 4.0, 3.0], [1.0, 4.0, 3.0]]
+    with pytest.raises(InputError, match="two nodes of the beam coincide") as told:
+        make_beams(nodes, [[0, 1], [2, 1]], axial=1, torsion=1, bending_y=1, bending_z=1)
+    assert (told.value.where, told.value.value) == ("beams[1]", [2, 1])
+
+
+def test_without_a_z_axis_it_is_the_global_one_and_in_upright_beams_global_x():
+    nodes = [[0, 0, 0], [0, 0, 2.0], [1.6e-6, 0, 0], [0, 2.4e-6, 0], [1.0, 0, 0.5]]
+    ends = [[0, 1], [1, 2], [1, 3], [0, 4]]
+    frames = make_beams(nodes, ends, axial=1, torsion=1, bending_y=1, bending_z=1).frames[:, 0]
+    for k, z in ((0, [1, 0, 0]), (1, [1, 0, 0]), (2, [0, 1, 0])):
+        np.testing.assert_allclose(frames[k, :, 2], z, atol=1e-5)
+    np.testing.assert_allclose(frames[3, :, 2], np.array([-0.5, 0.0, 1.0]) / np.sqrt(1.25), atol=1e-12)

@@ -22,10 +22,10 @@ class Line:
         self.steps, self.matrix = iter(steps), self
 
     def evaluate(self, state):
-        return SimpleNamespace(force=np.zeros((1, 6)), energy=0.5, turned=0.0, x=state.positions[0, 0])
+        return SimpleNamespace(force=np.full((1, 6), 1.5), energy=0.5, turned=0.0, x=state.positions[0, 0])
 
     def factor_indefinite(self, values):
-        return SimpleNamespace(solve=lambda right: np.array([next(self.steps)]))
+        return SimpleNamespace(solve=lambda right: right / 2.0 * next(self.steps))
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def measured(monkeypatch):
         residuals[:] = given
         asked.clear()
         start = at_rest(np.zeros((1, 3)))
-        return newton(Line(steps), start, np.zeros((1, 6)), tolerance=1e-3, **how)
+        return newton(Line(steps), start, np.full((1, 6), 3.5), tolerance=1e-3, **how)
 
     run.asked = asked
     return run

@@ -25,6 +25,7 @@ class Curve:
         return self.at(0.0)
 
     def at(self, x):
+        x = float(x)
         rate = (self.load(x + 1e-6) - self.load(x - 1e-6)) / 2e-6
         negative = self.negatives(x)
         found = Equilibrium(x, 0.0, 1e-9, 1, negative == 0, negative)
@@ -34,7 +35,7 @@ class Curve:
         self.sizes.append(size)
         if abs(size) > self.most:
             raise _Missed
-        onward = np.sign(last[0]) if last is not None else 1.0
+        onward = float(np.sign(last[0]) if last is not None else direction * np.sign(here.tangent[0]))
         return self.at(here.state + onward * abs(size))
 
     def between(self, before, after):
