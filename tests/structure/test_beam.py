@@ -218,3 +218,18 @@ def test_without_a_z_axis_it_is_the_global_one_and_in_upright_beams_global_x():
     for k, z in ((0, [1, 0, 0]), (1, [1, 0, 0]), (2, [0, 1, 0])):
         np.testing.assert_allclose(frames[k, :, 2], z, atol=1e-5)
     np.testing.assert_allclose(frames[3, :, 2], np.array([-0.5, 0.0, 1.0]) / np.sqrt(1.25), atol=1e-12)
+
+
+def test_the_one_beam_whose_z_axis_lies_along_it_is_named():
+    nodes = [[1.0, 2.0, 3.0], [1.0, 4.0, 3.0], [1.0, 4.0, 6.0]]
+    with pytest.raises(InputError, match="z_axis is zero or along the beam") as told:
+        make_beams(
+            nodes,
+            [[0, 1], [1, 2]],
+            axial=1,
+            torsion=1,
+            bending_y=1,
+            bending_z=1,
+            z_axis=[[0, 0, 1], [0, 0, -2]],
+        )
+    assert (told.value.where, told.value.value) == ("beams[1]", [0.0, 0.0, -2.0])
