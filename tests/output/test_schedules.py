@@ -3,6 +3,7 @@
 import csv
 import itertools
 from dataclasses import replace
+from types import SimpleNamespace
 
 import binpacking
 import numpy as np
@@ -14,9 +15,11 @@ from openpyxl import load_workbook
 import shellform as sf
 from shellform import tables
 from shellform.errors import InputError
+from shellform.gridshell.layers import TwoLayers
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
 from shellform.output.workshop.setting_out import support_plan
+from shellform.structure.elements.sections import Material, Rectangle
 
 
 @pytest.fixture(scope="module")
@@ -435,3 +438,145 @@ def test_coordinates_that_count_from_a_survey_s_origin_say_so_wherever_they_are_
     for make in (schedules.supports, schedules.survey, support_plan):
         assert told in make(moved).notes
         assert not any("count from" in note for note in make(built).notes)
+
+
+def test_a_shoe_is_three_times_as_wide_as_the_rod_s_larger_side():
+    """Of a lath of 20 × 60 mm: 180 mm."""
+    asked = []
+    rod = SimpleNamespace(
+        resized=lambda radius: (
+            asked.append(radius) or SimpleNamespace(section=SimpleNamespace(fibres=(0.01, 0.03)))
+        )
+    )
+    built = SimpleNamespace(shell=SimpleNamespace(rod=rod), design=SimpleNamespace(radius=0.04))
+    assert schedules.shoe_width(built) == pytest.approx(0.18)
+    assert asked == [0.04], "the design's, not the first one's"
+
+
+def test_supports_of_rods_and_of_edge_beams_lead_from_their_feet_to_the_next_node(monkeypatch):
+    """A rod U0 of five nodes and an edge beam E0 of five others, of which three stand on the ground; the first of
+    the beam's feet is the rod's second end too, and is called after the rod."""
+    place = np.array(
+        [
+            [1.0, 2.0, 0.5], [1.0, 5.0, 4.5], [3.0, 6.0, 6.0], [9.0, 6.0, 3.0], [12.0, 2.0, 3.0],
+            [7.0, 8.0, 5.0], [5.0, 9.0, 7.0], [3.0, 2.0, 2.0], [-1.0, -1.0, 1.0],
+        ]
+    )  # fmt: skip
+    rod = SimpleNamespace(direction="u", nodes=np.arange(5))
+    net = SimpleNamespace(
+        grid=SimpleNamespace(rods=(rod,)),
+        edges=(SimpleNamespace(nodes=np.array([4, 5, 6, 7, 8])),),
+        supports=np.array([8, 0, 4]),
+    )
+    built = SimpleNamespace(
+        grid=net.grid,
+        shell=SimpleNamespace(net=net, target=SimpleNamespace(positions=place)),
+        origin_notes=("from there",),
+    )
+    push = np.outer(np.arange(9.0), [1.0, -2.0, 3.0])
+    monkeypatch.setattr(schedules, "support_forces", lambda _: {"none": push, "design": 10.0 * push})
+    monkeypatch.setattr(schedules, "clashing_supports", lambda _: [(0, 1, 0.0125), (1, 2, 0.02)])
+    monkeypatch.setattr(schedules, "shoe_width", lambda _: 0.03)
+    table = schedules.supports(built)
+    beam, first, second = table.rows
+    assert beam[:6] == ("S0", "E0", "second", -1.0, -1.0, 1.0)
+    assert beam[6:9] == (pytest.approx(np.arctan2(3.0, 4.0)), pytest.approx(np.arctan2(1.0, 5.0)), "S1")
+    assert beam[9:] == (8.0, -16.0, 24.0, 80.0, -160.0, 240.0)
+    assert first[:6] == ("S1", "U0", "first", 1.0, 2.0, 0.5)
+    assert first[6:9] == (pytest.approx(np.pi / 2.0), pytest.approx(np.arctan2(4.0, 3.0)), "S0, S2")
+    assert first[9:] == (0.0,) * 6
+    assert second[:6] == ("S2", "U0", "second", 12.0, 2.0, 3.0)
+    assert second[6:9] == (pytest.approx(np.arctan2(4.0, -3.0)), pytest.approx(0.0), "S1")
+    assert second[9:] == (4.0, -8.0, 12.0, 40.0, -80.0, 120.0)
+    assert table.columns[9:] == tuple(
+        f"{name}: on the support along {axis} [N]" for name in ("erected", "design") for axis in "xyz"
+    )
+    assert "nearer than 30 mm" in table.notes[1]
+    assert table.notes[1].endswith("clash: S0 and S1, 12.5 mm, S1 and S2, 20.0 mm.")
+    assert table.notes[2:] == ("from there",)
+
+
+def test_an_edge_beam_s_first_foot_leads_along_the_beam(monkeypatch):
+    place = np.array([[1.0, 1.0, 0.0], [4.0, -3.0, 5.0], [0.0, 0.0, 0.0], [2.0, 2.0, 2.0]])
+    net = SimpleNamespace(
+        grid=SimpleNamespace(rods=()), edges=(SimpleNamespace(nodes=np.arange(4)),), supports=np.array([0])
+    )
+    built = SimpleNamespace(
+        grid=net.grid,
+        shell=SimpleNamespace(net=net, target=SimpleNamespace(positions=place)),
+        origin_notes=(),
+    )
+    monkeypatch.setattr(schedules, "support_forces", lambda _: {"none": np.ones((4, 3))})
+    monkeypatch.setattr(schedules, "clashing_supports", lambda _: [])
+    monkeypatch.setattr(schedules, "shoe_width", lambda _: 0.03)
+    table = schedules.supports(built)
+    (row,) = table.rows
+    assert row == (
+        "S0",
+        "E0",
+        "first",
+        1.0,
+        1.0,
+        0.0,
+        pytest.approx(np.arctan2(-4.0, 3.0)),
+        pytest.approx(np.pi / 4.0),
+        "",
+        1.0,
+        1.0,
+        1.0,
+    )
+    assert table.notes[1].endswith("clash: none.")
+
+
+@pytest.mark.parametrize("density", [460.0, 0.0])
+@pytest.mark.parametrize("layers", [1, 2])
+def test_a_rod_s_line_tells_its_mass_its_bars_and_its_parts(density, layers):
+    """U0 of 3 m whole, V1 of 7 m from two bars, of laths of 50 × 35 mm: 0.805 kg/m each."""
+    lath = Rectangle(0.050, 0.035, Material(12e9, 0.75e9, density, 24e6))
+    section = TwoLayers(lath) if layers == 2 else lath
+    rods = (
+        SimpleNamespace(direction="u", length=3.0, marks=np.array([0.25, 2.5]), crossings=np.array([4, 1])),
+        SimpleNamespace(
+            direction="v", length=7.0, marks=np.array([1.0, 3.0, 6.5]), crossings=np.array([0, 1, 2])
+        ),
+    )
+    rod = SimpleNamespace(resized=lambda radius: SimpleNamespace(section=section) if radius == 0.02 else None)
+    built = SimpleNamespace(
+        shell=SimpleNamespace(rod=rod), design=SimpleNamespace(radius=0.02), grid=SimpleNamespace(rods=rods)
+    )
+    pieces = (
+        [nesting.Piece(1, 2, 2, 5.0, 2.0), nesting.Piece(0, 1, 1, 0.0, 3.0)],
+        [nesting.Piece(1, 1, 2, 0.0, 5.0)],
+    )
+    cutting = nesting.Cutting(6.0, 0.003, tuple(nesting.Bar(tuple(each), 1.0) for each in pieces), 2)
+    table = schedules.rods(built, cutting)
+    whole, spliced = table.rows
+    assert (whole[:3], spliced[:3]) == (("U0", "u", 3.0), ("V1", "v", 7.0))
+    assert (whole[4], spliced[4]) == (
+        (None, None) if density == 0.0 else pytest.approx((layers * 2.415, layers * 5.635))
+    )
+    assert whole[5:] == (2, "250.0 2500.0", "4 1", "B1", "")
+    assert spliced[5:] == (3, "1000.0 3000.0 6500.0", "0 1 2", "part 1: B2, part 2: B1", "spliced")
+    assert ("Each rod is two laths" in " ".join(table.notes)) == (layers == 2)
+    assert ("No masses" in " ".join(table.notes)) == (density == 0.0)
+
+
+def test_shear_blocks_are_listed_where_rods_have_two_layers(monkeypatch, built):
+    cutting = nesting.cut(built.grid)
+    names = ["rods", "bars", "splices", "marks", "cables", "supports", "survey"]
+    assert [table.name for table in schedules.all_tables(built, cutting)] == names
+    monkeypatch.setattr(schedules, "layers_of", lambda _: 2)
+    assert [table.name for table in schedules.all_tables(built, cutting)] == [*names, "shear_blocks"]
+
+
+def test_supports_clash_where_they_stand_nearer_than_a_shoe_is_wide(monkeypatch):
+    feet = np.array([[5.0, 5.0, 5.0], [2.0, 1.0, 0.0], [2.0, 1.03, 0.04], [2.0, 1.0, 0.06], [0.0, 0.0, 0.0]])
+    shell = SimpleNamespace(
+        target=SimpleNamespace(positions=feet), net=SimpleNamespace(supports=np.array([4, 3, 1, 2]))
+    )
+    monkeypatch.setattr(schedules, "shoe_width", lambda _: 0.055)
+    found = schedules.clashing_supports(SimpleNamespace(shell=shell))
+    assert [pair[:2] for pair in found] == [(1, 3), (2, 3)], "by their numbers, not by their nodes"
+    assert [apart for *_, apart in found] == pytest.approx([0.0013**0.5, 0.05])
+    shell.net.supports = np.array([], dtype=int)
+    assert schedules.clashing_supports(SimpleNamespace(shell=shell)) == []
