@@ -2,10 +2,13 @@
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
+from scipy.stats import qmc
 
 from shellform.errors import InputError
+from shellform.study import plan as plans
 from shellform.study.expressions import evaluate
-from shellform.study.plan import changes, length, read_study, resolved
+from shellform.study.plan import Study, VaryEntry, changes, length, placed, ranged, read_study, resolved
 from tests.stubs import study_file
 
 ENTRIES = {"net.spacing": 0.055, "rod.radius": 1e-3}
@@ -187,3 +190,159 @@ def test_a_study_may_not_name_a_case_outside_its_folder(tmp_path):
     file.write_text('case = "../dome.toml"')
     with pytest.raises(InputError, match="leads out of the study file's folder"):
         read_study(file)
+
+
+@pytest.mark.parametrize(
+    ("entry", "values"),
+    [
+        ({"low": 2.0, "high": 8.0}, [2.0, 3.5, 5.0, 8.0]),
+        ({"low": 2.0, "high": 32.0, "scale": "log"}, [2.0, 4.0, 8.0, 32.0]),
+        ({"low": -3.0, "high": 4.6, "whole": True}, [-3, -1, 1, 5]),
+        ({"low": 10.0, "high": 2560.0, "scale": "log", "whole": True}, [10, 40, 160, 2560]),
+    ],
+)
+def test_a_range_is_walked_from_low_to_high_in_equal_steps_or_equal_ratios(entry, values):
+    found = [ranged(VaryEntry(**entry), at) for at in (0.0, 0.25, 0.5, 1.0)]
+    assert found == pytest.approx(values)
+    assert {type(each) for each in found} == {int if entry.get("whole") else float}
+
+
+def test_rounding_leads_no_value_out_of_its_range():
+    for low, high in ((0.1, 0.7), (1e-3, 0.3)):
+        entry = VaryEntry(low=low, high=high, scale="log")
+        assert (ranged(entry, 0.0), ranged(entry, 1.0)) == (low, high)
+        assert all(low <= ranged(entry, at) <= high for at in (-1e-16, 1e-17, 1.0 - 1e-16, 1.0 + 1e-16))
+
+
+@pytest.mark.parametrize("method", ["random", "latin", "sobol"])
+def test_samples_are_scipy_s_of_the_study_s_seed(tmp_path, method):
+    """Of 5 designs in two entries: the first 5 of Sobol's 8."""
+    plan = read_study(
+        study_file(
+            tmp_path,
+            f"""
+            method = "{method}"
+            count = 5
+            seed = 7
+            [vary]
+            net.spacing = {{ low = 0.1, high = 0.2 }}
+            cable.stiffness = [100, 150, 187]
+            """,
+        )
+    )
+    points = {
+        "random": lambda: np.random.default_rng(7).random((5, 2)),
+        "latin": lambda: qmc.LatinHypercube(2, rng=7).random(5),
+        "sobol": lambda: qmc.Sobol(2, rng=7).random_base2(3)[:5],
+    }[method]()
+    found = list(changes(plan))
+    assert [each["net.spacing"] for each in found] == pytest.approx(0.1 + 0.1 * points[:, 0])
+    assert [each["cable.stiffness"] for each in found] == [
+        [100, 150, 187][int(3 * at)] for at in points[:, 1]
+    ]
+
+
+def test_each_value_of_a_list_has_the_same_share_of_the_unit_interval(tmp_path):
+    text = "method = 'latin'\ncount = 4\n[vary]\ncable.stiffness = [100, 150, 187]"
+    plan = read_study(study_file(tmp_path, text))
+    at = (0.0, 0.33, 0.34, 0.66, 0.67, 0.999, 1.0)
+    found = [placed(plan, "cable.stiffness", each) for each in at]
+    assert found == [100, 100, 150, 150, 187, 187, 187]
+
+
+@pytest.mark.parametrize("own", [0, 1, 3])
+@pytest.mark.parametrize("method", ["grid", "latin"])
+def test_listed_designs_are_each_combined_with_all_that_varies(tmp_path, method, own):
+    listed = ", ".join(f"{{ rod.radius = {1e-3 + 1e-4 * k} }}" for k in range(own))
+    text = f"""
+        method = "{method}"
+        {"count = 5" if method == "latin" else ""}
+        designs = [{listed}]
+        [vary]
+        net.spacing = [0.1, 0.11]
+    """
+    plan = read_study(study_file(tmp_path, text))
+    designs = list(changes(plan))
+    assert length(plan) == len(designs) == max(1, own) * (2 if method == "grid" else 5)
+    assert len({each.get("rod.radius") for each in designs}) == max(1, own)
+
+
+def test_entries_follow_from_the_case_s_own_and_whole_ones_stay_whole(tmp_path):
+    text = """
+        [vary]
+        net.spacing = [0.1]
+        [function]
+        joint.gap = "net.elements / 1000"
+        net.elements = "rod.radius * 5000"
+        cable.force_max = 30
+        cable.stiffness = "cable.force_max * 5"
+    """
+    case, values = resolved(read_study(study_file(tmp_path, text)), {"net.spacing": 0.1})
+    assert (case.net.elements, case.cable.force_max, case.cable.stiffness) == (5, 30.0, 150.0)
+    assert case.joint.gap == pytest.approx(0.005), "from what follows from others, not from the case's"
+    assert [(name, type(each)) for name, each in values.items()] == [
+        ("net.spacing", float),
+        ("joint.gap", float),
+        ("net.elements", int),
+        ("cable.force_max", float),
+        ("cable.stiffness", float),
+    ]
+
+
+def test_what_follows_for_a_count_and_is_not_whole_is_refused_and_not_rounded(tmp_path):
+    with pytest.raises(InputError, match=r"net\.elements"):
+        read_study(study_file(tmp_path, "[vary]\nnet.spacing = [0.1]\n[function]\nnet.elements = 2.5"))
+
+
+@pytest.mark.parametrize("name", ["net", "net.spacing.deep", "surface.file", "surface.nothing"])
+def test_nothing_follows_from_what_is_no_number_of_the_case(tmp_path, name):
+    with pytest.raises(InputError, match="is no number of the case") as told:
+        read_study(study_file(tmp_path, f"[function]\njoint.gap = '{name}'"))
+    assert told.value.value == name
+
+
+def test_a_study_without_objective_is_fine_but_for_a_search(tmp_path):
+    text = "[vary]\nnet.spacing = [0.1, 0.11]\n[column]\na = 'net.spacing'"
+    plan = read_study(study_file(tmp_path, text))
+    assert (plan.study.objective, length(plan)) == ({}, 2)
+    assert Study(case="dome.toml").objective == {"misfit": "min", "cables": "min"}
+
+
+def test_a_grid_s_range_of_one_value_is_its_low_and_equal_whole_numbers_are_one(tmp_path):
+    text = """
+        [vary]
+        net.spacing = { low = 0.1, high = 0.2, count = 1 }
+        net.elements = { low = 2, high = 4, count = 9, whole = true }
+    """
+    plan = read_study(study_file(tmp_path, text))
+    assert plan.lists == {"net.spacing": [0.1], "net.elements": [2, 3, 4]}
+
+
+def test_a_design_may_take_up_to_a_year():
+    year = 365 * 86400.0
+    assert 0.98 * year < plans._LONGEST <= year
+    assert Study(case="a", longest=31e6).longest == 31e6
+    for wrong in (0.0, 32e6):
+        with pytest.raises(ValidationError, match="longest"):
+            Study(case="a", longest=wrong)
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("3 < 2", 0.0), ("2 < 3", 1.0), ("2 <= 2", 1.0), ("3 >= 4", 0.0), ("4 > 4", 0.0), ("2 == 2", 1.0), ("2 != 2", 0.0),
+        ("7 // 2", 3.0), ("-7 % 4", 1.0), ("+net.spacing - -1", 1.055), ("5 if 0 else 6", 6.0), ("abs(-2.5) * 3", 7.5),
+        ("ceil(2.1) - floor(2.9)", 1.0), ("log(exp(3))", 3.0), ("sin(pi / 6)", 0.5), ("tan(pi / 4)", 1.0),
+    ],
+)  # fmt: skip
+def test_each_sign_and_function_of_an_expression_has_its_usual_meaning(text, value):
+    found = worth(text)
+    assert found == pytest.approx(value)
+    assert type(found) is float
+
+
+def test_an_expression_may_have_500_characters():
+    assert worth("1" + " " * 498 + "") == 1.0
+    assert worth("1+" * 249 + "1 ") == 250.0
+    with pytest.raises(InputError, match="longer than 500 characters"):
+        worth("1+" * 250 + "1")
