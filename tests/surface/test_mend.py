@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
+from shellform.surface.readers import mend
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.reading import surface_of
 from shellform.surface.readers.seams import open_edges
@@ -239,3 +240,112 @@ def test_meshes_without_area_or_with_branching_edges_are_refused():
     fin = np.vstack([POINTS, [[0.0, 0.0, 5.0]]])
     with pytest.raises(InputError, match="more than two faces, the first at"):
         mended(fin, np.vstack([TRIANGLES, [[60, 61, len(POINTS)]]]))
+
+
+def test_vertices_nearer_than_a_hundred_millionth_of_the_size_are_one():
+    points = np.array(
+        [[5.0, 5.0, 0.0], [9.0, 5.0, 0.0], [5.0, 8.0, 0.0], [9.0, 5.0, 0.0], [9.0, 8.0, 0.0], [5.0, 8.0, 0.0]]
+    )
+    faces = np.array([[0, 1, 2], [3, 4, 5]])
+    for apart, count in ((0.9e-8, 4), (1.1e-8, 5), (1.9e-8, 5)):
+        near = points.copy()
+        near[3] += [apart * 4.0, 0.0, 0.0]
+        found = mend._merged(Draft(near, faces), 4.0)
+        assert len(found.points) == count
+        assert found.notes == (f"{6 - count} vertices lay on others and were merged",)
+
+
+def test_the_first_of_equal_points_stands_for_them_and_nearness_goes_on_from_one_to_the_next():
+    x = np.array([3.0, 1.0, 1.09, 3.0, 1.18, 2.0])
+    points = np.column_stack([x, 0.0 * x, 7.0 + 0.0 * x])
+    assert mend._same_places(points, 0.1).tolist() == [0, 1, 1, 0, 1, 5]
+    assert mend._same_places(points, 0.05).tolist() == [0, 1, 2, 0, 4, 5]
+    assert mend._same_places(points[:0], 0.1).tolist() == []
+
+
+def test_lines_of_faces_without_area_are_refused_wherever_they_lie():
+    line = np.outer(np.arange(5.0), [3.0, 0.0, 4.0]) + np.array([100.0, 70.0, -30.0])
+    with pytest.raises(InputError, match="no triangle with an area"):
+        mended(line, [[0, 1, 2], [2, 3, 4]])
+
+
+def test_what_lies_too_far_from_the_origin_or_has_no_extent_is_refused():
+    far = POINTS + np.array([0.0, -0.9e9, 0.0])
+    assert mend.mended(Draft(far, TRIANGLES), "s").points.shape == POINTS.shape
+    with pytest.raises(InputError, match=r"has coordinates of up to 1\.1e\+09 m"):
+        mended(POINTS + np.array([0.0, -1.1e9, 0.0]), TRIANGLES)
+
+
+def test_of_edges_of_three_faces_the_first_is_told_with_its_place():
+    """Two fins on the cap: one of a face on vertices 60 and 61, one on 20 and 21."""
+    fins = np.vstack([POINTS, [[0.0, 0.0, 5.0], [-2.0, 0.0, 5.0]]])
+    faces = np.vstack([TRIANGLES, [[60, 61, len(POINTS)], [20, 21, len(POINTS) + 1]]])
+    place = POINTS[20].round(4).tolist()
+    with pytest.raises(InputError) as told:
+        mended(fins, faces)
+    assert f"2 edges belong to more than two faces, the first at {place} m" in str(told.value)
+
+
+def test_pieces_are_told_with_their_areas_sizes_and_middles_the_largest_first():
+    """A triangle of 2 × 3 m, one of 4 × 5 m away from it, and one of 1 × 2 m on a wall."""
+    points = np.array(
+        [
+            [1.0, 1.0, 0.0], [3.0, 1.0, 0.0], [1.0, 4.0, 0.0],
+            [10.0, 10.0, 7.0], [14.0, 10.0, 7.0], [10.0, 15.0, 7.0],
+            [0.0, 30.0, 0.0], [1.0, 30.0, 0.0], [0.0, 30.0, 2.0],
+        ]
+    )  # fmt: skip
+    with pytest.raises(InputError, match=r"shell: has 3 separate pieces, of 10, 3, 1 m²") as told:
+        mended(points, np.arange(9).reshape(3, 3))
+    assert (
+        "--piece 1 is 4 × 5 × 0 m about (12, 12.5, 7), --piece 2 is 2 × 3 × 0 m about (2, 2.5, 0), "
+        "--piece 3 is 1 × 0 × 2 m about (0.5, 30, 1)"
+    ) in told.value.remedy
+    second = mend.mended(Draft(points, np.arange(9).reshape(3, 3)), "shell", piece=2)
+    assert second.points.tolist() == points[:3].tolist()
+    assert second.notes[-1] == "piece 2 of 3 was taken, 3 m²"
+    for piece in (0, 4):
+        with pytest.raises(InputError, match="has no such piece"):
+            mended(points, np.arange(9).reshape(3, 3), piece=piece)
+
+
+def test_more_than_five_pieces_are_told_in_part():
+    side = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    for count, more in ((5, False), (6, True)):
+        points = np.vstack([(6.0 - k) * side + [10.0 * k, 0.0, 0.0] * np.ones(3) for k in range(count)])
+        with pytest.raises(InputError, match=f"has {count} separate pieces") as told:
+            mended(points, np.arange(3 * count).reshape(-1, 3))
+        assert ("…" in str(told.value)) == more
+        assert "--piece 5 is" in told.value.remedy
+        assert "--piece 6 is" not in told.value.remedy
+
+
+def test_vertices_at_which_the_edge_meets_itself_are_parted_by_a_millionth_into_the_smaller_fan():
+    """Two triangles with a common edge, and two others in a row behind them, each on the last one's corner."""
+    points = np.array(
+        [[0.0, -1.0, 1.0], [4.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 3.0, 1.0], [8.0, 2.0, 1.0], [8.0, 0.0, 1.0], [12.0, 2.0, 1.0], [12.0, 0.0, 1.0]]
+    )  # fmt: skip
+    faces = np.array([[0, 1, 2], [2, 1, 3], [1, 5, 4], [4, 7, 6]])
+    found = mend._parted(Draft(points, faces, np.arange(24.0).reshape(8, 3)), 12.0)
+    assert found.notes == ("2 vertices at which the edge met itself were parted, by 1e-05 m",)
+    assert len(found.points) == 10
+    np.testing.assert_array_equal(found.points[:8], points)
+    assert found.triangles.tolist() == [[0, 1, 2], [2, 1, 3], [8, 5, 9], [4, 7, 6]]
+    for new, old, face in ((8, 1, [1, 5, 4]), (9, 4, [1, 5, 4])):
+        inwards = points[face].mean(axis=0) - points[old]
+        wanted = 1.2e-5 * inwards / np.linalg.norm(inwards)
+        np.testing.assert_allclose(found.points[new] - points[old], wanted, atol=1e-12)
+        np.testing.assert_array_equal(found.normals[new], np.arange(24.0).reshape(8, 3)[old])
+
+
+def test_faces_are_turned_as_most_of_their_own_piece():
+    """Two strips of three triangles: one face of the first is turned over, and two of the second."""
+    strip = np.array([[0, 1, 2], [2, 1, 3], [2, 3, 4]])
+    first, second = strip.copy(), strip + 10
+    first[1] = first[1, ::-1]
+    second[[0, 2]] = second[[0, 2], ::-1]
+    found = mend.turned_alike(np.vstack([first, second]), "shell")
+    np.testing.assert_array_equal(found[:3], strip)
+    np.testing.assert_array_equal(found[3:], (strip + 10)[:, ::-1])
+    first[:2] = strip[0, ::-1], strip[1]
+    np.testing.assert_array_equal(mend.turned_alike(first, "shell"), strip)

@@ -7,7 +7,7 @@ import pytest
 from shellform.errors import InputError
 from shellform.run.first_look import check_file
 from shellform.surface.readers.reading import read_surface
-from shellform.surface.readers.stated import line_without_number, stated_unit
+from shellform.surface.readers.stated import _words, line_without_number, stated_unit
 
 DATA = Path(__file__).parent.parent / "data"
 MILLI = "#1 = ( LENGTH_UNIT() NAMED_UNIT(*) SI_UNIT(.MILLI.,.METRE.) );"
@@ -79,5 +79,51 @@ def test_a_line_that_has_nan_for_a_number_is_found_and_refused(tmp_path, ending,
             read_surface(bad)
 
 
+def test_words_of_an_iges_file_s_other_sections_are_no_numbers(tmp_path):
+    """Its start and its global section are text, and what stands behind column 72 counts lines."""
+    lines = [
+        ("beams, nan, plates", "S"),
+        ("1H,,1H;,nan,2", "G"),
+        ("110,1.,2.,3.,4.,5.,6.;", "P"),
+        ("110,1.,nan,3.;", "P"),
+    ]
+    text = "\n".join(f"{words:<72}{section}{1:>7}" for words, section in lines)
+    (tmp_path / "a.igs").write_text(text, encoding="latin-1")
+    assert line_without_number(tmp_path / "a.igs", "iges") == 4
+    (tmp_path / "a.igs").write_text(
+        text.replace("110,1.,nan,3.;", "110,1.,3.;".ljust(14)), encoding="latin-1"
+    )
+    assert line_without_number(tmp_path / "a.igs", "iges") is None
+    long = f"#1=CARTESIAN_POINT('',({'0.,' * 15}    P, nan));"
+    assert long[72] == "P"
+    (tmp_path / "a.step").write_text(long)
+    assert line_without_number(tmp_path / "a.step", "step") == 1
+
+
 def test_check_names_the_unit_that_a_file_carries():
     assert check_file(DATA / "dome_mm.step", {}, allow_scripts=False).unit == "mm, as the file states"
+
+
+def test_a_section_s_words_end_with_its_semicolon_and_strings_where_they_say():
+    assert _words("1H,,1H;,4Hmesh, 3Ha;b,7,,2.5;8,9") == [",", ";", "mesh", "a;b", "7", "", "2.5"]
+    assert _words("12,3Habc") == ["12", "abc"]
+    assert _words("") == []
+
+
+@pytest.mark.parametrize(("count", "unit"), [(13, None), (14, "mm")])
+def test_what_follows_a_section_s_end_states_no_unit(tmp_path, count, unit):
+    """The unit's flag is the section's 14th word."""
+    text = ",".join(str(1 + k) if k < 13 else "2" for k in range(count)) + ";2,2,2,2"
+    (tmp_path / "a.igs").write_text(f"{text:<72}G{1:>7}\n", encoding="latin-1")
+    assert stated_unit(tmp_path / "a.igs", "iges") == unit
+
+
+@pytest.mark.parametrize(
+    ("flag", "unit"),
+    [("1", "in"), ("2", "mm"), ("4", "ft"), ("5", "mi"), ("6", "m"), ("7", "km"), ("8", "mil"), ("9", "µm"), ("10", "cm"), ("11", "µin"), ("3", None), ("12", None), ("3,2Hin", "in"), ("3,4HFOOT", "ft")],
+)  # fmt: skip
+def test_each_flag_of_iges_stands_for_its_unit(tmp_path, flag, unit):
+    text = "0," * 13 + f"{flag};"
+    (tmp_path / "a.igs").write_text(f"{text:<72}G{1:>7}\n", encoding="latin-1")
+    assert stated_unit(tmp_path / "a.igs", "iges") == unit
+    assert stated_unit(tmp_path / "a.igs", "brep") is None

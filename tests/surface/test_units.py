@@ -1,0 +1,24 @@
+"""Units and axes of files that others wrote."""
+
+import numpy as np
+import pytest
+
+from shellform.errors import InputError
+from shellform.surface.units import turned_up, unit_factor
+
+
+def test_units_are_so_many_metres():
+    """The inch and the foot as agreed on in 1959."""
+    metres = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 12 * 0.0254}
+    assert {unit: unit_factor(unit) for unit in metres} == pytest.approx(metres, rel=1e-12)
+    with pytest.raises(InputError, match=r"surface\.unit: isn't a known unit .*Known: m, cm, mm, in, ft"):
+        unit_factor("yd")
+
+
+def test_y_upwards_becomes_z_and_the_axes_keep_their_hand():
+    points = np.array([[1.0, 2.0, 3.0], [-4.0, 5.0, -6.0]])
+    np.testing.assert_array_equal(turned_up(points, "z"), points)
+    np.testing.assert_array_equal(turned_up(points, "y"), [[1.0, -3.0, 2.0], [-4.0, 6.0, 5.0]])
+    assert np.linalg.det(turned_up(np.eye(3), "y")) == pytest.approx(1.0)
+    with pytest.raises(InputError, match=r"surface\.up: must be y or z"):
+        turned_up(points, "x")
