@@ -16,8 +16,8 @@ _TO_EDGE = 0.99  # of the way to a bound that a step goes at the most
 
 
 def bounded_minimum(matrix: sp.csc_array, right: Reals, least: float) -> Reals:
-    """The minimum (k,) of x'Ax/2 - b'x, A `matrix` and b `right`, with all x at least `least`. Raises
-    NotConverged.
+    """The minimum (k,) of x'Ax/2 - b'x, A `matrix` and b `right`, with all x at least `least`, which is
+    above 0. Raises NotConverged.
     """
     target = right - matrix @ np.full(len(right), least)
     x = np.full(len(right), least)

@@ -194,7 +194,8 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
 
     Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held.
     The force densities are those that leave the least unbalanced force on the surface as it is, none below
-    `least` of their mean, so that all stays in compression. Raises InputError where nothing is held.
+    `least` of their mean, so that all stays in compression. Raises InputError where nothing is held, and where `least`
+    isn't above 0.
     """
     from shellform.surface.shape.target import make_surface, vertex_areas
 
@@ -231,8 +232,9 @@ def fitted_densities(
     They minimise the squared unbalanced forces on the free `nodes` (n, 3), m, under `loads` (n, 3), N, with
     the size of each at least `least` times that of the uniform density that fits best; of many such, those
     nearest to uniform. Arguments as in `force_density`. Raises InputError where no compression bears the
-    loads better than none.
+    loads better than none, and where `least` isn't above 0.
     """
+    require_number(least, above=0.0, where="least", give="a share of their mean, such as 0.05")
     place = reals("nodes", nodes, (None, 3))
     ends = indices("edges", edges, (None, 2), below=len(place))
     load = reals("loads", loads, (len(place), 3))

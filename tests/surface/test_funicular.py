@@ -310,3 +310,15 @@ def test_what_one_b_spline_can_not_be_is_not_written(tmp_path):
     with pytest.raises(InputError, match="has openings"):
         cad.write_fitted(tmp_path / "shell.step", hole)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("least", [0.0, -0.1, np.nan, np.inf])
+def test_densities_that_may_come_to_nothing_are_refused(least):
+    """With nothing as the least a shell's branches might hang slack."""
+    nodes, edges, loads, fixed = line(3, -1.0)
+    nodes[1:3, 2] = 0.5, 0.6
+    assert (fitted_densities(nodes, edges, loads, fixed, least=1e-6) < 0.0).all()
+    with pytest.raises(
+        InputError, match=r"least: .*\(found .*\)\. Give a share of their mean, such as 0\.05"
+    ):
+        fitted_densities(nodes, edges, loads, fixed, least=least)
