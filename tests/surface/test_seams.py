@@ -175,3 +175,19 @@ def test_a_sliver_whose_long_side_lies_on_the_edge_is_dropped():
     found = without_slivers(Draft(draft.points, draft.triangles[[0, 2, 3]]))
     assert found.notes == ("slivers: 1 dropped at the edge",)
     assert (len(found.triangles), len(found.points)) == (2, 4)
+
+
+def test_a_triangle_s_height_is_told_over_its_longest_side():
+    """3, 4 and 5 m: 2.4 m over the longest; and the same in centimetres."""
+    points = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
+    for scale in (1.0, 0.01):
+        assert seams._heights(scale * points, np.array([[0, 1, 2], [2, 0, 1]])) == pytest.approx([0.48, 0.48])
+
+
+@pytest.mark.parametrize(("tip", "turns"), [((0.5, 0.4), False), ((0.5, -0.4), True), ((0.5, 0.0), True)])
+def test_a_triangle_with_an_area_may_not_turn_over_and_a_sliver_may(tip, turns):
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.5, 0.6, 0.0], [*tip, 0.0], [0.5, 0.004, 0.0]])
+    new = np.array([[0, 1, 3]])
+    assert seams._turned(points, np.array([[0, 1, 2]]), new, allowed=0.01) == turns
+    assert not seams._turned(points, np.array([[0, 1, 4]]), new, allowed=0.01)
+    assert seams._turned(points, np.array([[0, 1, 4]]), new, allowed=0.001) == turns
