@@ -179,7 +179,7 @@ def test_a_sliver_whose_long_side_lies_on_the_edge_is_dropped():
 
 def test_a_triangle_s_height_is_told_over_its_longest_side():
     """3, 4 and 5 m: 2.4 m over the longest; and the same in centimetres."""
-    points = np.array([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
+    points = np.array([[7.0, 5.0, 2.0], [10.0, 5.0, 2.0], [7.0, 9.0, 2.0]])
     for scale in (1.0, 0.01):
         assert seams._heights(scale * points, np.array([[0, 1, 2], [2, 0, 1]])) == pytest.approx([0.48, 0.48])
 
