@@ -77,3 +77,22 @@ def test_ticks_of_counts_are_whole():
 
 def test_neighbouring_true_places_are_one_run():
     assert _runs([True, True, False, True, False, False, True, True]) == [[0, 1], [3], [6, 7]]
+
+
+def test_an_axis_begins_where_values_do_whether_or_not_a_tick_is_there():
+    """From -3 to 13.25, a quarter of 13 above the limit of 10; evaluations from 5 on."""
+    chart = line_chart("Pull", [5, 10, 15], {"a": [-3.0, 10.0, 0.0]}, limit=10.0)
+    height = 218.0 / 16.25
+    assert curves_of(chart)["series-1 main"] == [
+        [(52.0, 230.0), (250.0, round(230.0 - 13.0 * height, 1)), (448.0, round(230.0 - 3.0 * height, 1))]
+    ]
+    assert re.findall(r'<text x="([0-9.]*)" y="248" text-anchor="middle">([^<]*)<', chart.svg) == [
+        ("91.6", "6"), ("170.8", "8"), ("250.0", "10"), ("329.2", "12"), ("408.4", "14"),
+    ]  # fmt: skip
+
+
+def test_one_evaluation_and_values_of_nothing_have_a_place_too():
+    assert curves_of(line_chart("Misfit", [7], {"a": [3.0]}))["series-1 main"] == [[(52.0, 12.0)]]
+    assert curves_of(line_chart("Misfit", [0, 1], {"a": [0.0, 0.0]}))["series-1 main"] == [
+        [(52.0, 230.0), (448.0, 230.0)]
+    ]
