@@ -90,6 +90,16 @@ def test_spans_tell_the_crossings_rows_and_the_rods_ends(built):
     ]
 
 
+def test_segments_are_counted_wherever_the_grid_begins():
+    """Crossings 3 to 5 along u and -2 to 1 along v."""
+    lattice = np.array([(i, j) for i in range(3, 6) for j in range(-2, 2)])
+    grid = lattice_grid(lattice, spacing=(2.0, 1.5), gap=0.05, elements=1)
+    spans = layout._spans(SimpleNamespace(grid=grid), np.array([6e3, -3e3]), np.array([10e3, 1.5e3]), S)
+    assert [span.text for span in spans] == ["2 × 2000 = 4000", "4000.0", "3 × 1500 = 4500", "4500.0"]
+    assert [(span.a[0], span.b[0]) for span in spans[:2]] == 2 * [(6000.0, 10000.0)]
+    assert [(span.a[1], span.b[1]) for span in spans[2:]] == 2 * [(-3000.0, 1500.0)]
+
+
 def test_names_of_rods_stand_in_the_segment_nearest_to_their_middles_to_their_left(built):
     """Of two segments as near the first: from 0 to 2 m, and from 0 to 1.5 m."""
     for name, rod, place in (
@@ -127,6 +137,15 @@ def test_rods_are_told_with_their_marks_and_splices_one_under_the_other(built):
         ("splice 3750.0", 3750.0),
     ]
     assert [mark.place[1] for mark in splices] == pytest.approx([-0.24 * S, -3 * 0.75 * S - 0.24 * S])
+    strokes = on(sheet.marks, "SUPPORTS", Stroke)
+    np.testing.assert_allclose(
+        [np.mean(stroke.points, axis=0) for stroke in strokes], [(5000.0, 0.0), (3750.0, -3 * 0.75 * S)]
+    )
+    lengths = on(sheet.marks, "CUT_LENGTHS", Words)
+    assert [mark.place[0] > at for mark, at in zip(lengths, (8e3, 8e3, 6e3, 6e3, 6e3), strict=True)] == 5 * [
+        True
+    ]
+    assert [mark.place[1] for mark in lengths] == [-0.75 * S * row for row in range(5)]
     numbers = on(sheet.marks, "CROSSING_NUMBERS", Words)
     assert [(mark.text, mark.place[0]) for mark in numbers[-3:]] == [
         ("6", 1500.0),
