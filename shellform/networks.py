@@ -268,7 +268,7 @@ def _pairs(name: str, given: ArrayLike, count: int) -> list[tuple[int, int]]:
         raise InputError(
             f"names a node that isn't there: there are {count}",
             where=name,
-            value=int(values.max()),
+            value=int(values.min() if values.min() < 0 else values.max()),
             remedy="Nodes are counted from 0.",
         )
     return [(int(a), int(b)) for a, b in values]

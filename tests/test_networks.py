@@ -108,6 +108,11 @@ def test_a_rod_s_stiffnesses_are_told_apart():
     assert [float(each[0]) for each in found] == [5.0, 6.0, 7.0, 8.0]
 
 
+def test_a_node_below_the_first_is_told_and_not_the_largest_beside_it():
+    with pytest.raises(InputError, match=r"a node that isn't there: there are 3 \(found -2\)"):
+        sf.networks.from_arrays(NODES, [[0, 1], [-2, 2]], rod=ROD)
+
+
 def test_a_node_beyond_the_last_is_told_with_how_many_there_are():
     with pytest.raises(InputError, match=r"rods: names a node that isn't there: there are 3 \(found 3\)"):
         sf.networks.from_arrays(NODES, [[0, 1], [3, 2]], rod=ROD)
