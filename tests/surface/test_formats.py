@@ -194,6 +194,9 @@ def test_of_several_networks_one_has_to_be_named_and_a_damaged_one_is(tmp_path):
     (tmp_path / "two.json").write_text(json.dumps(two))
     with pytest.raises(InputError, match=r"2 networks.*shell, other"):
         read_surface(tmp_path / "two.json")
+    chosen = read_surface(tmp_path / "two.json", name="other")
+    same_shell(chosen)
+    assert any("between the lines of other were taken" in note for note in chosen.mended)
     network["data"]["edge"]["0"]["nowhere"] = {}
     (tmp_path / "bad.json").write_text(json.dumps(network))
     with pytest.raises(InputError, match="its network FDNetwork is damaged"):

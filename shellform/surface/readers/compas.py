@@ -10,7 +10,8 @@ the shell.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -40,21 +41,21 @@ def read_compas(file: Path, choice: Choice) -> Draft:
             where=str(file),
             remedy="Save a compas.datastructures.Mesh, or a RHINOVault session.",
         )
-    kind, read = ("network", _between_lines) if networks else ("mesh", _part)
+    kind, read = ("network", partial(_between_lines, str(file))) if networks else ("mesh", _part)
     found = found or networks
     named = [(name, table) for name, table in found if name == _SHELL]
     if not choice.name and not choice.layer and named:
         found = named[-1:]
     elif not choice.name and len(found) > 1:
         raise InputError(
-            f"holds {len(found)} {'meshes' if kind == 'mesh' else 'networks'}",
+            f"holds {len(found)} {'networks' if networks else 'meshes'}",
             where=str(file),
             remedy=f"Choose by surface.object (--object) among {', '.join(n for n, _ in found)}.",
         )
     parts, openings = [], 0
     for name, table in found:
         try:
-            part, left_out = read(name, table, str(file))
+            part, left_out = read(name, table)
         except InputError:
             raise
         except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
@@ -66,7 +67,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
     draft = joined(parts, choice, str(file))
     notes = [f"the mesh {found[0][0]} was taken"] if len(found) == 1 and found[0][0] else []
     if networks:
-        notes = [f"the faces between the lines of {found[0][0] or 'a network'} were taken"]
+        notes = [f"the faces between the lines of {choice.name or found[0][0] or 'a network'} were taken"]
     if openings:
         notes.append(f"{openings} faces without load were left out as openings")
     return Draft(draft.points, draft.triangles, notes=tuple(notes))
@@ -87,15 +88,14 @@ def _tables(data: Any, name: str, points: str, joins: str) -> Iterator[tuple[str
                 yield from _tables(each, called, points, joins)
 
 
-def _part(name: str, table: dict[str, Any], where: str) -> tuple[MeshObject, int]:
+def _part(name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
     """The mesh, and how many of its faces are openings."""
     number, points = _places(
         table["vertex"], table.get("default_vertex_attributes") or table.get("dva") or {}
     )
     shared = table.get("facedata") or {}
     whole = dict(table.get("default_face_attributes") or table.get("dfa") or {})
-    blocks: dict[int, list[list[int]]] = {}
-    openings = 0
+    faces, openings = [], 0
     for key, face in table["face"].items():
         if face is None:
             continue
@@ -105,18 +105,16 @@ def _part(name: str, table: dict[str, Any], where: str) -> tuple[MeshObject, int
         corners = [number[str(each)] for each in face]
         if len(corners) > 1 and corners[0] == corners[-1]:
             corners.pop()
-        blocks.setdefault(len(corners), []).append(corners)
-    return MeshObject(name, "", points, _arrays(blocks)), openings
+        faces.append(corners)
+    return MeshObject(name, "", points, _by_corners(faces)), openings
 
 
-def _between_lines(name: str, table: dict[str, Any], where: str) -> tuple[MeshObject, int]:
+def _between_lines(where: str, name: str, table: dict[str, Any]) -> tuple[MeshObject, int]:
     """The mesh of the faces between a network's lines, none of them known as an opening."""
     number, points = _places(table["node"], table.get("default_node_attributes") or table.get("dna") or {})
     lines = [(number[str(a)], number[str(b)]) for a, others in table["edge"].items() for b in others]
-    blocks: dict[int, list[list[int]]] = {}
-    for corners in faces_in_plan(points, np.array(lines, dtype=np.int64).reshape(-1, 2), where):
-        blocks.setdefault(len(corners), []).append(corners)
-    return MeshObject(name, "", points, _arrays(blocks)), 0
+    faces = faces_in_plan(points, np.array(lines, dtype=np.int64).reshape(-1, 2), where)
+    return MeshObject(name, "", points, _by_corners(faces)), 0
 
 
 def _places(table: dict[str, Any], others: Mapping[str, Any]) -> tuple[dict[str, int], Reals]:
@@ -126,6 +124,9 @@ def _places(table: dict[str, Any], others: Mapping[str, Any]) -> tuple[dict[str,
     return {str(key): row for row, key in enumerate(table)}, np.array(points).reshape(-1, 3)
 
 
-def _arrays(blocks: Mapping[int, list[list[int]]]) -> tuple[Indices, ...]:
-    """The faces of each number of corners (f, k)."""
+def _by_corners(faces: Iterable[list[int]]) -> tuple[Indices, ...]:
+    """The faces of each number of corners from three on (f, k)."""
+    blocks: dict[int, list[list[int]]] = {}
+    for corners in faces:
+        blocks.setdefault(len(corners), []).append(corners)
     return tuple(np.array(each, dtype=np.int64) for size, each in blocks.items() if size > 2)
