@@ -202,8 +202,8 @@ def likeliest(fault: Fault) -> list[str]:
     naming = [
         file for file in (*own, *rest) if any(word in file.read_text(encoding="utf-8") for word in words)
     ]
-    top = sorted((ROOT / "tests").glob("test_*.py"))  # of the modules that lie in no room
-    alike = [file for file in (*own, *top) if module.name.rstrip("s") in file.name]
+    near = own or sorted((ROOT / "tests").glob("test_*.py"))  # of modules that lie in no room
+    alike = [file for file in near if module.name.rstrip("s") in file.name]
     general = [
         ROOT / "tests/test_public.py",
         ROOT / "tests/structure/test_solver.py",

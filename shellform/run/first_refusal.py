@@ -27,7 +27,7 @@ _FLAT_SHARES = (1.0, 1.8)  # of a radius that makes a vault of flat pieces
 _WELL_COVERED = 1.4 * COVERED  # spacings: of COVERED itself half the nets are bent a little too much
 _APART = 1.3  # from one to the next, at the least
 _FURTHER = 1.7  # times the largest radius, where it helps nothing
-_WORK = 0.27  # of what a surface is worth: on rounded ones, and on these again on walls
+_TRIED = 0.27  # of the work that a surface is worth: on rounded ones, on these again on walls, and with less concrete
 _WALLED = 0.4  # on walls, with which large nets are tried once
 _WALLS = "--edges wall"
 _TAKEN = "--way-out"
@@ -87,7 +87,7 @@ def with_ways_out(
         way_out = _to_nearest(refusal, surface, output, again, say)
         if way_out is None:
             refusal = refusal.untried() if again.too_late else refusal.in_vain()
-            way_out = _poured_first(refusal, surface, wish, say, whole.part(_WORK))
+            way_out = _poured_first(refusal, surface, wish, say, whole.part(_TRIED))
     return Refused(refusal, way_out)
 
 
@@ -127,11 +127,11 @@ class _Rounded:
     def __init__(self, wish: DesignWish, whole: Allowance, say: Say) -> None:
         self.wish = wish  # with which the last surface went on
         self.options = ""  # of the command, that stand for it
-        self.too_late = False  # whether not even the first was begun in time
+        self.too_late = False  # whether no work was left for even the first
         self._begun = False
         self._say = say
-        self._brief = whole.part(_WORK, thorough=False, thins=False)
-        self._walled = whole.part(_WORK, thorough=False)
+        self._brief = whole.part(_TRIED, thorough=False, thins=False)
+        self._walled = whole.part(_TRIED, thorough=False)
 
     def __call__(self, surface: Surface) -> None:
         """Raises InputError or NotConverged where no design stands."""

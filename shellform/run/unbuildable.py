@@ -61,9 +61,10 @@ class Unbuildable(InputError):
         return self._saying(found, "It takes a rounder form there.")
 
     def untried(self) -> Unbuildable:
-        """The same, where no time was left to try any way out."""
+        """The same, where no work was left to try any way out."""
         return self._saying(
-            "rounder surfaces were left untried, since the search had taken all its time", self.remedy
+            "rounder surfaces were left untried, since the search had taken all the work that is allowed",
+            self.remedy,
         )
 
     def _saying(self, more: str, remedy: str) -> Unbuildable:
