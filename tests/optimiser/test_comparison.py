@@ -10,12 +10,7 @@ from shellform.errors import InputError, NotConverged
 from shellform.optimiser import comparison
 from shellform.optimiser.comparison import METHODS, Plain, compare
 from shellform.problem.evaluation import OffBranch
-
-
-@pytest.fixture(scope="module")
-def coarse(vault, shell):
-    net = sf.pull_net(vault, spacing=0.14, gap=0.002, angle=np.deg2rad(45.0), elements=2)
-    return sf.brace(net, shell.rod, shell.joint, shell.cable, below=vault)
+from tests.optimiser.told import loaded
 
 
 def problem(shell, force, *limits, radius=False):
@@ -222,14 +217,7 @@ def test_a_start_is_compared_that_bears_all_its_loads(monkeypatch, on_branch, re
             pass
 
         def begin(self):
-            return {
-                name: SimpleNamespace(
-                    on_branch=on_branch or name != "wetter",
-                    equilibrium=SimpleNamespace(state=name),
-                    share=0.4,
-                )
-                for name in ("wet", "wetter", "idle")
-            }
+            return loaded("wet", "wetter", "idle", falling=() if on_branch else ["wetter"])
 
         def seed(self, start, states, stage):
             assert (states, stage) == ({"wet": "wet", "wetter": "wetter"}, 1.0)

@@ -13,14 +13,9 @@ from shellform.errors import InputError, NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser import moving_asymptotes
 from shellform.problem.terms import Measurement, Term
+from tests.optimiser.told import loaded
 
 SHARE = np.array([61.0, 37.0, 19.0, 7.0, 1.0])  # of Svanberg's cantilever
-
-
-@pytest.fixture(scope="module")
-def coarse(vault, shell):
-    net = sf.pull_net(vault, spacing=0.14, gap=0.002, angle=np.deg2rad(45.0), elements=2)
-    return sf.brace(net, shell.rod, shell.joint, shell.cable, below=vault)
 
 
 def problem(shell, force=1.0, more=1.2, radius=False):
@@ -402,12 +397,7 @@ def test_a_direct_search_begins_as_far_as_its_start_bears_the_further_loads(monk
             pass
 
         def begin(self):
-            return {
-                name: SimpleNamespace(
-                    on_branch=on_branch or name != "wetter", equilibrium=SimpleNamespace(state=name)
-                )
-                for name in ("wet", "wetter")
-            }
+            return loaded("wet", "wetter", falling=() if on_branch else ["wetter"])
 
         def seed(self, start, states, stage):
             return states, stage

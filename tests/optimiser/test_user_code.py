@@ -55,12 +55,6 @@ class Ratios(sf.Variable):  # one rest length over target length for the cables 
         )
 
 
-@pytest.fixture(scope="module")
-def coarse(vault, shell):
-    net = sf.pull_net(vault, spacing=0.14, gap=0.002, angle=np.deg2rad(45.0), elements=2)
-    return sf.brace(net, shell.rod, shell.joint, shell.cable, below=vault)
-
-
 def problem(shell, *constraints, variables, minimise=None):
     wet = shell.point_load(1.0)
     shares = minimise or [sf.Share(1.0, sf.Misfit("wet"))]

@@ -51,3 +51,13 @@ def told_search(monkeypatch, *modules):
         judging="judging",
         problem=SimpleNamespace(shell="shell"),
     )
+
+
+def loaded(*names, falling=()):
+    """What loads come to from a start that falls under those `falling`, at two fifths of them; each state is told by its load."""
+    return {
+        name: SimpleNamespace(
+            on_branch=name not in falling, equilibrium=SimpleNamespace(state=name), share=0.4
+        )
+        for name in names
+    }

@@ -219,25 +219,20 @@ def test_nothing_is_told_of_a_design_that_was_not_examined_and_no_share_of_an_un
 
 
 def test_quantities_have_units_of_handy_size():
-    for path, value, shown, unit in (
-        ("designs.best.loads.design.deviation_max", 0.0123, 12.3, "mm"),
-        ("designs.best.loads.design.connector_turn_max", np.pi / 6.0, 30.0, "°"),
-        ("designs.best.loads.design.rod_utilisation_max", 0.625, 62.5, "%"),
-        ("designs.best.loads.design.cable_force_max", 12.5, 12.5, "N"),
-        ("designs.best.cables", 84, 84, ""),
-        ("x.unheard_of", 7.5, 7.5, ""),
+    for measure, value, shown, unit in (
+        (found("designs.best.loads.design.deviation_max"), 0.0123, 12.3, "mm"),
+        (found("designs.best.loads.design.connector_turn_max"), np.pi / 6.0, 30.0, "°"),
+        (found("designs.best.loads.design.rod_utilisation_max"), 0.625, 62.5, "%"),
+        (found("designs.best.loads.design.cable_force_max"), 12.5, 12.5, "N"),
+        (found("designs.best.cables"), 84, 84, ""),
+        (found("x.unheard_of"), 7.5, 7.5, ""),
+        (given("net.spacing"), 0.055, 55.0, "mm"),
+        (given("net.angle"), 45.0, 45.0, "°"),
+        (given("rod.young"), 40e9, 40.0, "GPa"),
+        (given("rod.strength"), 255e6, 255.0, "MPa"),
+        (given("cable.stiffness"), 187.0, 187.0, "N"),
+        (given("load.additional"), 1.5, 1.5, ""),
     ):
-        measure = found(path)
-        assert (measure.factor * value, measure.unit) == (pytest.approx(shown), unit)
-    for entry, value, shown, unit in (
-        ("net.spacing", 0.055, 55.0, "mm"),
-        ("net.angle", 45.0, 45.0, "°"),
-        ("rod.young", 40e9, 40.0, "GPa"),
-        ("rod.strength", 255e6, 255.0, "MPa"),
-        ("cable.stiffness", 187.0, 187.0, "N"),
-        ("load.additional", 1.5, 1.5, ""),
-    ):
-        measure = given(entry)
         assert (measure.factor * value, measure.unit) == (pytest.approx(shown), unit)
 
 

@@ -277,14 +277,13 @@ def test_two_layers_are_stiffer_across_the_surface_and_bent_like_one(net):
     assert erection_stress(net, two.section) == pytest.approx(erection_stress(net, one.section))
 
 
+def parts_of(rest_ratio, swivels=True):
+    rods = wished("gfrp_rods/6 mm")[0]
+    return FirstParts(rods, edge_choices(rods)[0], rest_ratio, rope_for(1.0), swivels)
+
+
 def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none():
-    parts = FirstParts(
-        wished("gfrp_rods/6 mm")[0],
-        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
-        0.996,
-        rope_for(1.0),
-        swivels=True,
-    )
+    parts = parts_of(0.996)
     assert 1.0 - parts.eased(PULLED + 0.2).rest_ratio == pytest.approx(0.004 - 0.2 * STRAINED, abs=1e-4)
     slack = parts.eased(3.0)
     assert slack.rest_ratio == 1.0 - LEAST_PRESTRAIN
@@ -293,13 +292,7 @@ def test_cables_pulled_too_much_at_the_start_get_less_prestrain_and_never_none()
 
 
 def test_cables_pulled_too_much_with_the_least_prestrain_become_thicker_as_far_as_there_are_strands():
-    parts = FirstParts(
-        wished("gfrp_rods/6 mm")[0],
-        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
-        1.0 - LEAST_PRESTRAIN,
-        rope_for(1.0),
-        swivels=True,
-    )
+    parts = parts_of(1.0 - LEAST_PRESTRAIN)
     diameters = []
     while parts is not None:
         diameters.append(parts.rope.diameter)
@@ -309,13 +302,7 @@ def test_cables_pulled_too_much_with_the_least_prestrain_become_thicker_as_far_a
 
 
 def test_rods_that_break_beside_cables_that_give_get_strands_that_bear_what_pulls_them():
-    parts = FirstParts(
-        wished("gfrp_rods/6 mm")[0],
-        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
-        0.998,
-        rope_for(1.0),
-        swivels=True,
-    )
+    parts = parts_of(0.998)
     breaks = Followed(NEEDED, 1.05, 0.5, 0.0, 1.2, np.zeros(3), np.zeros(3))
     assert parts.stronger(breaks) == replace(parts, rope=Rope(0.008))
     assert parts.stronger(replace(breaks, pull=2.5)).rope.diameter == 0.014, "5 times the section, not 2.9"
@@ -404,13 +391,7 @@ def test_rods_that_less_concrete_does_not_spare_are_not_tried_with_still_less():
 
 
 def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_before_anything_else():
-    parts = FirstParts(
-        wished("gfrp_rods/6 mm")[0],
-        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
-        0.996,
-        rope_for(1.0),
-        swivels=True,
-    )
+    parts = parts_of(0.996)
     breaks = Followed(NEEDED, 1.4, 0.5, 0.0, 2.0, np.zeros(3), np.zeros(3))
     assert parts.easier(breaks, PULLED).rest_ratio == pytest.approx(0.998)
     assert parts.easier(breaks, PULLED).easier(breaks, PULLED).rest_ratio == 1.0 - LEAST_PRESTRAIN
@@ -422,13 +403,7 @@ def test_prestress_that_breaks_rods_at_their_ends_is_halved_and_halved_again_bef
 
 
 def test_joints_turn_where_cables_are_made_slacker_for_rods_that_are_stressed_too_much():
-    parts = FirstParts(
-        wished("gfrp_rods/6 mm")[0],
-        edge_choices(wished("gfrp_rods/6 mm")[0])[0],
-        0.996,
-        rope_for(1.0),
-        swivels=False,
-    )
+    parts = parts_of(0.996, swivels=False)
     breaks = Followed(NEEDED, 1.4, 0.5, 0.0, 0.5, np.zeros(3), np.zeros(3))
     eased = parts.easier(breaks, PULLED)
     assert eased == replace(parts, rest_ratio=0.998, swivels=True)
