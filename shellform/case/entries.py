@@ -35,8 +35,8 @@ class SurfaceEntry(Entry):
     unit: Literal["m", "cm", "mm", "in", "ft"] | None = Field(
         None, description="unit of files that carry none"
     )
-    up: Literal["y", "z"] | None = Field(
-        None, description="vertical axis of the file; left out: the format's"
+    up: Literal["x", "y", "z", "-x", "-y", "-z"] | None = Field(
+        None, description="vertical axis of the file, with - where it points down; left out: the format's"
     )
     size: PositiveFloat | None = Field(None, description="mesh size, m")
     layer: str = Field("", description="layer of the surface in the file")

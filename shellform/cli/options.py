@@ -11,7 +11,9 @@ from typing import Annotated, Any
 import typer
 
 Unit = Annotated[str | None, typer.Option(help="Unit of files that carry none: m, cm, mm, in, ft.")]
-Up = Annotated[str | None, typer.Option(help="Vertical axis of the file: z or y.")]
+Up = Annotated[
+    str | None, typer.Option(help="Vertical axis of the file: z, y or x; -z of a form that hangs.")
+]
 Size = Annotated[float | None, typer.Option(help="Mesh size on CAD surfaces, m.")]
 Layer = Annotated[str | None, typer.Option(help="Layer of the surface in the file.")]
 Object = Annotated[str | None, typer.Option("--object", help="Name of the surface in the file.")]

@@ -30,7 +30,7 @@ from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
 from shellform.surface.readers.stated import line_without_number
-from shellform.surface.units import turned_up, unit_factor
+from shellform.surface.units import level_axes, turned_up, unit_factor
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
     from shellform.surface.shape.target import Surface
@@ -234,7 +234,7 @@ def _knots(knots: Reals) -> tuple[Reals, Indices]:
 def _draft(
     where: Path, size: float | None, up: str, face: str | None, before_mesh: Callable[[float], None]
 ) -> Draft:
-    plan = np.delete(extent(), 1 if up == "y" else 2)
+    plan = extent()[list(level_axes(up))]
     mesh = float(plan.max()) / _DEFAULT_EDGES if size is None else size
     points, triangles, normals = mesh_faces(mesh, where, face, up, before_mesh=before_mesh)
     notes = (

@@ -7,6 +7,16 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError
 
+_AXES: dict[
+    str, tuple[tuple[int, int, int], tuple[int, int, int]]
+] = {  # of the file, and their signs: x, y, z as they are here
+    "x": ((1, 2, 0), (1, 1, 1)),
+    "y": ((0, 2, 1), (1, -1, 1)),
+    "z": ((0, 1, 2), (1, 1, 1)),
+    "-x": ((1, 2, 0), (1, -1, -1)),
+    "-y": ((0, 2, 1), (1, 1, -1)),
+    "-z": ((0, 1, 2), (1, -1, -1)),
+}
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 
@@ -20,12 +30,24 @@ def unit_factor(unit: str) -> float:
 
 
 def turned_up(points: Reals, up: str) -> Reals:
-    """Points (k, 3) with the axis `up`, "z" or "y", turned to z."""
-    if up not in ("y", "z"):
+    """Points (k, 3) of a file whose vertical axis is `up`, "x", "y" or "z", or "-x", "-y" or "-z" where that points down, turned
+    so that it is z; nothing is mirrored."""
+    if up not in _AXES:
         raise InputError(
-            "must be y or z",
+            f"must be one of {', '.join(_AXES)}",
             where="surface.up",
             value=up,
-            remedy="Give z for CAD files, y for most viewers'.",
+            remedy="Give z for CAD files, y for most viewers', -z for a form that hangs.",
         )
-    return points if up == "z" else np.column_stack([points[:, 0], -points[:, 2], points[:, 1]])
+    if up == "z":
+        return points
+    order, signs = _AXES[up]
+    return np.column_stack(
+        [points[:, k] if sign > 0 else -points[:, k] for k, sign in zip(order, signs, strict=True)]
+    )
+
+
+def level_axes(up: str) -> tuple[int, int]:
+    """The numbers of a file's two axes that are level where `up` is vertical."""
+    first, second, _ = _AXES[up][0]
+    return first, second

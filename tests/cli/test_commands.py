@@ -136,7 +136,7 @@ def test_check_takes_what_a_file_leaves_open_and_tells_what_was_mended(tmp_path)
     assert "0.01 × 0.01 × 0 m" in one.stdout
     refused(shellform("check", "surfaces/hypar.obj", "--piece", 2), "surface.piece", "There are 1")
     refused(shellform("check", "surfaces/hypar.obj", "--piece", 0), "surface.piece")
-    refused(shellform("check", "surfaces/hypar.obj", "--up", "x"), "surface.up")
+    refused(shellform("check", "surfaces/hypar.obj", "--up", "w"), "surface.up")
 
 
 def test_a_refused_surface_leaves_nothing_behind(tmp_path):

@@ -409,21 +409,40 @@ def test_a_file_that_may_not_be_read_is_refused(tmp_path, monkeypatch):
 
 
 def test_a_shell_on_its_side_is_told(tmp_path):
-    lying = read_surface(write_obj(tmp_path / "a.obj", POINTS[:, [2, 0, 1]], QUADS))
+    lying = read_surface(write_obj(tmp_path / "a.obj", POINTS[:, [2, 0, 1]], QUADS), up="z")
     assert any("it stands upright" in note and "--up" in note for note in lying.mended)
     assert not read_surface(write_obj(tmp_path / "a.obj", POINTS, QUADS)).mended
 
 
-def test_a_shell_with_y_up_is_set_upright_unasked_and_told(tmp_path):
-    file = write_obj(tmp_path / "a.obj", np.column_stack([POINTS[:, 0], POINTS[:, 2], -POINTS[:, 1]]), QUADS)
-    found, asked = read_surface(file), read_surface(file, up="y")
+LYING = {
+    "y": np.column_stack([POINTS[:, 0], POINTS[:, 2], -POINTS[:, 1]]),
+    "x": np.column_stack([POINTS[:, 2], POINTS[:, 0], POINTS[:, 1]]),
+}
+
+
+@pytest.mark.parametrize("axis", LYING)
+def test_a_shell_with_another_axis_up_is_set_upright_unasked_and_told(tmp_path, axis):
+    file = write_obj(tmp_path / "a.obj", LYING[axis], QUADS)
+    found, asked = read_surface(file), read_surface(file, up=axis)
     np.testing.assert_array_equal(found.vertices, asked.vertices)
     np.testing.assert_array_equal(found.triangles, asked.triangles)
-    assert any("y axis is taken for the vertical" in note for note in found.mended)
+    np.testing.assert_allclose(
+        asked.vertices, read_surface(write_obj(tmp_path / "b.obj", POINTS, QUADS)).vertices
+    )
+    assert any(f"{axis} axis is taken for the vertical" in note for note in found.mended)
     assert not asked.mended
     as_told = read_surface(file, up="z")
     assert as_told.size[2] > asked.size[2]
     assert any("it stands upright" in note for note in as_told.mended)
+
+
+def test_a_form_drawn_as_it_hangs_is_told_and_turned_over_where_that_is_asked_for(tmp_path):
+    bowl = np.column_stack([POINTS[:, 0], -POINTS[:, 1], -POINTS[:, 2]])
+    file = write_obj(tmp_path / "a.obj", bowl, QUADS)
+    assert any("as it hangs" in note and "--up -z" in note for note in read_surface(file).mended)
+    turned = read_surface(file, up="-z")
+    np.testing.assert_allclose(turned.vertices, POINTS)
+    assert not turned.mended
 
 
 def test_which_axis_is_vertical_is_found_before_openings_are_filled(tmp_path):
@@ -444,7 +463,7 @@ def test_wrong_settings_are_refused_before_the_file_is_read(tmp_path):
     file = write_obj(tmp_path / "a.obj", POINTS, QUADS)
     for choice, word in [
         ({"unit": "furlong"}, "surface.unit"),
-        ({"up": "x"}, "surface.up"),
+        ({"up": "w"}, "surface.up"),
         ({"fill": "some"}, "surface.fill"),
     ]:
         with pytest.raises(InputError, match=word.replace(".", r"\.")):

@@ -121,7 +121,7 @@ def test_a_file_may_stand_on_its_y_axis(tmp_path):
         cad.import_surface(tmp_path / "wall.step", up="y").size, [1.0, 0.0, 2.0], atol=1e-9
     )
     with pytest.raises(InputError, match=r"surface\.up"):
-        cad.import_surface(tmp_path / "wall.step", up="x")
+        cad.import_surface(tmp_path / "wall.step", up="w")
 
 
 @pytest.mark.parametrize("ending", ["step", "igs", "brep"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.surface.units import turned_up, unit_factor
+from shellform.surface.units import level_axes, turned_up, unit_factor
 
 
 def test_units_are_so_many_metres():
@@ -19,6 +19,26 @@ def test_y_upwards_becomes_z_and_the_axes_keep_their_hand():
     points = np.array([[1.0, 2.0, 3.0], [-4.0, 5.0, -6.0]])
     np.testing.assert_array_equal(turned_up(points, "z"), points)
     np.testing.assert_array_equal(turned_up(points, "y"), [[1.0, -3.0, 2.0], [-4.0, 6.0, 5.0]])
-    assert np.linalg.det(turned_up(np.eye(3), "y")) == pytest.approx(1.0)
-    with pytest.raises(InputError, match=r"surface\.up: must be y or z"):
-        turned_up(points, "x")
+    with pytest.raises(InputError, match=r"surface\.up: must be one of x, y, z, -x, -y, -z"):
+        turned_up(points, "w")
+
+
+@pytest.mark.parametrize(
+    ("up", "vertical"),
+    [
+        ("x", [1, 0, 0]),
+        ("y", [0, 1, 0]),
+        ("z", [0, 0, 1]),
+        ("-x", [-1, 0, 0]),
+        ("-y", [0, -1, 0]),
+        ("-z", [0, 0, -1]),
+    ],
+)
+def test_the_axis_named_becomes_the_vertical_and_nothing_is_mirrored(up, vertical):
+    np.testing.assert_array_equal(turned_up(np.array([vertical], dtype=float), up) + 0.0, [[0.0, 0.0, 1.0]])
+    turned = turned_up(np.eye(3), up)
+    np.testing.assert_array_equal(turned @ turned.T, np.eye(3))
+    assert np.linalg.det(turned) == pytest.approx(1.0)
+    corners = np.array([[1.0, 2.0, 3.0]])
+    assert set(level_axes(up)) == set(range(3)) - {int(np.flatnonzero(vertical)[0])}
+    assert np.linalg.norm(turned_up(corners, up)) == pytest.approx(np.linalg.norm(corners))

@@ -37,7 +37,13 @@ MOST_BYTES = 512 * 1024**2
 _HEAD = 65536
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
 _STATED_UP = ("gltf",)  # formats that say which axis is vertical
-_TURNED = "its y axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
+_TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
+_OTHER_AXES = (
+    "y",
+    "x",
+)  # that are taken for the vertical, in this order, where a shell would lie on its side
+_LEVEL = 0.01  # of the rise: points as high as others
+_HANGS = "its highest point lies on its edge and its lowest does not: where it is drawn as it hangs, turn it over (surface.up, --up -z)"
 _OWN = {
     "obj": plain.read_obj,
     "off": plain.read_off,
@@ -69,8 +75,9 @@ def read_surface(
 ) -> Surface:
     """The surface in a file, in metres, z up.
 
-    `unit` of files that state none ("m" if left out); `up`, the file's vertical axis, "y" or "z" (left out:
-    the format's; where that is none, z, but for a shell that lies on its side with z up and not with y); `size`, m, of the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a
+    `unit` of files that state none ("m" if left out); `up`, the file's vertical axis, "x", "y" or "z", "-z" where it points
+    down (left out: the format's; where that is none, z, but for a shell that lies on its side with z up and not with y or
+    x); `size`, m, of the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a
     closed solid its "upper" or "lower" `face`; of several separate pieces the `piece` with that number, 1
     being the largest; `fill` "holes", "edges" or "all" closes openings (fill.py), edges down to the `ground`,
     m (left out: the edge's lowest point). `mended` of the result tells what was done. Raises InputError.
@@ -106,9 +113,10 @@ def read_surface(
     as_given = whole(up)
     # told from the skin as it is: what fills its openings depends on the axis
     if up is None and kind not in _STATED_UP and _plan_share(as_given) < _UPRIGHT:
-        turned = whole("y")
-        if _plan_share(turned) >= _UPRIGHT:
-            return _closed(noted(turned, _TURNED), str(file), fill, ground)
+        for axis in _OTHER_AXES:
+            turned = whole(axis)
+            if _plan_share(turned) >= _UPRIGHT:
+                return _closed(noted(turned, _TURNED.format(axis)), str(file), fill, ground)
     return _closed(as_given, str(file), fill, ground)
 
 
@@ -132,6 +140,8 @@ def _closed(whole: Draft, source: str, fill: str | None, ground: float | None) -
     surface = make_surface(whole.points, whole.triangles, normals=whole.normals, source=source)
     notes = whole.notes + surface.mended
     plan = _plan_share(whole)
+    if _hangs(surface):
+        notes = (*notes, _HANGS)
     if plan < _UPRIGHT:
         notes = (
             *notes,
@@ -139,6 +149,15 @@ def _closed(whole: Draft, source: str, fill: str | None, ground: float | None) -
             "(surface.up, --up)",
         )
     return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
+
+
+def _hangs(surface: Surface) -> bool:
+    """Whether a surface looks like a form that hangs from its edge: its highest point lies on that, and its lowest
+    doesn't."""
+    level = surface.vertices[:, 2]
+    edge = level[np.concatenate(surface.boundary)] if surface.boundary else level
+    slack = _LEVEL * float(np.ptp(level))
+    return bool(edge.max() >= level.max() - slack and edge.min() > level.min() + slack)
 
 
 def kind_of(file: Path) -> str:
