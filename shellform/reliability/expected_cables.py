@@ -6,11 +6,10 @@ p,
 
     energy    E = k ((m² + s²) P(u) + m s p(u)) / 2
     tension   N = dE/dl = k (m P(u) + s p(u))
-    slope     dN/dl = k P(u),     d²N/dl² = k p(u) / s.
+    slope     dN/dl = k P(u).
 
 There is no kink at l = l0: a cable that is taut by a hair gives half its stiffness, and as s -> 0 the sharp
-law of cable.py comes back. By the rest length, at fixed s: dN/dl0 = -N / l0 - k P, d(k P)/dl0 = -k P / l0 - k
-p / s.
+law of cable.py comes back.
 """
 
 from __future__ import annotations
@@ -50,7 +49,7 @@ class ExpectedCables:
     def evaluate(self, state: State, *, tangent: bool, into: Reals | None = None) -> Evaluation:
         """Energy (c,) J, forces (c, 6) N on the ends, packed lower tangents (c, 21) N/m, filled `into`."""
         unit, length = self.cables.directions(state)
-        energy, tension, slope, _ = self._law(length)
+        energy, tension, slope = self._law(length)
         along = tension[:, None] * unit
         force = np.hstack([-along, along])
         if not tangent:
@@ -64,47 +63,11 @@ class ExpectedCables:
             into[:] = packed
         return Evaluation(energy, force, packed if into is None else into)
 
-    def force_by_rest_length(self, state: State) -> Reals:
-        """Derivative (c, 6), N/m, of the end forces by the own rest length, geometry and deviation fixed."""
-        chord, length = self.cables.chords(state)
-        _, tension, slope, _ = self._law(length)
-        rate = -tension / self.cables.rest_length - slope
-        along = (rate / length)[:, None] * chord
-        return np.hstack([-along, along])
-
-    def stiffness_by_dof(self, state: State, mode: Reals) -> Reals:
-        """Derivative (c, 6) of each cable's v'Kv, N/m, by the coordinates of its two ends, for a mode (n, 6).
-
-        With d the ends' relative motion and a = e·d: v'Kv = k P a² + (N / l) (d·d - a²).
-        """
-        unit, length, along, whole, motion = self._relative(state, mode)
-        _, tension, slope, curvature = self._law(length)
-        across = (motion - along[:, None] * unit) / length[:, None]  # derivative of a by the second end
-        lateral = tension / length
-        by_length = curvature * along**2 + (slope / length - lateral / length) * (whole - along**2)
-        rate = by_length[:, None] * unit + (2.0 * (slope - lateral) * along)[:, None] * across
-        return np.hstack([-rate, rate])
-
-    def stiffness_by_rest_length(self, state: State, mode: Reals) -> Reals:
-        """Derivative (c,), N/m², of each cable's v'Kv by its rest length at the state."""
-        _, length, along, whole, _ = self._relative(state, mode)
-        _, tension, slope, curvature = self._law(length)
-        rest = self.cables.rest_length
-        by_slope = -slope / rest - curvature
-        by_tension = -tension / rest - slope
-        return np.asarray(by_slope * along**2 + by_tension / length * (whole - along**2))
-
-    def _law(self, length: Reals) -> tuple[Reals, Reals, Reals, Reals]:
-        """Energy, tension and its first two derivatives by the length, (c,) each."""
+    def _law(self, length: Reals) -> tuple[Reals, Reals, Reals]:
+        """Energy, J, tension, N, and its derivative by the length, N/m, (c,) each, at the lengths (c,), m."""
         stretch, s = length - self.cables.rest_length, self.deviation
         k = self.cables.stiffness / self.cables.rest_length
         share = ndtr(stretch / s)
         density = np.exp(-0.5 * (stretch / s) ** 2) / np.sqrt(2.0 * np.pi)
         energy = 0.5 * k * ((stretch**2 + s**2) * share + stretch * s * density)
-        return energy, k * (stretch * share + s * density), k * share, k * density / s
-
-    def _relative(self, state: State, mode: Reals) -> tuple[Reals, Reals, Reals, Reals, Reals]:
-        a, b = self.cables.ends.T
-        unit, length = self.cables.directions(state)
-        motion = mode[b, :3] - mode[a, :3]
-        return unit, length, (unit * motion).sum(axis=1), (motion**2).sum(axis=1), motion
+        return energy, k * (stretch * share + s * density), k * share

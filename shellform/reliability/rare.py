@@ -29,8 +29,8 @@ MOST = 3.0  # load factor
 RESOLUTION = 1.0 / 256.0
 COUNT = 200  # samples a level: one in a thousand takes three levels, 560 structures
 _AT_ONCE = 10  # structures, before they are told
-_STEP = 0.25
-_MEDIAN = 0.4549
+_STEP = 0.25  # of the load, on a structure's path at first
+_MEDIAN = 0.4549  # of a squared standard normal variable
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,12 @@ def rare_failure(
     known: Sequence[float] = (),
     tell: Callable[[Sequence[float]], None] | None = None,
 ) -> RareFailure:
-    """The probability that a structure of the workshop's design doesn't bear its load, with `count` structures
-    a level. `known` are the first load factors less 1 of an earlier call with the same arguments, as it let
-    `tell` know them."""
+    """The probability that a structure of the workshop's design doesn't bear its load.
+
+    `count` structures are followed on each level, none beyond the load factor `most`. `tell` hears the load factors less
+    1 of all structures so far, after every few; `known` are the first of those that an earlier call with the same
+    arguments told, so that it goes on from there. Raises InputError for a `count` that isn't a multiple of ten of at
+    least 20."""
     members = workshop.nominal.members
     names = [name for name in CAUSES if getattr(tolerances, name) > 0.0]
     counts = sizes(members)
@@ -91,9 +94,11 @@ def _by_cause(members: Members, names: list[str], z: Reals) -> dict[str, Reals]:
 
 
 def _shares(found: Rare, names: list[str], counts: list[int]) -> dict[str, float]:
-    """From the mean of all failed points, in which what has nothing to do with failing nearly cancels; what
-    is left of that is taken from its median, most variables having little to do with it (of a squared normal
-    variable it is 0.4549)."""
+    """Shares, 1 in all, of the causes `names`, each with so many variables as `counts` says; none where nothing failed.
+
+    They are those of the squares of the mean failed point. In this mean, variables that have nothing to do with failing
+    nearly cancel; what is left of them is noise, which is told from the median of the squares, since most
+    variables are such, and taken off."""
     if not len(found.failed):
         return {}
     squared = found.failed.mean(axis=0) ** 2

@@ -37,9 +37,13 @@ _ADAPTED = 5  # times a level at which the step is adapted
 
 @dataclass(frozen=True)
 class Rare:
-    """The `probability` of failure, its coefficient of `variation`, `evaluations` of the limit state, the
-    `levels` passed and the share that they `reached`, and the failed points (k, d) of the last one with the one of smallest norm first: the
-    `likeliest`."""
+    """What subset simulation found.
+
+    - `probability` of failure, with its coefficient of `variation`.
+    - `evaluations` of the limit state.
+    - `levels`: values of the limit state passed on the way.
+    - `failed` (k, d): the failed points of the last level, the likeliest (of smallest norm) first.
+    """
 
     probability: float
     variation: float
@@ -49,13 +53,8 @@ class Rare:
 
     @property
     def reached(self) -> float:
-        """The share of all points beyond the last level."""
+        """The share of all points that lie beyond the last level passed."""
         return float(_SHARE ** len(self.levels))
-
-    @property
-    def likeliest(self) -> Reals | None:
-        """The failed point nearest to the origin, (d,); None where nothing failed."""
-        return self.failed[0] if len(self.failed) else None
 
 
 def subset_simulation(limit_state: LimitState, size: int, *, count: int, seed: int) -> Rare:

@@ -90,60 +90,6 @@ def test_the_tangent_is_the_derivative_of_the_forces(cables):
     assert found == pytest.approx(2.0, abs=0.15)
 
 
-def longer(cables, h, rate):
-    return replace(cables, rest_length=cables.rest_length + h * rate)
-
-
-def test_the_derivative_by_the_rest_length_is_that_of_the_forces(cables):
-    rate = np.array([1.0, -0.5, 0.3, 2.0])
-    state = at_rest(PLACES)
-    slope = expected(cables).force_by_rest_length(state) * rate[:, None]
-    found = orders(lambda h: expected(longer(cables, h, rate)).evaluate(state, tangent=False).force, slope)
-    assert found == pytest.approx(2.0, abs=0.15)
-
-
-def quadratic(part, state, mode):
-    packed = part.evaluate(state, tangent=True).tangent
-    rows, columns = np.tril_indices(6)
-    own = mode[np.array(ENDS), :3].reshape(4, 6)
-    return (packed * own[:, rows] * own[:, columns] * np.where(rows == columns, 1.0, 2.0)).sum(axis=1)
-
-
-def test_the_derivative_of_a_modes_stiffness_by_the_places_is_exact(cables):
-    way, mode = directions()
-    part = expected(cables)
-    slope = (part.stiffness_by_dof(shifted(0.0, way), mode) * way[np.array(ENDS)].reshape(4, 6)).sum(axis=1)
-    found = orders(lambda h: quadratic(part, shifted(h, way), mode), slope)
-    assert found == pytest.approx(2.0, abs=0.15)
-
-
-def test_the_derivative_of_a_modes_stiffness_by_the_rest_length_is_exact(cables):
-    rate = np.array([1.0, -0.5, 0.3, 2.0])
-    _, mode = directions()
-    state = at_rest(PLACES)
-    slope = expected(cables).stiffness_by_rest_length(state, mode) * rate
-    found = orders(lambda h: quadratic(expected(longer(cables, h, rate)), state, mode), slope)
-    assert found == pytest.approx(2.0, abs=0.15)
-
-
-def test_both_derivatives_of_a_modes_stiffness_are_exact_for_cables_that_are_stretched_to_twice_their_length(
-    cables,
-):
-    """Where the tension across a cable counts as much as its own stiffness."""
-    way, mode = directions()
-    state, rate = at_rest(PLACES), np.array([1.0, -0.5, 0.3, 2.0])
-    taut = replace(cables, rest_length=0.5 * cables.lengths(state))
-    by_place = expected(taut).stiffness_by_dof(state, mode) * way[np.array(ENDS)].reshape(4, 6)
-    found = orders(lambda h: quadratic(expected(taut), shifted(h, way), mode), by_place.sum(axis=1))
-    assert found == pytest.approx(2.0, abs=0.15)
-    by_rest = expected(taut).stiffness_by_rest_length(state, mode) * rate
-    found = orders(lambda h: quadratic(expected(longer(taut, h, rate)), state, mode), by_rest)
-    assert found == pytest.approx(2.0, abs=0.15)
-    force = expected(taut).force_by_rest_length(state) * rate[:, None]
-    found = orders(lambda h: expected(longer(taut, h, rate)).evaluate(state, tangent=False).force, force)
-    assert found == pytest.approx(2.0, abs=0.15)
-
-
 def test_a_shell_whose_cables_are_taut_by_a_hair_is_told_to_be_softer_than_the_sharp_law_says(nominal):
     state, assembly = nominal.states[-1], assemble(nominal.network)
     cables = nominal.network.cables
