@@ -28,6 +28,7 @@ from shellform.net.refusal import NoNet, Reason
 _ITERATIONS = 30
 _CLOSE = 1e-10  # of the spacing
 _PARALLEL = 0.05  # sine of the angle between two rods, below which they run in one direction
+_MOST = 200_000  # crossings
 _MOST_STEPS = 4000  # of one guide
 
 
@@ -60,13 +61,12 @@ def covering_lattice(
     spacing: tuple[float, float],
     *,
     margin: float,
-    most: int = 200_000,
 ) -> tuple[Indices, Reals]:
     """Lattice places (c, 2) whose compass points (c, 3) lie on the surface or less than `margin` m past its
     edge.
 
     `origin` (3,) is on the surface; the `guides` run from it forwards and backwards along u, then along v.
-    Raises InputError where more than `most` crossings would be needed, and where the net breaks down on the
+    Raises InputError where more than `_MOST` crossings would be needed, and where the net breaks down on the
     surface.
     """
     points: dict[tuple[int, int], Reals] = {(0, 0): origin}
@@ -76,7 +76,7 @@ def covering_lattice(
             points[(sign * k, 0) if axis == 0 else (0, sign * k)] = point
     for right in (1, -1):
         for up in (1, -1):
-            _fill(finder, points, right, up, spacing, margin, most)
+            _fill(finder, points, right, up, spacing, margin)
     places = sorted(points)
     return np.array(places), np.array([points[place] for place in places])
 
@@ -155,7 +155,6 @@ def _fill(
     up: int,
     spacing: tuple[float, float],
     margin: float,
-    most: int,
 ) -> None:
     """Fills one quadrant, diagonal by diagonal; `right` and `up` are its signs."""
     overshoot: dict[tuple[int, int], float] = {}
@@ -187,9 +186,9 @@ def _fill(
             # A place is of use while one of its neighbours towards the origin isn't yet past the margin.
             if fine and nearer < margin:
                 points[place], overshoot[place] = point, float(over)
-        if len(points) > most:
+        if len(points) > _MOST:
             raise InputError(
-                f"more than {most} crossings would be needed",
+                f"more than {_MOST} crossings would be needed",
                 value=spacing[0],
                 remedy="Choose a larger spacing.",
             )

@@ -232,7 +232,7 @@ def _keep(
             break
         for each in poor:
             remaining -= each.keys()
-    remaining = _largest(pieces, joints, remaining)
+    remaining = _largest(joints, remaining)
     if not remaining:
         raise NoNet(
             Reason.EMPTY,
@@ -266,8 +266,8 @@ def _loose(piece: _Piece, arcs: list[float], step: float) -> bool:
     return len(arcs) > 0 and free > max(_FREE * step, _FREE_SHARE * (piece.end - piece.start))
 
 
-def _largest(pieces: list[_Piece], joints: list[dict[int, float]], remaining: set[int]) -> set[int]:
-    """The crossings of the largest connected part of the grid."""
+def _largest(joints: list[dict[int, float]], remaining: set[int]) -> set[int]:
+    """Of the `remaining` crossings those of the largest connected part of the grid; `joints` are those of each piece of rod."""
     if not remaining:
         return remaining
     numbers = {crossing: k for k, crossing in enumerate(sorted(remaining))}

@@ -29,6 +29,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.model import Model
 from shellform.structure.network import Network
 
+_LOAD = "load"  # the name of the load case under which models are loaded here
 _STEP = 0.25  # of the load, towards the critical factor
 _RESOLUTION = 1e-4  # of the load factor
 
@@ -51,7 +52,7 @@ def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float =
     NotConverged where there is no unloaded equilibrium."""
     section = shell.rod.resized(design.radius).section
     supports = tuple(int(node) for node in shell.net.supports)
-    model = Model(shell.network(design), {"load": load}, shell.target, supports)
+    model = Model(shell.network(design), {_LOAD: load}, shell.target, supports)
     coarse = _numbers(model, shell.target.positions, section, sought)
     fine = _numbers(rods_halved(model), shell.target.positions, section, sought)
     pairs = [Refined(one, other) for one, other in zip(coarse[:4], fine[:4], strict=True)]
@@ -62,12 +63,13 @@ def critical_factor(shell: Gridshell, design: Design, load: Reals, *, sought: fl
     """The load factor at which a design, loaded from nothing, loses stability, and what ends its path. Raises
     NotConverged where there is no unloaded equilibrium."""
     supports = tuple(int(node) for node in shell.net.supports)
-    return critical_of(Model(shell.network(design), {"load": load}, shell.target, supports), sought=sought)
+    return critical_of(Model(shell.network(design), {_LOAD: load}, shell.target, supports), sought=sought)
 
 
-def critical_of(model: Model, load: str = "load", *, sought: float = SOUGHT) -> Limit:
-    """The same of a model file under one of its load cases, with a start. Raises InputError, NotConverged."""
-    return _limit(model, load, sought)[1]
+def critical_of(model: Model, *, sought: float = SOUGHT) -> Limit:
+    """The same of a model with a start, under its load case "load". Raises InputError where it has no such load case,
+    NotConverged."""
+    return _limit(model, sought)[1]
 
 
 def rods_halved(model: Model) -> Model:
@@ -124,8 +126,8 @@ def _repeated(beams: Beams, rods: np.ndarray) -> Beams:
     return beams.chosen(np.concatenate([np.arange(len(beams.ends)), rods]))
 
 
-def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
-    nominal = perfect_of(model, load, shapes=0, step=_STEP)
+def _limit(model: Model, sought: float) -> tuple[Workshop, Limit]:
+    nominal = perfect_of(model, _LOAD, shapes=0, step=_STEP)
     workshop = Workshop(nominal)
     members = members_of_model(model)
     none = drawn(members, Tolerances(), 0, PERFECT)
@@ -137,7 +139,7 @@ def _limit(model: Model, load: str, sought: float) -> tuple[Workshop, Limit]:
 def _numbers(
     model: Model, target: Reals, section: Section, sought: float
 ) -> tuple[float, float, float, float, str]:
-    workshop, limit = _limit(model, "load", sought)
+    workshop, limit = _limit(model, sought)
     state, beams = workshop.nominal.states[-1], model.network.beams
     away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
     stress = float(rod_bending_stress(section, beams, beams.local_forces(state)).max())

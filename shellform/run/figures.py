@@ -19,7 +19,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.run.folder import Run, read_run
+from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.run.scales import colour_limit, force_limit
 from shellform.structure.elements.state import State
 from shellform.written import folder as made
@@ -299,9 +299,10 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
 
 def chosen(run: Run, design: str | None, load: str | None) -> tuple[list[str], list[str]]:
     """The designs and loads that are meant. Raises InputError for unknown ones."""
-    for what, name, known in [("--design", design, list(run.designs)), ("--load", load, list(run.loads))]:
-        if name is not None and name not in known:
-            raise InputError("isn't there", where=what, value=name, remedy=f"Known: {', '.join(known)}.")
+    if design is not None:
+        refuse_unknown("--design", design, run.designs)
+    if load is not None:
+        refuse_unknown("--load", load, run.loads)
     return [design] if design else list(run.designs), [load] if load else list(run.loads)
 
 

@@ -15,10 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from shellform.errors import InputError
 from shellform.records.progress import Event, Report, unheard
 from shellform.run.figures import Wish, look_of, titled
-from shellform.run.folder import Run
+from shellform.run.folder import Run, refuse_unknown
 from shellform.site.erection import erect
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -41,12 +40,8 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> l
     painter.require()  # before minutes are spent on states
     images.require(wish.endings)
     name = wish.design or run.best
-    for what, each, known in [
-        ("--design", name, list(run.designs)),
-        ("--load", wish.load or "design", list(run.loads)),
-    ]:
-        if each not in known:
-            raise InputError("isn't there", where=what, value=each, remedy=f"Known: {', '.join(known)}.")
+    refuse_unknown("--design", name, run.designs)
+    refuse_unknown("--load", wish.load or "design", run.loads)
     if kind == "pour":
         stages = _stages(run, wish.load)
         panels = _pour(run, name, stages, wish.quantity, report)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -96,6 +96,12 @@ class Run:
         if section is None or catalogue is None:
             return self.shell
         return replace(self.shell, rod=Rod(named(catalogue, section)))
+
+
+def refuse_unknown(option: str, name: str, known: Collection[str]) -> None:
+    """Raises InputError for the `name`, given by an `option`, of a design or a load case that isn't among those `known`."""
+    if name not in known:
+        raise InputError("isn't there", where=option, value=name, remedy=f"Known: {', '.join(known)}.")
 
 
 def read_run(folder: str | Path) -> Run:

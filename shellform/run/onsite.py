@@ -1,8 +1,8 @@
 """What a run tells the site: calibration of connectors from scans, re-tensioning from surveys, and erection
 (`shellform calibrate`, `survey`, `erect`).
 
-Each reads CSV files (tables.py), calls its module of the design room, and leaves its tables in the run's
-folder `schedules`.
+Each reads CSV files (site/measurements.py, site/scans.py), calls its module of shellform/site, and leaves its tables in
+the run's folder `schedules`.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
 from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.run.folder import Run, read_run
+from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.site import calibration, erection, measurements, retensioning
 from shellform.site.scans import Scan, match, read_points
 from shellform.structure.elements.state import State
@@ -383,11 +383,9 @@ def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, g
 
 
 def _design(run: Run, name: str | None, usual: str) -> str:
+    """The `name` of a design of the run, or where none is given the `usual` one. Raises InputError for an unknown one."""
     chosen = name or usual
-    if chosen not in run.designs:
-        raise InputError(
-            "isn't there", where="--design", value=chosen, remedy=f"Known: {', '.join(run.designs)}."
-        )
+    refuse_unknown("--design", chosen, run.designs)
     return chosen
 
 

@@ -17,12 +17,10 @@ from shellform.output.pictures.panel import Look, Panel
 from shellform.written import folder as made
 
 
-def draw_net(net: Net, folder: str | Path, *, look: Look | None = None, ending: str = ".png") -> list[Path]:
-    """Writes net-distance, net-curvature, net-skew and net-springs with the `ending` (.png, .svg or .pdf);
-    returns the files.
-    """
+def draw_net(net: Net, folder: str | Path) -> list[Path]:
+    """Writes net-distance, net-curvature, net-skew and net-springs, each as .png; returns the files."""
     target = made(folder)
-    return [draw_map(net, name, target / f"net-{name}{ending}", look=look) for name in _MAPS]
+    return [draw_map(net, name, target / f"net-{name}.png") for name in _MAPS]
 
 
 def draw_map(net: Net, name: str, path: Path, *, look: Look | None = None) -> Path:
