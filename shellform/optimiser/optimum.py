@@ -17,9 +17,14 @@ from shellform.structure.solve.loading import Loaded
 
 @dataclass(frozen=True)
 class Step:
-    """One trial in the history: `objective` and its weighted `terms`, `constraints` by name (largest value of
-    each), the `cables` in tension, the `stage` of the additional loads, whether it was `accepted`,
-    `seconds` since the start, and the `phase` of the search, "" where it has none or it isn't known."""
+    """One trial in the history.
+
+    - `evaluation`: its number.
+    - `objective` and its weighted `terms` by name; `constraints` by name, the largest value of each, at most 0 where kept.
+    - `cables` in tension under the design load; `stage`: share of the additional loads.
+    - `accepted`: whether it was; `seconds` since the start.
+    - `phase` of the search, "" where it has none or it isn't known.
+    """
 
     evaluation: int
     objective: float
@@ -45,12 +50,23 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class Optimum:
-    """The solution: what the optimisation found: the `design` without its slack cables, how it carries each
-    load on the documented path (`loaded`, with "none" first), the `history`, a `status` sentence, the work it
-    took, of which factorisations in rejected trials were `wasted`, and the `stiffness`, N/m, that the softest
-    mode had to keep under the additional loads; what is `asked` as built of what is made of it, None: nothing;
-    numbers of drawn structures that have `fallen` in the search, and those that it kept in `mind`, with the
-    factor of the largest load that each is to bear."""
+    """What an optimisation found.
+
+    The design:
+    - `design`, without its slack cables, and how it carries each load on the documented path, `loaded`, "none" first.
+    - `objective`, and of the start `objective_start`; `constraints` by name, the largest value of each, at most 0 where kept.
+    - `problem` that it answers; `stiffness`, N/m, that the softest mode had to keep under the additional loads.
+
+    The search:
+    - `history` of its trials; `status`: a sentence on why it ended.
+    - `evaluations` of designs, `rejected` ones among them; `equilibria`, `factorisations`, of which those in rejected
+      trials were `wasted`.
+
+    As built:
+    - `asked` of what is made of it, None: nothing.
+    - `fallen`: numbers of drawn structures that have in the search; `mind`: those that it kept in mind, with the factor
+      of the largest load that each is to bear.
+    """
 
     problem: Problem
     design: Design

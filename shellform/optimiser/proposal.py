@@ -39,12 +39,17 @@ _NONE = 1e-3  # of the mean tension: less is none, which MMA leaves of cables th
 
 @dataclass(frozen=True)
 class Task:
-    """What a step is asked for by the `solver`: from the `model`, within a `window`, N, `tension` being the
-    start's mean, N; constraints `bounded` by the design load's tensions; cables (c,) that are `tensioned` and
-    keep a least tension; `guards` of cables that may not go slack under the further loads, none where all
-    may; whether stability stands in for the objective, `climbing`; `groups` (c,) of cables alike; `excess`
-    (k,) of the constraints over their linear model in a whole window; the `least` tension, N, that cables
-    keep; how many of the constraints, the last ones, are `aims` of structures in mind."""
+    """What a step is asked for.
+
+    - `solver`: the settings; `model`: of the design from which it goes; `window`, N, within which it stays.
+    - `tension`, N: the start's mean; `least`, N: what cables that are `tensioned` (c,) keep.
+    - `bounded`: constraints by the design load's tensions, which are bounds here.
+    - `guards`: of cables that may not go slack under the further loads, none where all may.
+    - `climbing`: whether stability stands in for the objective.
+    - `groups` (c,): of cables alike, None where none are.
+    - `excess` (k,): of the constraints over their linear model in a whole window.
+    - `aims`: how many of the constraints' values, the last ones, are of structures in mind.
+    """
 
     solver: SequentialConvex
     model: StepModel

@@ -37,13 +37,27 @@ _NEARLY = 0.01  # of the stiffness left, to which the end of their branch is sou
 
 @dataclass(frozen=True)
 class Search:
-    """What stays the same in a search of the `problem`: its `solver`; the `evaluator` of the problem that is
-    searched, with constraints on stability, and without those that are `bounded` by the design load's
-    tensions; the number of design `evaluations`; the start's mean `tension`, N, and its `objective_start`;
-    the `inner` problem, without constraints on stability; the `softest` mode's stiffness at the start, N/m;
-    `groups` (c,) of present cables with one rest length each; whether cables are guarded from the beginning,
-    `always_guarded`; what is `asked` of designs as built, None where nothing is, and the `least` tension, N,
-    that cables keep for it; and whom to tell.
+    """What stays the same in a search.
+
+    The problem:
+    - `problem`: as it was given; `inner`: without constraints on stability.
+    - `evaluator`: of the problem that is searched, with constraints on stability, and without those `bounded` by
+      the design load's tensions, which are bounds of the model.
+    - `groups` (c,): of present cables with one rest length each, None where each has its own.
+
+    The start:
+    - `tension`, N: the mean of its cables; `softest`, N/m: the stiffness of its softest mode; `objective_start`.
+
+    How it is searched:
+    - `solver`: its settings; `evaluations`: of designs, at the most.
+    - `always_guarded`: whether cables are guarded from the beginning.
+    - `models`: step models and guards, made once for each design.
+
+    As built:
+    - `asked`: what is asked of designs, None where nothing is; `least`, N: the tension that cables keep for it.
+
+    Whom to tell:
+    - `progress` of steps, `keep` of checkpoints, `judging` of drawn structures; when it `began`, s.
     """
 
     problem: Problem
@@ -100,19 +114,33 @@ class Accepted:
 class Iterate:
     """Where a search stands.
 
-    The `point` and all `accepted` up to it, with the `history` of trials; the `stiffness`, N/m, that the
-    softest modes keep under the further loads. The `phase`; the `stage` of the further loads and the `margin`
-    kept from the end of their branch; the `window`, N; whether cables are `guarded` under further loads, and
-    stability stands in for the objective, `climbing`; the cables (c,) that are `tensioned` and stay so; the
-    constraints' `excess` (k,), 1/N², over their linear models at the last trial per square of the window; the
-    `status`. Descending: whether the last trial was `refused`; the objective `before` this turn. Thinning:
-    the objective that is still `thrifty`, the size of the next `batch`, single `failures` in a row, cables
-    `needed` (c,), and whether it is `paused` for a sample since so few are left of the cables `counted` at the last one.
-    As built: structures that have `fallen`, the last ones first; whether the last design
-    judged `fell`; how many fresh `samples` were drawn; drawn structures that the search keeps in `mind`, which are to bear their loads, and the
-    design in which they are `remembered`, None where nothing but stiffness leads it. Leading: how many
-    designs were accepted when the last one `stood`, the objective that it was `led_to`, the design
-    evaluations `until` which a turn lasts, and how many designs were accepted when it had `begun`.
+    - `point`: the present design; `accepted`: all designs up to it; `history`: all trials.
+    - `phase`: "climb", "descend", "lead", "thin" or "agree"; `status`: why it ended, once it has.
+    - `stiffness`, N/m: what the softest modes keep under the further loads.
+    - `stage`: share of the further loads that is borne; `margin`: what is kept from the end of their branch.
+    - `window`, N.
+    - `guarded`: whether cables are under further loads; `tensioned` (c,): cables that stay in tension.
+    - `excess` (k,), 1/N²: of the constraints over their linear models at the last trial, per square of the window.
+    - `climbing`: whether stability stands in for the objective.
+
+    Descending:
+    - `refused`: whether the last trial was; `before`: the objective before this turn.
+
+    Thinning:
+    - `thrifty`: the objective up to which cables are still taken away.
+    - `batch`: how many go next; `failures`: single ones in a row that can't; `needed` (c,): those that can't.
+    - `paused`: whether it waits for a fresh sample, so few being left of the cables `counted` at the last one.
+
+    As built:
+    - `fallen`: numbers of structures that have, the last ones first; `fell`: whether the last design judged did.
+    - `samples`: fresh ones drawn so far.
+    - `mind`: drawn structures that are to bear their loads, None where nothing but stiffness leads the search;
+      `remembered`: the design in which they were followed.
+
+    Led by structures in mind:
+    - `stood`, `begun`: how many designs were accepted when the last one stood, and when this turn began.
+    - `led_to`: the objective of the one that stood.
+    - `until`: how many evaluations are spent when this turn ends.
     """
 
     point: Evaluated

@@ -46,10 +46,13 @@ _DEAD = 1e-6  # of the cables' stiffness: a tension below it counts as none
 class StepModel:
     """The model at a `point`, in y = (tensions (c,), N, of the present cables; values of the other blocks).
 
-    `tensions`: how many of y are tensions, c or none; `state` under the design load; `shortest`, `longest` (c,),
-    m, bounds of the rest lengths. `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,) the
-    largest changes of the other values. `length` (c,), m; `answers` to changes of y; `constraints_by_y` (k,
-    y). `quadratics`: of each term of the objective, None where it has none.
+    - `evaluator` of the problem; `assembly` and `state` of the point under the design load.
+    - `tensions`: how many of y are tensions, c or none.
+    - `shortest`, `longest` (c,), m: bounds of the rest lengths; `length` (c,), m: of the cables as they lie.
+    - `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,): the largest changes of the other values.
+    - `answers`: of nodes and cables to changes of y.
+    - `constraints_by_y` (k, y): derivatives.
+    - `quadratics`: of each term of the objective, None where it has none.
     """
 
     evaluator: Evaluator

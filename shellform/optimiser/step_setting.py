@@ -24,14 +24,17 @@ from shellform.structure.solve.assembly import Assembly
 
 @dataclass(frozen=True)
 class Setting:
-    """The `state` under the design load of a `point`, its `assembly` and its present `cables`, numbered
-    `present` (c,) among the candidates.
+    """Where a step begins: a `point` under the design load, and what moves it.
 
-    y = (tensions (n,) of the present cables; values of the other blocks): `tensions` is n, c or 0, and `other`
-    (s,) says which of the problem's variables are the latter; `each` is where the rest lengths stand among
-    them, None where no block is these. `length` (c,), m, and `tension` (n,), N, of the cables; `pull` (f, n),
-    the forces on the free degrees of freedom by the tensions, and `right` (f, y) by all of y; `rates` (c + 1,
-    s) of rest lengths and radius by the values.
+    y = (tensions (n,) of the present cables; values of the other blocks).
+
+    - `evaluator` of the problem; `state` and `assembly` of the point.
+    - `cables` (c,): the present ones, numbered `present` (c,) among the candidates; `length` (c,), m.
+    - `tensions`: n, which is c or 0; `tension` (n,), N.
+    - `each`: where the rest lengths stand among the problem's variables, None where no block is these; `other` (s,):
+      which of the variables are other ones.
+    - `pull` (f, n): forces on the free degrees of freedom by the tensions; `right` (f, y): by all of y.
+    - `rates` (c + 1, s): of all rest lengths and the radius by the variables.
     """
 
     evaluator: Evaluator
