@@ -24,8 +24,8 @@ from shellform.net.pull import (
     REACH,
     SHEAR_STIFFNESS,
     TOLERANCE,
-    Progress,
     Pulled,
+    Pulling,
     compass_start,
     flat_start,
     laid,
@@ -79,7 +79,7 @@ def pull_net(
     ground: float | None = None,
     outline: ArrayLike | None = None,
     tuning: NetTuning | None = None,
-    progress: Progress | None = None,
+    progress: Pulling | None = None,
 ) -> Net:
     """The Chebyshev net of rods `spacing` m apart along u (`spacing_v` along v), the two layers `gap` m
     apart, on the surface.

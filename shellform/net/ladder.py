@@ -17,7 +17,7 @@ from typing import Any
 from shellform.net.chebyshev import NetTuning, pull_net
 from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
-from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Progress
+from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Pulling
 from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
 from shellform.surface.shape.target import Surface, largest_curvature
@@ -80,7 +80,7 @@ def climbed_net(
     failed: NoNet | Stalled | None = None,
     near: bool = True,
     progress: Callable[[str], None] = lambda text: None,
-    watch: Progress | None = None,
+    watch: Pulling | None = None,
 ) -> tuple[Net, Attempt]:
     """The net with the `settings` of pull_net at the `angle`, rad, and `offset`, or the first on the ladder,
     turned by at most `tolerance`, rad; and the attempt that gave it.

@@ -47,7 +47,8 @@ _TETHER = 5.0  # of the springs that hold the net's place and direction, EI/s³
 TOLERANCE = 1e-8  # residual
 _LEADING = 1e-3
 
-Progress = Callable[[str, float], None]
+Pulling = Callable[[str, float], None]
+"""Called while a net is pulled with what is done and the residual."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ def pull(
     spring_density: Sequence[float] = FROM_COMPASS,
     shear_stiffness: float = SHEAR_STIFFNESS,
     guided: bool = False,
-    progress: Progress | None = None,
+    progress: Pulling | None = None,
     limit: int = LIMIT,
     reach: float = REACH,
     tolerance: float = TOLERANCE,
@@ -164,7 +165,7 @@ def pull(
     )
 
 
-def _watched(progress: Progress | None, density: float) -> Callable[[int, float], None]:
+def _watched(progress: Pulling | None, density: float) -> Callable[[int, float], None]:
     """Tells the `progress` of one density, and ends a relaxation that has stopped to come nearer: what is
     left then is the surface's, known to a finite order, against which no step helps."""
     residuals: list[float] = []

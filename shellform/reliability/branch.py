@@ -19,7 +19,6 @@ ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
 _PATIENCE = 10  # factorisations of one step
 _FAR_OFF = 5.0  # rad, a step that leads nowhere
 
-Report = Callable[[float, State], None]
 Foreseen = tuple[Reals, ...] | None  # deformations of each part of beams
 
 
@@ -50,7 +49,7 @@ class Branch:
         most: float,
         step: float,
         smallest: float,
-        report: Report | None = None,
+        report: Callable[[float, State], None] | None = None,
     ) -> tuple[Here, float]:
         """The last state on the branch and its load factor, `most` where the branch goes on, from the state
         `here` at the `factor` on; `report` is told each one's load factor and state."""

@@ -51,8 +51,7 @@ def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float =
     """Of a design under the dead `load` (n, 6); critical factors are sought up to `sought`. Raises
     NotConverged where there is no unloaded equilibrium."""
     section = shell.rod.resized(design.radius).section
-    supports = tuple(int(node) for node in shell.net.supports)
-    model = Model(shell.network(design), {_LOAD: load}, shell.target, supports)
+    model = model_under(shell, design, load)
     coarse = _numbers(model, shell.target.positions, section, sought)
     fine = _numbers(rods_halved(model), shell.target.positions, section, sought)
     pairs = [Refined(one, other) for one, other in zip(coarse[:4], fine[:4], strict=True)]
@@ -62,14 +61,19 @@ def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float =
 def critical_factor(shell: Gridshell, design: Design, load: Reals, *, sought: float = SOUGHT) -> Limit:
     """The load factor at which a design, loaded from nothing, loses stability, and what ends its path. Raises
     NotConverged where there is no unloaded equilibrium."""
+    return critical_of(model_under(shell, design, load), sought=sought)
+
+
+def critical_of(model: Model, *, sought: float = SOUGHT, resolution: float = _RESOLUTION) -> Limit:
+    """The same of a model with a start, under its load case "load", the factor to a `resolution`. Raises InputError
+    where it has no such load case or no start, NotConverged."""
+    return _limit(model, sought, resolution)[1]
+
+
+def model_under(shell: Gridshell, design: Design, load: Reals) -> Model:
+    """The model of a design with one load case, "load": the dead `load` (n, 6)."""
     supports = tuple(int(node) for node in shell.net.supports)
-    return critical_of(Model(shell.network(design), {_LOAD: load}, shell.target, supports), sought=sought)
-
-
-def critical_of(model: Model, *, sought: float = SOUGHT) -> Limit:
-    """The same of a model with a start, under its load case "load". Raises InputError where it has no such load case,
-    NotConverged."""
-    return _limit(model, sought)[1]
+    return Model(shell.network(design), {_LOAD: load}, shell.target, supports)
 
 
 def rods_halved(model: Model) -> Model:
@@ -126,20 +130,21 @@ def _repeated(beams: Beams, rods: np.ndarray) -> Beams:
     return beams.chosen(np.concatenate([np.arange(len(beams.ends)), rods]))
 
 
-def _limit(model: Model, sought: float) -> tuple[Workshop, Limit]:
+def _limit(model: Model, sought: float, resolution: float) -> tuple[Workshop, Limit]:
+    """Where the perfect structure's path ends, and the workshop that has it."""
     nominal = perfect_of(model, _LOAD, shapes=0, step=_STEP)
     workshop = Workshop(nominal)
     members = members_of_model(model)
     none = drawn(members, Tolerances(), 0, PERFECT)
     return workshop, workshop.limit(
-        none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=nominal.known_to(sought)
+        none, most=sought, step=_STEP, resolution=resolution, begin=nominal.known_to(sought)
     )
 
 
 def _numbers(
     model: Model, target: Reals, section: Section, sought: float
 ) -> tuple[float, float, float, float, str]:
-    workshop, limit = _limit(model, sought)
+    workshop, limit = _limit(model, sought, _RESOLUTION)
     state, beams = workshop.nominal.states[-1], model.network.beams
     away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
     stress = float(rod_bending_stress(section, beams, beams.local_forces(state)).max())

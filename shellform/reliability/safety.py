@@ -17,17 +17,13 @@ from shellform.arrays import Reals
 from shellform.errors import InputError, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import PERFECT, drawn
-from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import Limit
-from shellform.reliability.perfect import TO_ITS_END, perfect, perfect_of
+from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.probability import CONFIDENCE, Standing, counted
-from shellform.reliability.refinement import rods_halved
+from shellform.reliability.refinement import critical_of, model_under, rods_halved
 from shellform.reliability.standing import Workshop
-from shellform.structure.model import Model
 
 _SAME = 1e-9  # relative
-_STEP = 0.25  # of the load, towards the critical factor
 _RESOLUTION = 1 / 256  # of the load, to which a critical factor is found
 
 
@@ -182,16 +178,11 @@ def judge(
 
 
 def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: float) -> Limit:
-    """The end of the perfect structure's path on the mesh with rod elements halved, followed up to the factor
-    `sought`; 0 where the finer mesh has no unloaded equilibrium."""
-    supports = tuple(int(node) for node in shell.net.supports)
-    model = rods_halved(Model(shell.network(design), {"load": load}, shell.target, supports))
-    nominal = perfect_of(model, "load", shapes=0, step=_STEP)
-    members = members_of_model(model)
-    none = drawn(members, Tolerances(), 0, PERFECT)
-    return Workshop(nominal).limit(
-        none, most=sought, step=_STEP, resolution=_RESOLUTION, begin=nominal.known_to(sought)
-    )
+    """The end of the perfect structure's path under the dead `load` (n, 6) on the mesh with rod elements halved,
+    followed up to the factor `sought`; the factor 0 where the unloaded state isn't stable on that mesh. Raises
+    NotConverged where there is none."""
+    model = rods_halved(model_under(shell, design, load))
+    return critical_of(model, sought=sought, resolution=_RESOLUTION)
 
 
 def paths(loads: Mapping[str, Reals]) -> dict[str, dict[str, float]]:

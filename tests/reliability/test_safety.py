@@ -275,37 +275,9 @@ def test_a_load_that_is_off_another_s_line_by_a_millionth_has_a_path_of_its_own(
 
 
 def test_the_critical_factor_is_sought_of_the_perfect_structure_up_to_what_is_asked_for(monkeypatch):
-    calls = []
-
-    class Nominal:
-        def known_to(self, factor):
-            return "known to", factor
-
-    class Followed:
-        def __init__(self, nominal):
-            assert isinstance(nominal, Nominal)
-
-        def limit(self, errors, **how):
-            calls.append((errors, how))
-            return "end"
-
-    def perfect_of(model, load, **how):
-        calls.append((model, load, how))
-        return Nominal()
-
-    shell = SimpleNamespace(
-        net=SimpleNamespace(supports=np.array([3, 5])), network=lambda design: design, target="t"
-    )
-    monkeypatch.setattr(safety_module, "Model", lambda *parts: parts)
+    monkeypatch.setattr(safety_module, "model_under", lambda *parts: parts)
     monkeypatch.setattr(safety_module, "rods_halved", lambda model: ("halved", *model))
-    monkeypatch.setattr(safety_module, "perfect_of", perfect_of)
-    monkeypatch.setattr(safety_module, "members_of_model", lambda model: ("members", model[0]))
-    monkeypatch.setattr(safety_module, "drawn", lambda *given: given)
-    monkeypatch.setattr(safety_module, "Workshop", Followed)
-    assert critical_on_halved(shell, "design", "load", 1.4) == "end"
-    made, followed = calls
-    assert made == (("halved", "design", {"load": "load"}, "t", (3, 5)), "load", {"shapes": 0, "step": 0.25})
-    assert followed == (
-        (("members", "halved"), Tolerances(), 0, PERFECT),
-        {"most": 1.4, "step": 0.25, "resolution": 1 / 256, "begin": ("known to", 1.4)},
-    )
+    monkeypatch.setattr(safety_module, "critical_of", lambda model, **how: (model, how))
+    model, how = critical_on_halved("shell", "design", "load", 1.4)
+    assert model == ("halved", "shell", "design", "load")
+    assert how == {"sought": 1.4, "resolution": 1 / 256}

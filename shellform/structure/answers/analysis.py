@@ -43,7 +43,7 @@ LIMIT = 1000  # factorisations of one relaxation
 _COARSE = 0.005  # of a critical factor, the error above which it is told
 _TURNING = 200  # the same under moments without potential, before their path is followed instead
 
-Progress = Callable[[float, int], None]
+PathWatch = Callable[[float, int], None]
 """Called with the load factor and the factorisations so far."""
 
 
@@ -86,7 +86,7 @@ def analyse(
     limit: int = LIMIT,
     mode_count: int = 0,
     critical_to: float | None = None,
-    progress: Progress | None = None,
+    progress: PathWatch | None = None,
 ) -> Analysis:
     """The equilibrium of the model under `factor` times the case `load`, reached in equal `increments` by one
     of METHODS.
@@ -154,7 +154,7 @@ class _Analysis:
     factor: float
     tolerance: float
     limit: int
-    progress: Progress | None
+    progress: PathWatch | None
     spent: int = 0
     reached: float = 0.0
     documented: list[dict[str, Any]] = field(default_factory=list)

@@ -84,7 +84,8 @@ class LostBranch(NotConverged):
     """The equilibrium next to the start ended: the tangent lost its definiteness on the way."""
 
 
-Progress = Callable[[int, float], None]
+Relaxing = Callable[[int, float], None]
+"""Called at every step with the factorisations so far and the residual."""
 
 
 def find_equilibrium(
@@ -96,7 +97,7 @@ def find_equilibrium(
     limit: int = 1000,
     reach: float = np.inf,
     on_branch: bool = False,
-    progress: Progress | None = None,
+    progress: Relaxing | None = None,
 ) -> Equilibrium:
     """The equilibrium that implicit dynamic relaxation reaches from `start` under the dead `load` (n, 6), N
     and N·m.
@@ -122,7 +123,7 @@ def _relaxed(
     limit: int,
     reach: float,
     on_branch: bool,
-    progress: Progress | None,
+    progress: Relaxing | None,
 ) -> Equilibrium:
     """The relaxation with the digits that the assembly has. Raises Drowned where they aren't enough."""
     walk = _Relaxation(assembly, start, load, reach, tolerance)
@@ -152,7 +153,7 @@ def newton(
     *,
     tolerance: float = TOLERANCE,
     limit: int = 50,
-    progress: Progress | None = None,
+    progress: Relaxing | None = None,
 ) -> Equilibrium:
     """The equilibrium that plain Newton-Raphson reaches from `start` under the dead `load` (n, 6): K dx = r,
     whole steps, no mass.

@@ -33,7 +33,8 @@ _LEAST = 1e-6  # of the whole, by which supports move on at least where the bran
 _LAST_DIGITS = 1e-15  # of a load, which nothing can be told from
 _REGROWTH = 2  # good increments before one is doubled again
 
-Report = Callable[[float, Equilibrium], None]
+Reached = Callable[[float, Equilibrium], None]
+"""Called with each share of the way that is reached, and the equilibrium there."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def apply_load(
     smallest: float = SMALLEST,
     tolerance: float = TOLERANCE,
     stay: bool = False,
-    report: Report | None = None,
+    report: Reached | None = None,
 ) -> Loaded:
     """The equilibrium under the load `after` (n, 6), reached from the equilibrium `start` under the load
     `before`; see `advance`.
@@ -112,7 +113,7 @@ def advance(
     tolerance: float = TOLERANCE,
     stay: bool = False,
     limit: int = 1000,
-    report: Report | None = None,
+    report: Reached | None = None,
 ) -> Loaded:
     """The equilibrium at the drive's factor `end`, reached from the equilibrium `start` at the factor
     `begin`.
