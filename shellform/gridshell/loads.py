@@ -29,12 +29,12 @@ GRAVITY = 9.81  # m/s²: the paper's 700 g are 6.9 N
 
 @dataclass(frozen=True)
 class Region:
-    """Where something lies on the surface: everything, but for what its limits take away.
+    """Where something lies on the surface: everywhere, but for what its limits take away.
 
-    `openings` and `inside`: plan polygons, m, outside all of which and inside one of which it lies; `half`:
-    the half towards this direction in plan, rad from x, from the middle of the surface's extent along it;
-    `strip`: a direction in plan, rad, and the lowest and highest place along it, m from the origin; `ring`:
-    lowest and highest level, m.
+    - `openings`: plan polygons, m, outside all of which it lies; `inside`: inside one of which.
+    - `half`: a direction in plan, rad from x: the half towards it, from the middle of the surface's extent along it.
+    - `strip`: a direction in plan, rad, and the lowest and highest place along it, m from the origin.
+    - `ring`: lowest and highest level, m.
     """
 
     openings: Sequence[ArrayLike] = ()

@@ -60,10 +60,15 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Net:
-    """`grid` flat; `target` its state on the surface, (n,) nodes; `supports` (s,) the nodes that are held:
-    the rods' ends, but for those on edge beams and free ones (edges.py), and the edge beams' feet; `quality`;
-    `notes`: what was left out; `attempts` at it, the last of which gave it, where the first failed; `edges`:
-    the edge beams; `stretches`: what the edge is, part after part (none: not asked)."""
+    """A grid of rods that lies on a surface.
+
+    - `grid`: flat; `target`: its state on the surface, (n,) nodes.
+    - `supports` (s,): the nodes that are held, which are the rods' ends, but for those on edge beams and free ones
+      (edges.py), and the edge beams' feet.
+    - `quality`: how good it is; `notes`: what was left out.
+    - `attempts` at it, the last of which gave it; none where the first did.
+    - `edges`: the edge beams; `stretches`: what the edge is, part after part (none: not asked).
+    """
 
     grid: Grid
     target: State

@@ -20,10 +20,14 @@ _APART = 2.5  # of the spacing: where a net was cut off, ends farther from one a
 
 @dataclass
 class Rim:
-    """A closed curve on which rods end: `points` (k, 3), m; whether it goes round an `opening`; whether the
-    net was `cut` off along it, from its first point, which is on the surface's edge, to its last, or goes
-    round; `kinds` and `names` (k,) of its points, and where the geometry decided (`found`); `along` (k + 1,),
-    m, its arc lengths."""
+    """A closed curve on which rods end.
+
+    - `points` (k, 3), m; `along` (k + 1,), m: its arc lengths.
+    - `opening`: whether it goes round one.
+    - `cut`: whether the net was cut off along it, from its first point, which is on the surface's edge, to its last;
+      else it goes round.
+    - `kinds` and `names` (k,) of its points; `found` (k,): whether the geometry decided these.
+    """
 
     points: Reals
     opening: bool

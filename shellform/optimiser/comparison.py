@@ -108,11 +108,15 @@ class Plain:
 
 @dataclass(frozen=True)
 class Compared:
-    """What a SciPy `method` found: the best feasible `design` without its slack cables, or the least
-    infeasible one, and how it carries each load on the documented path (`loaded`, with "none" first);
-    `objective` and largest `violation` where the optimiser had it; `history` (evaluation, objective,
-    violation) of the designs on the branch; the work; `status`, SciPy's sentence or that the evaluations were
-    used up."""
+    """What a SciPy `method` found.
+
+    - `design`: the best feasible one without its slack cables, or the least infeasible one; `loaded`: how it carries
+      each load on the documented path, "none" first.
+    - `objective` and largest `violation` where the optimiser had it.
+    - `history`: (evaluation, objective, violation) of the designs on the branch.
+    - `evaluations`, of which `rejected`, and `factorisations`: the work.
+    - `status`: SciPy's sentence, or that the evaluations were used up.
+    """
 
     method: str
     design: Design

@@ -93,11 +93,15 @@ class _Told:
 
 @dataclass
 class _Search:
-    """A search of the `problem` and where it stands, changed in place since NLopt calls back: the `stage` of
-    the further loads and the `margin` before their end; the `best` point of this stage and those to start
-    from, `near`; the `accepted` designs of this stage without their slack cables; what MMA was `told` in its
-    present run, which began with the `caution`, and how much that is `until` the further loads are raised
-    again."""
+    """A search and where it stands, changed in place since NLopt calls back.
+
+    - `problem`, `solver`, `evaluator`, at most so many `evaluations`, whom to tell `progress` and `keep`, when it `began`, s.
+    - `stage` of the further loads, and the `margin` before their end.
+    - `near`: points of this stage to start from, the best one last; `accepted`: its designs without their slack cables.
+    - `told`: what MMA was told in its present run, which began with the `caution`; `until`: how much that is before the
+      further loads are raised again.
+    - `history` of all trials; `status`: why it ended.
+    """
 
     problem: Problem
     solver: MovingAsymptotes

@@ -33,10 +33,14 @@ from shellform.structure.network import assemble
 
 @dataclass(frozen=True)
 class CandidateSection:
-    """A section of the catalogue: the `shell` with it and its `optimum` (None where none was found); the
-    `objective` of the free problem, distances `deviation_max` and `deviation_mean`, m, from the target and
-    stress `utilisation` under the design load, `cables`, the rods' `mass`, kg; `why` it isn't feasible, empty
-    where it is; and whether it is the one `rounded_up` to."""
+    """A section of the catalogue that is tried.
+
+    - `section`: its name; `shell` with it; `optimum`, None where none was found; `mass`, kg, of the rods.
+    - `objective` of the problem with the free radius; `deviation_max`, `deviation_mean`, m, from the target, and stress
+      `utilisation`, under the design load; `cables`: how many.
+    - `why` it isn't feasible, empty where it is.
+    - `rounded_up`: whether it is the one that the free radius is rounded up to.
+    """
 
     section: str
     shell: Gridshell

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class FailureRecord:
-    """How the `design` most likely fails under the `load`: structure `number`, of middle load factor among
-    the fallen ones, falls at the load `factor` by what `kind` tells; the `driver` is the cause of error
-    without which it bears most, `without` the factors that it reaches with one cause left out; `cables` go
-    slack on the way."""
+    """How the `design` most likely fails under the `load`.
+
+    - `number`: the structure of middle load factor among the fallen ones; `factor` of the load at which it falls;
+      `kind`: by what.
+    - `driver`: the cause of error without which it bears most; `without`: by cause, the factor that it reaches when that
+      one is left out.
+    - `cables` that go slack on the way.
+    """
 
     design: str
     load: str

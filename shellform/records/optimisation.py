@@ -26,12 +26,17 @@ class SymmetryRecord:
 
 @dataclass(frozen=True)
 class OptimisationRecord:
-    """What came of the optimisation: `objective_start` and `objective_end`; the work that it took, in
-    `iterations`, `evaluations` (so many of them `rejected`), solved `equilibria` and `factorisations` (those
-    of rejected evaluations: `factorisations_rejected`); `stiffness_min`, N/m, that the softest mode had to
-    keep; its `status`, a sentence; `constraints` as value over limit less 1; whether the optimised design is
-    `feasible`; why it was `not_polished`; what came of the wishes `cables_max` and `symmetric`; how far, m, a node may be
-    off by what is saved (`deviation_wished`, None: not said)."""
+    """What came of the optimisation.
+
+    - `objective_start`, `objective_end`; `status`: a sentence on why it ended.
+    - `constraints`: value over limit less 1, by name; `feasible`: whether the optimised design keeps them.
+    - `iterations`, `evaluations` (so many of them `rejected`), solved `equilibria`, and `factorisations` (those of
+      rejected evaluations: `factorisations_rejected`): the work that it took.
+    - `stiffness_min`, N/m, that the softest mode had to keep.
+    - `not_polished`: why it wasn't.
+    - `cables_max`, `symmetric`: what came of these wishes.
+    - `deviation_wished`, m: how far a node may be off by what is saved (None: not said).
+    """
 
     objective_start: float
     objective_end: float
@@ -53,10 +58,14 @@ class OptimisationRecord:
 
 @dataclass(frozen=True)
 class SectionRecord:
-    """A `section` of the catalogue that was tried in rounding: its `rod_radius`, m, `rod_mass`, kg, of all
-    rods, whether it is the one `rounded_up` to, and whether it is `feasible`, else `why_not`; its
-    `objective`, `deviation_max`, `deviation_mean`, m, `cables` and `stress_utilisation_max`, None where it
-    has no design."""
+    """A section of the catalogue that was tried in rounding.
+
+    - `section`: its name; `rod_radius`, m; `rod_mass`, kg, of all rods.
+    - `rounded_up`: whether it is the one that the free radius is rounded up to.
+    - `feasible`: whether its design keeps all limits, else `why_not`.
+    - `objective`, `deviation_max`, `deviation_mean`, m, `cables` and `stress_utilisation_max`: None where it has no
+      design.
+    """
 
     section: str
     rod_radius: float

@@ -31,10 +31,13 @@ _MOST = 1.5  # load factor up to which a structure without one cause is followed
 
 @dataclass(frozen=True)
 class Failure:
-    """Structure `number` fell at the load `factor` by what `kind` tells; `without` has the load factor that
-    it reaches with one cause left out, the most helpful first; `cables` are the numbers of those of the
-    design's cables that have gone slack; `mode` (n, 6), largest translation 1, is the shape in which it gives
-    way from its last `state`."""
+    """How one drawn structure falls.
+
+    - `number` under its seed; `factor` of the load at which it fell; `kind`: by what (path_of_one.py).
+    - `without`: by cause, the load factor that it reaches with that one left out, the most helpful first.
+    - `cables`: numbers of those of the design's cables that have gone slack.
+    - `state`: its last one; `mode` (n, 6), largest translation 1: the shape in which it gives way from there.
+    """
 
     number: int
     factor: float

@@ -24,9 +24,12 @@ _STRAIGHT_ON = 0.99  # cosine of the angle between two elements of one rod
 
 @dataclass(frozen=True)
 class Member:
-    """One rod: its `elements` (k,) among the beams from end to end, each one's `sense` (k,) ±1 along the rod,
-    and `marks` (q,) ascending places 0..k among its nodes that are measured on it, the ends included; `locks`
-    (k or 0,), the beams that lock its two layers."""
+    """One rod.
+
+    - `elements` (k,) among the beams, from end to end; `sense` (k,) ±1 of each along the rod.
+    - `marks` (q,): ascending places 0..k among its nodes that are measured on it, the ends included.
+    - `locks` (k or 0,): the beams that lock its two layers.
+    """
 
     elements: Indices
     sense: Reals
@@ -36,9 +39,13 @@ class Member:
 
 @dataclass(frozen=True)
 class Members:
-    """`rods`; `connectors` (j,) among the beams; `cables`, how many candidates; `held` degrees of freedom
-    (h,) of the supports' translations; `zone` (n,) the crossing that each node's load is counted to, of
-    `zones`; `places` (n, 3), m, of the nodes in the target; `beam_length` (m,), m, nominal rest lengths."""
+    """What errors are drawn for.
+
+    - `rods`; `connectors` (j,) among the beams; `cables`: how many candidates there are.
+    - `held` (h,): degrees of freedom of the supports' translations.
+    - `zone` (n,): the crossing, of `zones`, that each node's load is counted to.
+    - `places` (n, 3), m, of the nodes in the target; `beam_length` (m,), m: nominal rest lengths.
+    """
 
     rods: tuple[Member, ...]
     connectors: Indices

@@ -57,10 +57,15 @@ class Snap:
 
 @dataclass(frozen=True)
 class DrawnOutcome:
-    """One drawn structure: the load `factor` up to which its stable branch was followed, whether it `stands`,
-    how `far`, m, a node ends from the perfect structure's place (inf where it fell), its last `state` on the
-    branch, the `factorisations` spent, and the local `snaps` on the way; its state at rest under a share of the load,
-    `resting`, where that was asked for: None where it fell before."""
+    """What became of one drawn structure.
+
+    - `number` under its seed.
+    - `factor` of the load up to which its stable branch was followed; `stands`: whether it does.
+    - `far`, m: how far a node ends from the perfect structure's place, inf where it fell.
+    - `state`: its last one on the branch; `snaps`: local ones on the way.
+    - `factorisations` spent.
+    - `resting`: its state at rest under a share of the load, where that was asked for; None where it fell before.
+    """
 
     number: int
     factor: float

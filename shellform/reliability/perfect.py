@@ -29,9 +29,14 @@ TO_ITS_END = 0.5  # the same where only the last one is asked for
 
 @dataclass(frozen=True)
 class Perfect:
-    """The perfect structure under one `load` (n, 6): its `network`, `members`, which of the candidate cables
-    are `present`, its unloaded state and those at `factors` (k,) of the load along its path, as far as that
-    goes (all of it: `bears`); `imperfections` of shape."""
+    """The perfect structure under one load, and its path.
+
+    - `network`; `members`; `present` (c,): which of the candidate cables it has; dead `load` (n, 6).
+    - `start`: the state in which its unloaded one is sought.
+    - `factors` (k,) of the load along its path, 0 first, as far as that goes, with the `states` there; `bears`: whether
+      that is all of the load.
+    - `imperfections` of shape with which structures are drawn.
+    """
 
     network: Network
     members: Members

@@ -53,10 +53,15 @@ class Paper:
 
 @dataclass(frozen=True)
 class Wish:
-    """What of a run is to be drawn, and how: `design` and `load` (all of them), `quantity`, its `limit` in SI
-    units (the case's for the deviation, 1 for the utilisation, what the rods bear for their curvature, else
-    the largest), that of the cables' forces `force_limit`, N (0: the largest), the `paper` that it is for, and
-    the rest as in panel.py."""
+    """What of a run is to be drawn, and how.
+
+    - `design`, `load`: None: all of them.
+    - `quantity`, one of QUANTITIES; `limit` of its colours, SI units; None: the case's for the deviation, 1 for the
+      utilisation, what the rods bear for their curvature, else the largest.
+    - `force_limit`, N, of the cables' colours; 0: the largest.
+    - `paper` that it is for; None: a screen.
+    - `endings` of the files; the rest as in panel.py.
+    """
 
     design: str | None = None
     load: str | None = None

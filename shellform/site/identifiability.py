@@ -21,11 +21,16 @@ _APART = 0.95  # correlation of two parameters from which they can't be told apa
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What data of a given noise tell about `names` (p,): their relative standard `deviation` (p,) (infinite:
-    nothing; those that aren't told count as known to the others), the `correlation` (p, p) of their errors,
-    the `singular` values (p,) of the Jacobian over the noise with the `directions` (p, p) of the logarithms
-    that belong to them as rows, and `reach` (p,), m: how far the marker that moves most goes when the
-    parameter grows by 1 %."""
+    """What data of a given noise tell about parameters.
+
+    - `names` (p,).
+    - `deviation` (p,): relative standard deviations, infinite where nothing is told; parameters that aren't told count
+      as known to the others.
+    - `correlation` (p, p) of their errors.
+    - `singular` (p,): values of the Jacobian over the noise; `directions` (p, p): the logarithms' that belong to them, as
+      rows.
+    - `reach` (p,), m: how far the marker that moves most goes when the parameter grows by 1 %.
+    """
 
     names: tuple[str, ...]
     deviation: Reals

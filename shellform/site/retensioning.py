@@ -55,11 +55,14 @@ class Belief:
 
 @dataclass(frozen=True)
 class Adjustment:
-    """The next round: `turns` (c,) of every candidate cable in steps, `change` (c,), m, of rest length
-    (negative: shorter); the first-order shape `predicted` (n, 3), m, and the `belief` afterwards with the
-    true equilibrium; the sums of squares `misfit_before`, `misfit_predicted`, m², to first order, and
-    `misfit_after`, in the true equilibrium; `halved`: how often the change was, to stay on the stable
-    branch."""
+    """The next round of turning.
+
+    - `turns` (c,) of every candidate cable, in steps; `change` (c,), m, of rest length, negative where shorter.
+    - `predicted` (n, 3), m: the shape to first order; `belief` afterwards, in the true equilibrium.
+    - `misfit_before`, `misfit_predicted` and `misfit_after`, m²: sums of squares before, to first order, and in the true
+      equilibrium.
+    - `halved`: how often the change was, to stay on the stable branch.
+    """
 
     turns: Indices
     change: Reals

@@ -14,9 +14,14 @@ from shellform.records.words import number
 
 @dataclass(frozen=True)
 class EndedRun:
-    """Why a run ended: the `stage` in which it did, the `cause` and the `remedy`, a sentence or more each; all
-    `stages` with "done", "ended" or "" (not begun); `facts` that were found, by name; `notes`; the last lines of
-    the `log`; the `files` of its folder with their addresses; its `settings`, the case file's text."""
+    """A run that ended early.
+
+    - `title`, and `place`: the folder's name; `version` of shellform.
+    - `stage` in which it ended; `cause` and `remedy`, a sentence or more each.
+    - `stages`: all, each with "done", "ended" or "" (not begun).
+    - `facts` that were found, by name; `notes`; `log`: its last lines.
+    - `files` of the folder with their addresses; `settings`: the case file's text.
+    """
 
     title: str
     place: str

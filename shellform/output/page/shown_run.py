@@ -20,13 +20,19 @@ from shellform.surface.shape.target import Surface
 class ShownRun:
     """One run on the page.
 
-    `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which `best` is to
-    be built; `loads` (n, 6), N; the run's `summary`, and `checks` and `verdict` made from it; the optimiser's
-    `history`; `settings`, the case file's text; `limit`, m, ends the colour scale; `force_max`, N, limits the
-    cables; `notes` say what is missing or to be known; `files` are those of the run folder, which is reached
-    from the page by the relative address `home` ("": the page stands in it); `next_size` is the size of the
-    catalogue that the rods to build would be rounded to ("": no catalogue, or none is stiff enough);
-    `profile` is empty where none was made.
+    What was found:
+    - `surface`; `loads` (n, 6), N, by name; `designs` by name, each with its `shells` (rods may differ) and its
+      `states` by load case, of which `best` is to be built.
+    - `summary` of the run, and `checks` and `verdict` made from it; `history` of the optimiser.
+    - `next_size`: of the catalogue, that the rods to build would be rounded to ("": no catalogue, or none is stiff
+      enough).
+    - `profile`, empty where none was made.
+
+    What is shown of it:
+    - `title`, and `place`: the folder's name; `notes`: what is missing or to be known.
+    - `settings`: the case file's text; `pictures`.
+    - `limit`, m: the end of the colour scale; `force_max`, N: the cables' limit.
+    - `files` of the run folder, which is reached from the page by the relative address `home` ("": it stands in it).
     """
 
     title: str

@@ -44,9 +44,15 @@ class StudyRow:
 
 @dataclass(frozen=True)
 class StudyContent:
-    """What the page says: `rows` with their columns, of which `varied` were given, `found` came out and `goals` are to be
-    small (1) or large (-1), each with its measure; the keys on the `front`, of which `best` have a card; by key, `links` to pages and
-    `pictures` (SVG); counts of `designs` done and failed; rank `correlation`; and `notes`."""
+    """What the page says.
+
+    - `title`; `notes`; `designs`: how many are done and failed.
+    - `rows` with their columns: those `varied` were given, those `found` came out; `measures` by column.
+    - `goals` by column: 1 where it is to be small, -1 where large.
+    - `front`: the keys of the rows on it, of which `best` have a card.
+    - `links` to pages and `pictures` (SVG), by key.
+    - `correlation`: of ranks, by column found and column varied.
+    """
 
     title: str
     rows: Sequence[StudyRow]

@@ -63,11 +63,11 @@ class TitleBlock:
 
 @dataclass(frozen=True)
 class Built:
-    """A design to build: the `shell`, its `design`, its `states` by load case, "none" among them, and the state `hung`
-    in which the cables are hung in, the erected grid before bracing (left out: the target). `name` of the design and
-    `title` of the job are for the heads; `adjustment`, m, is the range of the turnbuckles by which cables are let out
-    from the lengths that they are cut to (None: each is cut for itself); `block` is what the title block says of who
-    drew them and when; `origin` (3,), m, is where coordinates count from in those of a survey (None: the file's)."""
+    """A `design` to build of a `shell`, with its `states` by load case, "none" among them; for the heads its `name` and
+    the job's `title`; `block`: what the title block says of who drew it and when.
+    `hung`: the state in which cables are hung in, the erected grid before bracing (None: the target). `adjustment`, m:
+    the turnbuckles' range, by which cables are let out from the lengths that they are cut to (None: each is cut for
+    itself). `origin` (3,), m: where coordinates count from in those of a survey (None: the file's)."""
 
     shell: Gridshell
     design: Design

@@ -44,11 +44,15 @@ class Balance:
 
 
 class Assembly:
-    """Parts on `count` nodes with held degrees of freedom `fixed` (count, 6). `free` (f,) lists the free
-    degrees of freedom in order, `number` (6 count,) the place of each degree of freedom among them, -1 where
-    it is held or has no stiffness; `arms` (count,), m: the mean rest length of each node's beams; `clock`
-    adds up the seconds spent on assembly, factorisation and solve; `last_digit`: how exactly, relative to 1,
-    coordinates are told."""
+    """Parts on `count` nodes, put together.
+
+    - `parts`, in order; `free` (f,): the degrees of freedom that aren't held, in order; `number` (6 count,): the place of
+      each degree of freedom among them, -1 where it is held or has no stiffness.
+    - `arms` (count,), m: the mean rest length of each node's beams.
+    - `matrix`: the pattern and the factor of the tangent.
+    - `clock`, s: what was spent on assembly, factorisation and solve.
+    - `last_digit`: how exactly, relative to 1, coordinates are told.
+    """
 
     last_digit: float = float(np.finfo(float).eps)
 

@@ -75,12 +75,17 @@ def read_surface(
 ) -> Surface:
     """The surface in a file, in metres, z up.
 
-    `unit` of files that state none ("m" if left out); `up`, the file's vertical axis, "x", "y" or "z", "-z" where it points
-    down (left out: the format's; where that is none, z, but for a shell that lies on its side with z up and not with y or
-    x); `size`, m, of the mesh on CAD surfaces; the objects on a `layer` or of a `name`; of a
-    closed solid its "upper" or "lower" `face`; of several separate pieces the `piece` with that number, 1
-    being the largest; `fill` "holes", "edges" or "all" closes openings (fill.py), edges down to the `ground`,
-    m (left out: the edge's lowest point). `mended` of the result tells what was done. Raises InputError.
+    - `unit`: of files that state none; left out: "m".
+    - `up`: the file's vertical axis, "x", "y" or "z", "-z" where it points down; left out: the format's, and where that has
+      none z, but y, or else x, for a shell that lies on its side with z up and not with that.
+    - `size`, m: of the mesh on CAD surfaces.
+    - `layer`, `name`: the objects that are meant.
+    - `face`: of a closed solid, "upper" or "lower".
+    - `piece`: of several separate ones, 1 being the largest.
+    - `fill`: "holes", "edges" or "all" closes openings (fills.py), edges down to the `ground`, m; left out: the edge's
+      lowest point.
+
+    `mended` of the result tells what was done. Raises InputError.
     """
     file = Path(path)
     kind = kind_of(file)
