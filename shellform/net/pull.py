@@ -33,9 +33,8 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 
 FROM_FLAT = (0.05, 0.5, 5.0)  # EI/s³; directly at 5 a flat grid folds (findings: 1e3 N/m at EI/s³ = 189 N/m)
 FROM_COMPASS = (5.0,)  # the compass net lies on the surface already
-SHEAR_STIFFNESS = (
-    0.1  # of a connector against turning in the grid's plane, EI/s a radian; at 0.01 nets slide for ever
-)
+# of a connector against turning in the grid's plane, EI/s a radian; at 0.01 nets slide for ever
+SHEAR_STIFFNESS = 0.1
 REACH = 1.0  # spacing a step
 LIMIT = 200  # factorisations at one density; nets that are found take up to half of that
 _STALL = 40  # steps that bring the residual down by less than a fifth, once it is

@@ -45,9 +45,8 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
 
 _TRIAL = 25  # factorisations of a sample's equilibrium
-_TOLERANCE = (
-    1e-11  # tighter than usual: the linear answer is a start so good that it would pass for a solution
-)
+# tighter than usual: the linear answer is a start so good that it would pass for a solution
+_TOLERANCE = 1e-11
 _SHARES = ((1.0,), (0.5, 1.0), (0.25, 0.5, 0.75, 1.0))  # of a sample's variation, tried one after the other
 
 

@@ -30,9 +30,8 @@ from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite,
 
 LIMIT_POINT, BIFURCATION, BORNE, UNLOADED = "limit point", "bifurcation", "none", "no unloaded state"
 ENDED = "not looked into"
-_ALIGNED = (
-    0.5  # cosine of the path's tangent and the softest mode, from which on the load itself is at its limit
-)
+# cosine of the path's tangent and the softest mode, from which on the load itself is at its limit
+_ALIGNED = 0.5
 
 FAR = 0.05  # of the span from the perfect structure
 STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps

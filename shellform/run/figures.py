@@ -25,15 +25,10 @@ from shellform.structure.elements.state import State
 from shellform.written import folder as made
 
 FAILURE = "states/failure.npz"  # of the stage "safety"
-_AMPLITUDE = 0.05  # of the shell's size, at which the failing mode is drawn
 _LOADS = {"none": "no load", "design": "design load", "additional": "additional load"}
-
-
 QUANTITIES = ("deviation", "utilisation", "curvature", "shear", "spring", "mode", "history")
 FILMS = ("pour", "erection")
 _STILL = ("spring", "mode", "history")  # of one state, or of none
-
-
 _USUAL = (1600, 1000)  # pixels
 
 
@@ -207,13 +202,10 @@ def draw_failure(run: Run) -> list[Path]:
         file.unlink(missing_ok=True)
         return []
     data = read_arrays(run.folder / FAILURE)
-    place, shift = data["positions"], data["mode"][:, :3]
-    size = float(np.ptp(place, axis=0).max())
-    upright = 1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0  # it sinks
     panel = maps.panel_of(
         run.shell_of(told.design),
         run.designs[told.design],
-        State(place + _AMPLITUDE * size * upright * shift, data["quaternions"]),
+        State(maps.sunk(data["positions"], data["mode"][:, :3]), data["quaternions"]),
         load=run.loads[told.load],
         title=f"{told.design} design, structure {told.number} as it fails at {told.factor:.2f} of {_LOADS.get(told.load, told.load)}",
     )

@@ -34,9 +34,8 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.tables import Table, table_text
 
-_LEARNING = (
-    8  # linearisations of one survey; where no cable becomes slack the error is of second order after each
-)
+# linearisations of one survey; where no cable becomes slack the error is of second order after each
+_LEARNING = 8
 _SETTLED = 0.02  # of a cable's usual error: smaller changes of the estimate end the learning
 _HALVINGS = 5  # of a change that leaves the stable branch, or leads to no likelier estimate
 _TRIAL = 25  # factorisations of an equilibrium next to a known one

@@ -26,9 +26,8 @@ from shellform.surface.units import METRES
 
 _TURNS = 24  # starts about the common normal, each also flipped
 _ROUNDS = 60  # of closest points from one start
-_STRAY = (
-    3.0  # times the median distance from the middle: such points don't take part in the axes of the start
-)
+# times the median distance from the middle: such points don't take part in the axes of the start
+_STRAY = 3.0
 _RIVAL = 1.5  # a second pairing whose cost is below this much times the best one's makes the match doubtful
 _PAIRS = 4  # three points and one to check them
 _THIN = 0.02  # second principal size over the first, below which points lie on a line

@@ -34,9 +34,8 @@ except (ImportError, OSError) as error:  # a shared library that gmsh's wheel ne
         "libxinerama1",
     ) from error
 
-_AGREES = (
-    0.95  # cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
-)
+# cosine between a CAD normal and the triangles around it, below which it is taken for a pole's
+_AGREES = 0.95
 _STEP_TIME = re.compile(r"(?<=')\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?=')")
 _STEP_FILE = re.compile(r"(Open CASCADE STEP translator [\d.]+) \d+")
 _STEP_PRODUCT = re.compile(r"PRODUCT\('Open CASCADE STEP translator [^']*',\s*'[^']*'")

@@ -69,3 +69,11 @@ def test_other_quantities_and_states_of_other_shells_are_refused(shell, braced):
         maps.panel_of(shell, None, state, quantity="colour")
     with pytest.raises(InputError, match="belongs to another shell"):
         maps.panel_of(shell, None, type(state)(state.positions[1:], state.quaternions[1:]))
+
+
+def test_a_mode_which_has_no_sign_is_drawn_as_it_sinks():
+    place = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.5], [4.0, 0.0, 0.0]])  # 4 m long
+    down = np.array([[0.1, 0.0, 0.2], [0.0, 0.0, -1.0], [0.0, 0.0, 0.0]])
+    expected = place + 0.05 * 4.0 * down
+    assert np.array_equal(maps.sunk(place, down), expected)
+    assert np.array_equal(maps.sunk(place, -down), expected)

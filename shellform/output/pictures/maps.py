@@ -117,14 +117,18 @@ def _shear(shell: Gridshell, design: Design, state: State) -> Map:
 
 def _mode(shell: Gridshell, design: Design, state: State) -> Map:
     found = modes(assemble(shell.network(design)), state, 1)
-    size = float(np.ptp(state.positions, axis=0).max())
     shift = found.shapes[0, :, :3] / np.linalg.norm(found.shapes[0, :, :3], axis=1).max()
-    upright = (
-        1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0
-    )  # a mode has no sign: drawn as it sinks
     note = f": softest mode, {found.stiffness[0]:.3g} N/m"
-    place = state.positions + _AMPLITUDE * size * upright * shift
+    place = sunk(state.positions, shift)
     return Map(np.linalg.norm(shift, axis=1), "amplitude over the largest", ("", 1.0), place, note)
+
+
+def sunk(positions: Reals, shift: Reals) -> Reals:
+    """The nodes' `positions` (n, 3), m, moved along the translations `shift` (n, 3) of a mode, the largest of which is 1,
+    so far that it is seen. A mode has no sign: where it moves most up or down it sinks."""
+    size = float(np.ptp(positions, axis=0).max())
+    upright = 1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0
+    return positions + _AMPLITUDE * size * upright * shift
 
 
 QUANTITIES: dict[str, Callable[[Gridshell, Design, State], Map]] = {

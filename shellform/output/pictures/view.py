@@ -22,9 +22,8 @@ _FIXED = {
     "side": ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)),
 }
 _OBLIQUE = (1.0, -1.6, 1.1)  # with the long axis along x
-_ROUND = (
-    0.05  # difference of the plan's principal variances over their sum below which no axis is the long one
-)
+# difference of the plan's principal variances over their sum below which no axis is the long one
+_ROUND = 0.05
 _CLEARER = 1.02  # a later quarter must spread the nodes that much wider to be preferred
 _MARGIN = 0.04  # of the panel, around everything
 _TITLE = 3.6  # letters' heights
