@@ -199,7 +199,7 @@ def _plain(text: str) -> str:
     return text.lower().replace("×", "x").replace("⌀", "").replace("mm", "").replace(" ", "")
 
 
-def allowed(catalogue: Catalogue, net: Net) -> tuple[Section, ...]:
+def sections_allowed(catalogue: Catalogue, net: Net) -> tuple[Section, ...]:
     """The sections that bear the net's curvature (equation 1), by rising stiffness. Raises InputError where
     there are none.
     """
@@ -222,7 +222,7 @@ def allowed(catalogue: Catalogue, net: Net) -> tuple[Section, ...]:
 
 def largest(catalogue: Catalogue, net: Net) -> Section:
     """The stiffest section that the net allows: that of the initial design (operation 2)."""
-    return allowed(catalogue, net)[-1]
+    return sections_allowed(catalogue, net)[-1]
 
 
 def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, float]:
@@ -231,7 +231,7 @@ def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, floa
 
     Raises InputError where the rod is stiffer than the stiffest.
     """
-    sections = allowed(catalogue, net)
+    sections = sections_allowed(catalogue, net)
     low, high = (radius_as_stiff(rod, sections[k]) for k in (0, -1))
     if rod.radius > high * (1.0 + _EQUAL):
         raise _too_stiff(rod.radius, catalogue, sections)
@@ -251,7 +251,7 @@ def rounded_up(shell: Gridshell, design: Design, catalogue: Catalogue) -> tuple[
 
     Raises InputError where no section that the net allows is stiff enough.
     """
-    sections = allowed(catalogue, shell.net)
+    sections = sections_allowed(catalogue, shell.net)
     at = _stiff_enough(sections, shell.rod.resized(design.radius).section)
     if at < len(sections):
         return with_section(shell, design, sections[at])
@@ -277,7 +277,7 @@ def neighbours(
     require_count(
         count, least=0, where="neighbours.count", give="how many sections to either side, such as 1"
     )
-    sections = allowed(catalogue, shell.net)
+    sections = sections_allowed(catalogue, shell.net)
     at = _stiff_enough(sections, shell.rod.resized(design.radius).section)
     return [with_section(shell, design, section) for section in sections[max(at - count, 0) : at + count + 1]]
 

@@ -112,18 +112,18 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
     `outline` (k, 2), m: the plan curve at which the net was cut off, if it was. Raises InputError where
     nothing is left that holds the shell.
     """
-    ends, loops = ends_of(net, surface, outline)
+    ends, rims = ends_of(net, surface, outline)
     low = _low(surface, edges)
-    for loop in loops:
-        _sort_out(loop, edges, low)
-    builder = _Builder(net, loops)
+    for rim in rims:
+        _sort_out(rim, edges, low)
+    builder = _Builder(net, rims)
     stretches = []
-    for number, loop in enumerate(loops):
-        for first, last in _runs(loop.kinds):
-            if loop.kinds[first] == "beam":
-                builder.beam(loop, first, last, [each for each in ends if each.loop == number])
-        stretches += _stretches(loop)
-    held = [each.node for each in ends if loops[each.loop].kinds[each.vertex] in HELD]
+    for number, rim in enumerate(rims):
+        for first, last in _runs(rim.kinds):
+            if rim.kinds[first] == "beam":
+                builder.beam(rim, first, last, [each for each in ends if each.rim == number])
+        stretches += _stretches(rim)
+    held = [each.node for each in ends if rims[each.rim].kinds[each.vertex] in HELD]
     if not held and not builder.feet:
         raise InputError(
             "nothing holds the shell: no part of its edge stands on the ground or a wall",
@@ -157,10 +157,10 @@ def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals 
 def stretches_of(surface: Surface, edges: Edges = Edges()) -> tuple[Stretch, ...]:
     """What the surface's edges are, before there is a net: a first look."""
     low, found = _low(surface, edges), list[Stretch]()
-    for number, rim in enumerate(surface.boundary):
-        loop = rim_of(surface.vertices[rim], number > 0)
-        _sort_out(loop, edges, low)
-        found += _stretches(loop)
+    for number, loop in enumerate(surface.boundary):
+        rim = rim_of(surface.vertices[loop], number > 0)
+        _sort_out(rim, edges, low)
+        found += _stretches(rim)
     return tuple(found)
 
 
@@ -171,16 +171,16 @@ def _low(surface: Surface, edges: Edges) -> float:
     return level + LOW * float(surface.size[:2].max())
 
 
-def _sort_out(loop: Rim, edges: Edges, low: float) -> None:
-    """Gives each point of the loop its kind; edge beams go down to where the edge stops falling."""
-    default = edges.openings if loop.opening else edges.outer
-    count = len(loop.points)
+def _sort_out(rim: Rim, edges: Edges, low: float) -> None:
+    """Gives each point of the rim its kind; edge beams go down to where the edge stops falling."""
+    default = edges.openings if rim.opening else edges.outer
+    count = len(rim.points)
     decided = np.full(count, -1)
     for number, place in enumerate(edges.places):
-        decided[(decided < 0) & place.holds(loop.points, opening=loop.opening)] = number
+        decided[(decided < 0) & place.holds(rim.points, opening=rim.opening)] = number
     auto = (decided < 0) & (default == "auto")
-    standing = loop.points[:, 2] <= low
-    loop.kinds = [
+    standing = rim.points[:, 2] <= low
+    rim.kinds = [
         edges.places[number].kind
         if number >= 0
         else ("ground" if stands else "beam")
@@ -188,23 +188,23 @@ def _sort_out(loop: Rim, edges: Edges, low: float) -> None:
         else default
         for number, stands in zip(decided.tolist(), standing.tolist(), strict=True)
     ]
-    loop.names = [edges.places[number].name if number >= 0 else "" for number in decided.tolist()]
-    loop.found = auto.tolist()
-    if loop.cut:  # its ends only close the curve: held where they are low, no part of a beam
+    rim.names = [edges.places[number].name if number >= 0 else "" for number in decided.tolist()]
+    rim.found = auto.tolist()
+    if rim.cut:  # its ends only close the curve: held where they are low, no part of a beam
         for last in (0, count - 1):
-            if loop.kinds[last] == "beam":
-                loop.kinds[last], loop.found[last] = "free", False
-    for first, last in _runs(loop.kinds):
-        if loop.kinds[first] != "beam" or last - first + 1 >= count:
+            if rim.kinds[last] == "beam":
+                rim.kinds[last], rim.found[last] = "free", False
+    for first, last in _runs(rim.kinds):
+        if rim.kinds[first] != "beam" or last - first + 1 >= count:
             continue
         for here, way in (((first - 1) % count, -1), ((last + 1) % count, 1)):
             while (
-                loop.found[here]
-                and loop.kinds[here] == "ground"
-                and loop.found[(here + way) % count]
-                and _falls(loop.points[here], loop.points[(here + way) % count])
+                rim.found[here]
+                and rim.kinds[here] == "ground"
+                and rim.found[(here + way) % count]
+                and _falls(rim.points[here], rim.points[(here + way) % count])
             ):
-                loop.kinds[here] = "beam"
+                rim.kinds[here] = "beam"
                 here = (here + way) % count
 
 
@@ -214,7 +214,7 @@ def _falls(here: Reals, there: Reals) -> bool:
 
 
 def _runs(kinds: Sequence[str]) -> list[tuple[int, int]]:
-    """First and last place of each run of one kind round a loop; the last may lie past the end, by less than
+    """First and last place of each run of one kind round a rim; the last may lie past the end, by less than
     once round."""
     count = len(kinds)
     starts = [k for k in range(count) if kinds[k] != kinds[k - 1]]
@@ -223,33 +223,33 @@ def _runs(kinds: Sequence[str]) -> list[tuple[int, int]]:
     return [(a, b - 1) for a, b in zip(starts, [*starts[1:], starts[0] + count], strict=True)]
 
 
-def _stretches(loop: Rim) -> list[Stretch]:
-    count = len(loop.points)
-    labels = [f"{kind}\n{name}" for kind, name in zip(loop.kinds, loop.names, strict=True)]
+def _stretches(rim: Rim) -> list[Stretch]:
+    count = len(rim.points)
+    labels = [f"{kind}\n{name}" for kind, name in zip(rim.kinds, rim.names, strict=True)]
     found = []
     for first, last in _runs(labels):
         whole = last - first + 1 == count
         at = np.arange(first, last + 2) % count  # up to where the next one begins
-        found.append(Stretch(loop.kinds[first], loop.names[first], loop.points[at], loop.opening, whole))
+        found.append(Stretch(rim.kinds[first], rim.names[first], rim.points[at], rim.opening, whole))
     return found
 
 
 class _Builder:
     """Puts the nodes of edge beams together: `places` of the new nodes, the `lines` and their `feet`."""
 
-    def __init__(self, net: Net, loops: Sequence[Rim]) -> None:
-        self.net, self.loops = net, loops
+    def __init__(self, net: Net, rims: Sequence[Rim]) -> None:
+        self.net, self.rims = net, rims
         self.places: list[Reals] = []
         self.lines: list[EdgeLine] = []
         self.feet: list[int] = []
 
-    def beam(self, loop: Rim, first: int, last: int, ends: Sequence[End]) -> None:
-        """The edge beam along a run of the loop's points with the rods' ends that lie on it."""
-        count, total = len(loop.points), float(loop.along[-1])
+    def beam(self, rim: Rim, first: int, last: int, ends: Sequence[End]) -> None:
+        """The edge beam along a run of the rim's points with the rods' ends that lie on it."""
+        count, total = len(rim.points), float(rim.along[-1])
         closed = last - first + 1 == count
         inside = {k % count for k in range(first, last + 1)}
         before, after = (first - 1) % count, (last + 1) % count
-        origin = 0.0 if closed else float(loop.along[before])
+        origin = 0.0 if closed else float(rim.along[before])
         own = sorted(
             (((each.at - origin) % total, each) for each in ends if each.vertex in inside),
             key=lambda pair: pair[0],
@@ -264,25 +264,25 @@ class _Builder:
             arcs.append(sum(at for at, _ in group) / len(group))
             links += [(nodes[-1], each.node) for _, each in group]
         if not closed:
-            length = (float(loop.along[after]) - origin) % total or total
-            if loop.kinds[before] in HELD:
-                nodes.insert(0, self._foot(loop.points[before]))
+            length = (float(rim.along[after]) - origin) % total or total
+            if rim.kinds[before] in HELD:
+                nodes.insert(0, self._foot(rim.points[before]))
                 arcs.insert(0, 0.0)
-            if loop.kinds[after] in HELD:
-                nodes.append(self._foot(loop.points[after]))
+            if rim.kinds[after] in HELD:
+                nodes.append(self._foot(rim.points[after]))
                 arcs.append(length)
-        path = self._filled(loop, nodes, arcs, origin, closed)
+        path = self._filled(rim, nodes, arcs, origin, closed)
         if len(path) > (2 if closed else 1):
             self.lines.append(
-                EdgeLine(np.array(path), np.array(links, dtype=np.int64), closed, loop.names[first % count])
+                EdgeLine(np.array(path), np.array(links, dtype=np.int64), closed, rim.names[first % count])
             )
 
     def _filled(
-        self, loop: Rim, nodes: Sequence[int], arcs: Sequence[float], origin: float, closed: bool
+        self, rim: Rim, nodes: Sequence[int], arcs: Sequence[float], origin: float, closed: bool
     ) -> list[int]:
         """The nodes in order with others on the edge between those that lie far apart."""
-        total = float(loop.along[-1])
-        track = np.vstack([loop.points, loop.points[:1]])
+        total = float(rim.along[-1])
+        track = np.vstack([rim.points, rim.points[:1]])
         stops = [*arcs[1:], arcs[0] + total] if closed else list(arcs[1:])
         path = []
         for k, node in enumerate(nodes):
@@ -292,7 +292,7 @@ class _Builder:
             parts = int(np.ceil((stops[k] - arcs[k]) / (_LONGEST * self.net.grid.scale) - 1e-9))
             for j in range(1, parts):
                 at = (origin + arcs[k] + j / parts * (stops[k] - arcs[k])) % total
-                path.append(self._new(np.array([np.interp(at, loop.along, track[:, i]) for i in range(3)])))
+                path.append(self._new(np.array([np.interp(at, rim.along, track[:, i]) for i in range(3)])))
         return path
 
     def _new(self, place: Reals) -> int:

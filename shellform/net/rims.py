@@ -40,11 +40,11 @@ class Rim:
 
 @dataclass(frozen=True)
 class End:
-    """A rod's end: its `node`, the `loop` that it lies on, its arc length `at` on it, m, the `vertex` of the
-    loop that is nearest, and its `middle` (3,) on the edge, m."""
+    """A rod's end: its `node`, the `rim` that it lies on, its arc length `at` on it, m, the `vertex` of the
+    rim that is nearest, and its `middle` (3,) on the edge, m."""
 
     node: int
-    loop: int
+    rim: int
     at: float
     vertex: int
     middle: Reals
@@ -62,30 +62,31 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
     b = np.vstack([np.roll(each, -1, axis=0) for each in curves])
     piece, closest, away = Tree(np.stack([a, b, b], axis=1)).nearest(middle)
     cut = np.flatnonzero(away > _OFF * net.grid.scale)
-    loops = [rim_of(points, number > 0) for number, points in enumerate(curves)]
+    rims = [rim_of(points, number > 0) for number, points in enumerate(curves)]
     found = []
     order: dict[int, tuple[int, int]] = {}
     if len(cut):
         inner = middle[cut, :2] - middle[cut, :2].mean(axis=0)
         key = np.arctan2(inner[:, 1], inner[:, 0]) if outline is None else _along(middle[cut, :2], outline)
         for chain in _chains(cut[np.argsort(key, kind="stable")], middle, _APART * net.grid.scale):
-            order |= {int(end): (len(loops), k) for k, end in enumerate(chain, 1)}
-            feet = _reached(middle[chain[[0, -1]]], loops, _APART * net.grid.scale)
-            loops.append(rim_of(np.vstack([feet[:1], middle[chain], feet[1:]]), False, cut=True))
+            order |= {int(end): (len(rims), k) for k, end in enumerate(chain, 1)}
+            feet = _reached(middle[chain[[0, -1]]], rims, _APART * net.grid.scale)
+            rims.append(rim_of(np.vstack([feet[:1], middle[chain], feet[1:]]), False, cut=True))
     for k, node in enumerate(nodes.tolist()):
         if k in order:
             number, vertex = order[k]
-            found.append(End(node, number, float(loops[number].along[vertex]), vertex, middle[k]))
+            found.append(End(node, number, float(rims[number].along[vertex]), vertex, middle[k]))
             continue
         number = int(np.searchsorted(starts, piece[k], side="right")) - 1
-        loop, first = loops[number], int(piece[k] - starts[number])
+        rim, first = rims[number], int(piece[k] - starts[number])
         part = float(np.linalg.norm(closest[k] - a[piece[k]]))
-        near = first if 2.0 * part < loop.along[first + 1] - loop.along[first] else first + 1
-        found.append(End(node, number, float(loop.along[first] + part), near % len(loop.points), middle[k]))
-    return found, loops
+        near = first if 2.0 * part < rim.along[first + 1] - rim.along[first] else first + 1
+        found.append(End(node, number, float(rim.along[first] + part), near % len(rim.points), middle[k]))
+    return found, rims
 
 
 def rim_of(points: Reals, opening: bool, *, cut: bool = False) -> Rim:
+    """The rim through `points` (k, 3), m, whose kinds and names aren't decided yet."""
     step = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
     return Rim(points, opening, cut, [], [], [], np.append(0.0, np.cumsum(step)))
 
@@ -100,13 +101,13 @@ def _chains(ends: Indices, middle: Reals, apart: float) -> list[Indices]:
     return np.split(turned, np.flatnonzero(np.roll(step, -(int(gaps[0]) + 1))[:-1] > apart) + 1)
 
 
-def _reached(points: Reals, loops: Sequence[Rim], apart: float) -> Reals:
+def _reached(points: Reals, rims: Sequence[Rim], apart: float) -> Reals:
     """Where the curve along which a net was cut off comes to the surface's edge next to its first and last
     points (2, 3); the points themselves where that is farther than `apart`, m."""
-    rim = np.vstack([loop.points for loop in loops if not loop.cut])
-    away = np.linalg.norm(points[:, None] - rim, axis=2)
+    edge = np.vstack([rim.points for rim in rims if not rim.cut])
+    away = np.linalg.norm(points[:, None] - edge, axis=2)
     near = np.argmin(away, axis=1)
-    return np.where((away[[0, 1], near] < apart)[:, None], rim[near], points)
+    return np.where((away[[0, 1], near] < apart)[:, None], edge[near], points)
 
 
 def _along(points: Reals, polygon: Reals) -> Reals:

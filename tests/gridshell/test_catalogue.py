@@ -10,13 +10,13 @@ import shellform as sf
 from shellform.errors import InputError
 from shellform.gridshell import catalogue as module
 from shellform.gridshell.catalogue import (
-    allowed,
     label,
     largest,
     named,
     neighbours,
     read_catalogue,
     rounded_up,
+    sections_allowed,
     shipped_catalogues,
     with_section,
 )
@@ -153,7 +153,9 @@ def test_strength_counts_as_far_as_it_lasts(tmp_path):
 def test_sections_that_the_net_would_break_are_not_allowed(mine, net):
     bearable = net.max_radius(young=40e9, strength=255e6)
     assert 0.0012 < bearable < 0.002  # else the test says nothing
-    assert [section.radius for section in allowed(mine, net)] == pytest.approx([0.001, 0.0011, 0.0012])
+    assert [section.radius for section in sections_allowed(mine, net)] == pytest.approx(
+        [0.001, 0.0011, 0.0012]
+    )
     assert largest(mine, net).radius == pytest.approx(0.0012)
 
 
@@ -162,7 +164,7 @@ def test_a_section_that_is_used_to_the_full_by_the_net_is_allowed(mine, net):
     for share, count in [(1.0, 3), (1.0 - 1e-6, 2)]:
         material = replace(mine.material, strength=share * full)
         sections = tuple(replace(each, material=material) for each in mine.sections)
-        assert len(allowed(replace(mine, sections=sections, material=material), net)) == count
+        assert len(sections_allowed(replace(mine, sections=sections, material=material), net)) == count
 
 
 @pytest.mark.parametrize(
@@ -215,7 +217,7 @@ def test_a_design_stiffer_than_the_catalogue_is_refused(mine, shell):
 
 def test_a_catalogue_that_the_net_breaks_altogether_is_refused(net):
     with pytest.raises(InputError, match=r"none of the sections.*would be stressed to.*MPa"):
-        allowed(read_catalogue("timber_laths"), net)
+        sections_allowed(read_catalogue("timber_laths"), net)
 
 
 @pytest.mark.parametrize(
@@ -257,10 +259,10 @@ def test_where_all_sections_break_the_one_that_is_stressed_least_tells_how_far_i
     bent[1, 0, 0] = 10.0
     net = SimpleNamespace(quality=SimpleNamespace(curvature=bent, curvature_max=10.0))
     with pytest.raises(TooCurved, match="⌀ 2 mm would be stressed to 400 of 255 MPa") as told:
-        allowed(mine, net)
+        sections_allowed(mine, net)
     assert told.value.radius == pytest.approx(40e9 * 0.001 / 255e6)
     bent[1, 0, 0] = 6.0
-    assert [label(section) for section in allowed(mine, net)] == ["⌀ 2 mm"]
+    assert [label(section) for section in sections_allowed(mine, net)] == ["⌀ 2 mm"]
 
 
 def test_a_section_is_stiff_enough_only_where_it_is_so_about_both_axes():

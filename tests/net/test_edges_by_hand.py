@@ -228,16 +228,16 @@ def test_rods_ends_lie_on_the_nearest_edge_half_a_gap_below_or_above_it_unless_t
         ),
         grid=SimpleNamespace(layer=layer[::-1], scale=1.0),
     )
-    ends, loops = ends_of(net, surface, None)
-    assert [(each.opening, each.cut) for each in loops] == [(False, False), (True, False), (False, True)]
+    ends, rims = ends_of(net, surface, None)
+    assert [(each.opening, each.cut) for each in rims] == [(False, False), (True, False), (False, True)]
     assert [each.node for each in ends] == list(range(8))[::-1]
     np.testing.assert_allclose([each.middle for each in ends], middles, atol=1e-12)
-    on_edges = [(each.loop, each.at, each.vertex) for each in ends[:5]]
+    on_edges = [(each.rim, each.at, each.vertex) for each in ends[:5]]
     assert on_edges == [(0, 3.0, 0), (0, 17.0, 2), (1, 3.5, 2), (1, 7.5, 0), (0, pytest.approx(11.0), 1)]
-    cut = loops[2]
+    cut = rims[2]
     assert len(cut.points) == 5
     for each in ends[5:]:
-        assert each.loop == 2
+        assert each.rim == 2
         np.testing.assert_allclose(cut.points[each.vertex], each.middle, atol=1e-12)
         assert each.at == cut.along[each.vertex]
     assert sorted(each.vertex for each in ends[5:]) == [1, 2, 3]
@@ -316,11 +316,11 @@ def test_ends_that_were_cut_off_are_chained_up_to_two_and_a_half_spacings_and_re
         target=SimpleNamespace(positions=middles, quaternions=np.tile([1.0, 0, 0, 0], (6, 1))),
         grid=SimpleNamespace(layer=np.zeros(6), scale=2.0),
     )
-    ends, loops = ends_of(net, surface, None)
-    assert ends[5].loop == 0, "less than half a spacing from the edge"
-    assert ends[0].loop == ends[1].loop == ends[2].loop
-    assert ends[3].loop == ends[4].loop != ends[0].loop
-    assert len(loops) == 4
-    points = loops[ends[0].loop].points.tolist()
+    ends, rims = ends_of(net, surface, None)
+    assert ends[5].rim == 0, "less than half a spacing from the edge"
+    assert ends[0].rim == ends[1].rim == ends[2].rim
+    assert ends[3].rim == ends[4].rim != ends[0].rim
+    assert len(rims) == 4
+    points = rims[ends[0].rim].points.tolist()
     points = points if points[1] == middles[0].tolist() else points[::-1]
     assert points == [[0.0, 0.0, 0.0], *middles[:3].tolist(), [8.0, 8.0, 0.0]]
