@@ -84,23 +84,14 @@ def pull_net(
     """The Chebyshev net on the surface, of rods `spacing` m apart along u (`spacing_v` along v), the two layers `gap` m
     apart.
 
-    Where it lies:
-    - `angle`, rad: of the u rods against the x axis in plan, at the net's origin.
-    - `offset`: of the origin from the middle of the plan, in spacings along u and v.
-    - `guides`, in place of both: two curves in plan, (k, 2) m each, that cross at the origin and along which the u rod and
-      the v rod through it run.
-
-    Where it ends:
-    - Rods end at the surface's edge, at the `ground` level, m, and at the closed curve `outline` (k, 2), m in plan.
-    - `merge`: joints nearer to a rod's end than so many spacings are left out.
-
-    How it is found:
-    - `method`: "pull" relaxes the grid on sliding springs from the `start`, "compass" for the compass net or "flat" for
-      the flat grid; "compass" leaves the compass net as it is.
-    - `elements` of a segment; `spring_density`, EI/s³, rising, and `shear_stiffness`, EI/s a radian, of the pulling
-      (net/pull.py).
-    - `tuning` of the numbers behind it; left out: as most nets need it.
-    - `progress` is told what is done and the residual.
+    - It lies at the `angle`, rad, of the u rods against the x axis in plan, where its origin is, and the `offset` of that
+      from the middle of the plan, in spacings along u and v; or along `guides`, two curves in plan, (k, 2) m each, that
+      cross at the origin and along which the u rod and the v rod through it run.
+    - Rods end at the surface's edge, at the `ground` level, m, and at the closed curve `outline` (k, 2), m in plan; joints
+      nearer to the end than `merge` spacings are left out.
+    - The `method` "pull" relaxes the grid, of so many `elements` a segment, on sliding springs of `spring_density`, EI/s³,
+      rising, and `shear_stiffness`, EI/s a radian (pull.py), from the compass net or the flat grid (`start`); "compass"
+      leaves the compass net as it is. `tuning` of the numbers behind it: left out, as most nets need it.
 
     Raises InputError for settings that can't work on this surface, NoNet for surfaces too curved for one net,
     Stalled where the pull fails.

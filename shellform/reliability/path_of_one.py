@@ -117,7 +117,8 @@ class Bench:
 
 
 class Loading(Branch):
-    """One structure under way."""
+    """One structure under way: the perfect one of the `bench` built with these `errors`, its `number` under a seed, and
+    the local `snaps` that it has gone on after so far."""
 
     def __init__(self, bench: Bench, errors: Errors, number: int) -> None:
         nominal = bench.nominal
@@ -131,6 +132,8 @@ class Loading(Branch):
         self.snaps: list[Snap] = []
 
     def outcome(self, step: float, smallest: float, marks: Sequence[float] = ()) -> DrawnOutcome:
+        """What becomes of it, loaded from nothing in steps of at most `step` of the load, where it falls known to the
+        `smallest` one, and beside factors in `marks` to MARKED."""
         nominal = self.nominal
         here, factor = self.borne(1.0, step, smallest, marks=marks)
         snaps = tuple(self.snaps)

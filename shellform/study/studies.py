@@ -86,6 +86,9 @@ class Finding:
 
 @dataclass(frozen=True)
 class _Studying:
+    """A study at work in its `folder`: its `plan`, its `log` of outcomes, the `front` so far, and its `progress`, which is
+    told by `show`."""
+
     plan: Plan
     folder: Path
     log: Log
@@ -97,9 +100,12 @@ class _Studying:
 
 @dataclass(frozen=True)
 class _Design:
+    """A design of a study: its `key`, its `own` entries, its `case` with the `keys` of its stages; no case where it is
+    refused, for the `reason`."""
+
     key: str
     own: Mapping[str, Value]
-    case: Case | None  # None: refused for `reason`
+    case: Case | None
     keys: Mapping[str, str]
     reason: str = ""
 

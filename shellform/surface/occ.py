@@ -278,6 +278,7 @@ def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, n
 
 
 def made(points: Reals, triangles: Indices, normals: Reals | None, source: str) -> Surface:
+    """The surface (target.py: make_surface), which loads Numba: only once there is one to make."""
     from shellform.surface.shape.target import make_surface
 
     return make_surface(points, triangles, normals=normals, source=source)

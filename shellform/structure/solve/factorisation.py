@@ -263,6 +263,8 @@ class Symmetric:
 
 
 class _Pardiso:
+    """A factor by PARDISO, good until its family makes another."""
+
     def __init__(self, family: Symmetric, factor: pardiso.Factoriser, generation: int) -> None:
         self._family, self._factor, self._generation = family, factor, generation
         self.negative = factor.negative
@@ -274,30 +276,35 @@ class _Pardiso:
 
 
 class _Cholmod:
+    """A factor by CHOLMOD, good until its family makes another."""
+
     def __init__(self, family: Symmetric, factor: Any, generation: int) -> None:
         self._family, self._factor, self._generation = family, factor, generation
 
     @told(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         self._family._check(self._generation)
-        vector = right.ndim == 1
-        solution = matrix(np.ascontiguousarray(right[:, None] if vector else right))
-        cholmod.solve(self._factor, solution)
-        result = np.array(solution)
-        return result[:, 0] if vector else result
+        return _by_cholmod(self._factor, right)
 
 
 @dataclass(frozen=True)
 class _Indefinite:
+    """A `factor` by CHOLMOD with so many `negative` pivots, its own for good."""
+
     factor: Any
     negative: int
 
     @told(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
-        solution = matrix(np.ascontiguousarray(right[:, None] if right.ndim == 1 else right))
-        cholmod.solve(self.factor, solution)
-        result = np.array(solution)
-        return result[:, 0] if right.ndim == 1 else result
+        return _by_cholmod(self.factor, right)
+
+
+def _by_cholmod(factor: Any, right: Reals) -> Reals:
+    """The solution for the columns of `right` (n, k), or for a vector (n,)."""
+    solution = matrix(np.ascontiguousarray(right[:, None] if right.ndim == 1 else right))
+    cholmod.solve(factor, solution)
+    result = np.array(solution)
+    return result[:, 0] if right.ndim == 1 else result
 
 
 @dataclass(frozen=True)
@@ -343,6 +350,8 @@ def _solve(order, starts, rows, entries, right):  # type: ignore[no-untyped-def]
 
 
 class _SuperLU:
+    """A factor by SciPy's SuperLU, its own for good. Raises NotPositiveDefinite where it isn't, if it is to be `definite`."""
+
     def __init__(self, full: sp.csc_array, *, definite: bool = True) -> None:
         options = {"SymmetricMode": True}
         try:

@@ -155,13 +155,18 @@ class _Here:
 
     @property
     def negative(self) -> int:
+        """How many pivots of the tangent are."""
         return self.equilibrium.negative
 
     def point(self) -> PathPoint:
+        """What is told of it."""
         return PathPoint(self.factor, self.equilibrium, self.rate)
 
 
 class _Path:
+    """The path of the `assembly` under a `drive` from the state `start`, and what was found of it on the way: `spent`
+    factorisations, the `largest` factor come to, and whether only rotations move (`by_turns`)."""
+
     def __init__(
         self, assembly: Assembly, start: State, drive: Drive, tolerance: float, largest: float
     ) -> None:
@@ -186,6 +191,7 @@ class _Path:
         return int(found[0])
 
     def displacement(self, state: State, lead: tuple[int, int, float]) -> float:
+        """Of the degree of freedom that leads, m, since the start."""
         return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
 
     def between(self, before: State, after: State) -> Reals:
@@ -199,6 +205,8 @@ class _Path:
         return (after.positions - before.positions).ravel()[self._flat()]
 
     def point(self, state: State, factor: float, iterations: int) -> _Here:
+        """The equilibrium `state` at a load factor, with the tangent of the path there. Raises InputError where nothing
+        moves under the load."""
         balance = self.assembly.evaluate(state)
         matrix = self._factor(balance)
         tangent = self.turning.solve(matrix, balance, self._drive(state))
@@ -299,6 +307,7 @@ class _Path:
         return replace(near.point(), event=kind)
 
     def gave_up(self, here: _Here, what: str) -> NotConverged:
+        """The refusal to go on from a point, saying `what` failed."""
         return NotConverged(
             f"{what} (load factor {here.factor:.6g})",
             state=here.state,

@@ -17,6 +17,7 @@ from shellform.errors import InputError, require_file
 
 
 def load_script(path: Path) -> ModuleType:
+    """The script, run as a module. Raises InputError where it is no Python script or fails."""
     require_file(path)
     spec = importlib.util.spec_from_file_location(f"surface_{path.stem}", path)
     if spec is None or spec.loader is None:
@@ -34,6 +35,7 @@ def load_script(path: Path) -> ModuleType:
 
 
 def function_of(module: ModuleType, name: str, path: Path) -> Callable[..., Any]:
+    """The script's function of that name. Raises InputError where it has none."""
     found = getattr(module, name, None)
     if not callable(found):
         raise InputError(
@@ -43,6 +45,8 @@ def function_of(module: ModuleType, name: str, path: Path) -> Callable[..., Any]
 
 
 def named_dimensions(build: Callable[..., Any], given: dict[str, float], path: Path) -> dict[str, float]:
+    """The dimensions, m, that `build` takes by keyword, those `given` in place of its defaults. Raises InputError for a
+    name that it doesn't take, and for a value or a default that is no positive number."""
     parameters = inspect.signature(build).parameters.values()
     known = {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
     for name, value in known.items():
