@@ -36,6 +36,40 @@ def test_a_snap_through_is_told():
     assert before.warnings == ()
 
 
+def shallow_truss(elements=1):
+    """Von Mises' truss: half span 1 m, rise 0.1 m, EA = 1 kN; it bears 0.38109 N."""
+    points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.0]], elements)
+    network = in_plane(chain(points, (1e3, 1e-7, 1e-7, 1e-7), {0: PIN, 2 * elements: PIN}))
+    down = load_at(network, elements, [0.0, 0.0, -1.0])
+    return Model(network, {"down": down}, None, (0, 2 * elements)), exact.shallow_truss(1.0, 0.1, 1e3)[0]
+
+
+@pytest.mark.parametrize("times", [1.01, 1.3, 2.6, 5.0, 25.0, 80.0, 250.0])
+@pytest.mark.parametrize(("increments", "way"), [(1, 1.0), (3, 1.0), (10, -1.0)])
+def test_a_truss_under_more_than_its_limit_load_has_snapped_whatever_the_increments(times, increments, way):
+    """Increments leapt over the unstable stretch: at 2.6 times the limit load it was told to be on its branch."""
+    model, limit = shallow_truss()
+    turned = Model(model.network, {"down": way * model.loads["down"]}, None, model.supported)
+    beyond = analyse(turned, factor=way * times * limit, increments=increments)
+    assert beyond.equilibrium.stable
+    assert beyond.equilibrium.state.positions[1, 2] < -0.1
+    assert beyond.on_branch is False
+    assert "stable branch from the start ends" in beyond.warnings[-1]
+
+
+def test_what_stiffens_without_end_stays_on_its_branch_at_any_load():
+    """The elastica under PL²/EI = 1000 and a rope pulled from its middle, whose stiffness grows by thousands."""
+    bent = in_plane(chain(line(4), (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))
+    down = load_at(bent, 4, [0.0, 0.0, -1000.0])
+    for increments in (1, 4):
+        found = analyse(Model(bent, {"down": down}, None, (0,)), increments=increments)
+        assert found.on_branch is True
+        assert found.warnings == ()
+    strung = in_plane(chain(line(2), (1e6, 1e-3, 1e-3, 1e-3), {0: PIN, 2: PIN}))
+    pulled = analyse(Model(strung, {"down": load_at(strung, 1, [0.0, 0.0, -1000.0])}, None, (0, 2)))
+    assert pulled.on_branch is True
+
+
 def test_newton_doesn_t_tell_whether_it_stayed_on_the_branch_and_a_path_does():
     assert analyse(toggle(), factor=0.05, method="newton").on_branch is None
     assert analyse(toggle(), factor=0.05, method="path").on_branch is True
@@ -208,3 +242,22 @@ def ropes_only():
 def test_no_load_and_increments_that_would_take_for_ever_are_refused(increments):
     with pytest.raises(InputError, match=r"--increments: must be between 1 and 1000000.*such as 10"):
         analyse(twisted(20, [2.0, 0.0, 5.0]), increments=increments)
+
+
+def test_a_critical_factor_below_nothing_is_too_high_by_the_share_of_its_size():
+    points = line(4)
+    network = in_plane(chain(points, (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))
+    model = Model(network, {"pull": load_at(network, 4, [1.0, 0.0, 0.0])}, None, (0,))
+    found = analyse(model, factor=-0.1, critical_to=-4.0)
+    assert found.critical.factor == pytest.approx(-(np.pi**2) / 4.0, rel=0.02)
+    assert found.warnings == (
+        "The critical factor -2.49928 is about 1.3 % too high, by the same with beams halved (extrapolated -2.46737): "
+        "divide the rods into more elements.",
+    )
+    fine = analyse(replace_rods(model, 16), factor=-0.1, critical_to=-4.0)
+    assert fine.warnings == ()
+
+
+def replace_rods(model, count):
+    network = in_plane(chain(line(count), (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))
+    return Model(network, {"pull": load_at(network, count, [1.0, 0.0, 0.0])}, None, (0,))

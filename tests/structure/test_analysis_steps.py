@@ -62,7 +62,8 @@ def test_increments_of_newton_s_and_of_dynamic_relaxation_are_equal_and_supports
 def test_a_relaxation_that_leaves_the_branch_says_at_which_factor(monkeypatch):
     asked, shares = [], [1.0, 0.25, 0.5]
 
-    def advance(_assembly, _state, _drive, *, begin, end, tolerance, limit, report):
+    def advance(_assembly, _state, _drive, *, begin, end, tolerance, heeding, limit, report):
+        assert heeding
         asked.append((begin, end, tolerance, limit))
         report(0.5, equilibrium(0.0, spent=3))
         share = shares.pop(0)

@@ -223,3 +223,26 @@ def test_supports_take_the_free_nodes_along_by_the_tangent_where_that_folds_noth
     with pytest.raises(NotConverged, match="Move them by less") as told:
         loading._carried(Springs(), start, drive, 0.5)
     assert (told.value.state, told.value.iterations) == (start, 1)
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "mean", "turns"),
+    [
+        (1.0, 1.0, 1.0, False),
+        (1.0, 3.0, 1.0, False),  # x³ + a little: as steep as it gets without turning
+        (3.9, 1.0, 1.0, False),
+        (4.1, 1.0, 1.0, True),
+        (1.0, 4.1, 1.0, True),
+        (1.0, 1.0, -0.1, True),
+        (-1.0, -1.0, 0.1, True),
+        (1.0, -1.0, 0.0, False),
+        (2.0, 23.5 * 2.0, 6.0 * 2.0, True),  # von Mises' x (1 - x) (1 - x/2) from 0 to 5
+    ],
+)
+def test_a_cubic_turns_round_between_its_ends_where_its_slope_has_both_signs(before, after, mean, turns):
+    assert loading.turns_between(before, after, mean) is turns
+    along = np.linspace(0.0, 1.0, 2001)
+    slope = before + along * (6.0 * mean - 4.0 * before - 2.0 * after)
+    slope = slope + 3.0 * along**2 * (before + after - 2.0 * mean)
+    if before * after > 0.0:
+        assert bool((slope * before < 0.0).any()) is turns

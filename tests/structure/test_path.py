@@ -14,7 +14,8 @@ from shellform.structure.solve import path
 from shellform.structure.solve.equilibrium import find_equilibrium, newton
 from shellform.structure.solve.loading import Drive, advance, forces
 from shellform.structure.solve.path import follow
-from shellform.verification.models import CLAMP, chain, line
+from shellform.verification import exact
+from shellform.verification.models import CLAMP, chain, line, load_at, polyline
 
 PIN = [True, True, True, False, False, False]
 
@@ -242,3 +243,58 @@ def test_an_element_that_the_supports_reverse_is_named_and_not_accepted():
     folded = State(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, 1e-9]]), identity(3))
     with pytest.raises(NotConverged, match=r"beams\[1\] is turned.*180 degrees.*more elements"):
         find_equilibrium(assemble(network), folded, np.zeros((3, 6)))
+
+
+def shallow_truss():
+    """Von Mises' truss of two bars, half span 1 m, rise 0.1 m and EA = 1 kN, its limit load, N, and its load."""
+    points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.0]], 1)
+    network = plane(chain(points, (1e3, 1e-7, 1e-7, 1e-7), {0: PIN, 2: PIN}))
+    return network, exact.shallow_truss(1.0, 0.1, 1e3)[0], load_at(network, 1, [0.0, 0.0, -1.0])
+
+
+@pytest.mark.parametrize("sought", [1.3, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4])
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_limit_load_is_found_however_far_and_in_whichever_direction_it_is_sought(sought, way):
+    """The closed form of von Mises (1923), 1e-6 for the bending stiffness of the hinges. A first step of a tenth of a
+    hundred times that load leapt over both limit points, and there was no critical factor."""
+    network, limit, load = shallow_truss()
+    start = at_rest(network.nodes)
+    found = critical_load(assemble(network), start, forces(way * load), goal=way * sought * limit)
+    assert found.kind == "limit point"
+    assert found.factor == pytest.approx(way * limit, rel=1e-6)
+
+
+@pytest.mark.parametrize("sought", [2.0, 100.0, 1e3, 1e4])
+def test_a_toggle_whose_load_falls_by_a_twelfth_only_is_not_leapt_over(sought):
+    """Williams' toggle, whose valley is at 31.3 below its limit of 33.87; 12 straight elements a member leave 0.6 %."""
+    points = polyline([[-12.943, 0.0, 0.0], [0.0, 0.0, 0.386], [12.943, 0.0, 0.0]], 12)
+    network = plane(chain(points, (1.885e6, 9.274e3, 9.274e3, 9.274e3), {0: CLAMP, 24: CLAMP}))
+    load = forces(load_at(network, 12, [0.0, 0.0, -1.0]))
+    found = critical_load(assemble(network), at_rest(points), load, goal=33.87 * sought)
+    assert found.kind == "limit point"
+    assert found.factor == pytest.approx(33.87, rel=8e-3)
+
+
+def test_a_pulled_column_s_critical_factor_and_estimate_are_those_of_the_pushed_one_below_nothing():
+    """The estimate was 5e9 where what was sought lay below nothing."""
+    assembly, start, load = column()
+    pushed = critical_load(assembly, start, forces(load), goal=12.0)
+    pulled = critical_load(assembly, start, forces(-load), goal=-12.0)
+    assert pulled.kind == pushed.kind == "bifurcation"
+    assert pulled.factor == pytest.approx(-pushed.factor, rel=1e-9)
+    assert pulled.linearised == pytest.approx(-pushed.linearised, rel=1e-6)
+
+
+@pytest.mark.parametrize("goal", [50.0, 1e3, 1e5])
+def test_an_arch_that_sways_before_its_load_turns_round_has_a_bifurcation_however_far_is_sought(goal):
+    """A step over both called the first one a limit point."""
+    angle = np.linspace(-0.35, 0.35, 17)
+    points = np.column_stack([np.sin(angle), 0.0 * angle, np.cos(angle)])
+    network = plane(chain(points, (1e5, 1.0, 1.0, 1.0), {0: PIN, 16: PIN}))
+    load = forces(load_at(network, 8, [0.0, 0.0, -1.0]))
+    found = critical_load(assemble(network), at_rest(points), load, goal=goal)
+    assert found.kind == "bifurcation"
+    assert found.factor == pytest.approx(33.4287, rel=1e-5)
+    lowered = points[8] - found.equilibrium.state.positions[8]
+    assert lowered[2] > 0.0
+    assert np.abs(found.mode[8, 2]) < 1e-3, "the crown stays level in the mode: it sways"

@@ -163,3 +163,37 @@ def test_only_a_free_displacement_leads_and_counts_from_the_start():
     walk.start = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]))
     there = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.25]]))
     assert _Path.displacement(walk, there, (1, 2, -0.5)) == -0.75
+
+
+def test_a_first_step_beyond_a_peak_and_a_valley_is_cut_until_it_meets_the_peak(monkeypatch):
+    """From x = 0 to 3, where the curve has come back to its first slope."""
+    curve = Curve(arch, lambda x: int(TOP < x < 2.0))
+    points = followed(monkeypatch, curve, goal=20.0, first=0.5)
+    assert curve.sizes[0] > 2.0
+    assert [each.event for each in points if each.event] == ["limit point", "limit point"]
+
+
+def test_a_first_step_after_which_a_path_is_four_times_as_stiff_is_cut(monkeypatch):
+    curve = Curve(lambda x: x + x**3)
+    followed(monkeypatch, curve, goal=10.0, first=0.5)
+    assert curve.sizes[:3] == pytest.approx([5.0, 1.25, 0.3125])
+    curve = Curve(lambda x: x + x**3)
+    followed(monkeypatch, curve, goal=10.0, first=0.099)
+    assert curve.sizes[:2] == pytest.approx([0.99, 0.99])
+
+
+def test_an_event_is_a_limit_point_where_the_load_turns_round_right_there_and_not_somewhere_in_the_step(
+    monkeypatch,
+):
+    curve = Curve(arch, lambda x: int(x > 0.5))
+    events = [each for each in followed(monkeypatch, curve, goal=2.0, first=0.76) if each.event]
+    assert curve.sizes[0] * 2.0 > TOP > 0.5 > curve.sizes[0]
+    assert [each.event for each in events] == ["bifurcation"]
+
+
+def test_the_rate_of_a_path_s_first_point_has_the_sign_of_its_direction(monkeypatch):
+    for first in (0.1, -0.1):
+        points = followed(monkeypatch, Curve(lambda x: 2.0 * x), lead=(0, 2, 10.0 * first))
+        assert points[0].rate == pytest.approx(np.copysign(2.0, first))
+    pulled = followed(monkeypatch, Curve(lambda x: 2.0 * x, iterations=1), goal=-0.3, first=1.0)
+    assert pulled[0].rate == pytest.approx(-2.0)

@@ -226,6 +226,7 @@ class _Analysis:
                 begin=before,
                 end=after,
                 tolerance=self.tolerance,
+                heeding=True,
                 limit=min(self.limit, _TURNING) if self.turns else self.limit,
                 report=self._reporter(steps, before, after),
             )
@@ -369,10 +370,10 @@ class _Analysis:
 
 def _coarse(mesh: Refined | None) -> list[str]:
     """What has to be said of a critical factor that the size of the elements decides, in a sentence."""
-    if mesh is None or abs(mesh.error) <= _COARSE * mesh.coarse:
+    if mesh is None or abs(mesh.error) <= _COARSE * abs(mesh.coarse):
         return []
-    share = 100.0 * abs(mesh.error) / mesh.coarse
-    side = "high" if mesh.error > 0.0 else "low"
+    share = 100.0 * abs(mesh.error / mesh.coarse)
+    side = "high" if mesh.error * mesh.coarse > 0.0 else "low"
     return [
         f"The critical factor {mesh.coarse:.6g} is about {share:.1f} % too {side}, by the same with "
         f"beams halved (extrapolated {mesh.extrapolated:.6g}): divide the rods into more elements."

@@ -99,16 +99,17 @@ def modes(assembly: Assembly, state: State, count: int) -> Modes:
 
 @told(Work.EIGENVECTORS)
 def linearised_factor(assembly: Assembly, before: State, after: State, factors: tuple[float, float]) -> float:
-    """The critical factor estimated from the equilibria `before` and `after` at two load `factors`; infinite
-    where there is none.
+    """The critical factor estimated from the equilibria `before` and `after` at two load `factors`, beyond the second
+    as seen from the first; infinite where there is none.
 
     Raises NotPositiveDefinite where `after` isn't stable.
     """
     then = held(assembly, assembly.evaluate(after))
-    change = (then - held(assembly, assembly.evaluate(before))) / (factors[1] - factors[0])
+    onward = factors[1] - factors[0]
+    change = (then - held(assembly, assembly.evaluate(before))) / abs(onward)
     solve = assembly.matrix.factor(then).solve
     rate, tangent = assembly.matrix.full(change), assembly.matrix.full(then)
-    # (K + m R) v = 0: R v = -1/m K v, so the largest -R over K is 1/m.
+    # With m along the way, (K + m R) v = 0: R v = -1/m K v, so the largest -R over K is 1/m.
     size = tangent.shape[0]
     if size <= _DENSE:
         largest = float(np.linalg.eigvals(solve(-rate.toarray())).real.max())
@@ -128,7 +129,7 @@ def linearised_factor(assembly: Assembly, before: State, after: State, factors: 
         except ArpackNoConvergence:  # nothing stands out from the many zeros: the structure stiffens
             return np.inf
         largest = float(found[0])
-    return factors[1] + 1.0 / largest if largest > 0.0 else np.inf
+    return float(factors[1] + np.copysign(1.0, onward) / largest) if largest > 0.0 else np.inf
 
 
 def critical_load(

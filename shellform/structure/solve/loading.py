@@ -8,6 +8,11 @@ the whole; after two that succeed it is doubled again. Where even the smallest f
 ended; the rest is then applied at once, supports being moved no farther at a time than no element folds, and
 implicit dynamic relaxation follows the snap-through to wherever it ends. So the same start and load always lead to the same state. Supports that move take the free nodes
 along by the tangent, K dx = -K_held d, before the steps begin.
+
+An increment may be so wide that its steps leap over an unstable stretch and meet nothing on their way that isn't
+definite: a truss of von Mises that bears 0.38 is at rest under 1.0 beyond its snap, with positive definite tangents only.
+The cubic of the load factor over the way between both states, from the factors and from the rates K gives at both, then
+turns round twice in between (`turns_between`); `heeding` that takes one factorisation more an increment.
 """
 
 from __future__ import annotations
@@ -29,6 +34,7 @@ from shellform.structure.solve.residual import held, overturned
 STEP = 0.25
 SMALLEST = 1.0 / 64.0
 _PATIENCE = 25  # factorisations of one increment; on the branch five or six are enough
+_STIFFENING = 1.0 / 16384.0  # of the whole, an increment in which no leap is suspected where it stiffens
 _LEAST = 1e-6  # of the whole, by which supports move on at least where the branch has ended
 _LAST_DIGITS = 1e-15  # of a load, which nothing can be told from
 _REGROWTH = 2  # good increments before one is doubled again
@@ -112,6 +118,7 @@ def advance(
     smallest: float = SMALLEST,
     tolerance: float = TOLERANCE,
     stay: bool = False,
+    heeding: bool = False,
     limit: int = 1000,
     report: Reached | None = None,
 ) -> Loaded:
@@ -120,15 +127,17 @@ def advance(
 
     Increments are at most `step` and at least `smallest`, shares of the whole. With `stay` the end of the
     stable branch is returned instead of what lies beyond the snap-through: the last stable equilibrium and
-    the share of the change that it bears. `report(share, equilibrium)` is called at each accepted increment;
+    the share of the change that it bears; `heeding`: increments that leap over an unstable stretch are halved too.
+    `report(share, equilibrium)` is called at each accepted increment;
     `limit` bounds the factorisations of what follows a snap-through. Raises NotConverged.
     """
     share, spent, good = 0.0, 0, 0
     state, found = start, None
     width = widest = 1.0 / max(1, round(1.0 / step))
+    motion = _motion(assembly, state, drive) if heeding else None
     while share < 1.0:
         goal = 1.0 if share + width > 1.0 - 1e-12 else share + width
-        factor = begin + goal * (end - begin)
+        factor, least = begin + goal * (end - begin), smallest
         try:
             then, cost = _carried(assembly, state, drive, (goal - share) * (end - begin))
             spent += cost
@@ -137,16 +146,24 @@ def advance(
             )
             spent += found.factorisations
             reached = found.stable  # converged onto an unstable equilibrium: no branch goes on from there
+            onward = _motion(assembly, found.state, drive) if reached and heeding else None
+            if motion is not None and onward is not None:
+                way, change = found.state.positions - state.positions, (goal - share) * (end - begin)
+                if _leapt(way, motion, onward, change):
+                    # That went less far than foreseen may have stiffened instead: only narrow increments tell.
+                    farther = float(np.linalg.norm(way)) > abs(change) * float(np.linalg.norm(motion))
+                    least = smallest if farther else 0.0
+                    reached = not farther and width <= _STIFFENING
         except NotConverged as error:
             spent += error.iterations
             reached = False
         if not reached:
             width, good = 0.5 * width, 0
-            if width < smallest:
+            if width < least:
                 break
             continue
         assert found is not None
-        share, state, good = goal, found.state, good + 1
+        share, state, good, motion = goal, found.state, good + 1, onward
         if report is not None:
             report(share, found)
         if good == _REGROWTH:
@@ -169,6 +186,39 @@ def advance(
         )
         spent += found.factorisations
     return Loaded(replace(found, factorisations=spent), share, spent)
+
+
+def turns_between(before: float, after: float, mean: float) -> bool:
+    """Whether a cubic with the slopes `before` and `after`, of one sign, at its ends, and the `mean` slope from one to the
+    other, has slopes of the other sign on its way."""
+    # At the share t of the way its slope is before - 2 half t + square t².
+    half, square = 2.0 * before + after - 3.0 * mean, 3.0 * (before + after - 2.0 * mean)
+    if not (before * after > 0.0 and before * square > 0.0):
+        return False
+    return 0.0 < half / square < 1.0 and half * half > before * square
+
+
+def _motion(assembly: Assembly, state: State, drive: Drive) -> Reals | None:
+    """How all nodes move (n, 3) with the load factor, m, by the tangent; None where that isn't positive definite."""
+    own = fit_for(assembly, state)
+    grows = drive.load - assembly.force_along(state, drive.imposed) if drive.moves_supports else drive.load
+    motion = drive.imposed.ravel().copy()
+    try:
+        factor = own.matrix.factor(held(own, own.evaluate(state)))
+    except NotPositiveDefinite:
+        return None
+    motion[assembly.free] = factor.solve(grows.ravel()[assembly.free])
+    return motion.reshape(-1, 6)[:, :3]
+
+
+def _leapt(way: Reals, motion: Reals, onward: Reals, change: float) -> bool:
+    """Whether an increment that moves the nodes by `way` (n, 3), m, for a `change` of the load factor, with which they
+    move by `motion` (n, 3) before and go `onward` (n, 3) after it, may have leapt over an unstable stretch."""
+    length = float(np.linalg.norm(way))
+    before, after = (float(np.einsum("ij,ij", way, each)) for each in (motion, onward))
+    if length == 0.0 or before == 0.0 or after == 0.0:
+        return False
+    return turns_between(length / before, length / after, change / length)
 
 
 def _moved_on(

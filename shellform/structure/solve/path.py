@@ -17,9 +17,10 @@ holds the step to its size s:
 
 Near a limit point K is nearly singular, but dx is not. K needn't be positive definite: its factor is L D L',
 whose negative pivots count the negative eigenvalues at each point. Where the count changes between two
-points, a limit point lies between them if f turns round, else a bifurcation; it is located by bisecting the
-step on that count. Steps follow the curvature of the path: longer where Newton needs few iterations, cut
-where it doesn't get there.
+points, a limit point lies between them if f turns round there, else a bifurcation; it is located by bisecting
+the step on that count. Steps follow the curvature of the path: longer where Newton needs few iterations, cut
+where it doesn't get there, or where the cubic through both its ends with their rates turns round twice in between:
+so long a step leaps from one stable branch to the next, over two limit points.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
 from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.factorisation import Indefinite
-from shellform.structure.solve.loading import Drive
+from shellform.structure.solve.loading import Drive, turns_between
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
 
 FIRST = 0.1  # of the goal, the first step's change of the factor
@@ -46,6 +47,7 @@ _ITERATIONS = 12  # of Newton in one step
 _EASY = 4  # iterations that leave the step as it is
 _LONGEST, _SHORTEST = 2.0, 0.25  # change of the step from one to the next
 _SMALLEST = 1e-6  # of the first step
+_STIFFER = 4.0  # times as stiff after it: a first step, as long as its goal is far, may have left its branch
 _BISECTIONS = 30
 _LOCATED = 1e-7  # of the factor, as near as an event is located
 
@@ -91,9 +93,11 @@ def follow(
     if lead is not None:
         size = first * abs(lead[2]) * (1.0 if lead[2] > 0.0 else -1.0)
         direction = 1.0
+        onward = float(np.sign(size * here.tangent[led]))
     else:
-        direction = 1.0 if goal > 0.0 else -1.0
+        direction = onward = 1.0 if goal > 0.0 else -1.0
         size = first * abs(goal) * float(np.linalg.norm(here.tangent[walk.moving]))
+    here = replace(here, rate=onward * here.rate)
     if size == 0.0 or not np.isfinite(size):
         raise InputError(
             "the goal of a path must not be zero",
@@ -107,6 +111,11 @@ def follow(
     for _ in range(most):
         try:
             there = walk.step(here, size, led, last, direction)
+            if abs(size) * _SHORTEST >= smallest and (
+                (last is None and there.rate * here.rate > _STIFFER * here.rate**2)
+                or _leaps(here, there, walk.between(here.state, there.state))
+            ):
+                raise _Missed
             crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
             if lead is None and crossing:
                 there = walk.at_factor(here, there, goal)
@@ -161,6 +170,15 @@ class _Here:
     def point(self) -> PathPoint:
         """What is told of it."""
         return PathPoint(self.factor, self.equilibrium, self.rate)
+
+
+def _leaps(here: _Here, there: _Here, moved_by: Reals) -> bool:
+    """Whether the factor's cubic between two points that are `moved_by` (t,) apart, of one number of negative
+    eigenvalues and with rates of one sign, has the other sign's on its way."""
+    length = float(np.linalg.norm(moved_by))
+    if here.negative != there.negative or length == 0.0:
+        return False
+    return turns_between(here.rate, there.rate, (there.factor - here.factor) / length)
 
 
 class _Path:
@@ -286,7 +304,7 @@ class _Path:
         self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float, there: _Here
     ) -> PathPoint | None:
         """The point between two where the number of negative eigenvalues changes."""
-        low, high, near = 0.0, 1.0, there
+        low, high, before, near = 0.0, 1.0, here, there
         total = size if led is not None else float(np.linalg.norm(self.between(here.state, there.state)))
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
@@ -295,7 +313,7 @@ class _Path:
             except _Missed:
                 return None
             if found.negative == here.negative:
-                low = middle
+                low, before = middle, found
             else:
                 high, near = middle, found
             if (
@@ -303,7 +321,7 @@ class _Path:
                 and high - low < 1e-3
             ):
                 break
-        kind = "limit point" if here.rate * there.rate < 0.0 else "bifurcation"
+        kind = "limit point" if before.rate * near.rate < 0.0 else "bifurcation"
         return replace(near.point(), event=kind)
 
     def gave_up(self, here: _Here, what: str) -> NotConverged:
