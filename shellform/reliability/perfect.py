@@ -16,6 +16,7 @@ from shellform.reliability.drawing import (
     Imperfections,
 )
 from shellform.reliability.members import Members, members_of, members_of_model
+from shellform.structure.answers.request import with_supports_moved
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
@@ -93,11 +94,8 @@ def perfect_of(model: Model, load: str, *, shapes: int = SHAPES, step: float = N
             where="start",
             remedy="Give the bent state as start.",
         )
-    positions = model.start.positions.copy()
-    fixed = network.fixed[:, :3]
-    positions[fixed] = (network.nodes + network.imposed[:, :3])[fixed]
     every = np.ones(len(network.cables.ends), dtype=bool)
-    start = State(positions, model.start.quaternions)
+    start = with_supports_moved(network, model.start)
     return _perfect(network, members, every, model.loads[load], start, shapes, step)
 
 

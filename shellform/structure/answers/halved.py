@@ -19,6 +19,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import NotConverged
+from shellform.structure.answers.request import with_supports_moved
 from shellform.structure.answers.stability import critical_load
 from shellform.structure.elements import rotation
 from shellform.structure.elements.beam import STIFFNESSES, Beams
@@ -63,9 +64,10 @@ def critical_error(
     wider = Drive(*(np.vstack([part, none]) for part in (drive.load, drive.imposed, drive.base)))
     assembly = assemble(finer.network)
     try:
-        state = at_rest(finer.network.nodes) if finer.start is None else finer.start
+        state = at_rest(finer.network.nodes)
         if finer.start is not None:
-            state = find_equilibrium(assembly, state, wider.at(0.0), tolerance=tolerance).state
+            begun = with_supports_moved(finer.network, finer.start)
+            state = find_equilibrium(assembly, begun, wider.at(0.0), tolerance=tolerance).state
         found = critical_load(assembly, state, wider, goal=1.5 * goal, first=0.1 / 1.5, tolerance=tolerance)
     except NotConverged:
         return None
