@@ -265,6 +265,17 @@ def test_the_error_of_a_critical_factor_is_that_of_supports_where_they_are_moved
     assert off.critical_mesh.fine == pytest.approx(right.critical_mesh.fine, rel=1e-6)
 
 
+def test_no_critical_factor_is_told_where_the_search_for_it_did_not_come_to_its_end():
+    """It was told that there is none up to 3 where no equilibrium had been found to begin with."""
+    network = in_plane(chain(line(4), (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))
+    model = Model(network, {"down": load_at(network, 4, [0.0, 0.0, -1e30])}, None, (0,))
+    lost = result(analyse(model, critical_to=3.0))
+    assert not lost["converged"]
+    assert "critical" not in lost
+    borne = result(analyse(model, factor=1e-30, critical_to=3e-30))
+    assert borne["critical"] == {"factor": None, "sought_to": 3e-30}
+
+
 def test_a_critical_factor_below_nothing_is_too_high_by_the_share_of_its_size():
     points = line(4)
     network = in_plane(chain(points, (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))

@@ -54,8 +54,8 @@ class Analysis:
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
     `converged`; `increments` as result.json has them, each with the `steps` it took; `modes` and `critical`
     where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable branch
-    from the start; None where the method (Newton's) doesn't tell. `critical_mesh`: the critical factor on
-    this mesh and with beams halved.
+    from the start; None where the method (Newton's) doesn't tell. `critical_sought`: the factor up to which there is
+    no other critical one, 0 where that wasn't found out; `critical_mesh`: the critical factor on this mesh and with beams halved.
     """
 
     model: Model
@@ -103,7 +103,7 @@ def analyse(
     assembly = assemble(model.network)
     walk = _Analysis(model, assembly, chosen, factor, tolerance, limit, progress)
     message, converged = "", True
-    critical, softest, mesh = None, None, None
+    critical, softest, mesh, sought = None, None, None, 0.0
     try:
         walk.begin()
         origin = walk.state
@@ -113,6 +113,7 @@ def analyse(
             walk.increments(increments, method)
         if critical_to is not None:
             critical = critical_load(assembly, origin, walk.drive, goal=critical_to, tolerance=tolerance)
+            sought = critical_to
             if critical is not None:
                 mesh = critical_error(
                     model, walk.drive, critical.factor, goal=critical_to, tolerance=tolerance
@@ -138,7 +139,7 @@ def analyse(
         (*doubts(model.network), *walk.warnings(), *_coarse(mesh)),
         softest,
         critical,
-        critical_to or 0.0,
+        sought,
         walk.on_branch,
         mesh,
     )
