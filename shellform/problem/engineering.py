@@ -104,7 +104,7 @@ class ConnectorTurn(Term):
         own = beams.of_kind(CONNECTOR)
         turn = twist(beams.local_deformations(state))[own]
         # Mx_a = GJ (theta_a - theta_b) / l0, so that its derivative is that of the twist but for a factor.
-        scale = (-beams.rest_length / beams.torsion)[own]
+        scale = -beams.rest_length[own] / beams.torsion[own]
         rows = scale[:, None] * beams.local_forces_by_dof(state)[own, 1]
         sign = np.where(turn < 0.0, -1.0, 1.0)
         return _largest(

@@ -26,8 +26,9 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.net.grid import ROD
 from shellform.output.workshop.block_schedule import block_marks, block_table
 from shellform.output.workshop.nesting import cut
-from shellform.problem.engineering import RodUtilisation
+from shellform.problem.engineering import ConnectorTurn, RodUtilisation
 from shellform.problem.paths import deviations, follow
+from shellform.problem.terms import LoadedDesign
 from shellform.reliability.drawing import errors_of, variables
 from shellform.reliability.members import members_of
 from shellform.reliability.refinement import rods_halved
@@ -286,6 +287,13 @@ def test_gradients_hold_with_two_layers(shells):
         variables=[sf.RestLengths(), sf.FreeRadius(0.004, 0.008)],
     )
     slopes_hold(problem, found["locked"].design(), 3.0)
+
+
+def test_the_turn_of_connectors_divides_by_no_torsion_of_locks(shells, solved):
+    found, load = shells
+    shell, design = found["locked"], found["locked"].design()
+    with np.errstate(all="raise"):
+        ConnectorTurn("wet").measure(LoadedDesign(shell, design, solved["locked"]["design"], load))
 
 
 def test_erection_slides_and_the_load_finds_locked_rods(shells):

@@ -12,7 +12,9 @@ along by the tangent, K dx = -K_held d, before the steps begin.
 An increment may be so wide that its steps leap over an unstable stretch and meet nothing on their way that isn't
 definite: a truss of von Mises that bears 0.38 is at rest under 1.0 beyond its snap, with positive definite tangents only.
 The cubic of the load factor over the way between both states, from the factors and from the rates K gives at both, then
-turns round twice in between (`turns_between`); `heeding` that takes one factorisation more an increment.
+turns round twice in between (`turns_between`); `heeding` that takes one factorisation more an increment. What stiffens
+a great deal, and a cable that goes slack, look alike, even in the smallest increment: only where the structure comes back
+when it is taken back has nothing snapped.
 """
 
 from __future__ import annotations
@@ -29,14 +31,15 @@ from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.factorisation import NotPositiveDefinite
-from shellform.structure.solve.residual import held, overturned
+from shellform.structure.solve.residual import ResidualNorm, held, overturned
 
 STEP = 0.25
 SMALLEST = 1.0 / 64.0
 _PATIENCE = 25  # factorisations of one increment; on the branch five or six are enough
-_STIFFENING = 1.0 / 16384.0  # of the whole, an increment in which no leap is suspected where it stiffens
+_RETURNED = 0.1  # of the way of an increment, as near as it comes to its begin from its end unless it leapt
 _LEAST = 1e-6  # of the whole, by which supports move on at least where the branch has ended
 _LAST_DIGITS = 1e-15  # of a load, which nothing can be told from
+_BALANCED = 1e-5  # residual up to which a state from which increments begin is in equilibrium
 _REGROWTH = 2  # good increments before one is doubled again
 
 Reached = Callable[[float, Equilibrium], None]
@@ -134,10 +137,12 @@ def advance(
     share, spent, good = 0.0, 0, 0
     state, found = start, None
     width = widest = 1.0 / max(1, round(1.0 / step))
-    motion = _motion(assembly, state, drive) if heeding else None
+    motion = (
+        _motion(assembly, state, drive) if heeding and _at_rest(assembly, state, drive.at(begin)) else None
+    )
     while share < 1.0:
         goal = 1.0 if share + width > 1.0 - 1e-12 else share + width
-        factor, least = begin + goal * (end - begin), smallest
+        factor = begin + goal * (end - begin)
         try:
             then, cost = _carried(assembly, state, drive, (goal - share) * (end - begin))
             spent += cost
@@ -148,18 +153,17 @@ def advance(
             reached = found.stable  # converged onto an unstable equilibrium: no branch goes on from there
             onward = _motion(assembly, found.state, drive) if reached and heeding else None
             if motion is not None and onward is not None:
-                way, change = found.state.positions - state.positions, (goal - share) * (end - begin)
-                if _leapt(way, motion, onward, change):
-                    # That went less far than foreseen may have stiffened instead: only narrow increments tell.
-                    farther = float(np.linalg.norm(way)) > abs(change) * float(np.linalg.norm(motion))
-                    least = smallest if farther else 0.0
-                    reached = not farther and width <= _STIFFENING
+                change = (goal - share) * (end - begin)
+                if _may_leap(found.state.positions - state.positions, motion, onward, change):
+                    reached = 0.5 * width < smallest and _returns(
+                        assembly, state, found.state, drive, factor, change, limit
+                    )
         except NotConverged as error:
             spent += error.iterations
             reached = False
         if not reached:
             width, good = 0.5 * width, 0
-            if width < least:
+            if width < smallest:
                 break
             continue
         assert found is not None
@@ -198,6 +202,11 @@ def turns_between(before: float, after: float, mean: float) -> bool:
     return 0.0 < half / square < 1.0 and half * half > before * square
 
 
+def _at_rest(assembly: Assembly, state: State, load: Reals) -> bool:
+    """Whether the state is in equilibrium, which that of a prestressed model without a start isn't."""
+    return ResidualNorm(assembly).residual(assembly.evaluate(state, tangent=False), load) < _BALANCED
+
+
 def _motion(assembly: Assembly, state: State, drive: Drive) -> Reals | None:
     """How all nodes move (n, 3) with the load factor, m, by the tangent; None where that isn't positive definite."""
     own = fit_for(assembly, state)
@@ -211,7 +220,7 @@ def _motion(assembly: Assembly, state: State, drive: Drive) -> Reals | None:
     return motion.reshape(-1, 6)[:, :3]
 
 
-def _leapt(way: Reals, motion: Reals, onward: Reals, change: float) -> bool:
+def _may_leap(way: Reals, motion: Reals, onward: Reals, change: float) -> bool:
     """Whether an increment that moves the nodes by `way` (n, 3), m, for a `change` of the load factor, with which they
     move by `motion` (n, 3) before and go `onward` (n, 3) after it, may have leapt over an unstable stretch."""
     length = float(np.linalg.norm(way))
@@ -219,6 +228,20 @@ def _leapt(way: Reals, motion: Reals, onward: Reals, change: float) -> bool:
     if length == 0.0 or before == 0.0 or after == 0.0:
         return False
     return turns_between(length / before, length / after, change / length)
+
+
+def _returns(
+    assembly: Assembly, before: State, after: State, drive: Drive, factor: float, change: float, limit: int
+) -> bool:
+    """Whether the state `after` an increment to the load factor comes back to the one `before` it where the `change` of
+    the factor is taken back: on one branch it does, with all kinks that cables make, and from another one it doesn't."""
+    try:
+        back, _ = _carried(assembly, after, drive, -change)
+        there = find_equilibrium(assembly, back, drive.at(factor - change), limit=limit)
+    except NotConverged:
+        return False
+    off = np.linalg.norm(there.state.positions - before.positions)
+    return bool(off <= _RETURNED * np.linalg.norm(after.positions - before.positions))
 
 
 def _moved_on(

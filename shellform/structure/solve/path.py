@@ -108,14 +108,23 @@ def follow(
     yield here.point()
     smallest = _SMALLEST * abs(size)
     last: Reals | None = None
+    doubted: tuple[float, _Here] | None = None  # a step that may have leapt, and where it led
     for _ in range(most):
         try:
-            there = walk.step(here, size, led, last, direction)
-            if abs(size) * _SHORTEST >= smallest and (
-                (last is None and there.rate * here.rate > _STIFFER * here.rate**2)
-                or _leaps(here, there, walk.between(here.state, there.state))
-            ):
-                raise _Missed
+            try:
+                there = walk.step(here, size, led, last, direction)
+            except _Missed:
+                if doubted is None or not walk.kinks(here, doubted[1]):
+                    raise
+                size, there = doubted  # nothing shorter gets over the kink
+            else:
+                if abs(size) * _SHORTEST >= smallest and (
+                    (last is None and there.rate * here.rate > _STIFFER * here.rate**2)
+                    or _leaps(here, there, walk.between(here.state, there.state))
+                ):
+                    doubted = size, there
+                    raise _Missed
+            doubted = None
             crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
             if lead is None and crossing:
                 there = walk.at_factor(here, there, goal)
@@ -241,6 +250,14 @@ class _Path:
                 "nothing moves under this load", where="path", remedy="Choose a load that acts on free nodes."
             )
         return _Here(state, factor, found, tangent, 1.0 / speed, iterations, balance.turned)
+
+    def kinks(self, here: _Here, there: _Here) -> bool:
+        """Whether a cable goes slack or taut from one point to the other."""
+        taut = [
+            [cables.lengths(each.state) > cables.rest_length for cables in self.assembly.cables]
+            for each in (here, there)
+        ]
+        return any((one != other).any() for one, other in zip(*taut, strict=True))
 
     def step(self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float) -> _Here:
         """The point at `size` from `here`. Raises _Missed."""
