@@ -91,6 +91,14 @@ def test_every_solver_solves_and_counts_negative_eigenvalues(backend, monkeypatc
     )
 
 
+@pytest.mark.parametrize("backend", factorisation.installed())
+def test_every_solver_takes_a_matrix_without_rows(backend, monkeypatch):
+    monkeypatch.setenv("SHELLFORM_SOLVER", backend)
+    symmetric, values = family(np.zeros((0, 0)))
+    assert symmetric.factor(values).solve(np.zeros(0)).shape == (0,)
+    assert symmetric.negative_eigenvalues(values) == 0
+
+
 def overtaken(monkeypatch, first, second):
     """What `first` returns where a second thread runs `second` between the setting of CHOLMOD's option and
     its use, unless a lock keeps it out.

@@ -35,7 +35,7 @@ from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.dynamic import dynamic
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
 from shellform.structure.solve.extended import fit_for
-from shellform.structure.solve.loading import Drive, advance
+from shellform.structure.solve.loading import Drive, advance, turns_half
 from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import Drowned, Turning
 
@@ -199,7 +199,14 @@ class _Analysis:
             before, after = (k - 1) / count * self.factor, k / count * self.factor
             steps: list[dict[str, Any]] = []
             if method in ("newton", "dynamic"):
-                start = moved(self.state, (after - before) * self.drive.imposed)
+                motion = (after - before) * self.drive.imposed
+                if turns_half(motion):
+                    raise NotConverged(
+                        f"Supports turn by half a turn or more from load factor {before:.6g} to {after:.6g}",
+                        state=self.state,
+                        remedy="Take more increments, so that each turns them by less.",
+                    )
+                start = moved(self.state, motion)
                 solve = newton if method == "newton" else dynamic
                 found = solve(
                     self.assembly,

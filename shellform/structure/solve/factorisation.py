@@ -101,7 +101,8 @@ class Symmetric:
         self.indptr, self.indices = indptr, indices
         self.columns = np.repeat(np.arange(self.size), np.diff(indptr))
         self.diagonal = indptr[:-1]  # the first stored entry of each column of a lower triangle
-        self._backend = backend()
+        chosen = backend()
+        self._backend = chosen if self.size else "superlu"  # PARDISO takes no matrix without rows
         self._pardiso: pardiso.Factoriser | None = None
         self._bunch_kaufman: pardiso.Factoriser | None = None
         self._condensed: tuple[Indices, pardiso.Factoriser] | None = None

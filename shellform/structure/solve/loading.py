@@ -252,8 +252,10 @@ def _moved_on(
     """
     goal = 1.0
     while True:
-        then = _with_supports(state, drive, (goal - share) * (end - begin))
-        if not drive.moves_supports or not _folded(assembly, state, then):
+        change = (goal - share) * (end - begin)
+        then = _with_supports(state, drive, change)
+        turned = drive.moves_supports and turns_half(change * drive.imposed)
+        if not drive.moves_supports or not (turned or _folded(assembly, state, then)):
             return then, goal
         goal = share + 0.5 * (goal - share)
         if goal - share < _LEAST:
@@ -262,6 +264,12 @@ def _moved_on(
                 state=state,
                 remedy="Apply the motion in more increments, or divide the rods into more elements.",
             )
+
+
+def turns_half(motion: Reals) -> bool:
+    """Whether a motion (n, 6), m and rad, turns a node by half a turn or more: the state after it doesn't tell which way,
+    or how often, it went round."""
+    return bool(np.linalg.norm(motion[:, 3:], axis=1).max(initial=0.0) >= np.pi)
 
 
 def _folded(assembly: Assembly, before: State, after: State) -> bool:
@@ -290,7 +298,7 @@ def _carried(assembly: Assembly, state: State, drive: Drive, change: float) -> t
         then = _with_supports(state, drive, change)
     else:
         then = moved(state, assembly.chords.corrected(state, step.reshape(-1, 6)))
-    if _folded(assembly, state, then):
+    if turns_half(step.reshape(-1, 6)) or _folded(assembly, state, then):
         raise NotConverged(
             "Supports that move fold an element",
             state=state,
