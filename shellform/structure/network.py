@@ -101,6 +101,16 @@ def doubts(network: Network) -> list[str]:
     return [*_coincident(network), *_far_apart(network), *_misfitting(network), *_free_to_spin(network)]
 
 
+def lost_moments(network: Network, load: Reals) -> list[str]:
+    """The same of moments of the `load` (n, 6) on nodes that have no rotations."""
+    lost = np.asarray(load[:, 3:].any(axis=1))
+    lost[network.beams.ends.ravel()] = False
+    if not lost.any():
+        return []
+    first = int(np.argmax(lost))
+    return [f"Moments act on nodes that no beam touches, nodes[{first}] the first: nothing bears them."]
+
+
 def _coincident(network: Network) -> list[str]:
     order = np.lexsort(network.nodes.T)
     same = (network.nodes[order[1:]] == network.nodes[order[:-1]]).all(axis=1)

@@ -318,6 +318,17 @@ def replace_rods(model, count):
     return Model(network, {"pull": load_at(network, count, [1.0, 0.0, 0.0])}, None, (0,))
 
 
+def test_a_moment_on_a_node_that_no_beam_touches_is_told_to_be_lost():
+    """It was left out without a word: no reaction bore it."""
+    model = ropes_only()
+    turned = load_at(model.network, 1, [0.0, 0.0, -1.0, 0.0, 2.0, 0.0])
+    told = "Moments act on nodes that no beam touches, nodes[1] the first: nothing bears them."
+    assert told in analyse(Model(model.network, {"m": turned}, None, model.supported)).warnings
+    assert told not in analyse(model).warnings
+    bent = in_plane(chain(line(2), (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))
+    assert analyse(Model(bent, {"m": load_at(bent, 1, [0, 0, 0, 0, 0.1, 0])}, None, (0,))).warnings == ()
+
+
 def twisted_rod(elements, angle):
     """A clamped rod, GJ = 0.7 N·m² and 1 m long, whose other clamp turns by the angle, rad, about its axis."""
     network = in_plane(chain(line(elements), (1e6, 0.7, 1.0, 1.0), {0: CLAMP, elements: CLAMP}))

@@ -30,7 +30,7 @@ from shellform.structure.answers.request import (
 from shellform.structure.answers.stability import Critical, Modes, critical_load, modes
 from shellform.structure.elements.state import State, at_rest, moved
 from shellform.structure.model import Model
-from shellform.structure.network import assemble, doubts
+from shellform.structure.network import assemble, doubts, lost_moments
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.dynamic import dynamic
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
@@ -136,7 +136,7 @@ def analyse(
         tuple(walk.documented),
         _seconds(assembly, time.perf_counter() - began),
         message,
-        (*doubts(model.network), *walk.warnings(), *_coarse(mesh)),
+        (*doubts(model.network), *lost_moments(model.network, chosen), *walk.warnings(), *_coarse(mesh)),
         softest,
         critical,
         sought,

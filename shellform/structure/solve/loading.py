@@ -152,7 +152,7 @@ def advance(
             spent += found.factorisations
             reached = found.stable  # converged onto an unstable equilibrium: no branch goes on from there
             onward = _motion(assembly, found.state, drive) if reached and heeding else None
-            if motion is not None and onward is not None:
+            if motion is not None and onward is not None and _alike(state, found.state):
                 change = (goal - share) * (end - begin)
                 if _may_leap(found.state.positions - state.positions, motion, onward, change):
                     reached = 0.5 * width < smallest and _returns(
@@ -200,6 +200,11 @@ def turns_between(before: float, after: float, mean: float) -> bool:
     if not (before * after > 0.0 and before * square > 0.0):
         return False
     return 0.0 < half / square < 1.0 and half * half > before * square
+
+
+def _alike(before: State, after: State) -> bool:
+    """Whether both states have the same number of digits; else the motion at one of them lacks some."""
+    return (before.tail is None) == (after.tail is None)
 
 
 def _at_rest(assembly: Assembly, state: State, load: Reals) -> bool:
