@@ -17,6 +17,7 @@ from shellform.structure.solve.assembly import Assembly
 _APART = 1e12  # ratio of stiffnesses of which double precision leaves four digits
 _MISFIT = 2.0  # ratio of a beam's rest length to the distance of its nodes
 _STRAIGHT = 1e-9  # off the axis, over the rod's length
+_LOOSE = 1e-12  # of the firmest, an eigenvalue of what holds a part, below which it doesn't
 
 
 @dataclass(frozen=True)
@@ -96,7 +97,7 @@ def connected(count: int, ends: Indices) -> tuple[int, Indices]:
 
 def doubts(network: Network) -> list[str]:
     """What is allowed but rarely meant, a sentence each: nodes in one place, stiffnesses too far apart, rest
-    lengths far from the distance of their nodes, and straight rods that nothing keeps from spinning about
+    lengths far from the distance of their nodes, straight rods that nothing keeps from spinning about
     their own axis (that spin is held in the solution)."""
     return [*_coincident(network), *_far_apart(network), *_misfitting(network), *_free_to_spin(network)]
 
@@ -198,4 +199,45 @@ def _free_to_spin(network: Network) -> list[str]:
     return [
         f"{len(free)} straight rods are free to spin about their own axis, the one at nodes[{first}] the "
         "first; the spin is held."
+    ]
+
+
+def swinging(network: Network) -> Indices:
+    """A node (k,) of each of the parts of beams that their supports let turn as a whole and that no cable holds: the
+    tangent of one that nothing loads is singular, but for what holds rotations in the solution."""
+    ends, count = network.beams.ends, len(network.nodes)
+    parts, label = connected(count, ends)
+    size = np.bincount(label, minlength=parts)
+    middle = np.zeros((parts, 3))
+    np.add.at(middle, label, network.nodes)
+    arm = network.nodes - (middle / size[:, None])[label]
+    reach = np.zeros(parts)
+    np.maximum.at(reach, label, np.linalg.norm(arm, axis=1))
+    arm /= np.where(reach > 0.0, reach, 1.0)[label, None]
+    # What a held degree of freedom keeps still of the motion u + ω × arm, and of the turn ω.
+    node, dof = np.nonzero(network.fixed)
+    axis = np.eye(3)[dof % 3]
+    shifts = (dof < 3)[:, None]
+    held = np.hstack([np.where(shifts, axis, 0.0), np.where(shifts, np.cross(arm[node], axis), axis)])
+    grip = np.zeros((parts, 6, 6))
+    np.add.at(grip, label[node], held[:, :, None] * held[:, None, :])
+    values, vectors = np.linalg.eigh(grip)
+    loose = (values < _LOOSE * np.maximum(values[:, -1:], 1.0)).sum(axis=1)
+    # A straight rod's spin moves no node.
+    first = vectors[:, :, 0][label]
+    moved = np.zeros(parts)
+    np.maximum.at(moved, label, np.linalg.norm(first[:, :3] + np.cross(first[:, 3:], arm), axis=1))
+    swings = (size > 1) & ((loose > 1) | ((loose == 1) & (moved > _STRAIGHT)))
+    swings[label[network.cables.ends.ravel()]] = False
+    return np.array([np.argmax(label == part) for part in np.flatnonzero(swings)], dtype=np.int64)
+
+
+def free_to_swing(network: Network) -> list[str]:
+    """The same of parts of beams that swing."""
+    found = swinging(network)
+    if not len(found):
+        return []
+    return [
+        f"{len(found)} parts of beams can swing about their supports as a whole, the one at nodes[{found[0]}] the first; "
+        "where no load holds such a swing it is held, and `stable` disregards it."
     ]

@@ -329,6 +329,21 @@ def test_a_moment_on_a_node_that_no_beam_touches_is_told_to_be_lost():
     assert analyse(Model(bent, {"m": load_at(bent, 1, [0, 0, 0, 0, 0.1, 0])}, None, (0,))).warnings == ()
 
 
+def test_a_gate_between_two_hinges_is_told_to_swing_where_nothing_loads_it():
+    """Its tangent is singular but for 3e-10 N/m that hold rotations: it was stable without a word."""
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    gate = Model(chain(points, (1e6, 1.0, 1.0, 1.0), {0: HINGE, 3: HINGE}), {}, None, (0, 3))
+    (told,) = analyse(gate).warnings
+    assert told.startswith(
+        "1 parts of beams can swing about their supports as a whole, the one at nodes[0] the first;"
+    )
+    shut = chain(points, (1e6, 1.0, 1.0, 1.0), {0: HINGE, 1: HINGE, 3: HINGE})
+    assert analyse(Model(shut, {}, None, (0, 1, 3))).warnings == ()
+
+
+HINGE = [True, True, True, False, False, False]
+
+
 def twisted_rod(elements, angle):
     """A clamped rod, GJ = 0.7 N·m² and 1 m long, whose other clamp turns by the angle, rad, about its axis."""
     network = in_plane(chain(line(elements), (1e6, 0.7, 1.0, 1.0), {0: CLAMP, elements: CLAMP}))

@@ -9,7 +9,7 @@ import pytest
 from shellform.errors import InputError
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.cable import make_cables
-from shellform.structure.network import Network, check_restrained, doubts
+from shellform.structure.network import Network, check_restrained, doubts, swinging
 
 ALL = [True] * 6
 STIFF = (3.0e6, 1.0, 2.0, 3.0)  # EA, GJ, EI_y, EI_z
@@ -170,3 +170,37 @@ def test_a_rod_is_straight_where_its_nodes_lie_off_its_axis_by_a_billionth_of_it
     for off, straight in ((0.8e-9, True), (1.2e-9, False)):
         nodes = size * np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [1.0, off, 0.0]])
         assert (spins(network(nodes, [[0, 1], [1, 2]])) is not None) == straight
+
+
+GATE = ([[3.0, 0, 5], [4.0, 0, 5], [4.0, 1, 5], [3.0, 1, 5]], [[0, 1], [1, 2], [2, 3]])
+HINGE, PART = [True, True, True, False, False, False], [False] * 6
+
+
+@pytest.mark.parametrize(
+    ("held", "cables", "swings"),
+    [
+        ({0: HINGE, 3: HINGE}, [], True),  # about the line through both
+        ({0: HINGE}, [], True),
+        ({0: HINGE, 2: HINGE, 3: HINGE}, [], False),
+        ({0: HINGE, 3: HINGE, 1: [False, False, True, False, False, False]}, [], False),
+        ({0: HINGE, 3: HINGE, 1: [True, False, False, False, False, False]}, [], True),  # in its plane only
+        ({0: HINGE, 3: HINGE}, [[1, 4]], False),  # a cable may hold it
+        ({0: [True, True, True, True, True, True]}, [], False),
+        ({0: [True, True, True, False, True, False], 3: HINGE}, [], False),  # the hinges' line is y
+        ({0: [True, True, True, True, False, True], 3: HINGE}, [], True),
+    ],
+)
+def test_a_part_that_turns_about_its_supports_as_a_whole_is_told_to_swing(held, cables, swings):
+    nodes, beams = GATE
+    far = [[9.0, 9.0, 9.0]] if cables else []
+    built = network([*nodes, *far], beams, cables)
+    fixed = np.array([held.get(k, PART) for k in range(len(built.nodes))])
+    found = swinging(replace(built, fixed=fixed))
+    assert found.tolist() == ([0] if swings else [])
+
+
+def test_a_straight_rod_between_hinges_spins_but_does_not_swing_and_one_on_a_hinge_does():
+    points, rods = along(0, 1, 2, 3), [[0, 1], [1, 2], [2, 3]]
+    for held, swings in (({0: HINGE, 3: HINGE}, []), ({1: HINGE}, [0])):
+        fixed = np.array([held.get(k, PART) for k in range(4)])
+        assert swinging(replace(network(points, rods), fixed=fixed)).tolist() == swings

@@ -30,7 +30,7 @@ from shellform.structure.answers.request import (
 from shellform.structure.answers.stability import Critical, Modes, critical_load, modes
 from shellform.structure.elements.state import State, at_rest, moved
 from shellform.structure.model import Model
-from shellform.structure.network import assemble, doubts, lost_moments
+from shellform.structure.network import assemble, doubts, free_to_swing, lost_moments, swinging
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.dynamic import dynamic
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
@@ -136,7 +136,13 @@ def analyse(
         tuple(walk.documented),
         _seconds(assembly, time.perf_counter() - began),
         message,
-        (*doubts(model.network), *lost_moments(model.network, chosen), *walk.warnings(), *_coarse(mesh)),
+        (
+            *doubts(model.network),
+            *lost_moments(model.network, chosen),
+            *free_to_swing(model.network),
+            *walk.warnings(),
+            *_coarse(mesh),
+        ),
         softest,
         critical,
         sought,
@@ -172,6 +178,7 @@ class _Analysis:
         imposed = none if self.model.start is not None else np.where(network.fixed, network.imposed, 0.0)
         self.drive = Drive(self.load, imposed, none)
         self.loaded = np.flatnonzero(self.load.any(axis=1))
+        self.swings = len(swinging(network)) > 0
         self.turns = len(Turning(self.assembly, self.load).nodes) > 0
         self.state = (
             at_rest(network.nodes)
@@ -234,7 +241,7 @@ class _Analysis:
                 begin=before,
                 end=after,
                 tolerance=self.tolerance,
-                heeding=True,
+                heeding=not self.swings,
                 limit=min(self.limit, _TURNING) if self.turns else self.limit,
                 report=self._reporter(steps, before, after),
             )

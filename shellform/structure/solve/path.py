@@ -111,24 +111,13 @@ def follow(
     doubted: tuple[float, _Here] | None = None  # a step that may have leapt, and where it led
     for _ in range(most):
         try:
-            try:
-                there = walk.step(here, size, led, last, direction)
-            except _Missed:
-                if doubted is None or not walk.kinks(here, doubted[1]):
-                    raise
-                size, there = doubted  # nothing shorter gets over the kink
-            else:
-                if abs(size) * _SHORTEST >= smallest and (
-                    (last is None and there.rate * here.rate > _STIFFER * here.rate**2)
-                    or _leaps(here, there, walk.between(here.state, there.state))
-                ):
-                    doubted = size, there
-                    raise _Missed
+            size, there = _onward(walk, here, size, led, last, direction, smallest, doubted)
             doubted = None
             crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
             if lead is None and crossing:
                 there = walk.at_factor(here, there, goal)
-        except _Missed:
+        except _Missed as missed:
+            doubted = missed.doubted or doubted
             size *= _SHORTEST
             if abs(size) < smallest:
                 raise walk.gave_up(here, "The path could not be followed further") from None
@@ -153,8 +142,39 @@ def follow(
     raise walk.gave_up(here, f"The path did not come to its end within {most} points")
 
 
+def _onward(
+    walk: _Path,
+    here: _Here,
+    size: float,
+    led: int | None,
+    last: Reals | None,
+    direction: float,
+    smallest: float,
+    doubted: tuple[float, _Here] | None,
+) -> tuple[float, _Here]:
+    """The step taken and its point; the `doubted` one where a cable's kink lies on the way that no shorter one gets over.
+    Raises _Missed."""
+    try:
+        there = walk.step(here, size, led, last, direction)
+    except _Missed:
+        if doubted is None or not walk.kinks(here, doubted[1]):
+            raise
+        return doubted
+    way = float(np.linalg.norm(walk.between(here.state, there.state)))
+    leaps = last is None and there.rate * here.rate > _STIFFER * here.rate**2
+    if here.negative == there.negative and way > 0.0:
+        leaps |= turns_between(here.rate, there.rate, (there.factor - here.factor) / way)
+    if leaps and abs(size) * _SHORTEST >= smallest:
+        raise _Missed((size, there))
+    return size, there
+
+
 class _Missed(Exception):
-    """A step found no point."""
+    """A step found no point, or a `doubted` one, with its size, that may lie beyond a leap."""
+
+    def __init__(self, doubted: tuple[float, _Here] | None = None) -> None:
+        self.doubted = doubted
+        super().__init__()
 
 
 @dataclass(frozen=True)
@@ -179,15 +199,6 @@ class _Here:
     def point(self) -> PathPoint:
         """What is told of it."""
         return PathPoint(self.factor, self.equilibrium, self.rate)
-
-
-def _leaps(here: _Here, there: _Here, moved_by: Reals) -> bool:
-    """Whether the factor's cubic between two points that are `moved_by` (t,) apart, of one number of negative
-    eigenvalues and with rates of one sign, has the other sign's on its way."""
-    length = float(np.linalg.norm(moved_by))
-    if here.negative != there.negative or length == 0.0:
-        return False
-    return turns_between(here.rate, there.rate, (there.factor - here.factor) / length)
 
 
 class _Path:
