@@ -205,17 +205,21 @@ def _free_to_spin(network: Network) -> list[str]:
 def swinging(network: Network) -> Indices:
     """A node (k,) of each of the parts of beams that their supports let turn as a whole and that no cable holds: the
     tangent of one that nothing loads is singular, but for what holds rotations in the solution."""
-    ends, count = network.beams.ends, len(network.nodes)
-    parts, label = connected(count, ends)
-    size = np.bincount(label, minlength=parts)
+    touched, ends = np.unique(network.beams.ends), network.beams.ends
+    if not len(touched):
+        return touched
+    _, first, label = np.unique(
+        connected(len(network.nodes), ends)[1][touched], return_index=True, return_inverse=True
+    )
+    parts, place = len(first), network.nodes[touched]
     middle = np.zeros((parts, 3))
-    np.add.at(middle, label, network.nodes)
-    arm = network.nodes - (middle / size[:, None])[label]
+    np.add.at(middle, label, place)
+    arm = place - (middle / np.bincount(label)[:, None])[label]
     reach = np.zeros(parts)
     np.maximum.at(reach, label, np.linalg.norm(arm, axis=1))
-    arm /= np.where(reach > 0.0, reach, 1.0)[label, None]
+    arm /= reach[label, None]
     # What a held degree of freedom keeps still of the motion u + ω × arm, and of the turn ω.
-    node, dof = np.nonzero(network.fixed)
+    node, dof = np.nonzero(network.fixed[touched])
     axis = np.eye(3)[dof % 3]
     shifts = (dof < 3)[:, None]
     held = np.hstack([np.where(shifts, axis, 0.0), np.where(shifts, np.cross(arm[node], axis), axis)])
@@ -224,12 +228,12 @@ def swinging(network: Network) -> Indices:
     values, vectors = np.linalg.eigh(grip)
     loose = (values < _LOOSE * np.maximum(values[:, -1:], 1.0)).sum(axis=1)
     # A straight rod's spin moves no node.
-    first = vectors[:, :, 0][label]
+    softest = vectors[:, :, 0][label]
     moved = np.zeros(parts)
-    np.maximum.at(moved, label, np.linalg.norm(first[:, :3] + np.cross(first[:, 3:], arm), axis=1))
-    swings = (size > 1) & ((loose > 1) | ((loose == 1) & (moved > _STRAIGHT)))
-    swings[label[network.cables.ends.ravel()]] = False
-    return np.array([np.argmax(label == part) for part in np.flatnonzero(swings)], dtype=np.int64)
+    np.maximum.at(moved, label, np.linalg.norm(softest[:, :3] + np.cross(softest[:, 3:], arm), axis=1))
+    swings = (loose > 1) | ((loose == 1) & (moved > _STRAIGHT))
+    swings[label[np.isin(touched, network.cables.ends)]] = False
+    return touched[first[swings]]
 
 
 def free_to_swing(network: Network) -> list[str]:
