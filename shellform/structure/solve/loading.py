@@ -39,6 +39,8 @@ _PATIENCE = 25  # factorisations of one increment; on the branch five or six are
 _RETURNED = 0.1  # of the way of an increment, as near as it comes to its begin from its end unless it leapt
 _LEAST = 1e-6  # of the whole, by which supports move on at least where the branch has ended
 _LAST_DIGITS = 1e-15  # of a load, which nothing can be told from
+_STRAIGHT = 5  # factorisations that an increment takes at the most …
+_NEAR = 0.02  # … and of the extent, that its nodes move, which leaps over nothing
 _BALANCED = 1e-5  # residual up to which a state from which increments begin is in equilibrium
 _REGROWTH = 2  # good increments before one is doubled again
 
@@ -137,9 +139,6 @@ def advance(
     share, spent, good = 0.0, 0, 0
     state, found = start, None
     width = widest = 1.0 / max(1, round(1.0 / step))
-    motion = (
-        _motion(assembly, state, drive) if heeding and _at_rest(assembly, state, drive.at(begin)) else None
-    )
     while share < 1.0:
         goal = 1.0 if share + width > 1.0 - 1e-12 else share + width
         factor = begin + goal * (end - begin)
@@ -151,10 +150,9 @@ def advance(
             )
             spent += found.factorisations
             reached = found.stable  # converged onto an unstable equilibrium: no branch goes on from there
-            onward = _motion(assembly, found.state, drive) if reached and heeding else None
-            if motion is not None and onward is not None and _alike(state, found.state):
+            if reached and heeding and (found.factorisations > _STRAIGHT or _far(state, found.state)):
                 change = (goal - share) * (end - begin)
-                if _may_leap(found.state.positions - state.positions, motion, onward, change):
+                if _may_leap(assembly, state, found.state, drive, factor, change):
                     reached = 0.5 * width < smallest and _returns(
                         assembly, state, found.state, drive, factor, change, limit
                     )
@@ -167,7 +165,7 @@ def advance(
                 break
             continue
         assert found is not None
-        share, state, good, motion = goal, found.state, good + 1, onward
+        share, state, good = goal, found.state, good + 1
         if report is not None:
             report(share, found)
         if good == _REGROWTH:
@@ -202,6 +200,12 @@ def turns_between(before: float, after: float, mean: float) -> bool:
     return 0.0 < half / square < 1.0 and half * half > before * square
 
 
+def _far(before: State, after: State) -> bool:
+    """Whether a node moves so far that the increment may have leapt over something."""
+    way = np.linalg.norm(after.positions - before.positions, axis=1).max()
+    return bool(way > _NEAR * np.ptp(before.positions, axis=0).max())
+
+
 def _alike(before: State, after: State) -> bool:
     """Whether both states have the same number of digits; else the motion at one of them lacks some."""
     return (before.tail is None) == (after.tail is None)
@@ -225,14 +229,23 @@ def _motion(assembly: Assembly, state: State, drive: Drive) -> Reals | None:
     return motion.reshape(-1, 6)[:, :3]
 
 
-def _may_leap(way: Reals, motion: Reals, onward: Reals, change: float) -> bool:
-    """Whether an increment that moves the nodes by `way` (n, 3), m, for a `change` of the load factor, with which they
-    move by `motion` (n, 3) before and go `onward` (n, 3) after it, may have leapt over an unstable stretch."""
-    length = float(np.linalg.norm(way))
-    before, after = (float(np.einsum("ij,ij", way, each)) for each in (motion, onward))
-    if length == 0.0 or before == 0.0 or after == 0.0:
+def _may_leap(
+    assembly: Assembly, before: State, after: State, drive: Drive, factor: float, change: float
+) -> bool:
+    """Whether an increment from one state to the other, by a `change` of the load factor up to this one, may have leapt over
+    an unstable stretch: whether the cubic through both, with the rates at which the nodes move there, turns back. A state
+    that isn't in equilibrium before, or has other digits, tells nothing."""
+    if not _alike(before, after) or not _at_rest(assembly, before, drive.at(factor - change)):
         return False
-    return turns_between(length / before, length / after, change / length)
+    way = after.positions - before.positions
+    length, rates = float(np.linalg.norm(way)), []
+    for state in (before, after):
+        motion = _motion(assembly, state, drive)
+        rate = 0.0 if motion is None else float(np.einsum("ij,ij", way, motion))
+        if length == 0.0 or rate == 0.0:
+            return False
+        rates.append(length / rate)
+    return turns_between(rates[0], rates[1], change / length)
 
 
 def _returns(
