@@ -51,27 +51,27 @@ def reals(name: str, value: ArrayLike, shape: Shape, *, positive: bool = False) 
 
 def indices(name: str, value: ArrayLike, shape: Shape, *, below: int) -> Indices:
     """A read-only int64 copy of `value` with the given shape, every entry in [0, below)."""
-    raw = np.asarray(value)
+    raw = regular(name, value, shape)
     if raw.size == 0:
-        raw = raw.astype(np.int64).reshape([0 if n is None else n for n in shape])
+        raw = raw.astype(np.int64)
     if raw.dtype.kind not in "iu":
         raise InputError(
             f"{name} must be whole numbers",
             value=_short(value),
             remedy="Give integers, not floats.",
         )
-    raw = _shaped(name, raw.astype(np.int64), shape)
+    raw = _shaped(name, raw, shape)
     outside = (raw < 0) | (raw >= below)
     if outside.any():
         where = _first(outside)
         remedy = f"Indices run from 0 to {below - 1}."
         raise InputError(f"{name}{where} is out of range", value=int(raw[where]), remedy=remedy)
-    return _frozen(raw)
+    return _frozen(raw.astype(np.int64))
 
 
 def flags(name: str, value: ArrayLike, shape: Shape) -> Flags:
     """A read-only boolean copy of `value` with the given shape."""
-    raw = np.asarray(value)
+    raw = regular(name, value, shape)
     if raw.dtype.kind != "b":
         raise InputError(
             f"{name} must be true or false",
@@ -79,6 +79,16 @@ def flags(name: str, value: ArrayLike, shape: Shape) -> Flags:
             remedy="Give booleans: a comparison, or an array of dtype bool.",
         )
     return _frozen(_shaped(name, raw, shape))
+
+
+def regular(name: str, value: ArrayLike, shape: Shape) -> NDArray[Any]:
+    """`value` as an array. Raises InputError where its rows have different lengths."""
+    try:
+        return np.asarray(value)
+    except ValueError as error:
+        raise InputError(
+            f"{name} has rows of different lengths", value=_short(value), remedy=f"Give {_wanted(shape)}."
+        ) from error
 
 
 class Arrays(dict[str, Any]):

@@ -15,12 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.errors import InputError
+from shellform.arrays import Reals, reals, regular
+from shellform.errors import InputError, require_number
 from shellform.structure.elements.sections import Section, stiffness
 from shellform.structure.model import Model, parse_model
 
 _HELD = {"pinned": [True] * 3 + [False] * 3, "fixed": [True] * 6}
-Rod = Section | Sequence[float]
+Rod = Section | Sequence[float] | Reals
 """A section of a material, or its stiffnesses (EA, GJ, EI_y, EI_z), N and N·m²."""
 
 _Lines = list[tuple[int, int, dict[str, float]]]  # two nodes, and what the line has of its own
@@ -59,15 +60,21 @@ def from_arrays(
     InputError naming what is wrong."""
     places = _numbers("nodes", nodes, 3)
     beams, ties = _pairs("rods", rods, len(places)), _pairs("cables", cables, len(places))
-    rest = None if rest_lengths is None else np.asarray(rest_lengths, dtype=float)
-    if rest is not None and rest.shape != (len(ties),):
+    rest = None if rest_lengths is None else reals("rest_lengths", rest_lengths, (None,))
+    if rest is not None and len(rest) != len(ties):
         raise InputError(
             "has another length than cables",
             where="rest_lengths",
             value=rest.shape,
             remedy="Give a rest length for each cable, or leave rest_lengths out.",
         )
-    held = supports if isinstance(supports, Mapping) else dict.fromkeys(supports, "pinned")
+    if not isinstance(loads, Mapping | None):
+        raise InputError(
+            "must have names",
+            where="loads",
+            value=type(loads).__name__,
+            remedy='Give arrays by name: {"snow": forces}.',
+        )
     forces = {name: _numbers(f"loads[{name!r}]", force, 3) for name, force in (loads or {}).items()}
     for name, force in forces.items():
         if len(force) != len(places):
@@ -82,7 +89,7 @@ def from_arrays(
         places.tolist(),
         [(a, b, {}) for a, b in beams],
         [(a, b, {} if rest is None else {"rest_length": float(rest[k])}) for k, (a, b) in enumerate(ties)],
-        dict(held),
+        _held(supports),
         {name: dict(enumerate(force.tolist())) for name, force in forces.items()},
         rod,
         cable,
@@ -149,7 +156,7 @@ def _from_attributes(
         where = f"node {key!r}"
         places.append(_three(where, place, "Give pos = (x, y, z), or x, y and z."))
         if data.get("support"):
-            held[k] = "pinned" if data["support"] is True else str(data["support"])
+            held[k] = "pinned" if isinstance(data["support"], bool | np.bool_) else str(data["support"])
         if data.get("load") is not None:
             loads[k] = _three(where, data["load"], "A load has three components.")
     known = ("rod", "cable", None)
@@ -163,7 +170,11 @@ def _from_attributes(
             )
     rods, cables = _Lines(), _Lines()
     for a, b, data in edges:
-        own = {"rest_length": float(data["rest_length"])} if data.get("rest_length") is not None else {}
+        own = {}
+        if data.get("rest_length") is not None:
+            own["rest_length"] = data["rest_length"]
+            where = f"edge {a!r}, {b!r}: rest_length"
+            require_number(own["rest_length"], above=0.0, where=where, give="metres, such as 0.055")
         (cables if data.get("kind") == "cable" else rods).append((number[a], number[b], own))
     return _built(keys, places, rods, cables, held, {"load": loads} if loads else {}, rod, cable)
 
@@ -186,19 +197,11 @@ def _built(
         raise InputError(
             "is needed: the network has cables", where="cable", remedy="Give their axial stiffness EA, N."
         )
-    values: list[float] = []
-    if rod is not None:
-        values = [float(each) for each in (rod if isinstance(rod, Sequence) else stiffness(rod))]
-    if rod is not None and len(values) != 4:
-        raise InputError(
-            "needs four stiffnesses",
-            where="rod",
-            value=len(values),
-            remedy="Give EA in N and GJ, EI_y, EI_z in N·m², or a section such as sf.Round.",
-        )
-    of_rods = dict(zip(("EA", "GJ", "EIy", "EIz"), values, strict=False))
+    if cable is not None:
+        require_number(cable, above=0.0, where="cable", give="their axial stiffness EA, N, such as 187.0")
+    of_rods = {} if rod is None else _stiffnesses(rod)
     for node, how in held.items():
-        if how not in _HELD:
+        if not isinstance(how, str) or how not in _HELD:
             raise InputError(
                 "is no way to hold a node",
                 where=f"supports[{node}]",
@@ -234,6 +237,41 @@ def _built(
     return OwnNetwork(model, tuple(keys))
 
 
+def _stiffnesses(rod: Any) -> dict[str, float]:
+    """A rod's stiffnesses by their names in the model file. Raises InputError for what are no four of them."""
+    given = stiffness(rod) if hasattr(rod, "constants") else rod
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    if values.shape != (4,):
+        raise InputError(
+            "needs four stiffnesses",
+            where="rod",
+            value=given,
+            remedy="Give EA in N and GJ, EI_y, EI_z in N·m², or a section: that of an sf.Rod is its .section.",
+        )
+    return dict(zip(("EA", "GJ", "EIy", "EIz"), values.tolist(), strict=True))
+
+
+def _held(supports: Mapping[int, str] | Sequence[int]) -> dict[int, str]:
+    """How each support is held, by the node's number. Raises InputError for what are no numbers: a flag isn't one."""
+    strange: list[object] = []
+    try:
+        held = dict(supports) if isinstance(supports, Mapping) else dict.fromkeys(supports, "pinned")
+        strange += [node for node in held if isinstance(node, bool) or not isinstance(node, int | np.integer)]
+    except TypeError:  # no list, or one of lists
+        strange.append(supports)
+    if strange:
+        raise InputError(
+            "is no node's number",
+            where="supports",
+            value=strange[0],
+            remedy='Give numbers counted from 0, or each with "pinned" or "fixed"; of flags np.flatnonzero(flags).',
+        )
+    return held
+
+
 def _length(places: Sequence[Sequence[float]], a: int, b: int) -> float:
     return float(np.linalg.norm(np.subtract(places[b], places[a])))
 
@@ -254,7 +292,7 @@ def _numbers(name: str, given: ArrayLike, width: int) -> np.ndarray:
 
 
 def _pairs(name: str, given: ArrayLike, count: int) -> list[tuple[int, int]]:
-    values = np.asarray(given)
+    values = regular(name, given, (None, 2))
     if values.size == 0:
         return []
     if values.ndim != 2 or values.shape[1] != 2 or not np.issubdtype(values.dtype, np.integer):

@@ -50,6 +50,18 @@ def test_numbers_and_indices_that_are_none_are_refused_with_where_they_stand_and
         flags("fixed", [1, 0], (2,))
 
 
+def test_rows_of_different_lengths_are_refused_and_so_is_nothing_where_a_count_is_known():
+    with pytest.raises(InputError, match=r"nodes has rows of different lengths.*shape \(any, 2\)"):
+        indices("nodes", [[0, 1], [1]], (None, 2), below=3)
+    with pytest.raises(InputError, match="fixed has rows of different lengths"):
+        flags("fixed", [[True], [True, False]], (None, 2))
+    with pytest.raises(InputError, match=r"nodes has the wrong shape \(found \(0,\)\)"):
+        indices("nodes", [], (4,), below=3)
+    assert indices("nodes", [], (None, 2), below=3).shape == (0, 2)
+    with pytest.raises(InputError, match=r"nodes\(0,\) is out of range \(found 9223372036854775808\)"):
+        indices("nodes", np.array([2**63], dtype=np.uint64), (1,), below=3)
+
+
 def test_what_was_found_is_told_up_to_sixty_letters():
     for count, whole in ((57, True), (58, False), (90, False)):
         text = "y" * count

@@ -55,6 +55,10 @@ def points(support="support"):
     return found
 
 
+def tied(name, value):
+    return "a", "c", {"kind": "cable", name: value}
+
+
 def same(one, other):
     found = [each.model.network for each in (one, other)]
     assert found[0].nodes == pytest.approx(found[1].nodes)
@@ -84,6 +88,21 @@ def test_arrays_networkx_and_compas_give_the_same_model():
     same(sf.networks.from_compas(Compas(points(), EDGES, "node"), rod=ROD, cable=187.0), wanted)
     anchored = Compas(points("is_anchor"), EDGES, "vertex")
     same(sf.networks.from_compas(anchored, rod=ROD, cable=187.0), wanted)
+
+
+def test_what_numpy_made_of_stiffnesses_and_flags_means_the_same():
+    load = np.zeros((3, 3))
+    load[1] = LOAD
+    nodes, rods, supports = np.array(NODES), np.array([[0, 1], [1, 2]]), np.array([0, 2])
+    found = [
+        sf.networks.from_arrays(nodes, rods, rod=rod, supports=held, loads={"load": load})
+        for rod, held in ((ROD, [0, 2]), (np.array(ROD), supports))
+    ]
+    same(*found)
+    assert (found[0].model.network.beams.axial == found[1].model.network.beams.axial).all()
+    held = points()
+    held["c"]["support"] = np.True_
+    same(*(sf.networks.from_networkx(Graph(each, EDGES), rod=ROD, cable=187.0) for each in (points(), held)))
 
 
 def test_the_model_has_the_places_stiffnesses_lengths_supports_and_forces_that_were_given():
@@ -168,6 +187,41 @@ def test_a_section_gives_the_stiffnesses_and_the_model_is_solved():
         ),
         (lambda: sf.networks.from_compas(Graph({}, [])), "no node_attribute"),
         (lambda: plain().index("z"), "is no node"),
+        (
+            lambda: sf.networks.from_arrays(NODES, [[0, 1], [1]], rod=ROD),
+            "rods has rows of different lengths",
+        ),
+        (
+            lambda: sf.networks.from_arrays(NODES, supports=[True, False, True]),
+            "supports: is no node's number",
+        ),
+        (lambda: sf.networks.from_arrays(NODES, supports=[0.5, 2]), "supports: is no node's number.*0.5"),
+        (lambda: sf.networks.from_arrays(NODES, supports="pinned"), "supports: is no node's number"),
+        (lambda: sf.networks.from_arrays(NODES, supports=[[0, 2]]), "supports: is no node's number"),
+        (lambda: sf.networks.from_arrays(NODES, supports=2), "supports: is no node's number"),
+        (lambda: sf.networks.from_arrays(NODES, supports={0: ["pinned"]}), "no way to hold"),
+        (lambda: sf.networks.from_arrays(NODES, loads=[[0, 0, 1]] * 3), "loads: must have names"),
+        (lambda: sf.networks.from_arrays(NODES, [[0, 1]], rod={"EA": 1.0}), "four stiffnesses"),
+        (
+            lambda: sf.networks.from_arrays(NODES, [[0, 1]], rod=sf.Rod.round(young=40e9, radius=0.01)),
+            "four stiffnesses.*is its .section",
+        ),
+        (
+            lambda: sf.networks.from_arrays(NODES, cables=[[0, 1]], cable=sf.Cable(187.0)),
+            "cable: must be a number",
+        ),
+        (
+            lambda: sf.networks.from_arrays(NODES, cables=[[0, 1]], cable=1.0, rest_lengths=[np.nan]),
+            r"rest_lengths\(0,\) is not finite",
+        ),
+        (
+            lambda: sf.networks.from_networkx(Graph(points(), [tied("rest_length", np.nan)]), cable=1.0),
+            "edge 'a', 'c': rest_length: must be positive and finite",
+        ),
+        (
+            lambda: sf.networks.from_networkx(Graph(points(), [tied("rest_length", "long")]), cable=1.0),
+            "edge 'a', 'c': rest_length: must be a number",
+        ),
     ],
 )
 def test_what_is_no_network_is_refused_with_where_it_is_wrong(make, message):

@@ -152,7 +152,7 @@ def thrust_shell(
     from shellform.surface import cad
     from shellform.surface.shape.target import make_surface
 
-    corners = reals("outline", outline, (None, 2))
+    corners = _corners("outline", outline)
     if len(corners) < 3 or _turning(corners) <= 0.0:
         raise InputError(
             "must be at least three corners, counterclockwise",
@@ -160,17 +160,29 @@ def thrust_shell(
             value=corners.tolist(),
             remedy="Reverse their order." if len(corners) > 2 else "Give x and y of each corner, m.",
         )
-    if not 0.0 < sag < 0.5:
-        raise InputError("must be above 0 and below 0.5", where="sag", value=sag, remedy="0.1 is usual.")
+    require_number(sag, above=0.0, below=0.5, where="sag", give="a share of the span, such as 0.1")
     require_number(size, above=0.0, where="size", give="metres, such as a fortieth of the span")
     line, corner = _divided(corners, size)
     stands = np.ones(len(line), dtype=bool) if supports is None else _standing(supports, corner, len(line))
-    rings = [_divided(reals("openings", each, (None, 2)), size)[0] for each in openings]
+    holes = [_corners(f"openings[{k}]", each) for k, each in enumerate(openings)]
+    for k, hole in enumerate(holes):
+        if _turning(hole) == 0.0:
+            raise InputError(
+                "encloses nothing",
+                where=f"openings[{k}]",
+                value=hole.tolist(),
+                remedy="Give x and y of at least three corners, m.",
+            )
+    rings = [_divided(hole, size)[0] for hole in holes]
     rings = [ring if _turning(ring) > 0.0 else ring[::-1] for ring in rings]
     inside, faces = cad.mesh_plan([line, *rings], size=size)
     plan = np.vstack([line, *rings, inside])
     held = np.zeros(len(plan), dtype=bool)
     held[: len(line)] = stands
+    if held.all():
+        raise InputError(
+            "leaves no point between the supports", where="size", value=size, remedy="Choose a smaller one."
+        )
     ends, density = _isotropic_thrust(plan, faces)
     arches, pull = _arches(line, stands, rings, sag)
     ends, density = np.vstack([ends, arches]), np.concatenate([density, pull])
@@ -266,6 +278,20 @@ def fitted_densities(
     return -bounded_minimum(matrix, push.T @ right + nearest * uniform, least * uniform)
 
 
+def _corners(name: str, polygon: ArrayLike) -> Reals:
+    """The corners (k, 2), m, of a closed polygon. Raises InputError where one lies on the next."""
+    corners = reals(name, polygon, (None, 2))
+    again = (corners == np.roll(corners, -1, axis=0)).all(axis=1)
+    if len(corners) > 1 and again.any():
+        raise InputError(
+            "has a corner twice in a row",
+            where=name,
+            value=corners[np.argmax(again)].tolist(),
+            remedy="Leave one of the two out: the last corner and the first are joined by themselves.",
+        )
+    return corners
+
+
 def _turning(polygon: Reals) -> float:
     """Twice the area, m², of a closed polygon, positive counterclockwise."""
     after = np.roll(polygon, -1, axis=0)
@@ -285,10 +311,7 @@ def _divided(polygon: Reals, size: float) -> tuple[Reals, Indices]:
 
 def _standing(supports: Sequence[tuple[int, int]], corner: Indices, count: int) -> Flags:
     held = np.zeros(count, dtype=bool)
-    for i, j in supports:
-        if not (0 <= i < len(corner) and 0 <= j < len(corner)):
-            remedy = f"Corners run from 0 to {len(corner) - 1}."
-            raise InputError("names a corner that isn't there", where="supports", value=(i, j), remedy=remedy)
+    for i, j in indices("supports", supports, (None, 2), below=len(corner)).tolist():
         length = int((corner[j] - corner[i]) % count)
         held[(corner[i] + np.arange(length + 1)) % count] = True
     if held.sum() < 2:
