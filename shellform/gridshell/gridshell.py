@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Flags, Indices, Reals, indices, reals
+from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
 from shellform.errors import InputError, require_number
 from shellform.gridshell.edge_beams import EdgeBeam, edge_beams
 from shellform.gridshell.layers import LOCK, locks, rod_bending_stress, rod_forces, rod_stress
@@ -145,10 +145,9 @@ class Design:
     radius: float
 
     def __post_init__(self) -> None:
-        count = len(self.present)
-        object.__setattr__(
-            self, "rest_length", reals("rest_length", self.rest_length, (count,), positive=True)
-        )
+        put = object.__setattr__
+        put(self, "present", flags("present", self.present, (None,)))
+        put(self, "rest_length", reals("rest_length", self.rest_length, (len(self.present),), positive=True))
 
     def __repr__(self) -> str:
         cables = f"{int(self.present.sum())} of {len(self.present)} cables"

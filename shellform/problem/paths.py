@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shellform.arrays import Flags, Reals
+from shellform.arrays import Flags, Reals, reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import side_by_side
@@ -24,9 +24,10 @@ def follow(
     """The documented path of a design: unloaded from the target shape by relaxation, then each load case on
     its own from there, step by step (loading.py). `shellform analyse` goes the same way.
 
-    The cases are solved side by side on the cores. With `stay` snap-through isn't followed. Raises
-    NotConverged where no equilibrium is found.
+    The cases, forces (n, 6), N and Nm, are solved side by side on the cores. With `stay` snap-through isn't followed.
+    Raises InputError for forces of another shape, NotConverged where no equilibrium is found.
     """
+    given = {name: reals(f"loads[{name!r}]", load, (shell.node_count, 6)) for name, load in loads.items()}
     none = np.zeros((shell.node_count, 6))
     first = assemble(shell.network(design))
     unloaded = find_equilibrium(first, shell.target, none)
@@ -43,7 +44,7 @@ def follow(
         idle.append(own)
         return found
 
-    return dict(zip(loads, side_by_side(loaded, list(loads.values())), strict=True))
+    return dict(zip(given, side_by_side(loaded, list(given.values())), strict=True))
 
 
 def in_tension(shell: Gridshell, design: Design, state: State) -> Flags:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, reals
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Gridshell
 from shellform.problem.constraints import Constraint, count
@@ -31,6 +31,11 @@ class LoadCase:
             raise InputError(
                 "a load case needs a name", where="problem", remedy='Give one, as in LoadCase("wet", force).'
             )
+        object.__setattr__(self, "force", reals(f"load case {self.name!r}: force", self.force, (None, 6)))
+
+    def __repr__(self) -> str:
+        loaded = int(self.force.any(axis=1).sum())
+        return f"LoadCase({self.name!r}, {loaded} of {len(self.force)} nodes loaded)"
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,14 @@ class Problem:
                 value=total,
                 remedy="Divide each share by their sum.",
             )
+        for case in self.load_cases:
+            if len(case.force) != self.shell.net.node_count:
+                raise InputError(
+                    "has not one row for each node of the gridshell",
+                    where=f"load case {case.name!r}: force",
+                    value=case.force.shape,
+                    remedy=f"Give {self.shell.net.node_count} rows, as shell.point_load does.",
+                )
 
     def __repr__(self) -> str:
         loads = ", ".join(case.name for case in self.load_cases)

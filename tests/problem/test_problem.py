@@ -226,20 +226,51 @@ def test_bad_rods_joints_cables_and_loads_are_refused(shell, net, vault):
     with pytest.raises(InputError, match="no crossing is loaded"):
         shell.point_load(1.0, openings=[[[-9, -9], [9, -9], [9, 9], [-9, 9]]])
     with pytest.raises(InputError, match="add up to 1"):
-        sf.Problem(shell, sf.LoadCase("a", np.zeros(1)), [sf.Share(0.5, sf.Misfit("a"))])
+        sf.Problem(shell, sf.LoadCase("a", np.zeros((1, 6))), [sf.Share(0.5, sf.Misfit("a"))])
     with pytest.raises(InputError, match="no load case"):
-        sf.Problem(shell, sf.LoadCase("a", np.zeros(1)), [sf.Share(1.0, sf.Misfit("b"))])
+        sf.Problem(shell, sf.LoadCase("a", np.zeros((1, 6))), [sf.Share(1.0, sf.Misfit("b"))])
     with pytest.raises(InputError, match="same name"):
         sf.Problem(
             shell,
-            sf.LoadCase("a", np.zeros(1)),
+            sf.LoadCase("a", np.zeros((1, 6))),
             [sf.Share(1.0, sf.Misfit("a"))],
-            further=[sf.LoadCase("a", np.ones(1))],
+            further=[sf.LoadCase("a", np.ones((1, 6)))],
         )
     with pytest.raises(InputError, match="nothing is varied"):
-        sf.Problem(shell, sf.LoadCase("a", np.zeros(1)), [sf.Share(1.0, sf.Misfit("a"))], variables=[])
+        sf.Problem(shell, sf.LoadCase("a", np.zeros((1, 6))), [sf.Share(1.0, sf.Misfit("a"))], variables=[])
     with pytest.raises(InputError, match="needs a name"):
-        sf.LoadCase("", np.zeros(1))
+        sf.LoadCase("", np.zeros((1, 6)))
+
+
+def test_a_load_case_keeps_a_copy_of_forces_that_can_be_and_has_a_row_for_each_node(shell):
+    force = shell.point_load(1.0)
+    case = sf.LoadCase("wet", force)
+    force *= 2.0
+    assert case.force == pytest.approx(shell.point_load(1.0))
+    assert not case.force.flags.writeable
+    assert len(repr(case)) < 60
+    with pytest.raises(InputError, match=r"load case 'wet': force\(0, 0\) is not finite"):
+        sf.LoadCase("wet", np.full_like(force, np.nan))
+    with pytest.raises(InputError, match=r"load case 'wet': force has the wrong shape.*\(any, 6\)"):
+        sf.LoadCase("wet", force[:, :3])
+    for wrong in (force[:1], force[:5]):
+        with pytest.raises(InputError, match="has not one row for each node"):
+            sf.Problem(shell, sf.LoadCase("wet", wrong), [sf.Share(1.0, sf.Misfit("wet"))])
+        with pytest.raises(InputError, match=r"loads\['wet'\] has the wrong shape"):
+            sf.follow(shell, shell.design(), {"wet": wrong})
+
+
+def test_which_cables_a_design_has_is_told_by_flags_and_kept_as_a_copy(shell):
+    present = np.ones(len(shell.cable_ends), dtype=bool)
+    design = sf.Design(0.99 * shell.cable_lengths, present, 0.001)
+    present[:] = False
+    assert design.present.all()
+    assert not design.present.flags.writeable
+    with pytest.raises(InputError, match="present must be true or false"):
+        sf.Design(0.99 * shell.cable_lengths, present.astype(int), 0.001)  # would be numbers of cables
+    assert (
+        sf.Design(0.99 * shell.cable_lengths, design.present.tolist(), 0.001).present == design.present
+    ).all()
 
 
 @pytest.mark.parametrize(
