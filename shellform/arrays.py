@@ -46,7 +46,7 @@ def reals(name: str, value: ArrayLike, shape: Shape, *, positive: bool = False) 
             value=float(raw[where]),
             remedy="Give numbers above zero, in SI units.",
         )
-    return _frozen(raw)
+    return frozen(raw)
 
 
 def indices(name: str, value: ArrayLike, shape: Shape, *, below: int) -> Indices:
@@ -66,7 +66,7 @@ def indices(name: str, value: ArrayLike, shape: Shape, *, below: int) -> Indices
         where = _first(outside)
         remedy = f"Indices run from 0 to {below - 1}."
         raise InputError(f"{name}{where} is out of range", value=int(raw[where]), remedy=remedy)
-    return _frozen(raw.astype(np.int64))
+    return frozen(raw.astype(np.int64))
 
 
 def flags(name: str, value: ArrayLike, shape: Shape) -> Flags:
@@ -78,7 +78,7 @@ def flags(name: str, value: ArrayLike, shape: Shape) -> Flags:
             value=_short(value),
             remedy="Give booleans: a comparison, or an array of dtype bool.",
         )
-    return _frozen(_shaped(name, raw, shape))
+    return frozen(_shaped(name, raw, shape))
 
 
 def regular(name: str, value: ArrayLike, shape: Shape) -> NDArray[Any]:
@@ -89,6 +89,13 @@ def regular(name: str, value: ArrayLike, shape: Shape) -> NDArray[Any]:
         raise InputError(
             f"{name} has rows of different lengths", value=_short(value), remedy=f"Give {_wanted(shape)}."
         ) from error
+
+
+def frozen(raw: NDArray[_T]) -> NDArray[_T]:
+    """A read-only copy."""
+    copy = np.array(raw, order="C", copy=True)
+    copy.setflags(write=False)
+    return copy
 
 
 class Arrays(dict[str, Any]):
@@ -137,12 +144,6 @@ def _shaped(name: str, raw: NDArray[_T], shape: Shape) -> NDArray[_T]:
     if raw.ndim != len(shape) or any(n is not None and n != m for n, m in zip(shape, raw.shape, strict=True)):
         raise InputError(f"{name} has the wrong shape", value=raw.shape, remedy=f"Give {_wanted(shape)}.")
     return raw
-
-
-def _frozen(raw: NDArray[_T]) -> NDArray[_T]:
-    copy = np.array(raw, order="C", copy=True)
-    copy.setflags(write=False)
-    return copy
 
 
 def _first(mask: Flags) -> tuple[int, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.arrays import Indices, Reals, indices, reals
+from shellform.arrays import Indices, Reals, frozen, indices, reals
 from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.state import State
 
@@ -32,6 +32,10 @@ class GridRod:
     arc: Reals
     crossings: Indices
     at: Indices
+
+    def __post_init__(self) -> None:
+        for name in ("nodes", "arc", "crossings", "at"):
+            object.__setattr__(self, name, frozen(np.asarray(getattr(self, name))))
 
     @property
     def length(self) -> float:
@@ -62,6 +66,7 @@ class Grid:
         put = object.__setattr__
         put(self, "spacing_v", self.spacing_v or self.spacing)
         put(self, "flat", reals("flat", self.flat, (None, 3)))
+        put(self, "lattice", frozen(self.lattice))
         count = len(self.lattice)
         put(
             self,

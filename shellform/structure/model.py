@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from shellform.arrays import Flags, Reals
+from shellform.arrays import Flags, Reals, reals
 from shellform.errors import InputError
 from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.cable import Cables, make_cables
@@ -96,6 +96,11 @@ class Model:
     loads: Mapping[str, Reals]
     start: State | None
     supported: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        shape = len(self.network.nodes), 6
+        loads = {name: reals(f"loads.{name}", load, shape) for name, load in self.loads.items()}
+        object.__setattr__(self, "loads", loads)
 
 
 def read_model(path: str | Path) -> Model:
@@ -252,10 +257,7 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
     z_axis = np.array(
         [undefined if each.z_axis is None else each.z_axis for each in entries], dtype=float
     ).reshape(-1, 3)
-    rest = np.array(
-        [np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float
-    )
-    positive(rest, "beams", "rest_length")
+    rest = _rest_lengths(entries, "beams")
     words: dict[str, int] = {"rod": 0}
     kind = np.array([words.setdefault(each.kind, len(words)) for each in entries], dtype=np.int64)
     made = make_beams(
@@ -281,6 +283,13 @@ def _beams(entries: list[_Beam], nodes: Reals) -> Beams:
         )
     )
     return replace(made, frames=frames, axial=ea, torsion=gj, bending_y=eiy, bending_z=eiz)
+
+
+def _rest_lengths(entries: list[_Beam] | list[_Cable], part: str) -> Reals:
+    """Those that are given (k,), m; NaN for those left out."""
+    given = [each.rest_length for each in entries]
+    positive(np.array([1.0 if each is None else each for each in given], dtype=float), part, "rest_length")
+    return np.array(given, dtype=float)
 
 
 def _axes(entries: list[_Beam], own: Flags) -> Reals:
@@ -313,10 +322,7 @@ def _axes(entries: list[_Beam], own: Flags) -> Reals:
 def _cables(entries: list[_Cable], nodes: Reals) -> Cables:
     ends = node_pairs([each.nodes for each in entries], "cables", len(nodes))
     stiffness = positive(np.array([each.EA for each in entries], dtype=float), "cables", "EA")
-    rest = np.array(
-        [np.nan if each.rest_length is None else each.rest_length for each in entries], dtype=float
-    )
-    positive(rest, "cables", "rest_length")
+    rest = _rest_lengths(entries, "cables")
     length = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
     meeting = np.isnan(rest) & (length == 0.0) & (ends[:, 0] != ends[:, 1])
     if meeting.any():

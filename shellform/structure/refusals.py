@@ -94,8 +94,8 @@ def node_pairs(pairs: list[tuple[int, int]], name: str, count: int) -> np.ndarra
 
 
 def positive(values: Reals, part: str, name: str) -> Reals:
-    """The values, NaN standing for those left out. Raises InputError."""
-    wrong = (values <= 0.0) | np.isinf(values)
+    """The values. Raises InputError."""
+    wrong = ~(values > 0.0) | np.isinf(values)
     absurd = (values > _HUGE) | (values < 1.0 / _HUGE)
     for which, what in (
         (wrong, "must be a positive number"),

@@ -71,6 +71,14 @@ def test_a_net_is_the_same_after_saving(tmp_path, net):
         load_net(tmp_path / "bad.npz")
 
 
+def test_nobody_can_change_a_rod_of_a_net(net):
+    with pytest.raises(ValueError, match="read-only"):
+        net.grid.lattice += 1
+    for name in ("nodes", "arc", "crossings", "at"):
+        with pytest.raises(ValueError, match="read-only"):
+            getattr(net.grid.rods[0], name)[0] = 7
+
+
 def test_a_surface_with_a_spike_is_refused(vault):
     peak = vault.vertices.copy()
     away = np.linalg.norm(peak[:, :2], axis=1)

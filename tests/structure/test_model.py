@@ -4,6 +4,7 @@ import copy
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -49,6 +50,9 @@ def bow():
         (lambda m: m["beams"][3].update(EA="1"), r"beams\[3\].EA.*expected a number"),
         (lambda m: m["beams"][3].update(EA=-1.0), r"beams\[3\].EA.*positive"),
         (lambda m: m["beams"][3].update(rest_length=0.0), r"beams\[3\].rest_length.*positive"),
+        (lambda m: m["beams"][3].update(rest_length=np.nan), r"beams\[3\].rest_length.*positive.*nan"),
+        (lambda m: m["beams"][3].update(EIz=np.nan), r"beams\[3\].EIz.*positive.*nan"),
+        (lambda m: m["cables"][0].update(rest_length=np.nan), r"cables\[0\].rest_length.*positive.*nan"),
         (lambda m: m["beams"][3].update(EIy=1e300), r"beams\[3\].EIy.*beyond what can be calculated"),
         (lambda m: m["nodes"].__setitem__(3, [1e300, 0, 0]), r"nodes\[3\].*below 1e\+30, in SI units"),
         (lambda m: m["beams"][3].update(nodes=[3, 99]), r"beams\[3\].nodes.*out of range.*0 to 8"),
@@ -98,6 +102,13 @@ def test_a_model_comes_back_from_its_file_bit_by_bit(tmp_path):
         np.testing.assert_array_equal(getattr(once.network.beams, name), getattr(again.network.beams, name))
     assert again.supported == once.supported
     np.testing.assert_array_equal(again.loads["push"], once.loads["push"])
+
+
+def test_a_model_s_loads_have_a_row_for_each_node_and_can_not_be_changed():
+    model = parse_model(bow())
+    assert not model.loads["push"].flags.writeable
+    with pytest.raises(InputError, match=r"loads\.push has the wrong shape \(found \(9, 3\)\)"):
+        replace(model, loads={"push": model.loads["push"][:, :3]})
 
 
 def test_what_is_rarely_meant_is_told_by_element():
