@@ -118,7 +118,7 @@ def read_arrays(path: Path) -> Arrays:
     if not path.is_file():
         raise InputError("isn't there", where=str(path), remedy="Run again with --fresh.")
     try:
-        with np.load(path, allow_pickle=False) as data:
+        with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
             return Arrays(path, {name: data[name] for name in data.files})
     except (
         OSError,

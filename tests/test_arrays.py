@@ -1,5 +1,7 @@
 """What is checked at the door of the package."""
 
+import os
+
 import numpy as np
 import pytest
 
@@ -104,3 +106,14 @@ def test_a_file_of_arrays_that_is_missing_broken_or_lacks_one_says_to_run_again(
     np.savez(file, places=np.array([{}], dtype=object))
     with pytest.raises(Damaged, match="is damaged"):
         read_arrays(file)
+
+
+def test_a_broken_file_of_arrays_is_not_left_open(tmp_path):
+    file = tmp_path / "a.npz"
+    np.savez(file, places=np.eye(3))
+    file.write_bytes(file.read_bytes()[:100])
+    before = os.listdir("/dev/fd")
+    with pytest.raises(Damaged) as told:
+        read_arrays(file)
+    assert os.listdir("/dev/fd") == before, "while somebody still looks at what was said"
+    assert told.value.where == str(file)

@@ -69,6 +69,9 @@ class Run:
     states: Mapping[str, Mapping[str, State]]
     summary: Summary
 
+    def __repr__(self) -> str:
+        return f"Run({str(self.folder)!r}, {self.shell!r}, designs {', '.join(self.designs)})"
+
     @property
     def net(self) -> Net:
         """The shell's net."""

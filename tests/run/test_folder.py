@@ -37,6 +37,8 @@ def test_a_run_left_after_its_initial_design_is_read_as_far_as_it_came(begun):
     assert list(run.designs) == ["unbraced", "initial"]
     assert run.best == "initial"
     assert set(run.states["initial"]) == {"none", "design", "additional"}
+    assert repr(run).endswith("designs unbraced, initial)")
+    assert repr(run.states["initial"]["none"]) == f"State({run.shell.node_count} nodes)"
 
 
 def test_what_is_made_to_compare_with_can_be_left_out(tmp_path):

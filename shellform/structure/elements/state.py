@@ -31,6 +31,9 @@ class State:
         if self.tail is not None:
             object.__setattr__(self, "tail", reals("tail", self.tail, (len(positions), 7)))
 
+    def __repr__(self) -> str:
+        return f"State({len(self.positions)} nodes)"
+
     @property
     def rotations(self) -> Reals:
         """Total rotation vectors (n, 3), rad, of length at most pi."""
