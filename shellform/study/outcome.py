@@ -25,6 +25,14 @@ class Status(StrEnum):
     MISSING = "missing"
 
 
+OWN_COLUMNS = (
+    "number",
+    "key",
+    "status",
+    "reason",
+    "seconds",
+    "worker",
+)  # of a study's tables, whatever is asked for
 TRIED_AGAIN = (Status.CRASHED, Status.OVERTIME)
 
 

@@ -31,20 +31,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from shellform.case.case import Case, make_case, read_toml, set_entry
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError
 from shellform.study.expressions import evaluate
-from shellform.study.outcome import Value
+from shellform.study.outcome import OWN_COLUMNS, Value
 
 _MOST = 1_000_000  # designs
 _LONGEST = 31e6  # s, a year
@@ -128,11 +121,9 @@ class Study(_Entry):
     @classmethod
     def _ways(cls, value: Any) -> Any:
         found = _flat(value, _LEAVES)
-        return (
-            {k: {"values": v} if isinstance(v, list) else v for k, v in found.items()}
-            if isinstance(found, dict)
-            else found
-        )
+        if not isinstance(found, dict):
+            return found
+        return {k: {"values": v} if isinstance(v, list) else v for k, v in found.items()}
 
     @field_validator("designs", mode="before")
     @classmethod
@@ -159,10 +150,17 @@ class Study(_Entry):
             raise ValueError("a search makes its own designs; leave [[designs]] out, or take another method")
         if self.method == "search" and not self.objective:
             raise ValueError('a search needs an [objective], such as misfit = "min"')
-        taken = [*self.set, *self.vary, *self.function]
-        for name in taken:
-            if taken.count(name) > 1:
-                raise ValueError(f"{name} stands in more than one of [set], [vary] and [function]; keep one")
+        listed = dict.fromkeys(name for each in self.designs for name in each)
+        for first, where in ((self.set, "[set]"), (listed, "[[designs]]")):
+            taken = [*first, *self.vary, *self.function]
+            for name in taken:
+                if taken.count(name) > 1:
+                    raise ValueError(
+                        f"{name} stands in more than one of {where}, [vary] and [function]; keep one"
+                    )
+        for name in self.column:
+            if name in OWN_COLUMNS or name.startswith("case."):
+                raise ValueError(f"a table has a column {name!r} of its own; give yours another name")
         for name in [*self.objective, *self.limit]:
             if name not in self.column:
                 raise ValueError(f"{name!r} is no column; known are {', '.join(self.column)}")
@@ -210,10 +208,9 @@ def make_plan(study: Study, file: Path) -> Plan:
             ]
         elif study.method == "grid":
             if entry.count is None:
+                where = f"{file}: vary.{name}"
                 raise InputError(
-                    "a grid needs the range's count",
-                    where=f"{file}: vary.{name}",
-                    remedy="For example count = 5.",
+                    "a grid needs the range's count", where=where, remedy="For example count = 5."
                 )
             at = [k / max(1, entry.count - 1) for k in range(entry.count)]
             lists[name] = list(dict.fromkeys(ranged(entry, each) for each in at))

@@ -8,6 +8,7 @@ from scipy.stats import qmc
 from shellform.errors import InputError
 from shellform.study import plan as plans
 from shellform.study.expressions import evaluate
+from shellform.study.outcome import OWN_COLUMNS
 from shellform.study.plan import Study, VaryEntry, changes, length, placed, ranged, read_study, resolved
 from tests.stubs import study_file
 
@@ -147,6 +148,12 @@ def test_designs_can_be_listed_and_surfaces_taken_from_a_folder(tmp_path):
         ("[vary]\nnet.spacing = { low = 0.1, high = 0.2, values = [1] }", "give one of"),
         ("[vary]\nnet.spacing = []", "vary.net.spacing"),
         ("[vary]\nnet.spacing = [0.1]\n[set]\nnet.spacing = 0.1", "more than one of"),
+        ("designs = [{ net.spacing = 0.1 }]\n[vary]\nnet.spacing = [0.1]", "more than one of [[designs]]"),
+        ("designs = [{ joint.gap = 0.1 }]\n[function]\njoint.gap = 0.002", "more than one of [[designs]]"),
+        *(
+            (f"[column]\n'{name}' = 'designs.best.cables'", f"has a column '{name}' of its own")
+            for name in (*OWN_COLUMNS, "case.net.spacing")
+        ),
         ("method = 'latin'\n[vary]\nnet.spacing = [0.1]", "needs a count"),
         ("method = 'latin'\ncount = 3", "needs entries under [vary]"),
         (
