@@ -143,7 +143,6 @@ def run_study(
             write_text(place / "study.toml", Path(file).read_text(encoding="utf-8"))
             front = Front(signed(plan.study.objective), plan.study.limit)
             study = _Studying(plan, place, log, front, StudyProgress(total=length(plan)), show, allow_scripts)
-            _tidy(study)
             _go(study, work, partial(engine, workers=workers, scheduler=scheduler, dashboard=dashboard))
             return _finish(study)
     except OSError as error:
@@ -167,6 +166,7 @@ def _go(study: _Studying, work: Work, begin: Callable[[], AbstractContextManager
         batch = next(batches, None)
         while batch is not None:
             keys, shared, fresh = _list(study, batch, listed)
+            _tidy(study, keys)
             if fresh and opened is None:
                 opened = stack.enter_context(begin())
                 study.progress.dashboard = opened.dashboard
@@ -327,9 +327,10 @@ def _unwanted(study: _Studying, row: Row) -> list[str]:
     return off if keep == "best" else [row.key] if keep == "none" else []
 
 
-def _tidy(study: _Studying) -> None:
-    """Brings the front up to the log, and drops what an earlier call had no time to drop."""
-    keys = list(study.log)
+def _tidy(study: _Studying, keys: Sequence[str]) -> None:
+    """Brings the front up to what the log has of these designs, and drops what an earlier call had no time to
+    drop. What the log has of others, from before the study or its case was changed, is on no front of this one.
+    """
     for found, outcome in zip(keys, study.log.outcomes(keys), strict=True):
         if outcome is not None:
             for key in _unwanted(study, _row(study, found, outcome)):

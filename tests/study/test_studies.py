@@ -163,6 +163,22 @@ def test_runs_are_kept_or_dropped_by_choice(tmp_path, on_two, keep, left):
     assert kept == {"all": {row["key"] for row in every}, "none": set(), "best": front}[keep]
 
 
+def test_designs_of_the_case_as_it_was_before_a_change_take_no_place_on_the_front(tmp_path, on_two):
+    """With a wider net each design is worse in cables; the better ones are those of the other case."""
+    text = 'keep = "best"\n[vary]\ncable.stiffness = [100, 187]\n[set]\nnet.spacing = '
+    kept = []
+    for spacing in ("0.11", "0.13", "0.11"):
+        run_study(
+            study_file(tmp_path, text + spacing + '\n[objective]\ncables = "min"\n'),
+            tmp_path / "out", work=quick,
+        )  # fmt: skip
+        kept.append({each.name for each in (tmp_path / "out/runs").iterdir()})
+        best = min(rows(tmp_path / "out"), key=lambda row: int(row["cables"]))
+        assert best["key"] in kept[-1]
+        assert f'"runs/{best["key"]}/' in (tmp_path / "out/study.html").read_text(encoding="utf-8")
+    assert [len(each) for each in kept] == [1, 2, 2], "nor do runs of the other case go"
+
+
 def test_a_design_that_kills_its_workers_is_recorded_and_the_rest_goes_on(tmp_path, on_two):
     file = study_file(tmp_path, "[vary]\ncable.stiffness = [100, 333, 666, 187, 150, 120]\n")
     found = run_study(file, tmp_path / "out", work=deadly)
