@@ -17,6 +17,7 @@ import json
 import os
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -283,16 +284,36 @@ def read_table(folder: str | Path, columns: Sequence[str] | None = None, filters
     """A study's table as a `pyarrow.Table`, of some columns and rows if asked: `filters=[("cables", "<",
     100)]`.
 
-    Raises InputError where there is none, or a damaged one.
+    Raises InputError where there is none, or a damaged one, and for columns and filters that it hasn't.
     """
     pa, pq = arrow()
 
     file = Path(folder) / "table.parquet"
     if not file.is_file():
         raise InputError("there is no table", where=str(file), remedy="Make one with shellform study.")
+    names = None if columns is None else [columns] if isinstance(columns, str) else list(columns)
     try:
-        return pq.read_table(file, columns=None if columns is None else list(columns), filters=filters)
-    except (pa.ArrowException, OSError) as error:
+        known = pq.read_schema(file).names
+        for name in [each for each in names or () if each not in known]:
+            near = get_close_matches(name, known, 1)
+            raise InputError(
+                "is no column of the table",
+                where=str(file),
+                value=name,
+                remedy=f"Did you mean {near[0]!r}?" if near else f"It begins with {', '.join(known[:8])}.",
+            )
+        return pq.read_table(file, columns=names, filters=filters)
+    except InputError:
+        raise
+    except (pa.ArrowException, OSError, ValueError) as error:
+        if filters is not None:
+            read_table(folder, names)  # a table that is damaged says so
+            raise InputError(
+                f"can't be used: {str(error).splitlines()[0][:200]}",
+                where="filters",
+                value=filters,
+                remedy='Name a column of the table, a sign and a value, as [("cables", "<", 100)].',
+            ) from error
         raise InputError(
             f"is damaged: {error}", where=str(file), remedy="Run the study again; its results are kept."
         ) from error

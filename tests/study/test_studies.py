@@ -105,6 +105,12 @@ def test_a_study_has_a_row_a_design_and_a_second_call_computes_nothing(tmp_path,
         tmp_path / "out", ["number", "case.net.spacing", "cables"], [("cables", "<", 46), ("cables", ">", 42)]
     )
     assert few.to_pydict() == {"number": [1], "case.net.spacing": [0.1], "cables": [44]}
+    with pytest.raises(InputError, match=r"is no column of the table.*'cabels'.*Did you mean 'cables'"):
+        read_table(tmp_path / "out", ["cabels"])
+    assert read_table(tmp_path / "out", "cables").num_columns == 1
+    for wrong in (("cabels", "<", 46), ("cables", "<<", 46), ("cables", "<", "few"), ("cables", 46)):
+        with pytest.raises(InputError, match=r"filters: can't be used.*Name a column"):
+            read_table(tmp_path / "out", ["cables"], [wrong])
     seconds = (tmp_path / "out/seconds.csv").read_text()
     assert seconds.count(",here,here,0.01\n") == 12
     assert "<h1>Study of dome.toml</h1>" in (tmp_path / "out/study.html").read_text(encoding="utf-8")
