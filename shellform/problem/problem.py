@@ -83,14 +83,6 @@ class Problem:
                 value=total,
                 remedy="Divide each share by their sum.",
             )
-        for case in self.load_cases:
-            if len(case.force) != self.shell.net.node_count:
-                raise InputError(
-                    "has not one row for each node of the gridshell",
-                    where=f"load case {case.name!r}: force",
-                    value=case.force.shape,
-                    remedy=f"Give {self.shell.net.node_count} rows, as shell.point_load does.",
-                )
 
     def __repr__(self) -> str:
         loads = ", ".join(case.name for case in self.load_cases)

@@ -254,10 +254,11 @@ def test_a_load_case_keeps_a_copy_of_forces_that_can_be_and_has_a_row_for_each_n
     with pytest.raises(InputError, match=r"load case 'wet': force has the wrong shape.*\(any, 6\)"):
         sf.LoadCase("wet", force[:, :3])
     for wrong in (force[:1], force[:5]):
-        with pytest.raises(InputError, match="has not one row for each node"):
-            sf.Problem(shell, sf.LoadCase("wet", wrong), [sf.Share(1.0, sf.Misfit("wet"))])
         with pytest.raises(InputError, match=r"loads\['wet'\] has the wrong shape"):
             sf.follow(shell, shell.design(), {"wet": wrong})
+        problem = sf.Problem(shell, sf.LoadCase("wet", wrong), [sf.Share(1.0, sf.Misfit("wet"))])
+        with pytest.raises(InputError, match=r"loads\['wet'\] has the wrong shape"):
+            sf.optimise(problem, shell.design(), evaluations=1)
 
 
 def test_which_cables_a_design_has_is_told_by_flags_and_kept_as_a_copy(shell):
