@@ -138,3 +138,71 @@ def uneven():
     )
     faces = np.vstack([faces, np.column_stack([np.full(40, 120), number[0], np.roll(number[0], -1)])])
     return make_surface(np.vstack([*rings, [[0.0, 0.0, 0.0]]]), faces)
+
+
+def peaks(x, y):
+    """Two steep ones, 3 m high and 3 m apart, that meet in a crease."""
+    return 3.0 * np.maximum(*(np.exp(-((x - side) ** 2 + y**2) / 1.5) for side in (-1.5, 1.5)))
+
+
+def everywhere(surface):
+    return fairing._Fit(surface, np.ones(len(surface.vertices), dtype=bool))
+
+
+def test_what_is_not_rounded_at_once_is_rounded_in_stages():
+    radius, before = 2.5, fairing._refined(sheet(peaks, count=21), fairing._MESH * 2.5)
+    with pytest.raises(NotConverged, match="No surface near this one"):
+        fairing._rounded(before, everywhere(before), [radius])
+    found = faired(sheet(peaks, count=21), radius)
+    bent = np.abs(curvature(found.surface)).max(axis=1)[inside(found.surface)]
+    assert np.percentile(bent, 99) <= 1.0 / radius * 1.1
+    assert 1.0 < found.change.max() < 0.7 * radius, "it takes the peaks down, and fills the valley"
+    far = np.abs(found.before.vertices[:, :2]).max(axis=1) > 3.9
+    assert found.change[far].max() < 0.1, "what is flat stays where it is"
+
+
+def test_stages_change_no_more_than_one_step_does():
+    before, off = sheet(gable), []
+    for radii in ([1.5], [0.6, 1.0, 1.5]):
+        found = fairing._rounded(before, everywhere(before), radii)
+        away = np.linalg.norm(found.surface.vertices - before.vertices, axis=1)
+        np.testing.assert_allclose(found.change, away, atol=1e-12)
+        off.append(np.sqrt((away**2).mean()))
+    assert off[1] <= off[0]
+
+
+def test_a_stage_whose_cap_asks_for_nothing_goes_back_to_the_surface_as_given():
+    """What is least is the change from that, and not from what the stage before has come to."""
+    flat = sheet(lambda x, y: np.zeros_like(x))
+    moved = make_surface(flat.vertices + np.array([0.0, 0.0, 0.1]), flat.triangles)
+    at, _ = fairing._at_stage(everywhere(flat), flat, moved, fairing._weights(flat), 1.0, 2)
+    assert np.abs(at[inside(flat), 2]).mean() < 0.03, "sixty steps of multipliers leave a part of the way"
+
+
+def test_stages_grow_from_what_the_surface_keeps_to_the_radius():
+    ball = sheet(lambda x, y: np.sqrt(36.0 - x**2 - y**2), size=6.0)
+    fit = everywhere(ball)
+    kept = 1.0 / fit.most(ball.vertices, fairing.rough_normals(ball.vertices, ball.triangles))
+    assert kept == pytest.approx(6.0, rel=0.05)
+    assert fairing._stages(ball, fit, 5.0) == [5.0]
+    assert fairing._stages(ball, fit, 1.2 * kept) == pytest.approx([kept, 1.2 * kept])
+    assert fairing._stages(ball, fit, 10.0 * kept)[:2] == pytest.approx([1.5 * kept, 2.1 * kept])
+    assert fairing._stages(ball, fit, 10.0 * kept)[-1] == 10.0 * kept
+
+
+def test_meshes_on_which_stages_take_minutes_are_refused_after_the_first_attempts(monkeypatch):
+    tried = []
+
+    def refused(start, fit, radii):
+        tried.append(radii)
+        raise NotConverged("no surface", residual=1.0, iterations=1)
+
+    monkeypatch.setattr(fairing, "_rounded", refused)
+    for most, times in ((21**2, 4), (21**2 - 1, 2)):
+        monkeypatch.setattr(fairing, "_STAGED", most)
+        monkeypatch.setattr(fairing, "_refined", lambda surface, longest: surface)
+        tried.clear()
+        with pytest.raises(NotConverged, match="no surface"):
+            faired(sheet(peaks, count=21), 2.5)
+        assert len(tried) == times
+        assert tried[:2] == [[2.5], [2.5]]

@@ -23,10 +23,16 @@ happens.
 D are normals smoothed over R, so that neighbours on both sides of a crease don't cross. Vertices on the
 ground stay on their level, and move in plan only where a crease runs into it; where that leaves none that keeps
 the cap, the ground is left uncapped: rods end there.
+
+Where much has to change, quadratics fitted across a sharp crease say little of the rounded one. Then the radius grows
+in stages from what the surface keeps to R, each from the places p that the one before has come to, with D, frames and multipliers
+made anew: ½ ∫ |p - v + d D|² dA is what is least there, so that it stays the change from the surface as given.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,6 +47,10 @@ _MESH = 0.3  # of R: edges that aren't longer show its curvature
 _MOST = 30_000  # vertices of the refined mesh
 _ROUNDS, _STEPS = 12, 60  # of frames, and of multipliers in each
 _BETTER, _VAIN = 0.98, 2  # of the least so far; rounds in a row that don't come below it end the search
+_FIRST, _GROWTH = 0.15, 1.4  # of R, the first stage at the least; from one stage to the next
+_STAGE_ROUNDS = 4  # of a stage but the last
+_STAGED = 10_000  # vertices: of more, stages take minutes
+_LOST = 0.05  # of a stage's radius, that is left at one place: no further stage mends that
 _MARGIN = 0.96  # of the cap, at which forms are capped
 _HEAVY = 10.0  # times their area: vertices on the ground
 _GROUND = 0.02  # of the rise: edges within it of the lowest stand on the ground
@@ -76,53 +86,84 @@ def faired(surface: Surface, radius: float) -> Faired:
             remedy="Give a smaller radius, or draw the surface anew.",
         )
     start = _refined(surface, _MESH * radius)
-    try:
-        return _rounded(start, _Fit(start, np.ones(len(start.vertices), dtype=bool)), radius)
-    except NotConverged:
-        return _rounded(start, _Fit(start, ~_on_ground(start)), radius)
+    everywhere, above = _Fit(start, np.ones(len(start.vertices), dtype=bool)), _Fit(start, ~_on_ground(start))
+    refusals = []
+    for staged in (False, True)[: 1 + (len(start.vertices) <= _STAGED)]:
+        for fit in (everywhere, above):
+            try:
+                return _rounded(start, fit, _stages(start, fit, radius) if staged else [radius])
+            except NotConverged as error:
+                refusals.append(error)
+    raise refusals[1]
 
 
-def _rounded(start: Surface, fit: _Fit, radius: float) -> Faired:
-    """The nearest surface that keeps the cap where it is fitted. Raises NotConverged."""
-    cap, at, place = 1.0 / radius, start.vertices, np.zeros(len(start.vertices))
-    toward, weight = _directions(start, radius), _weights(start)
-    if fit.most(at, rough_normals(at, start.triangles)) <= cap:
-        return Faired(start, start, place)
-    multiplier = np.zeros((len(fit.fitted), 3))
+def _stages(start: Surface, fit: _Fit, radius: float) -> list[float]:
+    """The radii, m, to which the surface is rounded one after the other."""
+    kept = 1.0 / max(fit.most(start.vertices, rough_normals(start.vertices, start.triangles)), 1e-300)
+    first = max(_FIRST * radius, kept)
+    count = max(math.ceil(math.log(radius / first) / math.log(_GROWTH)), 0) if first < radius else 0
+    return [*(first * _GROWTH**k for k in range(count)), radius]
+
+
+def _rounded(start: Surface, fit: _Fit, radii: Sequence[float]) -> Faired:
+    """The nearest surface that keeps the cap of the last of the `radii`, m, where it is fitted, rounded to each of them in turn. Raises
+    NotConverged."""
+    at, weight, faces = start.vertices, _weights(start), start.triangles
+    if fit.most(at, rough_normals(at, faces)) <= 1.0 / radii[-1]:
+        return Faired(start, start, np.zeros(len(at)))
+    for radius in radii:
+        here = start if at is start.vertices else make_surface(at, faces, source=start.source)
+        at, most = _at_stage(
+            fit, start, here, weight, radius, _ROUNDS if radius == radii[-1] else _STAGE_ROUNDS
+        )
+        if most * _LOST * radius > 1.0:
+            break
+    if most > 1.0 / radii[-1]:
+        raise NotConverged(
+            f"No surface near this one was found that is curved to {radii[-1]:.3g} m or more everywhere: {1.0 / most:.3g} m "
+            "is left at one place",
+            residual=radii[-1] * most - 1.0,
+            iterations=_ROUNDS * _STEPS,
+        )
+    _refuse_folds(start, at, radii[-1])
+    change = np.linalg.norm(at - start.vertices, axis=1)
+    return Faired(make_surface(at, faces, source=start.source), start, change)
+
+
+def _at_stage(
+    fit: _Fit, start: Surface, here: Surface, weight: Reals, radius: float, rounds: int
+) -> tuple[Reals, float]:
+    """Places (v, 3) on the way from `here` to those nearest to the `start` that keep the radius, m, after as many rounds as
+    help; and the largest curvature, 1/m, there, or the least that was met, where they don't."""
+    toward = _directions(here, radius)
+    before = np.sum((here.vertices - start.vertices) * toward, axis=1)
+    place, multiplier = np.zeros(len(toward)), np.zeros((len(fit.fitted), 3))
     best, vain = np.inf, 0
-    for _ in range(_ROUNDS):
-        place, multiplier = _round(fit, start, toward, weight, place, multiplier, radius)
-        at = start.vertices + place[:, None] * toward
-        most = fit.most(at, rough_normals(at, start.triangles))
-        if most <= cap:
-            _refuse_folds(start, at, radius)
-            result = make_surface(at, start.triangles, source=start.source)
-            return Faired(result, start, np.abs(place) * np.linalg.norm(toward, axis=1))
+    for _ in range(rounds):
+        place, multiplier = _round(fit, here, toward, weight, before, place, multiplier, radius)
+        at = here.vertices + place[:, None] * toward
+        most = fit.most(at, rough_normals(at, here.triangles))
         vain = 0 if most < _BETTER * best else vain + 1
         best = min(best, most)
-        if vain == _VAIN or np.abs(place).max() > radius:
+        if most <= 1.0 / radius or vain == _VAIN or np.abs(place).max() > radius:
             break
-    left = 1.0 / best
-    raise NotConverged(
-        f"No surface near this one was found that is curved to {radius:.3g} m or more everywhere: {left:.3g} m "
-        "is left at one place",
-        residual=radius / left - 1.0,
-        iterations=_ROUNDS * _STEPS,
-    )
+    return at, best
 
 
 def _round(
     fit: _Fit,
-    start: Surface,
+    here: Surface,
     toward: Reals,
     weight: Reals,
+    before: Reals,
     place: Reals,
     multiplier: Reals,
     radius: float,
 ) -> tuple[Reals, Reals]:
-    """The displacements (v,) and multipliers (i, 3) after a number of steps in the frames at `place`."""
-    at = start.vertices + place[:, None] * toward
-    frames = fit.frames(rough_normals(at, start.triangles))
+    """The displacements (v,) and multipliers (i, 3) after a number of steps in the frames at `place`; `before` (v,), m: how far
+    the vertices had moved along the directions before."""
+    at = here.vertices + place[:, None] * toward
+    frames = fit.frames(rough_normals(at, here.triangles))
     own, rate = fit.forms(at, frames), fit.by_distance(at, frames, toward)
     given = own - (rate @ place).reshape(-1, 3)
     scale = radius**4 * np.repeat(weight[fit.fitted], 3) * np.tile([1.0, 2.0, 1.0], len(fit.fitted))
@@ -131,7 +172,7 @@ def _round(
     most = _MARGIN / radius
     form, capped = own, _capped(own + multiplier, most)
     for _ in range(_STEPS):
-        place = factor.solve(weighted.T @ (capped - multiplier - given).ravel())
+        place = factor.solve(weighted.T @ (capped - multiplier - given).ravel() - weight * before)
         form = given + (rate @ place).reshape(-1, 3)
         mixed = _RELAXED * form + (1.0 - _RELAXED) * capped
         capped = _capped(mixed + multiplier, most)
