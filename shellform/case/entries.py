@@ -380,7 +380,10 @@ class TitleBlockEntry(Entry):
         if isinstance(value, datetime.date):
             return value.isoformat()
         if isinstance(value, str) and value:
-            datetime.date.fromisoformat(value)
+            try:
+                datetime.date.fromisoformat(value)
+            except ValueError as error:
+                raise ValueError(f"{value!r} is no day; write it like 2026-05-31") from error
         return value
 
 

@@ -30,6 +30,8 @@ def _in_words(error: Any, root: type[BaseModel]) -> tuple[str, str]:
     place = _place(error["loc"], root)
     entry, names = place.name, place.table.model_fields
     if kind == "extra_forbidden":
+        if error["loc"][-1] in place.elsewhere:
+            return f"{entry} doesn't go with {place.sign}", "Leave out one or the other."
         near = difflib.get_close_matches(str(error["loc"][-1]), names, n=1, cutoff=0.5)
         nearest = ".".join([*entry.split(".")[:-1], *near])
         known = f"Leave it out, or write one of {', '.join(names)}."
@@ -54,12 +56,15 @@ def _in_words(error: Any, root: type[BaseModel]) -> tuple[str, str]:
 @dataclass(frozen=True)
 class _Place:
     """An entry: its `name` as the file has it, the `table` in which it stands, the schema's `meaning` of it, and
-    the `kinds` of which it may be."""
+    the `kinds` of which it may be. Where the table is one of several kinds, `sign` is the entry that tells which, and
+    `elsewhere` the names that the others alone have."""
 
     name: str
     table: Any
     meaning: str
     kinds: Sequence[str]
+    sign: str = ""
+    elsewhere: frozenset[str] = frozenset()
 
 
 def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
@@ -67,7 +72,8 @@ def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
     names: list[str] = []
     kind: Any = root
     table: Any = root
-    meaning = ""
+    meaning = sign = ""
+    elsewhere: frozenset[str] = frozenset()
     for part in parts:
         plain = get_args(kind)[0] if get_origin(kind) is Annotated else kind
         if (
@@ -77,6 +83,7 @@ def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
         choices = {tag: each for each in get_args(plain) for tag in _tags(each)}
         if part in choices:
             kind = choices[part]
+            sign, elsewhere = _told_apart(str(part), choices, ".".join(names))
             continue
         names.append(str(part))
         if get_origin(plain) in (list, dict):
@@ -89,7 +96,26 @@ def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
         else:
             kind = Any
     kinds = [tag for each in _choices(kind) for tag in _tags(each)]
-    return _Place(".".join(names) or root.__name__.lower(), table, meaning, kinds)
+    return _Place(".".join(names) or root.__name__.lower(), table, meaning, kinds, sign, elsewhere)
+
+
+def _told_apart(tag: str, choices: dict[str, Any], name: str) -> tuple[str, frozenset[str]]:
+    """The entry of the table called `name` by which its kind `tag` is told from the other choices, and the entries that
+    those alone have."""
+    tables = {each: _table(choice) for each, choice in choices.items()}
+    own = tables[tag]
+    others = {entry for each in tables.values() for entry in each} - own.keys()
+    if "kind" in own:
+        return f"{name}.kind = {tag!r}", frozenset(others)
+    shared = {entry for each, fields in tables.items() if each != tag for entry in fields}
+    needed = [entry for entry, field in own.items() if field.is_required() and entry not in shared]
+    return f"{name}.{needed[0]}" if needed else "", frozenset(others if needed else ())
+
+
+def _table(choice: Any) -> dict[str, Any]:
+    """The fields of a union's choice by name; none where it is no table."""
+    plain = get_args(choice)[0] if get_origin(choice) is Annotated else choice
+    return dict(plain.model_fields) if isinstance(plain, type) and issubclass(plain, BaseModel) else {}
 
 
 def _choices(kind: Any) -> tuple[Any, ...]:

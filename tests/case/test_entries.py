@@ -318,3 +318,30 @@ def test_every_wrong_entry_of_a_case_is_told_at_once_with_its_remedies_once_each
     assert "Did you mean 'cable.rest_ratio'?" in remedy
     assert "Leave it out, or write one of stiffness, rest_ratio, force_max" in remedy
     assert "Give tolerances.supports (m, each coordinate: " in remedy
+
+
+def test_a_known_entry_that_another_entry_rules_out_is_not_called_unknown(tmp_path):
+    sized = {"young": 40e9, "strength": 255e6, "radius": 0.001}
+    cases = [
+        ({"rod": {**sized, "catalogue": "gfrp_rods"}}, "rod.young doesn't go with rod.catalogue"),
+        ({"rod": {**sized, "section": "8 mm"}}, "rod.section doesn't go with rod.young"),
+        (
+            {"part": {"wet": {"kind": "points", "force": 6.9, "thickness": 0.05}}},
+            "part.wet.thickness doesn't go with part.wet.kind = 'points'",
+        ),
+    ]
+    for tables, said in cases:
+        with pytest.raises(InputError) as told:
+            made(tmp_path, **tables)
+        assert said in told.value.what
+        assert "no known entry" not in told.value.what
+        assert told.value.remedy.startswith("Leave out one or the other.")
+    with pytest.raises(InputError, match=r"rod.xyzzy is no known entry. Leave it out"):
+        made(tmp_path, rod={"catalogue": "gfrp_rods", "xyzzy": 1.0})
+
+
+def test_a_date_that_is_none_is_refused_with_how_to_write_one(tmp_path):
+    with pytest.raises(
+        InputError, match=r"title_block.date: '31.5.2026' is no day; write it like 2026-05-31"
+    ):
+        made(tmp_path, title_block={"date": "31.5.2026"})
