@@ -44,6 +44,11 @@ def printable(text: str) -> str:
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
 
 
+def counted(count: int, one: str, many: str) -> str:
+    """A number and what it counts: "1 face was", "2 faces were"."""
+    return f"{count} {one if count == 1 else many}"
+
+
 def require_file(file: Path, *, where: str = "") -> None:
     """Raises InputError where there is no such file; `where` it is named, unless by itself."""
     if not file.is_file():

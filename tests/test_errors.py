@@ -4,7 +4,15 @@ import math
 
 import pytest
 
-from shellform.errors import InputError, NotConverged, not_installed, printable, require_count, require_number
+from shellform.errors import (
+    InputError,
+    NotConverged,
+    counted,
+    not_installed,
+    printable,
+    require_count,
+    require_number,
+)
 
 
 def refused(value, **bounds):
@@ -85,3 +93,11 @@ def test_a_library_that_is_missing_is_named_with_the_command_that_installs_it():
     assert "pictures: the library vtk can't be loaded (No module named 'vtk')" in told
     assert 'pip install "shellform[render]"' in told
     assert "the library asked for can't" in str(not_installed("pictures", "render", ImportError("broken")))
+
+
+def test_one_is_told_in_the_singular_and_any_other_number_in_the_plural():
+    assert [counted(count, "face was", "faces were") for count in (0, 1, 2)] == [
+        "0 faces were",
+        "1 face was",
+        "2 faces were",
+    ]

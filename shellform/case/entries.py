@@ -377,14 +377,10 @@ class TitleBlockEntry(Entry):
     @field_validator("date", mode="before")
     @classmethod
     def _day(cls, value: Any) -> Any:
-        if isinstance(value, datetime.date):
-            return value.isoformat()
-        if isinstance(value, str) and value:
-            try:
-                datetime.date.fromisoformat(value)
-            except ValueError as error:
-                raise ValueError(f"{value!r} is no day; write it like 2026-05-31") from error
-        return value
+        try:
+            return value and datetime.date.fromisoformat(str(value)).isoformat()
+        except ValueError as error:
+            raise ValueError(f"{str(value)!r} is no day; write it like 2026-05-31") from error
 
 
 class RobustEntry(Entry):

@@ -129,7 +129,8 @@ def tell_as_built(summary: Summary) -> None:
             print(f"{note}.")
     found = summary.failure
     if found is not None:
-        cables = f"; {', '.join(found.cables)} go slack" if found.cables else ""
+        slack = "goes slack" if len(found.cables) == 1 else "go slack"
+        cables = f"; {', '.join(found.cables)} {slack}" if found.cables else ""
         print(
             f"fails first: structure {found.number} at {found.factor:.2f} of the load “{found.load}” ({found.kind}), "
             f"driven by {cause_title(found.driver)}, without which it bears {found.without[found.driver]:.2f}{cables}"

@@ -18,7 +18,7 @@ from shellform.arrays import Indices, Reals, read_arrays
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import InputError, require_count, require_number
+from shellform.errors import InputError, counted, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.site import calibration, erection, measurements, retensioning
@@ -164,15 +164,18 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     size = len(goal)
     lines = [
         *doubts,
-        f"{len(places)} nodes were seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
+        f"{counted(len(places), 'node was', 'nodes were')} seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
         f"should be (root mean square)",
-        f"{count} cables to turn, {int(np.abs(step.turns).sum())} turns of {1e3 * options.step:g} mm; "
+        f"{counted(count, 'cable', 'cables')} to turn, {counted(int(np.abs(step.turns).sum()), 'turn', 'turns')} "
+        f"of {1e3 * options.step:g} mm; "
         f"afterwards {_mm(step.misfit_after, size)} mm are predicted"
         if count
         else "no turn is worth taking: what is left is below what the survey can see or the crew can do",
     ]
     if step.halved:
-        lines.append(f"the turns were halved {step.halved} times, to stay on the stable branch")
+        lines.append(
+            f"the turns were halved {counted(step.halved, 'time', 'times')}, to stay on the stable branch"
+        )
     return SiteResult(lines, files)
 
 
@@ -226,7 +229,7 @@ def replay(
     )
     file = made(output or run.folder / "schedules") / "replay.csv"
     write_text(file, text)
-    gone = f"{100.0 * played.removed:.0f} % of the misfit are gone after {len(played.adjustments)} rounds"
+    gone = f"{100.0 * played.removed:.0f} % of the misfit is gone after {counted(len(played.adjustments), 'round', 'rounds')}"
     return SiteResult([*text.splitlines(), gone], [file])
 
 

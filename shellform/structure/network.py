@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Flags, Indices, Reals, flags, reals
-from shellform.errors import InputError
+from shellform.errors import InputError, counted
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.solve.assembly import Assembly
@@ -120,8 +120,8 @@ def _coincident(network: Network) -> list[str]:
     k = int(np.argmax(same))
     pair = sorted((int(order[k]), int(order[k + 1])))
     return [
-        f"{int(same.sum())} nodes lie where another one does, nodes[{pair[0]}] and nodes[{pair[1]}] the "
-        "first; they don't touch."
+        f"{counted(int(same.sum()), 'node lies', 'nodes lie')} where another one does, nodes[{pair[0]}] and "
+        f"nodes[{pair[1]}] the first; they don't touch."
     ]
 
 

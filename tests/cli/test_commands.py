@@ -130,7 +130,7 @@ def test_check_takes_what_a_file_leaves_open_and_tells_what_was_mended(tmp_path)
     assert standing.returncode == 0, standing.stderr
     assert "0.05 × 0.03 × 0.05 m (is the unit right?)" in standing.stdout
     closed = shellform("check", "tests/data/rhinovault_holes.json", "--fill", "all")
-    assert "1 holes were closed" in closed.stdout
+    assert "1 hole was closed" in closed.stdout
     assert "COMPAS JSON" in closed.stdout
     one = shellform("check", "tests/data/tna_tutorial.3dm", "--object", "mesh 1")
     assert "0.01 × 0.01 × 0 m" in one.stdout

@@ -85,7 +85,12 @@ def test_how_it_fails_first_is_told_with_the_cables_that_go_slack(capsys):
     failure = FailureRecord(
         "initial", "wind", 7, 0.873, "limit point", "marks", {"marks": 1.1, "shape": 0.9}, ("C3", "C12")
     )
-    for found, slack in ((failure, "; C3, C12 go slack"), (replace(failure, cables=()), "")):
+    for cables, slack in (
+        (("C3", "C12"), "; C3, C12 go slack"),
+        (("C5",), "; C5 goes slack"),
+        ((), ""),
+    ):
+        found = replace(failure, cables=cables)
         tell_as_built(replace(summary(["initial"]), failure=found))
         told = capsys.readouterr().out
         assert "fails first: structure 7 at 0.87 of the load “wind” (limit point), driven by" in told

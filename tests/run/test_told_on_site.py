@@ -39,7 +39,7 @@ def run(monkeypatch, tmp_path):
     [
         ([2, 0, -3], 0, "2 cables to turn, 5 turns of 0.5 mm; afterwards 3.000 mm are predicted", 2),
         ([0, 0, 0], 0, "no turn is worth taking", 2),
-        ([0, 0, 1], 2, "1 cables to turn, 1 turns of 0.5 mm", 3),
+        ([0, 0, 1], 2, "1 cable to turn, 1 turn of 0.5 mm", 3),
     ],
 )
 def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
@@ -147,7 +147,7 @@ def test_a_replay_tells_what_is_left_after_each_round_and_draws_lengths_of_the_e
     assert [each.split(",") for each in found.lines[1:4]] == [
         ["0", "10.000", "0", "0"], ["1", "4.000", "2", "3"], ["2", "2.000", "1", "4"],
     ]  # fmt: skip
-    assert found.lines[-1] == "96 % of the misfit are gone after 2 rounds"
+    assert found.lines[-1] == "96 % of the misfit is gone after 2 rounds"
     np.testing.assert_allclose(asked["errors"], 0.002 * np.random.default_rng(4).normal(size=3))
     assert (asked["nodes"], asked["noise"], asked["rounds"], asked["seed"], asked["slip"]) == (
         [1, 3, 4], 0.3e-3, 2, 5, 0.05,

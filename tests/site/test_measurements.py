@@ -126,7 +126,7 @@ def test_supports_on_their_way_come_in_the_order_of_the_net_s_stop_after_stop(wr
     for text, said in [
         ("1,3,0,0,0\n", r"line 2: node: is no support \(found 3\). Supports: 4, 2"),
         ("1,4,0,0,0\n1,4,0,0,0\n", r"line 3: node: is there twice in one stop \(found 4\)"),
-        ("1,2,0,0,0\n", r"stop 1 lacks 1 supports \(found 4\)"),
+        ("1,2,0,0,0\n", r"stop 1 lacks 1 support \(found 4\)"),
     ]:
         with pytest.raises(InputError, match=said):
             read_way(written(head + text), SHELL)

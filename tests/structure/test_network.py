@@ -71,7 +71,7 @@ def test_nodes_in_one_place_are_counted_and_the_first_pair_named():
     nodes = [[0, 0, 0], [1, 0, 0], [1, 2, 0], [1, 0, 0], [0, 2, 1]]
     beside = network(nodes, [[0, 1], [1, 2], [0, 3], [0, 4]], held={0: ALL})
     (told,) = [each for each in doubts(beside) if "where another one does" in each]
-    assert told.startswith("1 nodes lie where another one does, nodes[1] and nodes[3] the first")
+    assert told.startswith("1 node lies where another one does, nodes[1] and nodes[3] the first")
 
 
 @pytest.mark.parametrize(

@@ -90,7 +90,7 @@ def test_the_first_vertex_without_a_number_is_named_and_the_others_counted():
     points = np.ones((9, 3))
     check_points(points, "f")
     points[[3, 5, 8], [2, 0, 1]] = np.nan, np.inf, -np.inf
-    with pytest.raises(InputError, match="f: vertex 4 has a coordinate that is no number, as have 2 others"):
+    with pytest.raises(InputError, match="f: vertex 4 has a coordinate that is no number, as 2 others have"):
         check_points(points, "f")
 
 

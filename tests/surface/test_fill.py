@@ -98,7 +98,7 @@ def test_the_fill_of_a_hole_in_a_sphere_is_the_sphere_within_a_hundredth_of_its_
         draft = pierced(step)
         closed = surface_of(draft, "cap", fill="holes")
         assert closed.holes == 0
-        assert any("1 holes were closed" in note for note in closed.mended)
+        assert any("1 hole was closed" in note for note in closed.mended)
         np.testing.assert_array_equal(closed.vertices[: len(draft.points)], draft.points)
         # The cap over the hole is 42 mm high; that of least bending isn't quite a sphere's.
         assert np.abs(np.linalg.norm(closed.vertices, axis=1) - 3.0).max() < 0.5e-3
@@ -186,7 +186,7 @@ def test_holes_that_stand_on_the_ground_stay_open():
     draft = Draft(points, np.vstack([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
     surface = surface_of(draft, "ring", fill="all")
     assert surface.holes == 1
-    assert any("1 that stand on the ground were not" in note for note in surface.mended)
+    assert any("1 that stands on the ground was not" in note for note in surface.mended)
 
 
 def test_what_can_not_be_closed_smoothly_is_refused():

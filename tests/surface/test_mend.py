@@ -55,7 +55,7 @@ def test_points_of_no_face_and_faces_given_twice_are_dropped():
         np.vstack([TRIANGLES, TRIANGLES[:3, [1, 2, 0]], TRIANGLES[:2, ::-1]]),
     )
     as_clean(surface)
-    told(surface, "1 points of no face", "5 faces given twice")
+    told(surface, "1 point of no face was", "5 faces given twice")
 
 
 def test_faces_that_are_a_point_or_a_line_are_dropped():
@@ -176,7 +176,7 @@ def test_an_edge_that_meets_itself_in_a_vertex_is_parted():
     at = np.arange(len(QUADS)).reshape(12, 8)
     quads = np.delete(QUADS, [at[4, 3], at[5, 4]], axis=0)
     surface = mended(POINTS, split(quads))
-    told(surface, "1 vertices at which the edge met itself")
+    told(surface, "1 vertex at which the edge met itself was parted")
     assert len(surface.boundary) == 2
     assert surface.holes == 1
     assert len(surface.vertices) == len(POINTS) + 1
@@ -252,7 +252,8 @@ def test_vertices_nearer_than_a_hundred_millionth_of_the_size_are_one():
         near[3] += [apart * 4.0, 0.0, 0.0]
         found = mend._merged(Draft(near, faces), 4.0)
         assert len(found.points) == count
-        assert found.notes == (f"{6 - count} vertices lay on others and were merged",)
+        merged = {1: "1 vertex lay on another and was merged", 2: "2 vertices lay on others and were merged"}
+        assert found.notes == (merged[6 - count],)
 
 
 def test_the_first_of_equal_points_stands_for_them_and_nearness_goes_on_from_one_to_the_next():

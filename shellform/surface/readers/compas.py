@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, counted
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 from shellform.surface.readers.network_faces import faces_in_plan
 
@@ -69,7 +69,13 @@ def read_compas(file: Path, choice: Choice) -> Draft:
     if networks:
         notes = [f"the faces between the lines of {choice.name or found[0][0] or 'a network'} were taken"]
     if openings:
-        notes.append(f"{openings} faces without load were left out as openings")
+        notes.append(
+            counted(
+                openings,
+                "face without load was left out as an opening",
+                "faces without load were left out as openings",
+            )
+        )
     return Draft(draft.points, draft.triangles, notes=tuple(notes))
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, counted
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000
@@ -126,9 +126,10 @@ def check_points(points: Reals, where: str) -> None:
     """Raises InputError that names the first vertex whose coordinates are no numbers."""
     bad = ~np.isfinite(points).all(axis=1)
     if bad.any():
-        vertex = int(np.argmax(bad))
+        vertex, others = int(np.argmax(bad)), int(bad.sum()) - 1
+        also = f", as {counted(others, 'other has', 'others have')}" if others else ""
         raise InputError(
-            f"vertex {vertex + 1} has a coordinate that is no number, as have {int(bad.sum()) - 1} others",
+            f"vertex {vertex + 1} has a coordinate that is no number{also}",
             where=where,
             remedy="Export the mesh anew.",
         )

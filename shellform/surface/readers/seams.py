@@ -17,6 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
+from shellform.errors import counted
 from shellform.surface.readers.draft import Draft
 
 _GAP = 0.1  # of the mean length of open edges
@@ -45,7 +46,14 @@ def sewn(draft: Draft, size: float) -> Draft:
             break
     notes = draft.notes
     if joined:
-        notes = (*notes, f"{joined} pairs of vertices across a gap of up to {gap:.2g} m were joined")
+        notes = (
+            *notes,
+            counted(
+                joined,
+                f"pair of vertices across a gap of {gap:.2g} m was joined",
+                f"pairs of vertices across a gap of up to {gap:.2g} m were joined",
+            ),
+        )
     if cut:
         notes = (
             *notes,

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.compiled import njit
-from shellform.errors import InputError
+from shellform.errors import InputError, counted
 from shellform.surface.shape.jets import jets
 
 _SAME = 1e-9  # of the size: vertices nearer than that are one
@@ -158,22 +158,44 @@ def _cleaned(
         rank = np.empty_like(order)
         rank[order] = np.arange(len(order))
         if len(first) < len(points):
-            mended.append(f"{len(points) - len(first)} vertices lay on others and were merged")
+            mended.append(
+                counted(
+                    len(points) - len(first),
+                    "vertex lay on another and was merged",
+                    "vertices lay on others and were merged",
+                )
+            )
         points, faces = points[first[order]], rank[same][faces]
         normals = None if normals is None else normals[first[order]]
     area = triangle_areas(points, faces)
     thin = area <= _FLAT * size * size
     if thin.any():
-        mended.append(f"{int(thin.sum())} triangles without area were dropped")
+        mended.append(
+            counted(
+                int(thin.sum()), "triangle without area was dropped", "triangles without area were dropped"
+            )
+        )
         faces = faces[~thin]
     once, _ = _distinct(np.sort(faces, axis=1))
     if len(once) < len(faces):
-        mended.append(f"{len(faces) - len(once)} triangles given twice were dropped")
+        mended.append(
+            counted(
+                len(faces) - len(once),
+                "triangle given twice was dropped",
+                "triangles given twice were dropped",
+            )
+        )
         faces = faces[np.sort(once)]
     used = np.zeros(len(points), dtype=bool)
     used[faces.ravel()] = True
     if not used.all():
-        mended.append(f"{int((~used).sum())} vertices without triangle were dropped")
+        mended.append(
+            counted(
+                int((~used).sum()),
+                "vertex without triangle was dropped",
+                "vertices without triangle were dropped",
+            )
+        )
         faces = (np.cumsum(used) - 1)[faces]
         points = points[used]
         normals = None if normals is None else normals[used]
@@ -186,7 +208,7 @@ def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
     if (counts > 2).any():
         a = keys[np.argmax(counts > 2)] // len(points)
         raise InputError(
-            f"{int((counts > 2).sum())} edges belong to more than two triangles, the first at "
+            f"{counted(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two triangles, the first at "
             f"{points[a].round(4).tolist()}",
             where=where,
             remedy="Remove the faces inside or behind the surface and export it again.",
