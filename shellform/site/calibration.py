@@ -225,7 +225,7 @@ def _rounds(
         known = fit.identifiability(free, noise)
         if not known.tellable:
             raise NotConverged(
-                "The data tell none of the connectors' stiffnesses: " + " ".join(known.sentences()),
+                f"The data tell none of the stiffnesses: {' '.join(known.sentences())[:-1]}",
                 state=states,
                 remedy="Choose load states that move the markers more (see `foresee`).",
             )

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 import csv
 import math
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, counted, require_number
+from shellform.errors import InputError, counted, require_file, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 
 
@@ -24,6 +25,7 @@ class MeasuredRow:
     values: dict[str, float]
 
 
+_NAMED = re.compile(r"[A-Za-z]+(\d+)")  # as drawings and schedules name cables: C12
 _TABLE = "Give a table as CSV in UTF-8, with a head line."
 
 
@@ -36,6 +38,7 @@ def check_noise(noise: float) -> None:
 
 def text_of(path: str | Path, remedy: str) -> str:
     """The text of a file in UTF-8, without a mark at its beginning. Raises InputError, with the `remedy`."""
+    require_file(Path(path))
     try:
         return Path(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
@@ -234,9 +237,9 @@ def _number(cell: str, where: str, may_be_empty: bool) -> float:
     try:
         value = float(cell)
     except ValueError as error:
-        raise InputError(
-            "must be a number", where=where, value=cell, remedy="Write it with a decimal point: 0.0125."
-        ) from error
+        named = _NAMED.fullmatch(cell)
+        remedy = f"Write its number alone: {named[1]}." if named else "Write it with a decimal point: 0.0125."
+        raise InputError("must be a number", where=where, value=cell, remedy=remedy) from error
     if not math.isfinite(value):
         raise InputError(
             "must be finite",
@@ -252,7 +255,7 @@ def _index(value: float, where: str, count: int) -> int:
         raise InputError(
             f"must be a whole number from 0 to {count - 1}",
             where=where,
-            value=value,
+            value=int(value) if value == int(value) else value,
             remedy="Take it from the run's own tables, which number from 0.",
         )
     return int(value)

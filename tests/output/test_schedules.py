@@ -19,6 +19,7 @@ from shellform.gridshell.layers import TwoLayers
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
 from shellform.output.workshop.setting_out import support_plan
+from shellform.site.measurements import read_places
 from shellform.structure.elements.sections import Material, Rectangle
 
 
@@ -272,15 +273,27 @@ def test_supports_and_survey_targets_stand_where_the_net_has_them(read, built):
         assert rod.nodes[0 if row["end"] == "first" else -1] == net.supports[number]
         assert float(row["rise of the rod [rad]"]) > 0.0  # every rod of the vault goes up from its foot
     assert len(read["survey"]) == len(net.grid.lattice)
+    upper = net.target.positions[net.grid.crossing_nodes[:, 1]]
     for k, row in enumerate(read["survey"]):
         assert [float(row[f"target: {axis} [m]"]) for axis in "xyz"] == pytest.approx(
-            net.crossings[k].tolist(), abs=1e-6
+            upper[k].tolist(), abs=1e-6
         )
         assert float(row["design: off the target [m]"]) == pytest.approx(0.0, abs=1e-6)
-        assert float(row["erected: z [m]"]) == pytest.approx(1.01 * net.crossings[k, 2], abs=1e-6)
+        assert float(row["erected: z [m]"]) == pytest.approx(1.01 * upper[k, 2], abs=1e-6)
         assert float(row["additional: off the target [m]"]) == pytest.approx(
-            0.02 * abs(net.crossings[k, 2]), abs=1e-6
+            0.02 * abs(upper[k, 2]), abs=1e-6
         )
+
+
+def test_a_survey_that_finds_each_crossing_where_the_schedule_expects_it_finds_nothing_off(
+    built, read, tmp_path
+):
+    axes = [f"erected: {axis} [m]" for axis in "xyz"]
+    lines = [",".join(row[each] for each in ("crossing", *axes)) for row in read["survey"]]
+    file = tmp_path / "survey.csv"
+    file.write_text("crossing,x,y,z\n" + "\n".join(lines))
+    nodes, places = read_places(file, built.shell)
+    np.testing.assert_allclose(places, built.states["none"].positions[nodes], atol=1e-6)
 
 
 def test_the_rods_press_on_their_supports_with_the_load(shell):

@@ -210,7 +210,7 @@ def test_scans_are_read_in_their_unit_with_or_without_names(tmp_path):
             read_points(file)
     with pytest.raises(InputError, match="known unit"):
         read_points(file, unit="furlong")
-    with pytest.raises(InputError, match="can't be read"):
+    with pytest.raises(InputError, match="there is no such file"):
         read_points(tmp_path / "none.csv")
 
 
@@ -227,7 +227,7 @@ def test_calibrations_that_can_t_be_done_are_refused(shell, loads, markers):
         foresee(shell, plain, [np.zeros((3, 6))], markers)
     with pytest.raises(NotConverged, match="bears 0"):
         foresee(shell, plain, [9.0 * loads[1]], markers)
-    with pytest.raises(NotConverged, match="tell none"):
+    with pytest.raises(NotConverged, match=r"tell none of the stiffnesses: .*[^.]\. Choose load"):
         calibrate(shell, plain, [scan], markers, free=["axial"])
     with pytest.raises(NotConverged, match=r"bears 0.*of load 1 only"):
         calibrate(shell, plain, [replace(scan, load=9.0 * loads[1])], markers)

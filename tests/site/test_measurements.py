@@ -112,8 +112,17 @@ def test_groups_come_by_rising_number_and_count_the_design_s_own_cables(written)
     design = SimpleNamespace(present=np.array([True, False, True, True, False]))
     first, second = read_groups(written("cable,group\n2,10\n0,2.5\n1,10\n"), design)
     assert (first.tolist(), second.tolist()) == ([0], [3, 2])
-    with pytest.raises(InputError, match="line 2: cable: must be a whole number from 0 to 2"):
-        read_groups(written("cable,group\n3,1\n"), design)
+    for text, said in [
+        ("3,1", r"line 2: cable: must be a whole number from 0 to 2 \(found 3\)"),
+        ("C1,1", r"line 2: cable: must be a number \(found 'C1'\). Write its number alone: 1\."),
+    ]:
+        with pytest.raises(InputError, match=said):
+            read_groups(written(f"cable,group\n{text}\n"), design)
+
+
+def test_a_table_that_is_not_there_is_said_not_to_be(tmp_path):
+    with pytest.raises(InputError, match=r"none.csv: there is no such file. Check the path"):
+        read_table(tmp_path / "none.csv", ("x",))
 
 
 def test_supports_on_their_way_come_in_the_order_of_the_net_s_stop_after_stop(written):

@@ -39,7 +39,7 @@ from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import cut_lengths
 from shellform.gridshell.layers import layers_of
-from shellform.net.grid import Grid, crossing_points
+from shellform.net.grid import Grid
 from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.edge_schedule import edge_names, edge_table
 from shellform.output.workshop.nesting import Cutting
@@ -339,10 +339,10 @@ def supports(built: Built) -> Table:
 
 
 def survey(built: Built) -> Table:
-    """Every crossing: where it is wanted, and where it is expected at each load, "none" before the pour."""
-    grid, shell = built.grid, built.shell
-    places = {"target": shell.net.crossings}
-    places |= {_stage(name): crossing_points(grid, built.states[name]) for name in _in_order(built)}
+    """Where the axis of each crossing's upper rod is wanted, and expected at each load, "none" before the pour."""
+    grid, shell, upper = built.grid, built.shell, built.grid.crossing_nodes[:, 1]
+    places = {"target": shell.target.positions[upper]}
+    places |= {_stage(name): built.states[name].positions[upper] for name in _in_order(built)}
     across = {
         (rod.direction, c): name
         for name, rod in zip(rod_names(grid), grid.rods, strict=True)
@@ -361,7 +361,7 @@ def survey(built: Built) -> Table:
             if name != "target"
         ]
         rows.append((k, across["u", k], across["v", k], *here, *off))
-    notes = ("Middle between the axes of the two rods.", *built.origin_notes)
+    notes = ("Axis of the upper rod, as `shellform survey` reads a crossing.", *built.origin_notes)
     return Table("survey", tuple(heads), tuple(rows), notes)
 
 
