@@ -25,7 +25,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged, require_file
-from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence
+from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence, to_sew
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
@@ -125,7 +125,7 @@ def read_cad(
             where=str(file),
             remedy="Open it in the program that wrote it, check it, and export it anew.",
         )
-    factor = 1.0 if kind != "brep" else unit_factor(unit or "m")
+    factor = {"step": unit_factor("mm"), "iges": 1.0, "brep": unit_factor(unit or "m")}[kind]
     with session(), errors(file, "gmsh can't read it", "Open it in a CAD program and export it anew."):
         _read_shapes(file, kind)
         _refuse_all_but_faces(file, kind, face)
@@ -149,8 +149,8 @@ def mesh_patches(
         for patch in patches:
             _add_patch(patch)
         gmsh.model.occ.synchronize()
-        if not _faces_connected():
-            tolerance = _SEWN * float(extent().max())
+        tolerance = _SEWN * float(extent().max())
+        if to_sew(tolerance):
             # Of all shapes at once, which an empty list means: named ones are sewn each by itself, to nothing.
             gmsh.model.occ.healShapes([], tolerance, False, False, False, True, False)
             gmsh.model.occ.synchronize()
@@ -333,30 +333,24 @@ def _stretches(edge: Reals) -> list[range]:
 
 
 def _read_shapes(file: Path, kind: str) -> None:
-    """The file's shapes into the current model, STEP and IGES in m, faces that touch sewn together."""
+    """The file's shapes into the current model, STEP in mm, IGES in m, faces that touch sewn together.
+
+    With metres for its unit OpenCASCADE loses the seam of what turns about a pole and is less than some 2 m wide in
+    STEP files of millimetres."""
+    if kind == "step":
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
     if kind == "iges":
         # OpenCASCADE takes a target unit for IGES only once it has read one: this reading is thrown away.
         gmsh.option.setString("Geometry.OCCTargetUnit", "")
         _import(file, kind)
         gmsh.option.setString("Geometry.OCCTargetUnit", "M")
     _import(file, kind)
-    if not gmsh.model.getEntities(3) and not _faces_connected():
+    tolerance = _SEWN * float(extent().max())
+    if not gmsh.model.getEntities(3) and to_sew(tolerance):
         # The sewing tolerance is a share of the size, which is known only now: read again.
-        gmsh.option.setNumber("Geometry.Tolerance", _SEWN * float(extent().max()))
+        gmsh.option.setNumber("Geometry.Tolerance", tolerance)
         gmsh.option.setNumber("Geometry.OCCSewFaces", 1)
         _import(file, kind)
-
-
-def _faces_connected() -> bool:
-    """Whether all faces hang together by curves that they share; sewing faces with a pole breaks them, so
-    only the others are sewn.
-    """
-    groups: list[set[int]] = []
-    for _, face in gmsh.model.getEntities(2):
-        curves = set(gmsh.model.getAdjacencies(2, face)[1].tolist())
-        touching = [group for group in groups if group & curves]
-        groups = [group for group in groups if not group & curves] + [curves.union(*touching)]
-    return len(groups) < 2
 
 
 def _import(file: Path, kind: str) -> None:

@@ -164,6 +164,27 @@ def extent() -> Reals:
     return np.asarray(np.ptp(np.vstack(ends), axis=0))
 
 
+def to_sew(tolerance: float) -> bool:
+    """Whether faces lie within the `tolerance`, m, of others without hanging together with them by curves that they
+    share; sewing faces with a pole breaks them, so only such are sewn.
+    """
+    groups: list[tuple[set[int], Reals, Reals]] = []
+    for _, face in gmsh.model.getEntities(2):
+        curves = set(gmsh.model.getAdjacencies(2, face)[1].tolist())
+        box = np.reshape(gmsh.model.getBoundingBox(2, face), (2, 3))
+        touching = [group for group in groups if group[0] & curves]
+        whole = (
+            curves.union(*(group[0] for group in touching)),
+            np.min([box[0], *(group[1] for group in touching)], axis=0),
+            np.max([box[1], *(group[2] for group in touching)], axis=0),
+        )
+        groups = [*(group for group in groups if not group[0] & curves), whole]
+    return any(
+        (low <= other + tolerance).all() and (lower <= high + tolerance).all()
+        for (_, low, high), (_, lower, other) in itertools.combinations(groups, 2)
+    )
+
+
 def mesh_faces(
     size: float,
     where: Path,
@@ -173,7 +194,7 @@ def mesh_faces(
     before_mesh: Callable[[float], None] = lambda triangles: None,
 ) -> tuple[Reals, Indices, Reals | None]:
     """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's
-    faces.
+    faces, zero at poles, where they mean nothing.
 
     Of a solid, only the triangles of its upper or lower `side`. `before_mesh` is told about how many triangles the mesh
     will have.
@@ -226,14 +247,8 @@ def mesh_faces(
     used[faces.ravel()] = True
     points, faces = points[used], (np.cumsum(used) - 1)[faces]
     normals, known = normals[used], length[used] > 0.5
-    if not known.any():
-        return points, faces, None
-    if not known.all():
-        estimated = made(points, faces, None, str(where))
-        from scipy.spatial import cKDTree
-
-        normals[~known] = estimated.normals[cKDTree(estimated.vertices).query(points[~known])[1]]
-    return points, faces, normals
+    normals[~known] = 0.0
+    return points, faces, normals if known.any() else None
 
 
 def _on_side(

@@ -10,6 +10,8 @@ import pytest
 
 from shellform.errors import InputError, NotConverged
 from shellform.surface import cad
+from shellform.surface.occ import gmsh, session, silence
+from shellform.surface.readers.reading import read_surface
 
 ROOT = Path(__file__).parent.parent.parent
 DATA = ROOT / "tests/data"
@@ -349,3 +351,38 @@ def test_a_curve_that_ends_where_it_begins_is_written_closed(tmp_path):
         gmsh.model.occ.synchronize()
         (curve,) = gmsh.model.getEntities(1)
         assert gmsh.model.occ.getMass(*curve) == pytest.approx(2.0 * np.pi, rel=1e-4)
+
+
+def turned(*domes):
+    """Turns an arc about its pole to a dome for each radius, height and place x, mm."""
+    gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+    for radius, height, x in domes:
+        points = [(x + radius, 0.0, 0.0), (x + 0.6 * radius, 0.0, height), (x, 0.0, height)]
+        arc = gmsh.model.occ.addBezier([gmsh.model.occ.addPoint(*point) for point in points])
+        gmsh.model.occ.revolve([(1, arc)], x, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0 * np.pi)
+    gmsh.model.occ.synchronize()
+
+
+@pytest.mark.parametrize("across", [6.0, 900.0, 6000.0])
+def test_a_dome_that_turns_about_its_pole_is_read_whatever_its_size(tmp_path, across):
+    file = tmp_path / "dome.step"
+    with session(), silence():
+        turned((0.5 * across, 0.2 * across, 0.0))
+        gmsh.write(str(file))
+    surface = read_surface(file)
+    np.testing.assert_allclose(1e3 * surface.size / across, [1.0, 1.0, 0.2], atol=3e-3)
+    top = np.argmax(surface.vertices[:, 2])
+    np.testing.assert_allclose(surface.normals[top], [0.0, 0.0, 1.0], atol=1e-3)
+
+
+@pytest.mark.parametrize(("ending", "unit"), [("step", None), ("brep", "mm")])
+def test_of_two_domes_that_do_not_touch_each_can_be_taken(tmp_path, ending, unit):
+    """Sewn, their poles would come apart."""
+    file = tmp_path / f"domes.{ending}"
+    with session(), silence():
+        turned((3000.0, 1200.0, 0.0), (500.0, 400.0, 6000.0))
+        gmsh.write(str(file))
+    with pytest.raises(InputError, match="2 separate pieces"):
+        read_surface(file, unit=unit)
+    for piece, size in ((1, [6.0, 6.0, 1.2]), (2, [1.0, 1.0, 0.4])):
+        np.testing.assert_allclose(read_surface(file, unit=unit, piece=piece).size, size, atol=0.02)

@@ -335,8 +335,12 @@ def half_circle(radius):
 
 def test_a_rhino_sphere_is_closed_and_refused(tmp_path):
     file = rhino_file(tmp_path / "a.3dm", [(sphere(1000.0).ToBrep(), "Shell", "ball")])
-    with pytest.raises(InputError, match="closed"):
-        read_surface(file)
+    for face, said in (
+        (None, r"is closed.*\(surface.face, --face\)"),
+        ("upper", "isn't set off from the rest"),
+    ):
+        with pytest.raises(InputError, match=said):
+            read_surface(file, face=face)
 
 
 def test_rhino_s_trimmed_breps_are_trimmed(tmp_path):

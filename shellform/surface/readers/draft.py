@@ -21,7 +21,7 @@ _NAMES_TOLD = 12
 @dataclass(frozen=True)
 class Draft:
     """`points` (v, 3) in units of `metres` m (None: the file doesn't say) with the vertical axis `up`;
-    `triangles` (t, 3); unit `normals` (v, 3) where the source knows them; `notes`, a sentence for each thing
+    `triangles` (t, 3); unit `normals` (v, 3) where the source knows them, zero where it knows others; `notes`, a sentence for each thing
     left out or chosen."""
 
     points: Reals

@@ -81,7 +81,7 @@ def make_surface(
     upwards.
 
     Vertices at one place are merged, unused ones and triangles without area or given twice are dropped
-    (`mended` says so). `normals` (v, 3) where the source knows them; else they are estimated. Raises
+    (`mended` says so). `normals` (v, 3) where the source knows them; else, and where they are zero, they are estimated. Raises
     InputError for an empty mesh, edges with more than two triangles, several separate pieces, a closed
     surface, and one with a single side.
     """
@@ -103,8 +103,11 @@ def make_surface(
     if given is None:
         unit = jets(points, faces, rough)[0]
     else:
-        unit = given / np.linalg.norm(given, axis=1, keepdims=True)
+        length = np.linalg.norm(given, axis=1, keepdims=True)
+        unit = given / np.where(length > 0.0, length, 1.0)
         unit = unit * np.where(np.sum(unit * rough, axis=1, keepdims=True) < 0.0, -1.0, 1.0)
+        if not length.all():
+            unit = np.where(length > 0.0, unit, jets(points, faces, rough)[0])
     return Surface(points, faces, unit, source, tuple(mended))
 
 
