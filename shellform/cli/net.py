@@ -33,9 +33,8 @@ def net(
     as_json: Json = False,
 ) -> None:
     """Draw the Chebyshev net alone."""
-    from shellform.case.build_net import size_text
     from shellform.records.summary import document
-    from shellform.run.first_look import net_alone
+    from shellform.run.first_look import labelled_net, net_alone
 
     report = Spinner(quiet=quiet)
     summary = net_alone(
@@ -52,5 +51,4 @@ def net(
     if as_json:
         print(json.dumps(document(summary), indent=1))
     elif not quiet:
-        found = document(summary)
-        tell_labelled({"size": size_text(found["surface"]["size"]), **found["net"]})
+        tell_labelled(labelled_net(summary) | {"everything is in": str(output)})

@@ -211,8 +211,9 @@ def nearness(quality: Quality, grid: Grid, state: State) -> str:
     points = crossing_points(grid, state)
     place = points[neighbours(grid)[0][worst]].mean(axis=0).round(3).tolist()
     return (
-        f"crossings at {place} lie {abs(error[worst]):.1%} {'nearer' if error[worst] < 0.0 else 'farther'} than their "
-        f"spacing, where {SPACING_ERROR:.1%} are usual: rods bend there to less than three spacings"
+        f"crossings at {place} lie {100.0 * abs(error[worst]):.2f} % {'nearer' if error[worst] < 0.0 else 'farther'} "
+        f"than their spacing, where up to {100.0 * SPACING_ERROR:.2f} % is usual: rods bend there to a radius of less "
+        "than three spacings"
     )
 
 

@@ -130,6 +130,29 @@ def labelled(found: FirstLook) -> dict[str, str]:
     return lines
 
 
+def labelled_net(found: Summary) -> dict[str, str]:
+    """What `net_alone` found, as labelled lines."""
+    assert found.surface is not None
+    assert found.net is not None
+    net = found.net
+    lines = {
+        "size": size_text(found.surface.size),
+        "rods": f"{net.rods} at {net.spacing:g} m, with {net.crossings} crossings and {net.supports} supports",
+        "off the surface": f"{net.distance_max:.2g} m at most, {net.distance_mean:.2g} m in the mean",
+        "off their spacing": f"{100.0 * net.spacing_error_max:.2f} % at most",
+        "sharpest angle": f"{math.degrees(net.shear_angle_min):.3g}° between two rods",
+        "largest curvature": f"{net.curvature_max:.3g} 1/m of a rod",
+        "area without rods": f"{net.uncovered_area:.3g} m²",
+    }
+    if net.angle is not None:
+        lines["angle of u rods"] = f"{math.degrees(net.angle):.4g}° against the x axis"
+    lengths: dict[str, float] = {}
+    for each in net.edges:
+        lengths[each.kind] = lengths.get(each.kind, 0.0) + each.length
+    lines["edge"] = ", ".join(f"{length:.3g} m {kind}" for kind, length in lengths.items())
+    return lines | {f"note {k}": text for k, text in enumerate(net.notes, 1)}
+
+
 class _Asked(Entry):
     """The part of a case that a file and options say."""
 

@@ -193,6 +193,11 @@ def test_net_alone_writes_the_contract_s_file_for_a_mesh(tmp_path):
     net = json.loads((tmp_path / "net.json").read_text(encoding="utf-8"))
     assert len(net["crossings"]) > 50
     assert {"direction", "index", "length", "marks", "crossings", "ends"} == set(net["rods"][0])
+    told = {line[:22].strip(): line[24:] for line in result.stdout.splitlines()}
+    rods = f"{len(net['rods'])} at 0.5 m, with {len(net['crossings'])} crossings and {len(net['supports'])} supports"
+    assert told["rods"] == rods
+    assert told["angle of u rods"] == "20° against the x axis"
+    assert not set(result.stdout) & set("[{"), "no records of the program's own"
 
 
 def test_ctrl_c_ends_with_130_and_keeps_what_was_computed(tmp_path):

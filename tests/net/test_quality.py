@@ -175,7 +175,7 @@ def test_crossings_that_lie_nearer_or_farther_than_their_spacing_by_half_a_perce
 ):
     error = np.zeros(60)
     error[3] = 0.001
-    for worst, said in ((-0.0049, ""), (0.0049, ""), (-0.0061, "0.6% nearer"), (0.0071, "0.7% farther")):
+    for worst, said in ((-0.0049, ""), (0.0049, ""), (-0.0054, "0.54 % nearer"), (0.0071, "0.71 % farther")):
         error[8] = worst
         made = SimpleNamespace(spacing_error=error, spacing_error_max=abs(worst))
         told = quality.nearness(made, grid, at_rest(grid.flat))
@@ -184,6 +184,7 @@ def test_crossings_that_lie_nearer_or_farther_than_their_spacing_by_half_a_perce
     pair = quality.neighbours(grid)[0][8]
     place = quality.crossing_points(grid, at_rest(grid.flat))[pair].mean(axis=0).round(3).tolist()
     assert f"crossings at {place} lie" in told
+    assert "where up to 0.50 % is usual" in told
 
 
 def test_what_is_bare_is_sampled_a_quarter_of_the_spacing_apart(monkeypatch):
