@@ -49,6 +49,16 @@ def test_where_none_is_meant_what_there_is_is_listed_the_most_frequent_first():
         among([("a", ""), ("b", "")], Choice(name="x"), "f.3dm")
 
 
+def test_a_layer_asked_for_as_an_object_is_told_to_be_one_and_the_other_way_round():
+    for choice, remedy in (
+        (Choice(name="Roof"), "A layer is called so: surface.layer."),
+        (Choice(layer="b"), "An object is called so: surface.object."),
+    ):
+        with pytest.raises(InputError) as told:
+            among([("Shell::Roof", ""), ("Site", "b")], choice, "f.obj")
+        assert told.value.remedy == remedy
+
+
 def test_chosen_parts_are_numbered_one_after_the_other():
     parts = [
         MeshObject("a", "1", SQUARE, (np.array([[0, 1, 2, 3]]),)),

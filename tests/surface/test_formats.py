@@ -382,6 +382,19 @@ def test_layers_and_names_of_a_rhino_file_are_listed_to_choose_from(tmp_path):
 def test_a_rhino_file_of_curves_holds_no_surface(tmp_path):
     with pytest.raises(InputError, match="holds no surface, only Curve"):
         read_surface(rhino_file(tmp_path / "a.3dm", [(half_circle(1.0), "Shell", "edge")]))
+    with pytest.raises(InputError, match=r"a.3dm: is empty. Save the surface"):
+        read_surface(rhino_file(tmp_path / "a.3dm", []))
+
+
+@pytest.mark.parametrize(
+    ("ending", "text"),
+    [("obj", "v 0 0 0\nv -3,25 0,5 1\n"), ("stl", "solid a\nfacet normal 0 0 1\nvertex 0,5 1 2\n")],
+)
+def test_decimals_with_a_comma_are_told_to_be_written_with_a_point(tmp_path, ending, text):
+    file = tmp_path / f"a.{ending}"
+    file.write_text(text)
+    with pytest.raises(InputError, match=r"line [23] can't be read .*Export it anew, with decimal points\."):
+        read_surface(file)
 
 
 def test_rhino_s_blocks_stand_where_their_instances_are(tmp_path):

@@ -16,6 +16,7 @@ from shellform.errors import InputError, counted
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000
 _NAMES_TOLD = 12
+_ENTRIES = ("surface.layer", "surface.object")
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flag
     what there is.
     """
     kept = np.ones(len(labels), dtype=bool)
-    for column, wanted, entry in [(0, choice.layer, "surface.layer"), (1, choice.name, "surface.object")]:
+    for column, (wanted, entry) in enumerate(zip((choice.layer, choice.name), _ENTRIES, strict=True)):
         if not wanted:
             continue
         kept &= [_is_called(label[column], wanted) for label in labels]
@@ -67,11 +68,14 @@ def among(labels: Sequence[tuple[str, str]], choice: Choice, where: str) -> Flag
                 f"{name!r}" + (f" ({n})" if n > 1 else "") for name, n in known.most_common(_NAMES_TOLD)
             )
             more = f" and {len(known) - _NAMES_TOLD} more" if len(known) > _NAMES_TOLD else ""
+            remedy = f"There are {listed}{more}." if listed else "None has a name."
+            if any(_is_called(label[1 - column], wanted) for label in labels):
+                remedy = f"A{' layer' if column else 'n object'} is called so: {_ENTRIES[1 - column]}."
             raise InputError(
                 f"{where} has no such surface",
                 where=entry,
                 value=wanted,
-                remedy=f"There are {listed}{more}." if listed else "None has a name.",
+                remedy=remedy,
             )
     return kept
 

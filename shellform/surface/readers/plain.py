@@ -4,6 +4,7 @@ a word.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 
 _ANEW = "Export it anew."
 _STL_HEAD, _STL_FACET = 84, np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("extra", "<u2")])
+_COMMA = re.compile(r"\d,\d")  # as some programs write decimals in some countries
 _TOLD = 40  # characters of a bad line that are quoted
 
 
@@ -146,6 +148,7 @@ def _lines(file: Path) -> list[str]:
 
 
 def _bad_line(file: Path, number: int, line: str) -> InputError:
+    remedy = "Export it anew, with decimal points." if _COMMA.search(line) else _ANEW
     return InputError(
-        f"line {number} can't be read", where=str(file), value=line[:_TOLD] or None, remedy=_ANEW
+        f"line {number} can't be read", where=str(file), value=line[:_TOLD] or None, remedy=remedy
     )

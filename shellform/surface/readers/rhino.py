@@ -129,12 +129,9 @@ def read_rhino(
     factor = _factor(model, unit, file)
     found = _numbered([each for each in _objects(model) if _is_surface(each[2])])
     if not found:
-        said = (
-            ", ".join(sorted({str(each.Geometry.ObjectType).rpartition(".")[2] for each in model.Objects}))
-            or "nothing"
-        )
+        said = ", ".join(sorted({str(each.Geometry.ObjectType).rpartition(".")[2] for each in model.Objects}))
         raise InputError(
-            f"holds no surface, only {said}",
+            f"holds no surface, only {said}" if said else "is empty",
             where=str(file),
             remedy="Save the surface, or a mesh of it, with it.",
         )
