@@ -96,7 +96,8 @@ def read_catalogue(source: str | Path) -> Catalogue:
         document = msgspec.toml.decode(path.read_bytes(), type=_CatalogueFile)
     except OSError as error:
         remedy = f"Shipped are {', '.join(shipped_catalogues())}."
-        raise InputError(f"can't be read: {error}", where=f"catalogue {path}", remedy=remedy) from error
+        said = f"can't be read: {error.strerror}" if path.exists() else "is neither shipped nor a file"
+        raise InputError(said, where=f"catalogue {path}", remedy=remedy) from error
     except msgspec.ValidationError as error:
         raise refusal(error, _PARTS).within(f"catalogue {path}") from error
     except (msgspec.DecodeError, ValueError, RecursionError) as error:  # ValueError: a number of 5,000 digits

@@ -157,7 +157,7 @@ def refuse_size(surface: Surface) -> None:
         else "Scale the file to the size that is meant."
     )
     raise InputError(
-        f"is {x:.4g} × {y:.4g} × {z:.4g} m, which no gridshell is ({SMALLEST:g} to {LARGEST:g} m): is the unit right?",
+        f"is {x:.4g} × {y:.4g} × {z:.4g} m, which no gridshell is ({SMALLEST:g} to {LARGEST:g} m)",
         where="surface.unit",
         remedy=remedy,
     )

@@ -240,7 +240,7 @@ def test_loads_that_do_not_fit_the_net_are_named(tmp_path, net, vault, old, new,
 def test_rods_that_do_not_fit_are_named(tmp_path, net, vault):
     with pytest.raises(InputError, match=r"rod.section.*'7.5 mm'.*Known: ⌀ 1.5 mm"):
         read(tmp_path, with_rod('catalogue = "gfrp_rods"\nsection = "7.5 mm"'))
-    with pytest.raises(InputError, match=r"catalogue .*bamboo: can't be read"):
+    with pytest.raises(InputError, match=r"catalogue .*bamboo: is neither shipped nor a file\. Shipped are"):
         read(tmp_path, with_rod('catalogue = "bamboo"'))
     case = read(tmp_path, with_rod('catalogue = "gfrp_rods"\nsection = "20 mm"'))
     with pytest.raises(InputError, match="they break"):

@@ -246,7 +246,8 @@ def test_wrong_catalogues_are_refused_with_their_entry(tmp_path, old, new, said)
 
 def test_unknown_catalogues_and_sections_are_answered_with_the_known_ones(mine):
     with pytest.raises(
-        InputError, match=r"can't be read.*edge_tubes, gfrp_rods, gfrp_tubes, steel_tubes, timber_laths"
+        InputError,
+        match=r"is neither shipped nor a file. Shipped are edge_tubes, gfrp_rods, gfrp_tubes, steel_tubes, timber_laths",
     ):
         read_catalogue("bamboo")
     with pytest.raises(InputError, match=r"'3 mm'.*Known: ⌀ 2 mm, ⌀ 2.2 mm"):

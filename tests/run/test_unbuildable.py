@@ -78,6 +78,7 @@ def test_a_size_that_no_shell_has_is_refused_with_the_first_unit_that_makes_a_bu
     with pytest.raises(InputError, match="which no gridshell is") as told:
         refuse_size(of_size(*size))
     assert f"{size[0]:.4g} × {size[1]:.4g} × {size[2]:.4g} m" in told.value.what
+    assert f"150 m). {told.value.remedy}" in str(told.value), "one sentence ends before the next"
     if unit is None:
         assert told.value.remedy == "Scale the file to the size that is meant."
     else:
