@@ -159,7 +159,10 @@ def test_shares_of_fixed_radii_go_to_the_others(shell, loads):
         (["tolerances.suports=0.1"], "Did you mean 'tolerances.supports'"),
         (["optimise.built_misfit=0.6"], "rod_radius and built_misfit must add up to 1, not 1.3"),
         (["optimise.catalogue=gfrp_rods"], "catalogue is for a free radius"),
-        (["optimise.catalogue=none", "optimise.misfit=0.3", "optimise.rod_radius=0.2"], "can't be read"),
+        (
+            ["optimise.catalogue=none", "optimise.misfit=0.3", "optimise.rod_radius=0.2"],
+            "is neither shipped nor a file",
+        ),
         (["optimise.neighbours=-1"], "optimise.neighbours"),
         (["limits.deviation=0"], "limits.deviation.*greater than 0"),
         (["limits.built_deviation=0"], "limits.built_deviation.*greater than 0"),

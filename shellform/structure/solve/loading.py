@@ -200,6 +200,14 @@ def turns_between(before: float, after: float, mean: float) -> bool:
     return 0.0 < half / square < 1.0 and half * half > before * square
 
 
+def kinked(assembly: Assembly, before: State, after: State) -> bool:
+    """Whether a cable goes slack or taut from one state to the other."""
+    return any(
+        np.any((cables.lengths(before) > cables.rest_length) != (cables.lengths(after) > cables.rest_length))
+        for cables in assembly.cables
+    )
+
+
 def _far(before: State, after: State) -> bool:
     """Whether a node moves so far that the increment may have leapt over something."""
     way = np.linalg.norm(after.positions - before.positions, axis=1).max()

@@ -38,7 +38,7 @@ from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.equilibrium import TOLERANCE, TURN, Equilibrium
 from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.factorisation import Indefinite
-from shellform.structure.solve.loading import Drive, turns_between
+from shellform.structure.solve.loading import Drive, kinked, turns_between
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
 
 FIRST = 0.1  # of the goal, the first step's change of the factor
@@ -50,6 +50,10 @@ _SMALLEST = 1e-6  # of the first step
 _STIFFER = 4.0  # times as stiff after it: a first step, as long as its goal is far, may have left its branch
 _BISECTIONS = 30
 _LOCATED = 1e-7  # of the factor, as near as an event is located
+
+
+Lead = tuple[int, int, float]
+"""A degree of freedom that leads: the node, the axis 0 to 2, its displacement, m."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +73,7 @@ def follow(
     drive: Drive,
     *,
     goal: float = 1.0,
-    lead: tuple[int, int, float] | None = None,
+    lead: Lead | None = None,
     first: float = FIRST,
     most: int = MOST,
     tolerance: float = TOLERANCE,
@@ -77,26 +81,23 @@ def follow(
 ) -> Iterator[PathPoint]:
     """The points of the path from the equilibrium `start` at factor 0, one by one.
 
-    It ends when the factor comes to `goal` for the first time. With `lead` (node, axis 0 to 2, displacement
-    in m) that degree of freedom is led instead, up to its displacement. `first`: the first step, as a share
-    of the goal or of the led displacement; `most` points. With `events` limit points and bifurcations are
-    located and given as points of their own. Raises NotConverged with the last state where no step succeeds
+    It ends when the factor comes to `goal` for the first time. With a `lead` that degree of freedom is led instead, up
+    to its displacement. `first`: the first step, as a share of the goal or of the led displacement; `most` points. With
+    `events` limit points and bifurcations are located and given as points of their own. Raises NotConverged with the last state where no step succeeds
     or the points run out, InputError for a held degree of freedom as lead.
     """
     precise = with_twice_the_digits(assembly)
     load, measure = drive.at(goal), ResidualNorm(assembly)
     if precise is not None and measure.drowns(assembly.evaluate(start), start, load, tolerance):
         assembly, start = precise, extended(start)
-    walk = _Path(assembly, start, drive, tolerance, abs(goal) if lead is None else 0.0)
-    led = None if lead is None else walk.number(lead)
+    walk = _Path(assembly, start, drive, tolerance, goal, lead)
     here = walk.point(start, 0.0, 0)
     if lead is not None:
-        size = first * abs(lead[2]) * (1.0 if lead[2] > 0.0 else -1.0)
-        direction = 1.0
-        onward = float(np.sign(size * here.tangent[led]))
+        size = first * lead[2]
+        onward = float(np.sign(size * here.tangent[walk.led]))
     else:
-        direction = onward = 1.0 if goal > 0.0 else -1.0
         size = first * abs(goal) * float(np.linalg.norm(here.tangent[walk.moving]))
+        onward = walk.direction
     here = replace(here, rate=onward * here.rate)
     if size == 0.0 or not np.isfinite(size):
         raise InputError(
@@ -108,10 +109,10 @@ def follow(
     yield here.point()
     smallest = _SMALLEST * abs(size)
     last: Reals | None = None
-    doubted: tuple[float, _Here] | None = None  # a step that may have leapt, and where it led
+    doubted: _Doubted = None
     for _ in range(most):
         try:
-            size, there = _onward(walk, here, size, led, last, direction, smallest, doubted)
+            size, there = _onward(walk, here, size, last, smallest, doubted)
             doubted = None
             crossing = (here.factor - goal) * (there.factor - goal) <= 0.0 and there.factor != here.factor
             if lead is None and crossing:
@@ -122,9 +123,8 @@ def follow(
             if abs(size) < smallest:
                 raise walk.gave_up(here, "The path could not be followed further") from None
             continue
-        turned = there.negative != here.negative
-        if events and turned:
-            event = walk.located(here, size, led, last, direction, there)
+        if events and there.negative != here.negative:
+            event = walk.located(here, size, last, there)
             if event is not None:
                 yield event
         yield there.point()
@@ -143,21 +143,14 @@ def follow(
 
 
 def _onward(
-    walk: _Path,
-    here: _Here,
-    size: float,
-    led: int | None,
-    last: Reals | None,
-    direction: float,
-    smallest: float,
-    doubted: tuple[float, _Here] | None,
+    walk: _Path, here: _Here, size: float, last: Reals | None, smallest: float, doubted: _Doubted
 ) -> tuple[float, _Here]:
     """The step taken and its point; the `doubted` one where a cable's kink lies on the way that no shorter one gets over.
     Raises _Missed."""
     try:
-        there = walk.step(here, size, led, last, direction)
+        there = walk.step(here, size, last)
     except _Missed:
-        if doubted is None or not walk.kinks(here, doubted[1]):
+        if doubted is None or not kinked(walk.assembly, here.state, doubted[1].state):
             raise
         return doubted
     way = float(np.linalg.norm(walk.between(here.state, there.state)))
@@ -172,9 +165,8 @@ def _onward(
 class _Missed(Exception):
     """A step found no point, or a `doubted` one, with its size, that may lie beyond a leap."""
 
-    def __init__(self, doubted: tuple[float, _Here] | None = None) -> None:
+    def __init__(self, doubted: _Doubted = None) -> None:
         self.doubted = doubted
-        super().__init__()
 
 
 @dataclass(frozen=True)
@@ -201,12 +193,17 @@ class _Here:
         return PathPoint(self.factor, self.equilibrium, self.rate)
 
 
+_Doubted = tuple[float, _Here] | None
+"""A step that may have leapt, and where it led."""
+
+
 class _Path:
     """The path of the `assembly` under a `drive` from the state `start`, and what was found of it on the way: `spent`
-    factorisations, the `largest` factor come to, and whether only rotations move (`by_turns`)."""
+    factorisations, the `largest` factor come to, and whether only rotations move (`by_turns`). The number of the degree of
+    freedom that is `led` among the free ones, None where none is; the `direction` of the first step, 1 or -1."""
 
     def __init__(
-        self, assembly: Assembly, start: State, drive: Drive, tolerance: float, largest: float
+        self, assembly: Assembly, start: State, drive: Drive, tolerance: float, goal: float, lead: Lead | None
     ) -> None:
         self.assembly, self.drive, self.tolerance, self.start = assembly, drive, tolerance, start
         self.measure = ResidualNorm(assembly)
@@ -214,9 +211,11 @@ class _Path:
         self.moving = assembly.free % 6 < 3
         self.by_turns = False
         self.spent = 0
-        self.largest = largest  # of the factors come to
+        self.largest = abs(goal) if lead is None else 0.0  # of the factors come to
+        self.led = None if lead is None else self.number(lead)
+        self.direction = 1.0 if lead is not None or goal > 0.0 else -1.0
 
-    def number(self, lead: tuple[int, int, float]) -> int:
+    def number(self, lead: Lead) -> int:
         """Place among the free degrees of freedom of the one that leads."""
         found = np.flatnonzero(self.assembly.free == 6 * lead[0] + lead[1])
         if not len(found):
@@ -228,7 +227,7 @@ class _Path:
             )
         return int(found[0])
 
-    def displacement(self, state: State, lead: tuple[int, int, float]) -> float:
+    def displacement(self, state: State, lead: Lead) -> float:
         """Of the degree of freedom that leads, m, since the start."""
         return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
 
@@ -262,20 +261,12 @@ class _Path:
             )
         return _Here(state, factor, found, tangent, 1.0 / speed, iterations, balance.turned)
 
-    def kinks(self, here: _Here, there: _Here) -> bool:
-        """Whether a cable goes slack or taut from one point to the other."""
-        taut = [
-            [cables.lengths(each.state) > cables.rest_length for cables in self.assembly.cables]
-            for each in (here, there)
-        ]
-        return any((one != other).any() for one, other in zip(*taut, strict=True))
-
-    def step(self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float) -> _Here:
-        """The point at `size` from `here`. Raises _Missed."""
-        tangent = here.tangent
+    def step(self, here: _Here, size: float, last: Reals | None) -> _Here:
+        """The point at `size` from `here`, to which the step `last` (t,) led. Raises _Missed."""
+        tangent, led = here.tangent, self.led
         if led is None:
             along = tangent[self.moving]
-            onward = direction if last is None else float(np.sign(along @ last)) or 1.0
+            onward = self.direction if last is None else float(np.sign(along @ last)) or 1.0
             change = onward * abs(size) / float(np.linalg.norm(along))
         else:
             if tangent[led] == 0.0:
@@ -328,16 +319,14 @@ class _Path:
             state = self._moved(state, self.turning.solve(self._factor(balance), balance, unbalanced), 0.0)
         return there  # the factor is close to a turning point: the path goes on and comes by again
 
-    def located(
-        self, here: _Here, size: float, led: int | None, last: Reals | None, direction: float, there: _Here
-    ) -> PathPoint | None:
+    def located(self, here: _Here, size: float, last: Reals | None, there: _Here) -> PathPoint | None:
         """The point between two where the number of negative eigenvalues changes."""
         low, high, before, near = 0.0, 1.0, here, there
-        total = size if led is not None else float(np.linalg.norm(self.between(here.state, there.state)))
+        total = size if self.led is not None else float(np.linalg.norm(self.between(here.state, there.state)))
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             try:
-                found = self.step(here, middle * total, led, last, direction)
+                found = self.step(here, middle * total, last)
             except _Missed:
                 return None
             if found.negative == here.negative:
