@@ -445,6 +445,17 @@ def test_a_form_drawn_as_it_hangs_is_told_and_turned_over_where_that_is_asked_fo
     assert not turned.mended
 
 
+def test_coordinates_that_32_bits_have_rounded_are_told(tmp_path):
+    """At 2,600,000 m numbers of 32 bits lie a quarter of a metre apart."""
+    away = 20.0 * POINTS + np.array([2_600_000.0, 0.0, 0.0])
+    rounded = away.astype(np.float32).astype(float)
+    for points, told in ((rounded, True), (away, False), (POINTS.astype(np.float32).astype(float), False)):
+        notes = read_surface(write_obj(tmp_path / "a.obj", points, QUADS)).mended
+        assert any("0.25 m apart" in note and "32 bits" in note for note in notes) is told
+    in_mm = read_surface(write_obj(tmp_path / "a.obj", rounded, QUADS), unit="mm").mended
+    assert any("0.00025 m apart" in note for note in in_mm)
+
+
 def test_which_axis_is_vertical_is_found_before_openings_are_filled(tmp_path):
     """A barrel between two open arches, y up: with z up it lies on its side, where its ends can't be filled down to
     a ground, or come out flat."""

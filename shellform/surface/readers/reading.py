@@ -43,6 +43,11 @@ _OTHER_AXES = (
     "x",
 )  # that are taken for the vertical, in this order, where a shell would lie on its side
 _LEVEL = 0.01  # of the rise: points as high as others
+_COARSE = 1e-4  # of the extent, that coordinates lie apart: rounding bends what is flat
+_STEPS = (
+    "its coordinates are numbers of 32 bits, {:.2g} m apart so far from the origin, which creases it: export it nearer to "
+    "its origin, or in a format of 64 bits (OBJ, STEP, 3DM)"
+)
 _HANGS = "its highest point lies on its edge and its lowest does not: where it is drawn as it hangs, turn it over (surface.up, --up -z)"
 _OWN = {
     "obj": plain.read_obj,
@@ -113,6 +118,10 @@ def read_surface(
                 "face": face,
             }
             draft = foreign.read_foreign(file, kind, settings)
+        step = _step_of_32_bits(draft)
+        if step > 0.0:
+            metres = unit_factor(unit or "m") if draft.metres is None else draft.metres
+            draft = noted(draft, _STEPS.format(metres * step))
         return mended(_upright(draft, unit, axis), str(file), face=face, piece=piece)
 
     as_given = whole(up)
@@ -154,6 +163,18 @@ def _closed(whole: Draft, source: str, fill: str | None, ground: float | None) -
             "(surface.up, --up)",
         )
     return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
+
+
+def _step_of_32_bits(draft: Draft) -> float:
+    """How far apart coordinates lie that are numbers of 32 bits, in the file's unit, where that is too far for a shell;
+    else 0."""
+    points = draft.points
+    with np.errstate(over="ignore"):
+        rounded = points.astype(np.float32)
+    if not len(points) or not np.array_equal(rounded, points):
+        return 0.0
+    step = float(np.spacing(np.abs(rounded).max()))
+    return step if step > _COARSE * float(np.ptp(points, axis=0).max()) else 0.0
 
 
 def _hangs(surface: Surface) -> bool:
