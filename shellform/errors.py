@@ -44,7 +44,7 @@ def printable(text: str) -> str:
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
 
 
-def counted(count: int, one: str, many: str) -> str:
+def how_many(count: int, one: str, many: str) -> str:
     """A number and what it counts: "1 face was", "2 faces were"."""
     return f"{count} {one if count == 1 else many}"
 

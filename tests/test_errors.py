@@ -7,7 +7,7 @@ import pytest
 from shellform.errors import (
     InputError,
     NotConverged,
-    counted,
+    how_many,
     not_installed,
     printable,
     require_count,
@@ -96,7 +96,7 @@ def test_a_library_that_is_missing_is_named_with_the_command_that_installs_it():
 
 
 def test_one_is_told_in_the_singular_and_any_other_number_in_the_plural():
-    assert [counted(count, "face was", "faces were") for count in (0, 1, 2)] == [
+    assert [how_many(count, "face was", "faces were") for count in (0, 1, 2)] == [
         "0 faces were",
         "1 face was",
         "2 faces were",

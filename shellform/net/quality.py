@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Reals, reals
-from shellform.errors import counted
+from shellform.errors import how_many
 from shellform.net.compass import Finder, gaussian
 from shellform.net.grid import Grid, cells, crossing_points, neighbours
 from shellform.net.refusal import NoNet, Reason
@@ -165,7 +165,7 @@ def refuse_folds(finder: Finder, grid: Grid, state: State) -> None:
         middle = corner[np.argmax(folded)].mean(axis=0).round(3).tolist()
         raise NoNet(
             Reason.FOLDED,
-            f"the net folds over itself in {counted(int(folded.sum()), 'cell', 'cells')}, first at {middle}: the surface, whose "
+            f"the net folds over itself in {how_many(int(folded.sum()), 'cell', 'cells')}, first at {middle}: the surface, whose "
             "Gaussian curvature adds up "
             f"to {float(gaussian(finder, corner).sum()):.2f} there, is curved more than rods at this spacing "
             "can follow",

@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import counted
+from shellform.errors import how_many
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
 from shellform.net.notes import NetNote, NoteKind
@@ -250,16 +250,16 @@ def _keep(
     notes = []
     if close:
         within = f"nearer to the edge than {merge * grid.scale:.3g} m"
-        near = counted(len(close), f"joint {within} was left out", f"joints {within} were left out")
+        near = how_many(len(close), f"joint {within} was left out", f"joints {within} were left out")
         notes.append(NetNote(NoteKind.JOINTS, near))
     if loose:
         free = f"beside the edge, with no joint over {_FREE:g} spacings or more,"
-        beside = counted(
+        beside = how_many(
             len(loose), f"rod that runs {free} was left out", f"rods that run {free} were left out"
         )
         notes.append(NetNote(NoteKind.RODS, beside))
     if len(kept) + len(loose) < len(pieces):
-        few = counted(
+        few = how_many(
             len(pieces) - len(kept) - len(loose),
             f"rod with fewer than {_FEWEST} joints was left out",
             f"rods with fewer than {_FEWEST} joints were left out",

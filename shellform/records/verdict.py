@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from shellform.errors import how_many
 from shellform.records.check import Cell, Check
 from shellform.records.checks import BUILT
 from shellform.records.summary import VerdictRecord
@@ -68,16 +69,10 @@ def headline(record: VerdictRecord) -> str:
     """The verdict in a line, the same everywhere."""
     name = f"The {record.design} design"
     if record.failed:
-        return f"{name} does not hold: {_many(len(record.failed), 'check fails', 'checks fail')}."
+        return f"{name} does not hold: {how_many(len(record.failed), 'check fails', 'checks fail')}."
     if record.not_examined:
-        return (
-            f"{name} is not examined: {_many(len(record.not_examined), 'check is', 'checks are')} still open."
-        )
+        return f"{name} is not examined: {how_many(len(record.not_examined), 'check is', 'checks are')} still open."
     return f"{name} holds: all checks do."
-
-
-def _many(count: int, one: str, more: str) -> str:
-    return f"{count} {one if count == 1 else more}"
 
 
 def _sentence(check: Check, cell: Cell) -> str:

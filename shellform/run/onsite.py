@@ -18,7 +18,7 @@ from shellform.arrays import Indices, Reals, read_arrays
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import InputError, counted, require_count, require_number
+from shellform.errors import InputError, how_many, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.site import calibration, erection, measurements, retensioning
@@ -164,9 +164,9 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     size = len(goal)
     lines = [
         *doubts,
-        f"{counted(len(places), 'node was', 'nodes were')} seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
+        f"{how_many(len(places), 'node was', 'nodes were')} seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
         f"should be (root mean square)",
-        f"{counted(count, 'cable', 'cables')} to turn, {counted(int(np.abs(step.turns).sum()), 'turn', 'turns')} "
+        f"{how_many(count, 'cable', 'cables')} to turn, {how_many(int(np.abs(step.turns).sum()), 'turn', 'turns')} "
         f"of {1e3 * options.step:g} mm; "
         f"afterwards {_mm(step.misfit_after, size)} mm are predicted"
         if count
@@ -174,7 +174,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     ]
     if step.halved:
         lines.append(
-            f"the turns were halved {counted(step.halved, 'time', 'times')}, to stay on the stable branch"
+            f"the turns were halved {how_many(step.halved, 'time', 'times')}, to stay on the stable branch"
         )
     return SiteResult(lines, files)
 
@@ -229,7 +229,7 @@ def replay(
     )
     file = made(output or run.folder / "schedules") / "replay.csv"
     write_text(file, text)
-    gone = f"{100.0 * played.removed:.0f} % of the misfit is gone after {counted(len(played.adjustments), 'round', 'rounds')}"
+    gone = f"{100.0 * played.removed:.0f} % of the misfit is gone after {how_many(len(played.adjustments), 'round', 'rounds')}"
     return SiteResult([*text.splitlines(), gone], [file])
 
 

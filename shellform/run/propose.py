@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from shellform.case.build_net import FAR, counted_from, distant_origin, size_text, surface_of
-from shellform.errors import InputError, NotConverged, printable
+from shellform.errors import InputError, NotConverged, how_many, printable
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.layers import layers_of, single
@@ -345,13 +345,13 @@ def _edges_told(stretches: Sequence[Stretch]) -> str:
     beams = [each for each in stretches if each.kind == "beam"]
     standing, walls = len(stretches) - len(beams), all(each.kind in ("wall", "beam") for each in stretches)
     rings = sum(each.opening for each in beams)
-    told = f"{standing} {'stretch' if standing == 1 else 'stretches'} on {'walls' if walls else 'the ground'}"
+    told = f"{how_many(standing, 'stretch', 'stretches')} on {'walls' if walls else 'the ground'}"
     if not beams:
         return told
     ground = min(float(each.points[:, 2].min()) for each in stretches)
     highest = max(float(each.points[:, 2].max()) for each in beams) - ground
     return (
-        f"{told}, {len(beams)} edge {'beam' if len(beams) == 1 else 'beams'} up to {highest:.3g} m above the lowest"
+        f"{told}, {how_many(len(beams), 'edge beam', 'edge beams')} up to {highest:.3g} m above the lowest"
         + (f", {rings} of them round openings" if rings else "")
     )
 

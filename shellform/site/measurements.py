@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, counted, require_file, require_number
+from shellform.errors import InputError, how_many, require_file, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 
 
@@ -223,7 +223,7 @@ def read_way(path: str | Path, shell: Gridshell) -> list[Reals]:
         lacking = [node for node in supports if node not in places]
         if lacking:
             raise InputError(
-                f"stop {stop:g} lacks {counted(len(lacking), 'support', 'supports')}",
+                f"stop {stop:g} lacks {how_many(len(lacking), 'support', 'supports')}",
                 where=str(path),
                 value=lacking[0],
                 remedy="Give every support a row in each stop.",

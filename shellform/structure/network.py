@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Flags, Indices, Reals, flags, reals
-from shellform.errors import InputError, counted
+from shellform.errors import InputError, how_many
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.solve.assembly import Assembly
@@ -120,7 +120,7 @@ def _coincident(network: Network) -> list[str]:
     k = int(np.argmax(same))
     pair = sorted((int(order[k]), int(order[k + 1])))
     return [
-        f"{counted(int(same.sum()), 'node lies', 'nodes lie')} where another one does, nodes[{pair[0]}] and "
+        f"{how_many(int(same.sum()), 'node lies', 'nodes lie')} where another one does, nodes[{pair[0]}] and "
         f"nodes[{pair[1]}] the first; they don't touch."
     ]
 
@@ -236,9 +236,8 @@ def swinging(network: Network) -> Indices:
     return touched[first[swings]]
 
 
-def free_to_swing(network: Network) -> list[str]:
-    """The same of parts of beams that swing."""
-    found = swinging(network)
+def free_to_swing(found: Indices) -> list[str]:
+    """The same of parts of beams that swing, a node (k,) of each of which was `found`."""
     if not len(found):
         return []
     return [

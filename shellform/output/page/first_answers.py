@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from shellform.errors import counted
+from shellform.errors import how_many
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import layers_of
@@ -96,7 +96,7 @@ def answers(
             "What to buy?",
             f"{number(laths * float(rods.sum()))} m of {'rod' if laths == 1 else 'laths, two a rod'}{weight}",
             f"{len(rods)} rods, {len(shell.net.grid.lattice)} connectors, {len(shell.net.supports)} supports, "
-            f"{counted(len(cables.ends), 'cable', 'cables')} of {number(float(cables.rest_length.sum()))} m in all{cut}",
+            f"{how_many(len(cables.ends), 'cable', 'cables')} of {number(float(cables.rest_length.sum()))} m in all{cut}",
         )
     )
     return found

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shellform.arrays import Reals
-from shellform.errors import counted
+from shellform.errors import how_many
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.output.pictures.panel import Panel, Scale
 
@@ -91,7 +91,7 @@ def title(panel: Panel, scale: Scale, size: tuple[int, int]) -> tuple[Word, ...]
     taut = panel.cable_forces > 0.0
     if taut.any():
         label, size_of = _newtons(scale.force)
-        caption += f"; {counted(int(taut.sum()), 'cable', 'cables')}, {panel.cable_forces.max() / size_of:.3g} {label} at most"
+        caption += f"; {how_many(int(taut.sum()), 'cable', 'cables')}, {panel.cable_forces.max() / size_of:.3g} {label} at most"
     line = scale.letters
     return (
         Word(

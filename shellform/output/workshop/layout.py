@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import counted
+from shellform.errors import how_many
 from shellform.gridshell.catalogue import label
 from shellform.net.grid import GridRod
 from shellform.net.notes import NoteKind
@@ -246,7 +246,7 @@ def cable_plan(built: Built) -> Sheet:
         "Where a cell has two cables, the upper name is that of the rising one.",
         "Rounds go from the supports to the crown; within a round tighten on opposite sides at a time "
         "(schedules/cables.csv).",
-        f"{counted(len(pairs), 'cable', 'cables')}, joined to the lower rods; lengths and forces at each stage: "
+        f"{how_many(len(pairs), 'cable', 'cables')}, joined to the lower rods; lengths and forces at each stage: "
         "schedules/cables.csv.",
     )
     return Sheet("Cables", tuple(marks), height, notes)

@@ -34,7 +34,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, counted
+from shellform.errors import InputError, how_many
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.grouping import cut_lengths
@@ -239,7 +239,7 @@ def cables(built: Built) -> Table:
         columns[f"{_stage(name)}: force [N]"] = ties.tension(state)
     rows = tuple((f"C{k}", *(values[k].item() for values in columns.values())) for k in range(len(pairs)))
     notes = (
-        f"Lengths between the pins' axes. {counted(len(pairs), 'cable', 'cables')}, EA = {shell.cable.stiffness:g} N. A force of "
+        f"Lengths between the pins' axes. {how_many(len(pairs), 'cable', 'cables')}, EA = {shell.cable.stiffness:g} N. A force of "
         "0: slack at that stage.",
         *cutting_of_cables(built),
     )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from shellform.errors import counted
+from shellform.errors import how_many
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import LOCK, TwoLayers
 from shellform.net.grid import ROD
@@ -20,13 +20,13 @@ def cutting_notes(cutting: Cutting, names: list[str]) -> tuple[str, ...]:
     count = len(cutting.bars)
     fewer = "fewer" if count == cutting.least else f"fewer than {cutting.least}"
     said = [
-        f"{counted(count, 'bar', 'bars')} of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, "
+        f"{how_many(count, 'bar', 'bars')} of {cutting.stock:g} m, saw cuts of {1e3 * cutting.kerf:g} mm, "
         f"{100 * cutting.waste:.0f} % waste; {fewer} can't do."
     ]
     if cutting.spliced:
         which = ", ".join(names[rod] for rod in cutting.spliced)
         said.append(
-            f"{counted(len(cutting.spliced), 'rod is', 'rods are')} longer than the stock and must be SPLICED; the analysis takes "
+            f"{how_many(len(cutting.spliced), 'rod is', 'rods are')} longer than the stock and must be SPLICED; the analysis takes "
             "a splice for as stiff and as "
             f"strong as the rod: {which}."
         )

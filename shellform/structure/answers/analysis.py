@@ -36,7 +36,7 @@ from shellform.structure.solve.dynamic import dynamic
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.loading import Drive, advance, turns_half
-from shellform.structure.solve.path import follow
+from shellform.structure.solve.path import Lead, follow
 from shellform.structure.solve.residual import Drowned, Turning
 
 LIMIT = 1000  # factorisations of one relaxation
@@ -82,7 +82,7 @@ def analyse(
     increments: int = 1,
     tolerance: float = TOLERANCE,
     method: str = "relaxation",
-    lead: tuple[int, int, float] | None = None,
+    lead: Lead | None = None,
     limit: int = LIMIT,
     mode_count: int = 0,
     critical_to: float | None = None,
@@ -139,7 +139,7 @@ def analyse(
         (
             *doubts(model.network),
             *lost_moments(model.network, chosen),
-            *free_to_swing(model.network),
+            *free_to_swing(walk.swinging),
             *walk.warnings(),
             *_coarse(mesh),
         ),
@@ -178,7 +178,7 @@ class _Analysis:
         imposed = none if self.model.start is not None else np.where(network.fixed, network.imposed, 0.0)
         self.drive = Drive(self.load, imposed, none)
         self.loaded = np.flatnonzero(self.load.any(axis=1))
-        self.swings = len(swinging(network)) > 0
+        self.swinging = swinging(network)
         self.turns = len(Turning(self.assembly, self.load).nodes) > 0
         self.state = (
             at_rest(network.nodes)
@@ -241,7 +241,7 @@ class _Analysis:
                 begin=before,
                 end=after,
                 tolerance=self.tolerance,
-                heeding=not self.swings,
+                heeding=not len(self.swinging),
                 limit=min(self.limit, _TURNING) if self.turns else self.limit,
                 report=self._reporter(steps, before, after),
             )
@@ -280,7 +280,7 @@ class _Analysis:
                 self.progress(factor, self.spent + wasted + last.equilibrium.factorisations)
         return last.equilibrium
 
-    def path(self, lead: tuple[int, int, float] | None, parts: int) -> None:
+    def path(self, lead: Lead | None, parts: int) -> None:
         """Along the path to the factor or to the led displacement, the first step a `parts`-th of it, or a
         tenth.
         """

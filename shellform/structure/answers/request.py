@@ -10,6 +10,7 @@ from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
 from shellform.structure.network import Network
+from shellform.structure.solve.path import Lead
 
 _MOST = 1_000_000  # increments: of the smallest structure they take 15 minutes
 METHODS = ("relaxation", "dynamic", "newton", "path")
@@ -20,7 +21,7 @@ def check_request(
     increments: int,
     tolerance: float,
     method: str,
-    lead: tuple[int, int, float] | None,
+    lead: Lead | None,
     limit: int,
     count: int,
 ) -> None:

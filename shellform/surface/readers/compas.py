@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, counted
+from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Choice, Draft, MeshObject, joined
 from shellform.surface.readers.network_faces import faces_in_plan
 
@@ -70,7 +70,7 @@ def read_compas(file: Path, choice: Choice) -> Draft:
         notes = [f"the faces between the lines of {choice.name or found[0][0] or 'a network'} were taken"]
     if openings:
         notes.append(
-            counted(
+            how_many(
                 openings,
                 "face without load was left out as an opening",
                 "faces without load were left out as openings",

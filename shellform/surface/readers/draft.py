@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, counted
+from shellform.errors import InputError, how_many
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000
@@ -131,7 +131,7 @@ def check_points(points: Reals, where: str) -> None:
     bad = ~np.isfinite(points).all(axis=1)
     if bad.any():
         vertex, others = int(np.argmax(bad)), int(bad.sum()) - 1
-        also = f", as {counted(others, 'other has', 'others have')}" if others else ""
+        also = f", as {how_many(others, 'other has', 'others have')}" if others else ""
         raise InputError(
             f"vertex {vertex + 1} has a coordinate that is no number{also}",
             where=where,

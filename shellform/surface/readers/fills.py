@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, counted
+from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.mend import noted
 from shellform.surface.readers.seams import open_edges
@@ -68,16 +68,16 @@ def filled(draft: Draft, where: str, *, what: str, ground: float | None = None) 
     notes = []
     if what != "edges":
         notes.append(
-            counted(len(holes), "hole was closed", "holes were closed")
+            how_many(len(holes), "hole was closed", "holes were closed")
             + (
-                f", {counted(standing, 'that stands on the ground was not', 'that stand on the ground were not')}"
+                f", {how_many(standing, 'that stands on the ground was not', 'that stand on the ground were not')}"
                 if standing
                 else ""
             )
         )
     if what != "holes":
         notes.append(
-            counted(
+            how_many(
                 len(arches),
                 f"open stretch of the edge was brought down to the ground at {level:.4g} m",
                 f"open stretches of the edge were brought down to the ground at {level:.4g} m",

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, counted
+from shellform.errors import InputError, how_many
 from shellform.surface.readers.draft import Draft
 from shellform.surface.readers.seams import sewn, without_slivers
 from shellform.surface.readers.sides import shared_edges, side_of
@@ -59,7 +59,7 @@ def mended(draft: Draft, where: str, *, face: str | None = None, piece: int | No
     if flipped:
         draft = noted(
             draft,
-            counted(
+            how_many(
                 flipped,
                 "face was turned the same way as the others",
                 "faces were turned the same way as the others",
@@ -104,7 +104,7 @@ def _merged(draft: Draft, size: float) -> Draft:
     """
     unused = without_unused(draft)[1]
     if unused:
-        points = counted(unused, "point of no face was dropped", "points of no face were dropped")
+        points = how_many(unused, "point of no face was dropped", "points of no face were dropped")
         draft = noted(without_unused(draft)[0], points)
     draft = _without_points(draft)
     same = _same_places(draft.points, _SAME * size)
@@ -112,12 +112,14 @@ def _merged(draft: Draft, size: float) -> Draft:
     if merged:
         draft = noted(
             draft,
-            counted(merged, "vertex lay on another and was merged", "vertices lay on others and were merged"),
+            how_many(
+                merged, "vertex lay on another and was merged", "vertices lay on others and were merged"
+            ),
         )
         draft = _without_points(replace(draft, triangles=same[draft.triangles]))
     _, once = np.unique(np.sort(draft.triangles, axis=1), axis=0, return_index=True)
     if len(once) < len(draft.triangles):
-        note = counted(
+        note = how_many(
             len(draft.triangles) - len(once), "face given twice was dropped", "faces given twice were dropped"
         )
         draft = noted(replace(draft, triangles=draft.triangles[np.sort(once)]), note)
@@ -152,7 +154,7 @@ def _without_points(draft: Draft) -> Draft:
     if not whole.all():
         draft = noted(
             replace(draft, triangles=draft.triangles[whole]),
-            counted(int((~whole).sum()), "face without area was dropped", "faces without area were dropped"),
+            how_many(int((~whole).sum()), "face without area was dropped", "faces without area were dropped"),
         )
     return without_unused(draft)[0]
 
@@ -163,7 +165,7 @@ def _refuse_branches(draft: Draft, where: str) -> None:
     if (counts > 2).any():
         place = draft.points[pairs[np.argmax(counts > 2), 0]]
         raise InputError(
-            f"{counted(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two faces, the first at "
+            f"{how_many(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two faces, the first at "
             f"{place.round(4).tolist()} m",
             where=where,
             remedy="Remove the faces inside or behind the surface and export it again.",
@@ -283,7 +285,7 @@ def _parted(draft: Draft, size: float) -> Draft:
     points = np.vstack([draft.points, draft.points[of_fan[extra]] + step])
     normals = None if draft.normals is None else np.vstack([draft.normals, draft.normals[of_fan[extra]]])
     parted = replace(draft, points=points, triangles=number[fan].reshape(3, count).T.copy(), normals=normals)
-    met = counted(
+    met = how_many(
         len(extra),
         "vertex at which the edge met itself was parted",
         "vertices at which the edge met itself were parted",

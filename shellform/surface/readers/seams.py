@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import counted
+from shellform.errors import how_many
 from shellform.surface.readers.draft import Draft
 
 _GAP = 0.1  # of the mean length of open edges
@@ -48,7 +48,7 @@ def sewn(draft: Draft, size: float) -> Draft:
     if joined:
         notes = (
             *notes,
-            counted(
+            how_many(
                 joined,
                 f"pair of vertices across a gap of {gap:.2g} m was joined",
                 f"pairs of vertices across a gap of up to {gap:.2g} m were joined",

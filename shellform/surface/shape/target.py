@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.compiled import njit
-from shellform.errors import InputError, counted
+from shellform.errors import InputError, how_many
 from shellform.surface.shape.jets import jets
 
 _SAME = 1e-9  # of the size: vertices nearer than that are one
@@ -162,7 +162,7 @@ def _cleaned(
         rank[order] = np.arange(len(order))
         if len(first) < len(points):
             mended.append(
-                counted(
+                how_many(
                     len(points) - len(first),
                     "vertex lay on another and was merged",
                     "vertices lay on others and were merged",
@@ -174,7 +174,7 @@ def _cleaned(
     thin = area <= _FLAT * size * size
     if thin.any():
         mended.append(
-            counted(
+            how_many(
                 int(thin.sum()), "triangle without area was dropped", "triangles without area were dropped"
             )
         )
@@ -182,7 +182,7 @@ def _cleaned(
     once, _ = _distinct(np.sort(faces, axis=1))
     if len(once) < len(faces):
         mended.append(
-            counted(
+            how_many(
                 len(faces) - len(once),
                 "triangle given twice was dropped",
                 "triangles given twice were dropped",
@@ -193,7 +193,7 @@ def _cleaned(
     used[faces.ravel()] = True
     if not used.all():
         mended.append(
-            counted(
+            how_many(
                 int((~used).sum()),
                 "vertex without triangle was dropped",
                 "vertices without triangle were dropped",
@@ -211,7 +211,7 @@ def _refuse_pieces(points: Reals, faces: Indices, where: str) -> None:
     if (counts > 2).any():
         a = keys[np.argmax(counts > 2)] // len(points)
         raise InputError(
-            f"{counted(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two triangles, the first at "
+            f"{how_many(int((counts > 2).sum()), 'edge belongs', 'edges belong')} to more than two triangles, the first at "
             f"{points[a].round(4).tolist()}",
             where=where,
             remedy="Remove the faces inside or behind the surface and export it again.",
