@@ -86,15 +86,19 @@ def faired(surface: Surface, radius: float) -> Faired:
             remedy="Give a smaller radius, or draw the surface anew.",
         )
     start = _refined(surface, _MESH * radius)
-    everywhere, above = _Fit(start, np.ones(len(start.vertices), dtype=bool)), _Fit(start, ~_on_ground(start))
-    refusals = []
-    for staged in (False, True)[: 1 + (len(start.vertices) <= _STAGED)]:
-        for fit in (everywhere, above):
-            try:
-                return _rounded(start, fit, _stages(start, fit, radius) if staged else [radius])
-            except NotConverged as error:
-                refusals.append(error)
-    raise refusals[1]
+    fits: list[_Fit] = []
+    for chosen in (np.ones(len(start.vertices), dtype=bool), ~_on_ground(start)):
+        fits.append(_Fit(start, chosen))
+        try:
+            return _rounded(start, fits[-1], [radius])
+        except NotConverged as error:
+            refusal = error
+    for fit in fits if len(start.vertices) <= _STAGED else ():
+        try:
+            return _rounded(start, fit, _stages(start, fit, radius))
+        except NotConverged:
+            continue  # what is told is how it ends without stages
+    raise refusal
 
 
 def _stages(start: Surface, fit: _Fit, radius: float) -> list[float]:
