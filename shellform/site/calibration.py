@@ -225,7 +225,7 @@ def _rounds(
         known = fit.identifiability(free, noise)
         if not known.tellable:
             raise NotConverged(
-                f"The data tell none of the stiffnesses: {' '.join(known.sentences())[:-1]}",
+                f"The data tell none of the stiffnesses: {' '.join(known.sentences()).removesuffix('.')}",
                 state=states,
                 remedy="Choose load states that move the markers more (see `foresee`).",
             )

@@ -25,14 +25,8 @@ class Status(StrEnum):
     MISSING = "missing"
 
 
-OWN_COLUMNS = (
-    "number",
-    "key",
-    "status",
-    "reason",
-    "seconds",
-    "worker",
-)  # of a study's tables, whatever is asked for
+# of a study's tables, whatever is asked for
+OWN_COLUMNS = ("number", "key", "status", "reason", "seconds", "worker")
 TRIED_AGAIN = (Status.CRASHED, Status.OVERTIME)
 
 

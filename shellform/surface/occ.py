@@ -152,7 +152,7 @@ def silence() -> Iterator[None]:
 
 
 def extent() -> Reals:
-    """The extents (3,), m, of the model's curves along x, y and z: gmsh's own boxes are those of the control
+    """The extents (3,), in the model's unit, of its curves along x, y and z: gmsh's own boxes are those of the control
     points.
     """
     ends = [np.reshape(gmsh.model.getValue(0, point, []), (-1, 3)) for _, point in gmsh.model.getEntities(0)]
@@ -165,8 +165,8 @@ def extent() -> Reals:
 
 
 def to_sew(tolerance: float) -> bool:
-    """Whether faces lie within the `tolerance`, m, of others without hanging together with them by curves that they
-    share; sewing faces with a pole breaks them, so only such are sewn.
+    """Whether faces lie within the `tolerance`, in the model's unit, of others without hanging together with them by
+    curves that they share; sewing faces with a pole breaks them, so only such are sewn.
     """
     groups: list[tuple[set[int], Reals, Reals]] = []
     for _, face in gmsh.model.getEntities(2):

@@ -7,9 +7,8 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import InputError
 
-_AXES: dict[
-    str, tuple[tuple[int, int, int], tuple[int, int, int]]
-] = {  # of the file, and their signs: x, y, z as they are here
+# by the file's vertical axis, which of its axes become x, y and z, and their signs
+_AXES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
     "x": ((1, 2, 0), (1, 1, 1)),
     "y": ((0, 2, 1), (1, -1, 1)),
     "z": ((0, 1, 2), (1, 1, 1)),

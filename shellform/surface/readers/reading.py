@@ -38,10 +38,8 @@ _HEAD = 65536
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
 _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
-_OTHER_AXES = (
-    "y",
-    "x",
-)  # that are taken for the vertical, in this order, where a shell would lie on its side
+# that are taken for the vertical, in this order, where a shell would lie on its side
+_OTHER_AXES = ("y", "x")
 _LEVEL = 0.01  # of the rise: points as high as others
 _COARSE = 1e-4  # of the extent, that coordinates lie apart: rounding bends what is flat
 _STEPS = (
