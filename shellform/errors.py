@@ -49,6 +49,12 @@ def how_many(count: int, one: str, many: str) -> str:
     return f"{count} {one if count == 1 else many}"
 
 
+def unreadable(error: Exception) -> str:
+    """That a file can't be read, and why: of the system's errors their words alone, without number and path."""
+    system = error.strerror if isinstance(error, OSError) else None
+    return f"can't be read: {system or error}"
+
+
 def require_file(file: Path, *, where: str = "") -> None:
     """Raises InputError where there is no such file; `where` it is named, unless by itself."""
     if not file.is_file():

@@ -12,6 +12,7 @@ from shellform.errors import (
     printable,
     require_count,
     require_number,
+    unreadable,
 )
 
 
@@ -101,3 +102,13 @@ def test_one_is_told_in_the_singular_and_any_other_number_in_the_plural():
         "1 face was",
         "2 faces were",
     ]
+
+
+def test_a_file_that_can_not_be_read_is_told_in_words_without_the_system_s_number_and_its_path_again(
+    tmp_path,
+):
+    with pytest.raises(FileNotFoundError) as missing:
+        (tmp_path / "none.toml").read_text(encoding="utf-8")
+    assert unreadable(missing.value) == "can't be read: No such file or directory"
+    assert unreadable(OSError("gone")) == "can't be read: gone"
+    assert unreadable(ValueError("no text")) == "can't be read: no text"

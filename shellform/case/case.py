@@ -45,7 +45,7 @@ from shellform.case.entries import (
 from shellform.case.older_names import with_present_names
 from shellform.case.safety_entries import SafetyEntry, TolerancesEntry
 from shellform.case.wrong_entries import refusal
-from shellform.errors import InputError
+from shellform.errors import InputError, unreadable
 from shellform.gridshell.catalogue import named, read_catalogue, shipped_catalogues
 from shellform.gridshell.gridshell import Rod
 from shellform.gridshell.joints import following
@@ -146,7 +146,7 @@ def read_toml(file: Path) -> dict[str, Any]:
         return tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
-            f"can't be read: {error}",
+            unreadable(error),
             where=str(file),
             remedy="Name a file that is there, or lay one with: shellform example vault (of a study: study).",
         ) from error

@@ -18,7 +18,7 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from shellform.errors import InputError, require_count, require_number
+from shellform.errors import InputError, require_count, require_number, unreadable
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.gridshell import Design, Gridshell, Rod, TooCurved, erection_stress
 from shellform.gridshell.layers import TwoLayers
@@ -96,7 +96,7 @@ def read_catalogue(source: str | Path) -> Catalogue:
         document = msgspec.toml.decode(path.read_bytes(), type=_CatalogueFile)
     except OSError as error:
         remedy = f"Shipped are {', '.join(shipped_catalogues())}."
-        said = f"can't be read: {error.strerror}" if path.exists() else "is neither shipped nor a file"
+        said = unreadable(error) if path.exists() else "is neither shipped nor a file"
         raise InputError(said, where=f"catalogue {path}", remedy=remedy) from error
     except msgspec.ValidationError as error:
         raise refusal(error, _PARTS).within(f"catalogue {path}") from error

@@ -16,7 +16,7 @@ from typing import Any, TypeVar, cast
 
 from pydantic import TypeAdapter, ValidationError
 
-from shellform.errors import Damaged
+from shellform.errors import Damaged, unreadable
 
 ANEW = "Run again with --fresh."
 _T = TypeVar("_T")
@@ -56,7 +56,7 @@ def read_record(path: Path, kind: type[_T]) -> _T:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise Damaged(f"can't be read: {error.strerror}", where=str(path), remedy=ANEW) from error
+        raise Damaged(unreadable(error), where=str(path), remedy=ANEW) from error
     try:
         adapter: TypeAdapter[_T] = _adapter(cast(Hashable, kind))
         return adapter.validate_json(data, strict=True)

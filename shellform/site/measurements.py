@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, how_many, require_file, require_number
+from shellform.errors import InputError, how_many, require_file, require_number, unreadable
 from shellform.gridshell.gridshell import Design, Gridshell
 
 
@@ -42,7 +42,7 @@ def text_of(path: str | Path, remedy: str) -> str:
     try:
         return Path(path).read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"can't be read: {error}", where=str(path), remedy=remedy) from error
+        raise InputError(unreadable(error), where=str(path), remedy=remedy) from error
 
 
 def cells_of(file: Path, numbered: list[tuple[int, str]], delimiter: str) -> list[list[str]]:

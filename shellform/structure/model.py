@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from shellform.arrays import Flags, Reals, reals
-from shellform.errors import InputError
+from shellform.errors import InputError, unreadable
 from shellform.structure.elements.beam import Beams, make_beams
 from shellform.structure.elements.cable import Cables, make_cables
 from shellform.structure.elements.state import State, from_vectors
@@ -110,7 +110,7 @@ def read_model(path: str | Path) -> Model:
         content = file.read_bytes()
     except OSError as error:
         raise InputError(
-            f"can't be read: {error}",
+            unreadable(error),
             where=str(file),
             remedy="Name a model file, such as RUN/designs/optimised.json.",
         ) from error

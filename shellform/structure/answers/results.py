@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, unreadable
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.sections import (
@@ -110,7 +110,7 @@ def read_sections(path: str | Path) -> dict[str, Section]:
         tables = tomllib.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(
-            f"can't be read: {error}",
+            unreadable(error),
             where=str(file),
             remedy="Give the sections as TOML, a table for each kind of beam.",
         ) from error

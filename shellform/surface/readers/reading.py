@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from shellform.errors import InputError, require_file
+from shellform.errors import InputError, require_file, unreadable
 from shellform.surface.readers import compas, foreign, plain
 from shellform.surface.readers.draft import Choice, Draft
 from shellform.surface.readers.fills import filled
@@ -201,9 +201,7 @@ def kind_of(file: Path) -> str:
         with file.open("rb") as opened:
             head = opened.read(_HEAD)
     except OSError as error:
-        raise InputError(
-            f"can't be read: {error.strerror}", where=str(file), remedy="Check its permissions."
-        ) from error
+        raise InputError(unreadable(error), where=str(file), remedy="Check its permissions.") from error
     for first, what in _OTHERS.items():
         if head.startswith(first):
             raise InputError(
