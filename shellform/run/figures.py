@@ -169,27 +169,34 @@ def _pixels(text: str) -> tuple[int, int]:
     return width, height
 
 
-def draw_everything(run: Run, *, report: Report = unheard) -> bool:
-    """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False."""
-    from shellform.output.pictures.net_maps import draw_net  # loads no OpenGL
-
-    drawn = pictures_possible(report)
+def draw_everything(run: Run, *, mapped: bool | None = None, report: Report = unheard) -> bool:
+    """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False. Where its maps are
+    there already, `mapped` says whether all of them are."""
+    drawn = draw_maps(run, report=report) if mapped is None else mapped
     if drawn:
-        draw_designs(run, report=report)
-        for quantity in ("utilisation", "curvature", "shear", "mode"):
-            try:
-                draw_designs(run, Wish(run.best, "design", quantity), report=report)
-            except (
-                NotConverged
-            ) as error:  # of a shell at its limit no mode may be found; the other maps stand
-                report(Event("figures", f"no pictures of the {quantity}: {error}", Kind.NOTE))
-        for view in ("top", "front", "side"):
-            draw_designs(run, Wish(run.best, "design", view=view), report=report)
-        draw_net(run.net, run.folder / "figures")
         draw_failure(run)
     if (run.folder / history.FILE).is_file():
         draw_histories(run)
     return drawn
+
+
+def draw_maps(run: Run, *, report: Report = unheard) -> bool:
+    """The maps of a run's designs and of its net, none of which tells what the stage `safety` finds. Without OpenGL
+    none, a line that says why, and False."""
+    from shellform.output.pictures.net_maps import draw_net  # loads no OpenGL
+
+    if not pictures_possible(report):
+        return False
+    draw_designs(run, report=report)
+    for quantity in ("utilisation", "curvature", "shear", "mode"):
+        try:
+            draw_designs(run, Wish(run.best, "design", quantity), report=report)
+        except NotConverged as error:  # of a shell at its limit no mode may be found; the other maps stand
+            report(Event("figures", f"no pictures of the {quantity}: {error}", Kind.NOTE))
+    for view in ("top", "front", "side"):
+        draw_designs(run, Wish(run.best, "design", view=view), report=report)
+    draw_net(run.net, run.folder / "figures")
+    return True
 
 
 def draw_failure(run: Run) -> list[Path]:

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -35,13 +36,13 @@ from shellform.records.summary import ModelRecord, Summary, read_summary, write_
 from shellform.run import designs
 from shellform.run.broken_off import break_off
 from shellform.run.checkpoint import drop_checkpoint
-from shellform.run.figures import draw_everything
 from shellform.run.folder import alone, load_surface, read_run, refuse_links, refuse_overwriting, save_surface
 from shellform.run.judged import judged
 from shellform.run.keys import stage_keys
 from shellform.run.lasting import lasting
 from shellform.run.log import logged
 from shellform.run.pages import FILE, write_page
+from shellform.run.pictures_beside import DrawnMaps, draw_all_but, maps_beside
 from shellform.run.profiling import Profiler
 from shellform.run.sketch import STAGES_OF_SKETCH, draw_sketch, drop_other, refuse_over_full, sketched
 from shellform.run.way_out import BUILDABLE, COVERED, with_way_out
@@ -63,6 +64,7 @@ class Parts:
     net: Net | None = None
     shell: Gridshell | None = None
     loads: Mapping[str, Reals] | None = None
+    maps: DrawnMaps | None = None
 
 
 @dataclass(frozen=True)
@@ -136,8 +138,8 @@ def _run(
         parts = Parts(surface=surface_of(case.surface, allow_scripts=allow_scripts))
         report(Event("surface", f"size {size_text(_there(parts.surface).size)}", Kind.NOTE))
     with alone(folder, wait=wait):
-        workspace = Workspace(case, folder, logged(folder, report), keys, profiler, sketch)
-        return _run_alone(workspace, until, fresh, parts, began)
+        workspace = Workspace(case, folder, logged(folder, report), keys, until, profiler, sketch)
+        return _run_alone(workspace, fresh, parts, began)
 
 
 def _done(folder: Path, fresh: bool) -> StagesDone:
@@ -150,7 +152,7 @@ def _done(folder: Path, fresh: bool) -> StagesDone:
     return lasting(folder, done, read_summary(folder)) if done.keys else done
 
 
-def _run_alone(workspace: Workspace, until: str, fresh: bool, parts: Parts, began: float) -> Summary:
+def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) -> Summary:
     """As `run_case`, in a folder where nobody else is at work."""
     folder, keys = workspace.folder, workspace.keys
     done = _done(folder, fresh)
@@ -169,7 +171,8 @@ def _run_alone(workspace: Workspace, until: str, fresh: bool, parts: Parts, bega
     for part in ("designs", "states", "figures", "schedules"):
         made_folder(folder / part)
     workspace.say(
-        "run", f"shellform {shellform.__version__}, Python {platform.python_version()}, up to {until}"
+        "run",
+        f"shellform {shellform.__version__}, Python {platform.python_version()}, up to {workspace.until}",
     )
     if fresh:
         drop_checkpoint(folder)
@@ -180,16 +183,14 @@ def _run_alone(workspace: Workspace, until: str, fresh: bool, parts: Parts, bega
         write_summary(folder, summary)
     drop_other(folder, sketch=workspace.sketch)
     write_text(folder / "case.toml", dump_case(workspace.case))
-    return _stages(workspace, until, parts, summary, done, began)
+    return _stages(workspace, parts, summary, done, began)
 
 
-def _stages(
-    workspace: Workspace, until: str, parts: Parts, summary: Summary, done: StagesDone, began: float
-) -> Summary:
+def _stages(workspace: Workspace, parts: Parts, summary: Summary, done: StagesDone, began: float) -> Summary:
     """Stage after stage. Raises the first error of those that only show what was found, once all were tried;
     any other at once."""
     reusable, failures = True, list[Exception]()
-    for stage in _wanted(workspace, until):
+    for stage in _wanted(workspace, workspace.until):
         reusable = reusable and done.has(stage, workspace.keys[stage])
         kind = Kind.KEPT if reusable else Kind.DONE
         try:
@@ -364,11 +365,15 @@ def _safety(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) ->
     from shellform.run.examination import examine
 
     write_summary(workspace.folder, summary)
-    return _Ended(parts, examine(workspace))
+    if "figures" not in _wanted(workspace, workspace.until):
+        return _Ended(parts, examine(workspace))
+    with maps_beside(workspace.folder) as maps:
+        summary = examine(workspace)
+        return _Ended(replace(parts, maps=maps.drawn()), summary)
 
 
 def _figures(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:
-    draw = draw_sketch if workspace.sketch else draw_everything
+    draw = draw_sketch if workspace.sketch else partial(draw_all_but, parts.maps)
     complete = keep or draw(read_run(workspace.folder), report=workspace.report)
     return _Ended(parts, summary, complete)
 

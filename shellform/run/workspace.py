@@ -8,18 +8,20 @@ from pathlib import Path
 
 from shellform.case.case import Case
 from shellform.records.progress import Event, Kind, Report
+from shellform.records.stages import STAGES
 from shellform.run.profiling import Profiler
 
 
 @dataclass(frozen=True)
 class Workspace:
     """The `case` of a run that is being made, its `folder`, whom to `report` events to, the `keys` of its
-    stages, what measures them, if anything does, and whether it is a `sketch`."""
+    stages, `until` which of them it is made, what measures them, if anything does, and whether it is a `sketch`."""
 
     case: Case
     folder: Path
     report: Report
     keys: Mapping[str, str]
+    until: str = STAGES[-1]
     profiler: Profiler | None = None
     sketch: bool = False
 
