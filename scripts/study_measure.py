@@ -1,7 +1,8 @@
 """What a study costs besides its designs: one command, a few numbers each.
 
     scripts/study_measure.py soak [--designs 200]     real small designs on two workers and on one, in turns: throughput, memory over time
-    scripts/study_measure.py thousand [--designs 1000] a whole study of a small dome, 1,500 degrees of freedom, 15 evaluations each
+    scripts/study_measure.py thousand [--designs 1000] [--unjudged] a whole study of a small dome, 1,500 degrees of freedom, 15 evaluations each,
+                                                      judged as built or with nothing asked of them as built
     scripts/study_measure.py overhead                 the engine's time a design, with designs that take none
     scripts/study_measure.py table [--rows 100000]    a table of so many rows: written, opened, filtered
     scripts/study_measure.py many [--workers 1000]    so many workers in one process, with designs that sleep: what limits them
@@ -117,7 +118,7 @@ def soak(count: int) -> None:
         )
 
 
-def thousand(count: int) -> None:
+def thousand(count: int, *, judged: bool) -> None:
     """A study by its command's function, from the study file to the page."""
     from shellform.study.store import read_table
     from shellform.study.studies import run_study
@@ -128,7 +129,9 @@ def thousand(count: int) -> None:
 method = "latin"
 count = {count}
 keep = "best"
+{"" if judged else 'until = "optimise"'}
 [set]
+{"" if judged else "safety.required = false"}
 net.spacing = 0.102
 optimise.evaluations = 15
 optimise.unloaded = false
@@ -278,6 +281,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("what", choices=["soak", "thousand", "overhead", "table", "many"])
     parser.add_argument("--designs", type=int, default=None)
+    parser.add_argument("--unjudged", action="store_true")
     parser.add_argument("--rows", type=int, default=100_000)
     parser.add_argument("--workers", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=1.0)
@@ -285,7 +289,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if asked.what == "soak":
         soak(asked.designs or 200)
     elif asked.what == "thousand":
-        thousand(asked.designs or 1000)
+        thousand(asked.designs or 1000, judged=not asked.unjudged)
     elif asked.what == "overhead":
         overhead()
     elif asked.what == "table":
