@@ -10,9 +10,9 @@ granted for this are spent.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
+from shellform.optimiser.descent import descend
 from shellform.optimiser.going_back import last_sound
 from shellform.optimiser.minding import WORTH, finely, led_by, turned
 from shellform.optimiser.search_state import Iterate, Search, accepted_design, taut_count
@@ -42,13 +42,13 @@ def pausing(search: Search, it: Iterate) -> bool:
     return taut_count(search, it.point) < _PAUSE * it.counted
 
 
-def agreed(
-    search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]
-) -> tuple[bool, Iterate]:
-    """Whether a fresh sample agrees that the last design stands, after turns of a sample and a descent led by
-    what falls in it; and the iterate. Where the search was led and thinning has ended, turns follow as long as they lead
-    to a better design with which a sample agrees. After a turn without a step another sample leads on, and can't agree: drawn often
-    enough, a design stands by luck."""
+def agreed(search: Search, it: Iterate) -> tuple[bool, Iterate]:
+    """Whether a fresh sample agrees that the last design stands, and the iterate.
+
+    Where one disagrees, turns follow: what falls in it leads a descent, and another sample judges what that comes to.
+    Where thinning has ended they go on after a sample has agreed, too, as long as each leads to a better design with
+    which one agrees. A turn that finds no step is followed by one that another sample leads on, but that sample can't
+    agree: drawn often enough, a design stands by luck."""
     if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return True, it
     asked = search.asked

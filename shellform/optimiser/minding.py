@@ -10,7 +10,7 @@ is the sample: what structures in mind bear is an aim and no limit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
+from shellform.optimiser.descent import descend
 from shellform.optimiser.going_back import last_sound
 from shellform.optimiser.search_state import (
     Iterate,
@@ -57,7 +58,7 @@ def looking_closer(search: Search) -> Search:
     return search if search.asked is None else replace(search, asked=closer(search.asked))
 
 
-def led(search: Search, it: Iterate, descend: Callable[[Search, Iterate], Iterate]) -> Iterate:
+def led(search: Search, it: Iterate) -> Iterate:
     """After turns of a descent and a judgement, as long as they lead to a better design that stands as built:
     at the last one that does, or where none does at the one that stood before."""
     last = int(_LED * search.evaluations)

@@ -5,7 +5,7 @@ solved exactly. Directly in the rest lengths (moving_asymptotes.py) it finds as 
 in tension, but knows nothing of what holds the shell up: without its slack cables the design collapses
 (documentation/decisions.md). Here each convex problem is the model in tensions (step_model.py), exact in first
 order and with Gauss-Newton curvature; interior points and NLopt's MMA solve it within a window round the present
-design (proposal.py), and the trial is then evaluated by its true equilibria (trials.py, phases.py):
+design (proposal.py), and the trial is then evaluated by its true equilibria (trials.py, descent.py):
 
 - it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
 - a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;

@@ -1,8 +1,8 @@
-"""The phases of a search, each from an iterate to an iterate: rounds of proposal (proposal.py), trial
-(trials.py) and judgement (search_state.py).
+"""The phases of a search in their order, each from an iterate to an iterate.
 
-Climbing, where the start doesn't bear the further loads; descending, by the objective; thinning, which takes
-cables away; agreeing, with fresh samples of structures as built (agreeing.py).
+Climbing, where the start doesn't bear the further loads, and descending, by the objective (descent.py); being led
+by structures that fall (minding.py); thinning, which takes cables away, here; agreeing, with fresh samples of
+structures as built (agreeing.py).
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices
 from shellform.optimiser.agreeing import agreed, leaving_some, pausing
+from shellform.optimiser.descent import climb, descend
 from shellform.optimiser.going_back import last_confirmed, last_sound, last_standing
 from shellform.optimiser.minding import (
     joined,
@@ -42,17 +43,12 @@ from shellform.optimiser.trials import (
     accepted,
     attempt,
     attempt_without,
-    reach,
     sound,
-    staged,
     standing,
     task,
 )
 from shellform.problem.evaluation import Evaluated
 
-_TINY = -1e-300  # a predicted change that isn't one
-# of the objective, gained by a turn, for which another is made where thinning is to end with what stands
-_WORTH = 0.05
 _STIFFER = 0.01  # of the stiffness: less is no gain
 _SAME = 1e-6  # relative: stiffnesses that count as equal
 
@@ -60,10 +56,10 @@ _SAME = 1e-6  # relative: stiffnesses that count as equal
 def run(search: Search, it: Iterate) -> Iterate:
     """First the branch up to the further loads, then the objective alone, then thinning, then what fresh samples say."""
     if it.phase == "climb":
-        it = replace(_climb(search, it), phase="descend")
+        it = replace(climb(search, it), phase="descend")
     if it.phase == "descend":
         thins = search.solver.thin and search.evaluator.blocks.each_cable is not None
-        it = last_sound(search, _descend(search, it, least=search.evaluations // 2 if thins else 0))
+        it = last_sound(search, descend(search, it, least=search.evaluations // 2 if thins else 0))
         if thins:
             it = _stiffened(search, it) if it.accepted else last_standing(search, it)
         elif it.mind is not None:  # judged by what it was led by, trials would say nothing new
@@ -76,91 +72,13 @@ def run(search: Search, it: Iterate) -> Iterate:
         if it.phase == "thin":
             it = _thin(leaving_some(search if it.mind is None else looking_closer(search)), it)
             it = replace(it, phase="agree", until=0, stood=0, led_to=np.inf)
-        agrees, it = agreed(search, it, _descend)
+        agrees, it = agreed(search, it)
         if agrees and not it.paused:
             return it
         if not agrees:
             break
         it = _going_on(search, it)
     return last_confirmed(search, it)
-
-
-def _climb(search: Search, it: Iterate) -> Iterate:
-    """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the
-    further loads are borne whole.
-
-    Each goes along the gradient of the constraints on it, with all cables kept taut; it counts where the
-    stable branch reaches farther.
-    """
-    if it.stage == 1.0 or not any(part.term.stabilises for part in search.evaluator.problem.constraints):
-        return it
-    evaluator, base = search.evaluator, search.base
-    it = replace(it, guarded=True, climbing=True)
-    while it.stage < 1.0 and search.left() > 0 and it.window > search.solver.smallest * search.tension:
-        tell(search, it)
-        model = search.models.at(it.point)
-        y, _ = propose(task(search, it, model))
-        trial, it = attempt(search, it, model, y)
-        stage = 0.0 if trial is None else reach(evaluator, trial.design, trial.states[base], 0.0, it.margin)
-        if trial is None or stage <= it.stage:
-            it = replace(it, window=it.window * search.solver.shrink)
-            it = noted(search, it, trial or it.point, False)
-            continue
-        states = staged(evaluator, trial.design, trial.states[base], stage)
-        point = evaluator.seed(trial.design, states, stage)
-        it = replace(it, stage=stage, point=point, accepted=(*it.accepted, accepted_design(search, point)))
-        it = noted(search, it, point, True)
-    return replace(it, window=search.first_window, guarded=search.always_guarded, climbing=False)
-
-
-def _descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
-    """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none
-    may; and so in turns as long as a turn improves the objective. A design that keeps every limit leaves the
-    `least` of the evaluations to what comes next."""
-    solver = search.solver
-    while search.left() > (least if it.stage == 1.0 and violation(search, it.point) <= 0.0 else 0):
-        tell(search, it)
-        model = search.models.at(it.point)
-        y, predicted = propose(task(search, it, model))
-        status = _settled(search, it, predicted)
-        if status:
-            it = replace(it, status=status)
-            worth = solver.settled if search.asked is None else _WORTH
-            turned = it.guarded and it.point.objective > (1.0 - worth) * it.before
-            idle = not it.guarded and it.point.objective == it.before  # guarded it would try the same again
-            # without further loads there are no guards
-            if search.always_guarded or turned or idle or len(search.evaluator.problem.used()) == 1:
-                return it
-            before = it.point.objective if it.guarded else it.before
-            it = replace(it, before=before, guarded=not it.guarded, window=search.first_window)
-            continue
-        trial, it = attempt(search, it, model, y)
-        if trial is None or merit(search, trial) >= merit(search, it.point):
-            it = replace(it, window=it.window * solver.shrink, refused=True)
-            it = noted(search, it, trial or it.point, False)
-            continue
-        ratio = (trial.objective - it.point.objective) / min(predicted, _TINY)
-        grown = 1.0 if it.refused else solver.grow  # a window that was just refused isn't tried again at once
-        factor = grown if ratio > solver.good else (solver.shrink if ratio < solver.poor else 1.0)
-        it = accepted(search, replace(it, window=it.window * factor, refused=False), trial)
-    return it
-
-
-def _settled(search: Search, it: Iterate, predicted: float) -> str:
-    """The criterion of convergence that the point meets, in words; empty where none is met."""
-    solver = search.solver
-    if it.stage < 1.0:
-        return ""
-    kept = violation(search, it.point) <= 0.0
-    if kept and -predicted < solver.settled * it.point.objective and it.window >= search.tension:
-        return f"the model predicts less than {solver.settled:.1%} improvement"
-    if it.window < solver.smallest * search.tension:
-        return (
-            "the objective has no better design within the smallest window"
-            if kept
-            else "no design within the smallest window breaks its limits less"
-        )
-    return ""
 
 
 def _stiffened(search: Search, it: Iterate) -> Iterate:
@@ -188,7 +106,7 @@ def _stiffened(search: Search, it: Iterate) -> Iterate:
 def _led(search: Search, it: Iterate) -> Iterate:
     """Ready to thin at a design to which drawn structures have led; where they lead to none, at the last one
     that stood."""
-    it = led(search, it, _descend)
+    it = led(search, it)
     return _ready_as_it_is(search, it) if it.mind is None else _ready_to_thin(search, it)
 
 

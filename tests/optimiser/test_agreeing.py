@@ -8,6 +8,7 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser import agreeing, phases
+from shellform.optimiser.descent import descend
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.optimum import Checkpoint
 from shellform.optimiser.resuming import resumed
@@ -58,7 +59,7 @@ def samples(monkeypatch):
 def test_a_design_that_a_sample_agrees_with_is_left_as_it_is(searching, samples):
     search, it, _ = searching
     samples[0][:] = [STANDS]
-    agrees, after = agreeing.agreed(search, it, phases._descend)
+    agrees, after = agreeing.agreed(search, it)
     assert agrees
     assert after.samples == 1
     np.testing.assert_array_equal(after.point.design.rest_length, it.point.design.rest_length)
@@ -72,9 +73,9 @@ def test_a_search_keeps_its_designs_whatever_is_found_of_their_paths_afterwards(
     told, _ = samples
     monkeypatch.setattr(agreeing, "last_sound", lambda search, it: replace(it, accepted=()))
     told[:] = [STANDS]
-    assert agreeing.agreed(search, it, phases._descend)[1].accepted
+    assert agreeing.agreed(search, it)[1].accepted
     told[:] = [FALLS, STANDS, *[FALLS] * 20]
-    agrees, after = agreeing.agreed(search, it, phases._descend)
+    agrees, after = agreeing.agreed(search, it)
     assert not agrees
     assert after.accepted
 
@@ -83,7 +84,7 @@ def test_what_falls_in_a_sample_leads_the_search_on_until_another_one_agrees(sea
     search, it, _ = searching
     told, judged = samples
     told[:] = [FALLS, *[STANDS] * 20]
-    agrees, after = agreeing.agreed(search, it, phases._descend)
+    agrees, after = agreeing.agreed(search, it)
     assert agrees
     assert [each.number for each in after.mind.scenarios] == [FRESH + 1]
     assert after.fallen[0] == FRESH + 1, "it is among what trials have to bear"
@@ -97,43 +98,45 @@ def test_a_better_design_with_which_no_sample_agrees_isnt_taken(searching, sampl
     search, it, _ = searching
     told, judged = samples
     told[:] = [FALLS, STANDS, *[FALLS] * 20]
-    agrees, after = agreeing.agreed(search, it, phases._descend)
+    agrees, after = agreeing.agreed(search, it)
     assert agrees
     assert len(judged) > 2
     assert after.point.objective == pytest.approx(judged[1])
 
 
-def test_of_designs_with_which_samples_agree_the_better_one_is_taken(searching, samples):
+def test_of_designs_with_which_samples_agree_the_better_one_is_taken(searching, samples, monkeypatch):
     search, it, _ = searching
     told, judged = samples
     told[:] = [FALLS, *[STANDS] * 20]
     start = it.point
     turns = []
 
-    def descend(search, it):
+    def to_another(search, it):
         turns.append(it)
         if len(turns) == 1:
-            return phases._descend(search, it)
+            return descend(search, it)
         point = search.evaluator.seed(start.design, start.states, 1.0)
         return replace(it, point=point, accepted=(*it.accepted, accepted_design(search, point)))
 
-    agrees, after = agreeing.agreed(search, it, descend)
+    monkeypatch.setattr(agreeing, "descend", to_another)
+    agrees, after = agreeing.agreed(search, it)
     assert agrees
     assert len(judged) == 3
     assert judged[2] > judged[1]
     assert after.point.objective == pytest.approx(judged[1])
 
 
-def test_a_search_without_an_evaluation_left_says_that_no_sample_agrees(searching, samples):
+def test_a_search_without_an_evaluation_left_says_that_no_sample_agrees(searching, samples, monkeypatch):
     search, it, _ = searching
     told, _ = samples
     told[:] = [FALLS] * 2
-    assert not agreeing.agreed(replace(search, evaluations=0), it, phases._descend)[0]
-    assert not agreeing.agreed(search, it, lambda search, it: it)[0], "a turn that leads nowhere"
+    assert not agreeing.agreed(replace(search, evaluations=0), it)[0]
+    monkeypatch.setattr(agreeing, "descend", lambda search, it: it)
+    assert not agreeing.agreed(search, it)[0], "a turn that leads nowhere"
     assert not told, "no design is drawn twice until it stands by luck"
 
 
-def test_after_a_turn_without_a_step_another_sample_leads_on_and_cant_agree(searching, samples):
+def test_after_a_turn_without_a_step_another_sample_leads_on_and_cant_agree(searching, samples, monkeypatch):
     search, it, _ = searching
     told, judged = samples
     turns = []
@@ -141,19 +144,20 @@ def test_after_a_turn_without_a_step_another_sample_leads_on_and_cant_agree(sear
     def stuck_once(search, it):
         turns.append(it)
         if len(turns) > 1:
-            return phases._descend(search, it)
+            return descend(search, it)
         search.evaluator.evaluations += 3  # trials, none of which is accepted
         return it
 
     told[:] = [FALLS, OTHER, *[STANDS] * 20]
-    agrees, after = agreeing.agreed(search, it, stuck_once)
+    monkeypatch.setattr(agreeing, "descend", stuck_once)
+    agrees, after = agreeing.agreed(search, it)
     assert agrees
     assert judged[0] == judged[1] > after.led_to
     assert {each.number for each in turns[1].mind.scenarios} == {FRESH + 1, FRESH + 2}
 
     turns.clear()
     told[:] = [FALLS, STANDS]
-    assert not agreeing.agreed(search, it, stuck_once)[0]
+    assert not agreeing.agreed(search, it)[0]
     assert not told
 
 
@@ -161,13 +165,13 @@ def test_a_turn_taken_up_in_its_middle_ends_as_if_nothing_had_been(searching, sa
     search, it, kept = searching
     told, _ = samples
     told[:] = [FALLS, *[STANDS] * 20]
-    _, whole = agreeing.agreed(search, it, phases._descend)
+    _, whole = agreeing.agreed(search, it)
     begun = kept[len(kept) // 2]
     numbers = json.loads(json.dumps(begun.numbers))  # as a run folder keeps them
     assert numbers["until"] > numbers["evaluations"] > 0
     told[:] = [STANDS] * 20
     search, again = resumed(search, Checkpoint(numbers, begun.arrays, begun.history))
-    _, again = agreeing.agreed(search, again, phases._descend)
+    _, again = agreeing.agreed(search, again)
     np.testing.assert_array_equal(again.point.design.rest_length, whole.point.design.rest_length)
     assert (again.samples, again.stood, again.led_to) == (whole.samples, whole.stood, whole.led_to)
 
@@ -215,7 +219,7 @@ def test_a_paused_search_is_thinned_on_with_what_is_left_to_spend_once_a_sample_
         ways.append(("thin", it.counted, it.thrifty, it.needed.all()))
         return replace(it, paused=len(ways) == 1)
 
-    def agreed(search, it, descend):
+    def agreed(search, it):
         ways.append(("agree", it.paused))
         return answers.pop(0), it
 
@@ -246,6 +250,6 @@ def test_a_paused_search_takes_the_first_design_with_which_a_sample_agrees(searc
     search, it, _ = searching
     told, judged = samples
     told[:] = [FALLS, *[STANDS] * 20]
-    agrees, _ = agreeing.agreed(search, replace(it, paused=True), phases._descend)
+    agrees, _ = agreeing.agreed(search, replace(it, paused=True))
     assert agrees
     assert len(judged) == 2

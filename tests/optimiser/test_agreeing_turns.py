@@ -42,7 +42,8 @@ def samples(search, monkeypatch):
     monkeypatch.setattr(agreeing, "aims", lambda asked, judged: asked)
     monkeypatch.setattr(agreeing, "led_by", led_by)
     monkeypatch.setattr(agreeing, "last_sound", lambda search, it: it)
-    told.agreed = lambda it=None: agreeing.agreed(search, it or iterate(1.0, phase="agree"), descend)
+    monkeypatch.setattr(agreeing, "descend", descend)
+    told.agreed = lambda it=None: agreeing.agreed(search, it or iterate(1.0, phase="agree"))
     return told
 
 

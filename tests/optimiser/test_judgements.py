@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.optimiser import going_back, phases, search_state, thinning, trials
+from shellform.optimiser import descent, going_back, phases, search_state, thinning, trials
 from shellform.optimiser.search_state import Accepted, Iterate, merit, missed, stiffness_of, violation
 from shellform.optimiser.thinning import kept_stiffness, removable
 from shellform.problem.engineering import ModalStiffness
@@ -79,19 +79,21 @@ def bare(monkeypatch):
         told.taken.append((trial, it.window))
         return replace(it, point=trial)
 
-    monkeypatch.setattr(phases, "tell", lambda *_: None)
-    monkeypatch.setattr(phases, "task", lambda *_: None)
-    monkeypatch.setattr(phases, "propose", lambda *_: (None, told.predicted))
-    monkeypatch.setattr(phases, "attempt", attempted)
-    monkeypatch.setattr(phases, "accepted", took)
-    monkeypatch.setattr(phases, "merit", lambda search, point: told.merits.get(point.name, point.objective))
-    monkeypatch.setattr(phases, "violation", lambda search, point: point.constraints.max(initial=0.0))
-
     def noted(search, it, point, kept):
         told.noted.append((point, kept))
         return it
 
-    monkeypatch.setattr(phases, "noted", noted)
+    for module in (descent, phases):
+        monkeypatch.setattr(module, "tell", lambda *_: None)
+        monkeypatch.setattr(module, "task", lambda *_: None)
+        monkeypatch.setattr(module, "propose", lambda *_: (None, told.predicted))
+        monkeypatch.setattr(module, "attempt", attempted)
+        monkeypatch.setattr(module, "accepted", took)
+        monkeypatch.setattr(
+            module, "merit", lambda search, point: told.merits.get(point.name, point.objective)
+        )
+        monkeypatch.setattr(module, "violation", lambda search, point: point.constraints.max(initial=0.0))
+        monkeypatch.setattr(module, "noted", noted)
     return told
 
 
@@ -99,7 +101,7 @@ def test_a_trial_counts_only_where_the_merit_falls(bare):
     start = Point(1.0)
     for other in (Point(1.0), Point(1.1), None):
         bare.trials, bare.taken = [other], []
-        found = phases._descend(searching(1), standing_at(start))
+        found = descent.descend(searching(1), standing_at(start))
         assert bare.taken == []
         assert found.point is start
         assert found.window == pytest.approx(0.4 * 0.2)
@@ -107,13 +109,13 @@ def test_a_trial_counts_only_where_the_merit_falls(bare):
         assert bare.noted[-1] == (other or start, False)
     better = Point(0.999)
     bare.trials = [better]
-    assert phases._descend(searching(1), standing_at(start)).point is better
+    assert descent.descend(searching(1), standing_at(start)).point is better
 
 
 def test_a_lower_objective_that_breaks_a_limit_is_refused_by_its_merit(bare):
     broken = Point(0.5, "broken")
     bare.trials, bare.merits = [broken], {"broken": 1.5}
-    assert phases._descend(searching(1), standing_at(Point(1.0))).point.objective == 1.0
+    assert descent.descend(searching(1), standing_at(Point(1.0))).point.objective == 1.0
 
 
 @pytest.mark.parametrize(
@@ -131,19 +133,19 @@ def test_the_window_grows_where_the_model_was_right_and_shrinks_where_it_was_wro
     bare, objective, refused, factor
 ):
     bare.trials = [Point(objective)]
-    found = phases._descend(searching(1), standing_at(Point(1.0), refused=refused))
+    found = descent.descend(searching(1), standing_at(Point(1.0), refused=refused))
     assert found.window == pytest.approx(factor * 0.2)
     assert not found.refused
 
 
 def test_a_descent_leaves_evaluations_to_what_comes_next_once_it_keeps_every_limit(bare):
     bare.trials = [Point(0.9 - 0.01 * k) for k in range(10)]
-    found = phases._descend(searching(10), standing_at(Point(1.0)), least=4)
+    found = descent.descend(searching(10), standing_at(Point(1.0)), least=4)
     assert len(bare.taken) == 6
     assert found.point.objective == pytest.approx(0.85)
     broken = np.array([0.2])
     bare.taken, bare.trials = [], [Point(0.9, constraints=broken), *(Point(0.8 - 0.01 * k) for k in range(9))]
-    phases._descend(searching(5), standing_at(Point(1.0, constraints=broken)), least=5)
+    descent.descend(searching(5), standing_at(Point(1.0, constraints=broken)), least=5)
     assert len(bare.taken) == 2  # as long as a limit is broken it goes on
 
 
@@ -181,10 +183,10 @@ def test_a_search_has_settled_where_little_is_predicted_or_the_window_is_smalles
 
     def settled(predicted, **changes):
         point = Point(1.0, constraints=np.array([changes.pop("broken", -1.0)]), states={"wet": None})
-        return phases._settled(search, standing_at(point, **changes), predicted)
+        return descent._settled(search, standing_at(point, **changes), predicted)
 
     monkey = pytest.MonkeyPatch()
-    monkey.setattr(phases, "violation", lambda _, point: max(point.constraints[0], 0.0))
+    monkey.setattr(descent, "violation", lambda _, point: max(point.constraints[0], 0.0))
     with monkey.context():
         assert "less than 0.1% improvement" in settled(-0.9e-3, window=1.0)
         assert settled(-1.1e-3, window=1.0) == ""
@@ -203,11 +205,11 @@ def climbing(bare, monkeypatch, reached, **changes):
     search.evaluator.problem.constraints = [SimpleNamespace(term=SimpleNamespace(stabilises=True))]
     search.evaluator.seed = lambda design, states, stage: Point(0.5, f"seeded at {stage}")
     far = iter(reached)
-    monkeypatch.setattr(phases, "reach", lambda *_: next(far))
-    monkeypatch.setattr(phases, "staged", lambda *_: {})
-    monkeypatch.setattr(phases, "accepted_design", lambda search, point: point.name)
+    monkeypatch.setattr(descent, "reach", lambda *_: next(far))
+    monkeypatch.setattr(descent, "staged", lambda *_: {})
+    monkeypatch.setattr(descent, "accepted_design", lambda search, point: point.name)
     bare.trials = [Point(2.0, states={"wet": None}) for _ in reached]
-    return phases._climb(search, standing_at(Point(1.0, "start"), **{"stage": 0.5, **changes}))
+    return descent.climb(search, standing_at(Point(1.0, "start"), **{"stage": 0.5, **changes}))
 
 
 def test_a_climb_counts_only_trials_whose_stable_branch_reaches_farther(bare, monkeypatch):
@@ -222,9 +224,9 @@ def test_a_climb_counts_only_trials_whose_stable_branch_reaches_farther(bare, mo
 def test_nothing_climbs_that_bears_the_load_or_has_nothing_that_stabilises(bare, monkeypatch):
     search = searching()
     whole = standing_at(Point(1.0))
-    assert phases._climb(search, whole) is whole
+    assert descent.climb(search, whole) is whole
     staged = standing_at(Point(1.0), stage=0.5)
-    assert phases._climb(search, staged) is staged
+    assert descent.climb(search, staged) is staged
 
 
 @pytest.mark.parametrize(

@@ -209,9 +209,8 @@ def turns(search, monkeypatch):
     monkeypatch.setattr(
         minding, "restiffened", lambda search, it, least: told.log.append(("as before", least, it.mind)) or it
     )
-    told.led = lambda **changes: minding.led(
-        search, iterate(1.0, mind="some", stood=1, until=10, **changes), descend
-    )
+    monkeypatch.setattr(minding, "descend", descend)
+    told.led = lambda **changes: minding.led(search, iterate(1.0, mind="some", stood=1, until=10, **changes))
     return told
 
 

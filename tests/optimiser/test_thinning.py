@@ -8,6 +8,7 @@ import pytest
 
 import shellform as sf
 from shellform.optimiser import phases, thinning, trials
+from shellform.optimiser.descent import descend
 from shellform.optimiser.optimise import begin
 from shellform.optimiser.phases import _made_to_stand, _repaired, _thin
 from shellform.optimiser.proposal import _as_far_as_can_be
@@ -97,7 +98,7 @@ def descended(stout, stiffness):
     """A search whose rods are as thin as the stiffness asked for allows, as good as a descent gets them."""
     wet = stout.point_load(4.5, every=2)
     search, it = searched(stout, 0.005, stiffness=stiffness, evaluations=60, asked=demanded({"wet": wet}))
-    it = phases._descend(replace(search, evaluations=40), replace(it, guarded=False))
+    it = descend(replace(search, evaluations=40), replace(it, guarded=False))
     return search, phases._ready_to_thin(search, it)
 
 

@@ -1,0 +1,104 @@
+"""Steps of a search, from an iterate to an iterate: rounds of proposal (proposal.py), trial (trials.py) and
+judgement (search_state.py).
+
+A descent takes the steps that the objective asks for, within the limits. A climb comes before it where the
+start doesn't bear the further loads, and takes those that stiffen its softest mode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from shellform.optimiser.proposal import propose
+from shellform.optimiser.resuming import tell
+from shellform.optimiser.search_state import (
+    Iterate,
+    Search,
+    accepted_design,
+    merit,
+    noted,
+    violation,
+)
+from shellform.optimiser.trials import accepted, attempt, reach, staged, task
+
+_TINY = -1e-300  # a predicted change that isn't one
+# of the objective, gained by a turn, for which another is made where thinning is to end with what stands
+_WORTH = 0.05
+
+
+def climb(search: Search, it: Iterate) -> Iterate:
+    """Steps that stiffen the softest mode under the staged loads, whatever the objective, until the
+    further loads are borne whole.
+
+    Each goes along the gradient of the constraints on it, with all cables kept taut; it counts where the
+    stable branch reaches farther.
+    """
+    if it.stage == 1.0 or not any(part.term.stabilises for part in search.evaluator.problem.constraints):
+        return it
+    evaluator, base = search.evaluator, search.base
+    it = replace(it, guarded=True, climbing=True)
+    while it.stage < 1.0 and search.left() > 0 and it.window > search.solver.smallest * search.tension:
+        tell(search, it)
+        model = search.models.at(it.point)
+        y, _ = propose(task(search, it, model))
+        trial, it = attempt(search, it, model, y)
+        stage = 0.0 if trial is None else reach(evaluator, trial.design, trial.states[base], 0.0, it.margin)
+        if trial is None or stage <= it.stage:
+            it = replace(it, window=it.window * search.solver.shrink)
+            it = noted(search, it, trial or it.point, False)
+            continue
+        states = staged(evaluator, trial.design, trial.states[base], stage)
+        point = evaluator.seed(trial.design, states, stage)
+        it = replace(it, stage=stage, point=point, accepted=(*it.accepted, accepted_design(search, point)))
+        it = noted(search, it, point, True)
+    return replace(it, window=search.first_window, guarded=search.always_guarded, climbing=False)
+
+
+def descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
+    """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none
+    may; and so in turns as long as a turn improves the objective. A design that keeps every limit leaves the
+    `least` of the evaluations to what comes next."""
+    solver = search.solver
+    while search.left() > (least if it.stage == 1.0 and violation(search, it.point) <= 0.0 else 0):
+        tell(search, it)
+        model = search.models.at(it.point)
+        y, predicted = propose(task(search, it, model))
+        status = _settled(search, it, predicted)
+        if status:
+            it = replace(it, status=status)
+            worth = solver.settled if search.asked is None else _WORTH
+            turned = it.guarded and it.point.objective > (1.0 - worth) * it.before
+            idle = not it.guarded and it.point.objective == it.before  # guarded it would try the same again
+            # without further loads there are no guards
+            if search.always_guarded or turned or idle or len(search.evaluator.problem.used()) == 1:
+                return it
+            before = it.point.objective if it.guarded else it.before
+            it = replace(it, before=before, guarded=not it.guarded, window=search.first_window)
+            continue
+        trial, it = attempt(search, it, model, y)
+        if trial is None or merit(search, trial) >= merit(search, it.point):
+            it = replace(it, window=it.window * solver.shrink, refused=True)
+            it = noted(search, it, trial or it.point, False)
+            continue
+        ratio = (trial.objective - it.point.objective) / min(predicted, _TINY)
+        grown = 1.0 if it.refused else solver.grow  # a window that was just refused isn't tried again at once
+        factor = grown if ratio > solver.good else (solver.shrink if ratio < solver.poor else 1.0)
+        it = accepted(search, replace(it, window=it.window * factor, refused=False), trial)
+    return it
+
+
+def _settled(search: Search, it: Iterate, predicted: float) -> str:
+    """The criterion of convergence that the point meets, in words; empty where none is met."""
+    solver = search.solver
+    if it.stage < 1.0:
+        return ""
+    kept = violation(search, it.point) <= 0.0
+    if kept and -predicted < solver.settled * it.point.objective and it.window >= search.tension:
+        return f"the model predicts less than {solver.settled:.1%} improvement"
+    if it.window < solver.smallest * search.tension:
+        return (
+            "the objective has no better design within the smallest window"
+            if kept
+            else "no design within the smallest window breaks its limits less"
+        )
+    return ""

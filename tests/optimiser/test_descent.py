@@ -1,0 +1,171 @@
+"""How a search climbs and descends: its windows and turns, with trials that are told."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import shellform as sf
+from shellform.optimiser import descent
+from tests.optimiser.test_phases import iterate, point, searching
+
+
+def test_a_climb_ends_with_its_window_or_its_evaluations(monkeypatch):
+    """Refused each time, it shrinks from 0.2 N by 0.4 to 0.128 of 4 N times 0.01."""
+    search = searching(
+        solver=sf.SequentialConvex(smallest=0.004), first_window=0.8, always_guarded=True, base="wet"
+    )
+    search.evaluator.problem.constraints = [
+        SimpleNamespace(term=SimpleNamespace(stabilises=each)) for each in (False, True)
+    ]
+    tries = []
+    monkeypatch.setattr(descent, "tell", lambda *_: None)
+    monkeypatch.setattr(
+        descent, "task", lambda search, it, model: tries.append((it.window, it.guarded, it.climbing))
+    )
+    monkeypatch.setattr(descent, "propose", lambda *_: (None, 0.0))
+    monkeypatch.setattr(descent, "attempt", lambda search, it, model, y: (None, it))
+    monkeypatch.setattr(descent, "noted", lambda search, it, point, kept: it)
+    begun = iterate("start", stage=0.5)
+    end = descent.climb(search, begun)
+    assert [window for window, *_ in tries] == pytest.approx([0.2, 0.08, 0.032])
+    assert {each[1:] for each in tries} == {(True, True)}
+    assert (end.window, end.guarded, end.climbing, end.stage) == (0.8, True, False, 0.5)
+    tries.clear()
+    search.left = lambda: 2 - len(tries)
+    descent.climb(search, begun)
+    assert len(tries) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "begun", "ends"),
+    [
+        # with cables that may go slack, then with none that may, then nothing new is left to try
+        ({}, {"guarded": False}, [(False, np.inf), (True, np.inf), (False, 0.96)]),
+        # a turn has gained 4 % since it began: enough without structures as built, with them it isn't
+        ({}, {"guarded": True, "before": 1.0}, [(True, 1.0), (False, 0.96)]),
+        ({"asked": "asked"}, {"guarded": True, "before": 1.0}, [(True, 1.0)]),
+        ({"asked": "asked"}, {"guarded": True, "before": 1.02}, [(True, 1.02), (False, 0.96)]),
+        ({}, {"guarded": True, "before": 0.9605}, [(True, 0.9605)]),
+        ({}, {"guarded": True, "before": 0.9615}, [(True, 0.9615), (False, 0.96)]),
+        ({"always_guarded": True}, {"guarded": True}, [(True, np.inf)]),
+        ({"used": ["wet"]}, {"guarded": False}, [(False, np.inf)]),
+    ],
+)
+def test_a_descent_turns_between_cables_that_may_go_slack_and_none_that_may_while_that_gains_something(
+    monkeypatch, changes, begun, ends
+):
+    turns = []
+
+    def settled(search, it, predicted):
+        turns.append((it.guarded, it.before))
+        assert len(turns) == 1 or it.window == 0.8, "each turn begins with the first window"
+        return "settled"
+
+    monkeypatch.setattr(descent, "violation", lambda *_: 0.0)
+    monkeypatch.setattr(descent, "tell", lambda *_: None)
+    monkeypatch.setattr(descent, "task", lambda *_: None)
+    monkeypatch.setattr(descent, "propose", lambda *_: (None, 0.0))
+    monkeypatch.setattr(descent, "_settled", settled)
+    given = {"always_guarded": False, "first_window": 0.8, **changes}
+    used = given.pop("used", ["wet", "wetter"])
+    search = searching(**given)
+    search.evaluator.problem.used = lambda: used
+    end = descent.descend(search, iterate(point(0.96), **begun))
+    assert turns == ends
+    assert (end.status, end.point.objective) == ("settled", 0.96)
+
+
+def test_half_of_the_evaluations_left_to_thinning_are_kept_only_under_the_whole_loads(monkeypatch):
+    """A search that hasn't reached them, or breaks a limit, spends all."""
+    monkeypatch.setattr(descent, "violation", lambda search, point: point)
+    for stage, broken, spent in ((1.0, 0.0, 2), (0.9, 0.0, 5), (1.0, 0.1, 5)):
+        search = searching(5)
+
+        def tried(search, it, model, y):
+            search.evaluator.evaluations += 1
+            return None, it
+
+        monkeypatch.setattr(descent, "tell", lambda *_: None)
+        monkeypatch.setattr(descent, "task", lambda *_: None)
+        monkeypatch.setattr(descent, "propose", lambda *_: (None, 0.0))
+        monkeypatch.setattr(descent, "_settled", lambda *_: "")
+        monkeypatch.setattr(descent, "attempt", tried)
+        monkeypatch.setattr(descent, "noted", lambda search, it, point, kept: it)
+        descent.descend(search, iterate(broken, stage=stage), least=3)
+        assert search.evaluator.evaluations == spent
+
+
+@pytest.fixture
+def descending(monkeypatch):
+    """Descents of one trial, whose objective is told."""
+    told = SimpleNamespace(predicted=-0.5, trial=None, broken=0.0)
+    monkeypatch.setattr(descent, "violation", lambda *_: told.broken)
+    monkeypatch.setattr(descent, "tell", lambda *_: None)
+    monkeypatch.setattr(descent, "task", lambda *_: None)
+    monkeypatch.setattr(descent, "merit", lambda search, point: point.objective)
+    monkeypatch.setattr(descent, "noted", lambda search, it, point, kept: it)
+    monkeypatch.setattr(descent, "accepted", lambda search, it, trial: replace(it, point=trial))
+
+    def attempt(search, it, model, y):
+        search.evaluator.evaluations += 1
+        return told.trial, it
+
+    monkeypatch.setattr(descent, "propose", lambda *_: (None, told.predicted))
+    monkeypatch.setattr(descent, "attempt", attempt)
+    return told
+
+
+@pytest.mark.parametrize(
+    ("predicted", "gained", "factor"),
+    [(-0.5, 0.36, 1.6), (-0.5, 0.34, 1.0), (-0.5, 0.16, 1.0), (-0.5, 0.14, 0.4), (0.0, 0.01, 1.6)],
+)
+def test_what_came_true_of_a_prediction_decides_on_the_next_window(descending, predicted, gained, factor):
+    """More than seven tenths of a half, or less than three; of nothing that was predicted any gain is more."""
+    descending.predicted, descending.trial = predicted, point(2.0 - gained)
+    found = descent.descend(searching(1), iterate(point(2.0), window=0.5))
+    assert found.window == pytest.approx(factor * 0.5)
+
+
+def test_a_search_settles_by_shares_of_its_objective_and_of_mean_tensions(descending):
+    """A thousandth of 0.4 in a window of 4 N; the smallest window is 0.03 of that."""
+
+    def settled(predicted, **changes):
+        return descent._settled(searching(), iterate(point(0.4), **changes), predicted)
+
+    assert "less than 0.1% improvement" in settled(-0.39e-3, window=4.0)
+    assert settled(-0.41e-3, window=4.0) == settled(-0.39e-3, window=3.9) == ""
+    assert "no better design within the smallest" in settled(-1.0, window=0.119)
+    assert settled(-1.0, window=0.121) == ""
+    descending.broken = 0.1
+    assert "breaks its limits less" in settled(-0.39e-3, window=0.119)
+
+
+def test_a_climb_ends_where_the_further_loads_are_borne_whole(monkeypatch):
+    search = searching(first_window=0.8, always_guarded=False, base="wet")
+    search.evaluator.problem.constraints = [SimpleNamespace(term=SimpleNamespace(stabilises=True))]
+    search.evaluator.seed = lambda design, states, stage: f"{design} at {stage}"
+    noted, reached = [], [0.5, 0.75, 1.0, 1.0]
+
+    def attempt(search, it, model, y):
+        return SimpleNamespace(design="design", states={"wet": "rest"}), it
+
+    monkeypatch.setattr(descent, "tell", lambda *_: None)
+    monkeypatch.setattr(descent, "task", lambda *_: None)
+    monkeypatch.setattr(descent, "propose", lambda *_: (None, 0.0))
+    monkeypatch.setattr(descent, "attempt", attempt)
+    monkeypatch.setattr(
+        descent, "reach", lambda *given: reached.pop(0) if given[2:] == ("rest", 0.0, 0.15) else None
+    )
+    monkeypatch.setattr(descent, "staged", lambda *_: {})
+    monkeypatch.setattr(descent, "accepted_design", lambda search, point: point)
+    monkeypatch.setattr(descent, "noted", lambda search, it, point, kept: noted.append((point, kept)) or it)
+    end = descent.climb(search, iterate("start", stage=0.5, window=0.8))
+    assert (end.stage, reached) == (1.0, [1.0])
+    assert noted[0][0].design == "design", "the trial that was refused"
+    assert noted[1:] == [("design at 0.75", True), ("design at 1.0", True)]
+    assert end.accepted == ("first", "design at 0.75", "design at 1.0")
+    assert (end.window, end.guarded) == (0.8, False)
+    whole = iterate("start", stage=1.0)
+    assert descent.climb(search, whole) is whole
