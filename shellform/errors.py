@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -98,6 +99,13 @@ def require_count(value: int, *, where: str, give: str, least: int = 1, most: fl
     if not fits:
         what = f"must be at least {least}" if most == math.inf else f"must be between {least} and {most}"
         raise InputError(what, where=where, value=value, remedy=f"Give {give}.")
+
+
+def require_known(value: object, known: Iterable[str], *, where: str, what: str) -> None:
+    """Raises InputError for a name that isn't among those `known`; `what` says what it isn't."""
+    names = list(known)  # in which a value may be sought that has no hash
+    if value not in names:
+        raise InputError(what, where=where, value=value, remedy=f"Known: {', '.join(names)}.")
 
 
 def _between(above: float, least: float, below: float, most: float) -> str:

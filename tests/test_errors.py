@@ -11,6 +11,7 @@ from shellform.errors import (
     not_installed,
     printable,
     require_count,
+    require_known,
     require_number,
     unreadable,
 )
@@ -65,6 +66,14 @@ def test_a_count_is_refused_below_and_beyond_its_bounds_and_where_it_is_no_whole
             require_count(value, where="--limit", give="a number of steps", **bounds)
     for value, bounds in ((1, {}), (10**9, {}), (3, {"least": 3, "most": 7}), (7, {"least": 3, "most": 7})):
         require_count(value, where="--limit", give="a number of steps", **bounds)
+
+
+def test_a_name_is_refused_that_is_none_of_those_known_which_are_listed_and_so_is_what_has_no_hash():
+    require_known("cm", {"m": 1.0, "cm": 0.01}, where="--unit", what="isn't a known unit")
+    for value in ("furlong", ["m"], None):
+        with pytest.raises(InputError, match=r"^--unit: isn't a known unit.* Known: m, cm\.$") as told:
+            require_known(value, {"m": 1.0, "cm": 0.01}, where="--unit", what="isn't a known unit")
+        assert told.value.value == value
 
 
 def test_a_refusal_within_a_file_says_both_places_and_keeps_the_rest():

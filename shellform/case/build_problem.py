@@ -10,7 +10,7 @@ path ends before F isn't feasible.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from shellform.arrays import Reals
 from shellform.case.build_gridshell import rod_bounds
 from shellform.case.build_safety import case_tolerances, critical_factors_asked
 from shellform.case.case import Case
-from shellform.errors import InputError, NotConverged
+from shellform.errors import NotConverged, require_known
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import CONNECTOR
@@ -80,7 +80,8 @@ def case_problem(
         constraints.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
     used = dict(loads)
     further = {name: factor for name, factor in critical_factors_asked(case).items() if name != "design"}
-    _known("safety.critical_further", list(further), others)
+    for name in further:
+        require_known(name, others, where="safety.critical_further", what="there is no such load case")
     critical = []
     if further:
         least = _SOFTEST * _stiffness(shell, start, loads["design"])
@@ -106,7 +107,7 @@ def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[V
     entry, bounds = case.optimise, rod_bounds(case, shell)
     blocks: list[Variable] = [RestLengths(entry.rest_length_min, entry.rest_length_max)]
     if frees_radius and entry.rod_radius > 0.0:
-        blocks.append(FreeRadius(*bounds) if bounds else FreeRadius())
+        blocks.append(FreeRadius(*bounds))
     return blocks
 
 
@@ -127,18 +128,10 @@ def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list
     if entry.slack_min is not None:
         longest = case.cable.rest_ratio * case.optimise.rest_length_max
         let_out = 0.5 * (1.0 + longest) if longest > 1.0 else np.inf
-        for name in _known("limits.slack_loads", entry.slack_loads, list(loads)):
+        for name in entry.slack_loads:
+            require_known(name, loads, where="limits.slack_loads", what="there is no such load case")
             found.append(AtLeast(entry.slack_min, LeastTension(name, entry.slack_min, let_out)))
     return found
-
-
-def _known(where: str, names: Sequence[str], known: Sequence[str]) -> Sequence[str]:
-    for name in names:
-        if name not in known:
-            raise InputError(
-                "there is no such load case", where=where, value=name, remedy=f"Known: {', '.join(known)}."
-            )
-    return names
 
 
 def _stiffness(shell: Gridshell, start: Design, load: Reals) -> float:

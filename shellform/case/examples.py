@@ -10,7 +10,7 @@ from pathlib import Path
 
 import shellform
 from shellform.case.case import shipped_surfaces
-from shellform.errors import InputError
+from shellform.errors import InputError, require_known
 from shellform.written import whole
 
 
@@ -88,8 +88,7 @@ def lay_example(name: str, folder: str | Path) -> list[Path]:
     """Writes the files of an example into a folder and returns them, the one to compute first. Raises
     InputError for an unknown name, and where a file of that name with other content is there.
     """
-    if name not in EXAMPLES:
-        raise InputError("is no example", where="NAME", value=name, remedy=f"Known: {', '.join(EXAMPLES)}.")
+    require_known(name, EXAMPLES, where="NAME", what="is no example")
     example, place = EXAMPLES[name], Path(folder)
     contents = {
         each: _at_home((_cases() / each).read_text(encoding="utf-8")).encode() for each in example.files

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, reals
-from shellform.errors import InputError, require_count, require_number
+from shellform.errors import InputError, require_count, require_known, require_number
 from shellform.gridshell.areas import areas, between, facets, tributary, within
 from shellform.net.net import Net
 from shellform.structure.elements.sections import Section, mass_per_length
@@ -177,13 +177,7 @@ def combined(
     if not factors:
         raise InputError("names no part", where=where, remedy=f"Known: {', '.join(parts)}.")
     for name, factor in factors.items():
-        if name not in parts:
-            raise InputError(
-                "there is no such part of the load",
-                where=where,
-                value=name,
-                remedy=f"Known: {', '.join(parts)}.",
-            )
+        require_known(name, parts, where=where, what="there is no such part of the load")
         require_number(factor, where=f"{where}.{name}", give="a factor of that part, such as 1.2")
     return np.asarray(sum(factor * parts[name] for name, factor in factors.items()))
 

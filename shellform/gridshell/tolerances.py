@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from shellform.errors import InputError, require_number
+from shellform.errors import InputError, require_known, require_number
 from shellform.gridshell.gridshell import Gridshell
 
 SCALE_MODEL_BELOW: Final = 2.0  # m of span
@@ -101,13 +101,7 @@ class Tolerances:
         """The same with all other causes left out. Raises InputError for an unknown name."""
         known = [each.name for each in fields(self)]
         for name in names:
-            if name not in known:
-                raise InputError(
-                    "there is no such cause",
-                    where="tolerances",
-                    value=name,
-                    remedy=f"Known: {', '.join(known)}.",
-                )
+            require_known(name, known, where="tolerances", what="there is no such cause")
         return Tolerances(**{name: getattr(self, name) for name in names})
 
 

@@ -28,7 +28,7 @@ from itertools import pairwise
 import numpy as np
 
 from shellform.arrays import Reals, reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_known
 from shellform.net.net import EdgeLine, Net, Stretch
 from shellform.net.rims import End, Rim, ends_of, rim_of
 from shellform.structure.elements.rotation import from_matrices
@@ -61,13 +61,7 @@ class Place:
     opening: bool | None = None
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InputError(
-                "is no kind of edge",
-                where="edges.kind",
-                value=self.kind,
-                remedy=f"Known: {', '.join(KINDS)}.",
-            )
+        require_known(self.kind, KINDS, where="edges.kind", what="is no kind of edge")
         for name, shape in (("box", (2, 3)), ("curve", (None, 2))):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, reals(f"edges.{name}", getattr(self, name), shape))
@@ -97,13 +91,8 @@ class Edges:
 
     def __post_init__(self) -> None:
         for name in ("outer", "openings"):
-            if getattr(self, name) not in (*KINDS, "auto"):
-                raise InputError(
-                    "is no kind of edge",
-                    where=f"edges.{name}",
-                    value=getattr(self, name),
-                    remedy=f"Known: {', '.join(('auto', *KINDS))}.",
-                )
+            kind = getattr(self, name)
+            require_known(kind, ("auto", *KINDS), where=f"edges.{name}", what="is no kind of edge")
 
 
 def stand(net: Net, surface: Surface, edges: Edges = Edges(), *, outline: Reals | None = None) -> Net:

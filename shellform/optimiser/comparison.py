@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import require_known
 from shellform.gridshell.gridshell import Design
 from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch, not_carried
 from shellform.problem.paths import follow, without_slack
@@ -148,10 +148,7 @@ def compare(
     trust-constr. For the same problem from optimise give its solver `stiffness=0`, `thin=False`: both add to
     the problem. Raises InputError for another method and NotConverged where the start doesn't bear all loads.
     """
-    if method not in METHODS:
-        raise InputError(
-            "is no known method", where="method", value=method, remedy=f"Known: {', '.join(METHODS)}."
-        )
+    require_known(method, METHODS, where="method", what="is no known method")
     plain = Plain(problem, start)
 
     def counted(function: Any) -> Any:

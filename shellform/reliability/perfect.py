@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Flags, Reals, flags
-from shellform.errors import InputError
+from shellform.errors import InputError, require_known
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.reliability.branch import Branch
 from shellform.reliability.drawing import (
@@ -80,13 +80,7 @@ def perfect(
 
 def perfect_of(model: Model, load: str, *, shapes: int = SHAPES, step: float = NOMINAL_STEP) -> Perfect:
     """The same of a model file and one of its load cases. Raises InputError for an unknown one."""
-    if load not in model.loads:
-        raise InputError(
-            "there is no such load case",
-            where="load",
-            value=load,
-            remedy=f"Known: {', '.join(model.loads)}.",
-        )
+    require_known(load, model.loads, where="load", what="there is no such load case")
     network, members = model.network, members_of_model(model)
     if model.start is None:
         raise InputError(

@@ -18,7 +18,7 @@ import shellform
 from shellform.arrays import Reals, read_arrays, reals
 from shellform.case.build_gridshell import gridshell, rounding_catalogue
 from shellform.case.case import Case, load_case
-from shellform.errors import Damaged, InputError
+from shellform.errors import Damaged, InputError, require_known
 from shellform.gridshell.catalogue import named
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.net.net import Net
@@ -103,8 +103,7 @@ class Run:
 
 def refuse_unknown(option: str, name: str, known: Collection[str]) -> None:
     """Raises InputError for the `name`, given by an `option`, of a design or a load case that isn't among those `known`."""
-    if name not in known:
-        raise InputError("isn't there", where=option, value=name, remedy=f"Known: {', '.join(known)}.")
+    require_known(name, known, where=option, what="isn't there")
 
 
 def read_run(folder: str | Path) -> Run:

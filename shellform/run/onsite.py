@@ -18,13 +18,13 @@ from shellform.arrays import Indices, Reals, read_arrays
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import InputError, how_many, require_count, require_number
+from shellform.errors import InputError, how_many, require_count, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.site import calibration, erection, measurements, retensioning
 from shellform.site.scans import Scan, match, read_points
 from shellform.structure.elements.state import State
-from shellform.surface.units import METRES
+from shellform.surface.units import unit_factor
 from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
@@ -288,13 +288,7 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     """The design's name, its shell, and what is believed of it: as drawn, or after the round before."""
     measurements.check_noise(options.noise)
     name = _design(run, options.design, run.best)
-    if options.load not in run.loads:
-        raise InputError(
-            "there is no such load case",
-            where="--load",
-            value=options.load,
-            remedy=f"Known: {', '.join(run.loads)}.",
-        )
+    require_known(options.load, run.loads, where="--load", what="there is no such load case")
     shell, load = run.shell_of(name), run.loads[options.load]
     design, state = run.designs[name], run.states[name][options.load]
     if options.after is None:
@@ -335,15 +329,9 @@ def _surveyed(
     crossings by a rigid motion.
     """
     if measurements.has_column(path, "node") or measurements.has_column(path, "crossing"):
-        if options.unit not in METRES:
-            raise InputError(
-                "isn't a known unit",
-                where="--unit",
-                value=options.unit,
-                remedy=f"Known: {', '.join(METRES)}.",
-            )
+        metres = unit_factor(options.unit, where="--unit")
         nodes, places = measurements.read_places(path, shell)
-        places = METRES[options.unit] * places
+        places = metres * places
         seen = np.isfinite(places).all(axis=1)
         if not seen.any():
             raise InputError(

@@ -27,7 +27,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_known
 from shellform.gridshell.gridshell import Design, Gridshell, Joint
 from shellform.net.grid import CONNECTOR
 from shellform.problem.paths import follow
@@ -153,13 +153,7 @@ def calibrate(
     """
     markers = _checked(shell, nodes)
     for name in free:
-        if name not in PARAMETERS:
-            raise InputError(
-                "isn't a connector's stiffness",
-                where="calibrate.free",
-                value=name,
-                remedy=f"Known: {', '.join(PARAMETERS)}.",
-            )
+        require_known(name, PARAMETERS, where="calibrate.free", what="isn't a connector's stiffness")
     if not scans:
         remedy = "Give a scan with the load it was taken under."
         raise InputError("needs at least one scan", where="calibrate", remedy=remedy)

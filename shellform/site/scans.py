@@ -22,7 +22,7 @@ from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
 from shellform.site.measurements import cells_of, text_of
 from shellform.structure.elements.state import State
-from shellform.surface.units import METRES
+from shellform.surface.units import unit_factor
 
 _TURNS = 24  # starts about the common normal, each also flipped
 _ROUNDS = 60  # of closest points from one start
@@ -90,10 +90,7 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
     """Points (k, 3), m, from a CSV file: columns x, y, z by their names in the first line or, without names,
     the first three; lines that start with # and lines whose coordinates are all empty (markers out of sight)
     are passed over. Raises InputError."""
-    if unit not in METRES:
-        raise InputError(
-            "isn't a known unit", where="scan.unit", value=unit, remedy=f"Known: {', '.join(METRES)}."
-        )
+    metres = unit_factor(unit, where="scan.unit")
     file, text = Path(path), text_of(path, "Give a text file: x, y, z of a point in each line.")
     numbered = [
         (k, line)
@@ -124,7 +121,7 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
         raise InputError(
             "has no points", where=str(file), remedy="Give a text file: x, y, z of a point in each line."
         )
-    return METRES[unit] * reals(str(file), found, (None, 3))
+    return metres * reals(str(file), found, (None, 3))
 
 
 def rigid_fit(points: Reals, places: Reals) -> Motion:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_known
 
 # by the file's vertical axis, which of its axes become x, y and z, and their signs
 _AXES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
@@ -19,12 +19,9 @@ _AXES: dict[str, tuple[tuple[int, int, int], tuple[int, int, int]]] = {
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 
-def unit_factor(unit: str) -> float:
-    """Metres in one `unit`."""
-    if unit not in METRES:
-        raise InputError(
-            "isn't a known unit", where="surface.unit", value=unit, remedy=f"Known: {', '.join(METRES)}."
-        )
+def unit_factor(unit: str, *, where: str = "surface.unit") -> float:
+    """Metres in one `unit`, which is given `where`. Raises InputError for an unknown one."""
+    require_known(unit, METRES, where=where, what="isn't a known unit")
     return METRES[unit]
 
 

@@ -117,6 +117,7 @@ def test_impossible_sections_and_materials_are_refused():
     [
         ("rod = 3", "must be a table"),
         ("[rod]\nshape = 'star'", "unknown shape.*round, tube, rectangle"),
+        ("[rod]\nshape = ['round']", "unknown shape.*round, tube, rectangle"),
         ("[rod]\nshape = 'round'\nyoung = 1\npoisson = 0.3", "'radius' is missing"),
         ("[rod]\nshape = 'round'\nradius = 1\nyoung = 1", "shear or poisson"),
         ("[rod]\nshape = 'round'\nradius = 'thick'\nyoung = 1\nshear = 1", "must be a number"),

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError
+from shellform.errors import InputError, require_known
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import ROD
 from shellform.net.net import Net
@@ -60,10 +60,7 @@ def panel_of(
     Raises InputError for another quantity and where the shell and the state don't belong together,
     NotConverged where no mode is found.
     """
-    if quantity not in QUANTITIES:
-        raise InputError(
-            "is nothing to draw", where="quantity", value=quantity, remedy=f"Known: {', '.join(QUANTITIES)}."
-        )
+    require_known(quantity, QUANTITIES, where="quantity", what="is nothing to draw")
     if len(state.positions) != shell.node_count:
         raise InputError(
             "belongs to another shell",

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError, require_number
+from shellform.errors import InputError, require_known, require_number
 
 LIMIT = 0.010  # m, end of the colour scale in figures 12 to 14
 EDGE_BEAM = 1.8  # times as thick as rods edge beams are drawn
@@ -119,10 +119,7 @@ class Look:
     letters: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.view not in VIEWS:
-            raise InputError(
-                "is no view", where="view", value=self.view, remedy=f"Known: {', '.join(VIEWS)}."
-            )
+        require_known(self.view, VIEWS, where="view", what="is no view")
         require_number(
             self.limit, above=0.0, where="figures.limit", give="metres at the scale's end, such as 0.010"
         )

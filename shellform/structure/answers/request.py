@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError, require_count
+from shellform.errors import InputError, require_count, require_known
 from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
@@ -33,10 +33,7 @@ def check_request(
             value=(factor, tolerance),
             remedy="For example --factor 1 --tolerance 1e-9.",
         )
-    if method not in METHODS:
-        raise InputError(
-            "unknown method", where="--method", value=method, remedy=f"Known: {', '.join(METHODS)}."
-        )
+    require_known(method, METHODS, where="--method", what="unknown method")
     require_count(limit, where="--limit", give="a number of iterations, such as 100")
     if lead is not None and not (
         0 <= lead[0] < count and lead[1] in (0, 1, 2) and np.isfinite(lead[2]) and lead[2] != 0.0

@@ -7,11 +7,12 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError, unreadable
+from shellform.errors import InputError, require_known, unreadable
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.sections import (
@@ -122,9 +123,8 @@ def _section(table: object, where: str) -> Section:
         raise InputError(
             "must be a table", where=where, value=table, remedy='Write [rod], and below it shape = "round" …'
         )
-    shape = table.get("shape")
-    if shape not in SHAPES:
-        raise InputError("unknown shape", where=where, value=shape, remedy=f"Known: {', '.join(SHAPES)}.")
+    shape: Any = table.get("shape")
+    require_known(shape, SHAPES, where=where, what="unknown shape")
     sizes = sizes_of(shape)
     for name in table:
         if name not in ("shape", *sizes, *_MATERIAL):
