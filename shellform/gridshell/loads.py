@@ -21,6 +21,7 @@ from shellform.arrays import Indices, Reals, reals
 from shellform.errors import InputError, require_count, require_known, require_number
 from shellform.gridshell.areas import areas, between, facets, tributary, within
 from shellform.net.net import Net
+from shellform.net.polylines import inside
 from shellform.structure.elements.sections import Section, mass_per_length
 from shellform.surface.shape.target import Surface
 
@@ -240,17 +241,6 @@ def _polygons(where: str, given: Sequence[ArrayLike]) -> list[Reals]:
             )
         result.append(corners)
     return result
-
-
-def inside(points: Reals, polygon: Reals) -> np.ndarray:
-    """Which plan points (k, 2) lie inside the polygon (p, 2), by the parity of crossings of a ray along x."""
-    x, y = points[:, :1], points[:, 1:]
-    x1, y1 = polygon.T
-    x2, y2 = np.roll(polygon, -1, axis=0).T
-    straddles = (y1 > y) != (y2 > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        hit = x < x1 + (y - y1) * (x2 - x1) / (y2 - y1)
-    return np.asarray((straddles & hit).sum(axis=1) % 2 == 1)
 
 
 def _down(weight: Reals) -> Reals:

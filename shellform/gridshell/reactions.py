@@ -9,7 +9,6 @@ shell down, inwards where it takes an arch's thrust.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.edges import HELD
 from shellform.net.net import Net
+from shellform.net.polylines import nearest
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 
@@ -97,20 +97,10 @@ def edge_of(net: Net, nodes: Indices) -> list[tuple[str, str]]:
     if not held:
         return [("ground", "")] * len(nodes)
     place = net.target.positions[nodes]
-    away = np.array([_distance(place, each.points) for each in held])
+    away = np.array([nearest(place, each.points)[0] for each in held])
     return [(held[k].kind, held[k].name) for k in np.argmin(away, axis=0)]
 
 
 def _three(values: Reals) -> tuple[float, float, float]:
     x, y, z = values.tolist()
     return x, y, z
-
-
-def _distance(points: Reals, curve: Reals) -> Reals:
-    """Distances (k,), m, of points (k, 3) from a polyline (p, 3)."""
-    best = np.linalg.norm(points - curve[0], axis=1)
-    for a, b in pairwise(curve):
-        side = b - a
-        share = np.clip((points - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
-        best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * side, axis=1))
-    return best

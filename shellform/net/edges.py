@@ -23,13 +23,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from shellform.arrays import Reals, reals
 from shellform.errors import InputError, require_known
 from shellform.net.net import EdgeLine, Net, Stretch
+from shellform.net.polylines import nearest
 from shellform.net.rims import End, Rim, ends_of, rim_of
 from shellform.structure.elements.rotation import from_matrices
 from shellform.structure.elements.state import State
@@ -74,7 +74,7 @@ class Place:
         if self.box is not None:
             inside &= ((points >= self.box.min(axis=0)) & (points <= self.box.max(axis=0))).all(axis=1)
         if self.curve is not None:
-            inside &= _distance(points[:, :2], self.curve) <= self.within
+            inside &= nearest(points[:, :2], self.curve)[0] <= self.within
         return inside
 
 
@@ -314,13 +314,3 @@ def _upright(normals: Reals) -> Reals:
     x = np.cross(aside, normals)
     x /= np.linalg.norm(x, axis=1, keepdims=True)
     return from_matrices(np.stack([x, np.cross(normals, x), normals], axis=2))
-
-
-def _distance(points: Reals, curve: Reals) -> Reals:
-    """Distances (k,), m, of plan points from an open plan curve."""
-    best = np.full(len(points), np.inf)
-    for a, b in pairwise(curve):
-        side = b - a
-        share = np.clip((points - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
-        best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * side, axis=1))
-    return best

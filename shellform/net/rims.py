@@ -10,6 +10,7 @@ import numpy as np
 
 from shellform.arrays import Indices, Reals
 from shellform.net.net import Net
+from shellform.net.polylines import closed, nearest
 from shellform.structure.elements.rotation import matrices
 from shellform.surface.shape.target import Surface
 from shellform.surface.shape.tree import Tree
@@ -67,7 +68,11 @@ def ends_of(net: Net, surface: Surface, outline: Reals | None) -> tuple[list[End
     order: dict[int, tuple[int, int]] = {}
     if len(cut):
         inner = middle[cut, :2] - middle[cut, :2].mean(axis=0)
-        key = np.arctan2(inner[:, 1], inner[:, 0]) if outline is None else _along(middle[cut, :2], outline)
+        key = (
+            np.arctan2(inner[:, 1], inner[:, 0])
+            if outline is None
+            else nearest(middle[cut, :2], closed(outline))[1]
+        )
         for chain in _chains(cut[np.argsort(key, kind="stable")], middle, _APART * net.grid.scale):
             order |= {int(end): (len(rims), k) for k, end in enumerate(chain, 1)}
             feet = _reached(middle[chain[[0, -1]]], rims, _APART * net.grid.scale)
@@ -108,18 +113,3 @@ def _reached(points: Reals, rims: Sequence[Rim], apart: float) -> Reals:
     away = np.linalg.norm(points[:, None] - edge, axis=2)
     near = np.argmin(away, axis=1)
     return np.where((away[[0, 1], near] < apart)[:, None], edge[near], points)
-
-
-def _along(points: Reals, polygon: Reals) -> Reals:
-    """Arc lengths (k,), m, on a closed plan polygon of the places nearest to points (k, 2)."""
-    best, at = np.full(len(points), np.inf), np.zeros(len(points))
-    passed = 0.0
-    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        side = b - a
-        length = float(np.linalg.norm(side))
-        share = np.clip((points - a) @ side / max(length**2, 1e-300), 0.0, 1.0)
-        away = np.linalg.norm(points - a - share[:, None] * side, axis=1)
-        at = np.where(away < best, passed + share * length, at)
-        best = np.minimum(best, away)
-        passed += length
-    return at

@@ -20,6 +20,7 @@ from shellform.errors import how_many
 from shellform.net.compass import Finder
 from shellform.net.grid import Grid, GridRod
 from shellform.net.notes import NetNote, NoteKind
+from shellform.net.polylines import closed, inside, nearest
 from shellform.net.refusal import NoNet, Reason
 from shellform.structure.elements.rotation import matrices
 from shellform.structure.elements.state import State
@@ -27,10 +28,8 @@ from shellform.structure.network import connected
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
 _FEWEST = 2  # joints on a rod
-_FREE, _FREE_SHARE = (
-    2.5,
-    0.4,
-)  # spacings, and of a rod, without a joint: rods with more of both run beside the edge
+# a rod that has no joint over more than so many spacings, and over more than this share of it, runs beside the edge
+_FREE, _FREE_SHARE = 2.5, 0.4
 _CUT = 1e-9  # of the spacing: how near to the edge rods are cut
 _CUTTINGS = 30  # steps of the Illinois method
 
@@ -89,22 +88,10 @@ class Limits:
         if self.ground is not None:
             result = np.maximum(result, self.ground - points[:, 2])
         if self.plan is not None:
-            result = np.maximum(result, _outside(self.plan, points[:, :2]))
+            plan = points[:, :2]
+            away, _ = nearest(plan, closed(self.plan))
+            result = np.maximum(result, np.where(inside(plan, self.plan), -away, away))
         return np.asarray(result)
-
-
-def _outside(plan: Reals, points: Reals) -> Reals:
-    """Signed distance (k,), m, of plan points from a closed polygon, positive outside."""
-    start, stop = plan, np.roll(plan, -1, axis=0)
-    best, inside = np.full(len(points), np.inf), np.zeros(len(points), dtype=bool)
-    for a, b in zip(start, stop, strict=True):
-        side = b - a
-        share = np.clip((points - a) @ side / max(float(side @ side), 1e-300), 0.0, 1.0)
-        best = np.minimum(best, np.linalg.norm(points - a - share[:, None] * side, axis=1))
-        if a[1] != b[1]:
-            at = a[0] + (points[:, 1] - a[1]) * side[0] / side[1]
-            inside ^= ((a[1] > points[:, 1]) != (b[1] > points[:, 1])) & (points[:, 0] < at)
-    return np.where(inside, -best, best)
 
 
 def trim(grid: Grid, state: State, finder: Finder, *, merge: float, limits: Limits) -> Trimmed:

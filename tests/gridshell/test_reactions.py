@@ -3,23 +3,8 @@
 from types import SimpleNamespace
 
 import numpy as np
-import pytest
 
 from shellform.gridshell import reactions
-
-
-def test_the_distance_from_a_curve_is_that_from_its_nearest_piece():
-    curve = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 3.0, 0.0]])
-    points = np.array([[1.0, -0.5, 0.0], [2.5, 1.0, 0.0], [-3.0, 4.0, 0.0], [1.9, 1.5, 0.2], [2.0, 5.0, 0.0]])
-    wanted = [0.5, 0.5, 5.0, np.hypot(0.1, 0.2), 2.0]
-    assert reactions._distance(points, curve) == pytest.approx(wanted)
-    away = np.array([10.0, -20.0, 3.0])
-    assert reactions._distance(points + away, curve + away) == pytest.approx(wanted)
-    assert reactions._distance(-away[None], curve + away) == pytest.approx(
-        [np.linalg.norm([22.0, -37.0, 6.0])]
-    )
-    twice = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 4.0, 0.0]])
-    assert reactions._distance(points[:1], twice) == pytest.approx([1.25**0.5])
 
 
 def support(number, *force):
