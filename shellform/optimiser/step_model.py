@@ -24,7 +24,6 @@ keeps to the variables' own values, and X = -K⁻¹ ∂f/∂r.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -110,7 +109,8 @@ def step_model(evaluator: Evaluator, point: Evaluated, *, whole: bool) -> StepMo
     """The model at the point, with dense matrices if it is to be `whole`. Its answers take as long as the point's
     derivatives, beside which they are worked out."""
     shell, blocks, design = evaluator.shell, evaluator.blocks, point.design
-    at, residuals = setting(evaluator, point), _distinct(evaluator, point)
+    at = setting(evaluator, point)
+    residuals, numbers = _sums_of_squares(evaluator, point)
 
     def answered() -> Answers:
         return whole_answers(at, residuals) if whole else solved_answers(at, residuals)
@@ -123,55 +123,40 @@ def step_model(evaluator: Evaluator, point: Evaluated, *, whole: bool) -> StepMo
     )
     count, length = at.tensions, at.length[: at.tensions]
     return StepModel(
-        evaluator,
-        at.assembly,
-        linear,
-        at.state,
-        count,
-        shortest,
-        longest,
-        np.append(at.tension, values[at.other]),
-        np.append(np.zeros(count), lower[at.other]),
-        np.append(shell.cable.stiffness * (length / shortest - 1.0), upper[at.other]),
-        blocks.step(design)[at.other],
-        length,
-        answers,
-        answers.by_variables(linear.constraints_by_variables),
-        _of_terms(evaluator, linear, residuals, answers.quadratics),
+        evaluator=evaluator,
+        assembly=at.assembly,
+        point=linear,
+        state=at.state,
+        tensions=count,
+        shortest=shortest,
+        longest=longest,
+        origin=np.append(at.tension, values[at.other]),
+        lower=np.append(np.zeros(count), lower[at.other]),
+        upper=np.append(shell.cable.stiffness * (length / shortest - 1.0), upper[at.other]),
+        step=blocks.step(design)[at.other],
+        length=length,
+        answers=answers,
+        constraints_by_y=answers.by_variables(linear.constraints_by_variables),
+        quadratics=tuple(None if k is None else answers.quadratics[k] for k in numbers),
     )
 
 
-def _distinct(evaluator: Evaluator, point: Evaluated) -> list[Squares]:
-    """The sums of squares in the objective under the design load, with residuals of their own each."""
+def _sums_of_squares(evaluator: Evaluator, point: Evaluated) -> tuple[list[Squares], list[int | None]]:
+    """The sums of squares in the objective under the design load, with residuals of their own each; and which of them
+    each term of the objective is, None where it is none."""
     found: list[Squares] = []
+    numbers: list[int | None] = []
     for part, measurement in zip(evaluator.problem.minimise, point.summands, strict=True):
-        own = measurement.squares
-        if (
-            own is not None
-            and part.term.load == evaluator.base
-            and not any(_same(own, each) for each in found)
-        ):
-            found.append(own)
-    return found
+        own, number = measurement.squares, None
+        if own is not None and part.term.load == evaluator.base:
+            number = next((k for k, each in enumerate(found) if _same(own, each)), len(found))
+            if number == len(found):
+                found.append(own)
+        numbers.append(number)
+    return found, numbers
 
 
 def _same(one: Squares, other: Squares) -> bool:
     return one.by_dof.shape == other.by_dof.shape and bool(
         np.array_equal(one.residual, other.residual) and (one.by_dof != other.by_dof).nnz == 0
     )
-
-
-def _of_terms(
-    evaluator: Evaluator, point: Linearisation, residuals: Sequence[Squares], made: Sequence[Quadratic]
-) -> tuple[Quadratic | None, ...]:
-    """Of each term of the objective its quadratic, `made` of these residuals."""
-    result: list[Quadratic | None] = []
-    for part, measurement in zip(evaluator.problem.minimise, point.summands, strict=True):
-        own = measurement.squares
-        known = own is not None and part.term.load == evaluator.base
-        result.append(
-            next(made[k] for k, each in enumerate(residuals) if own is not None and _same(own, each))
-            if known
-            else None
-        )
-    return tuple(result)
