@@ -138,7 +138,16 @@ def load_net(path: Path) -> Net:
         stretches = tuple(
             Stretch(points=data[f"stretch_{k}_points"], **each) for k, each in enumerate(meta["stretches"])
         )
-        return Net(grid, target, data["supports"], quality, notes, attempts, edges, stretches)
+        return Net(
+            grid=grid,
+            target=target,
+            supports=data["supports"],
+            quality=quality,
+            notes=notes,
+            attempts=attempts,
+            edges=edges,
+            stretches=stretches,
+        )
     except InputError:
         raise
     except (ValueError, KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:

@@ -168,16 +168,16 @@ def compare(
     design = without_slack(shell, best.design, best.states[problem.design_load.name])
     none = np.zeros((shell.node_count, 6))
     return Compared(
-        method,
-        design,
-        follow(shell, design, {"none": none, **problem.loads}),
-        best.objective,
-        best.violation,
-        tuple(plain.history),
-        evaluator.evaluations,
-        evaluator.rejected,
-        evaluator.factorisations,
-        status,
+        method=method,
+        design=design,
+        loaded=follow(shell, design, {"none": none, **problem.loads}),
+        objective=best.objective,
+        violation=best.violation,
+        history=tuple(plain.history),
+        evaluations=evaluator.evaluations,
+        rejected=evaluator.rejected,
+        factorisations=evaluator.factorisations,
+        status=status,
     )
 
 

@@ -293,20 +293,20 @@ def _step(search: _Search, point: Evaluated, accepted: bool) -> Step:
     problem = search.problem
     pull = problem.shell.cables(point.design).tension(point.states[search.base])
     return Step(
-        search.evaluator.evaluations,
-        point.objective,
-        {
+        evaluation=search.evaluator.evaluations,
+        objective=point.objective,
+        terms={
             problem.column(part.term): float(value)
             for part, value in zip(problem.minimise, point.terms, strict=True)
         },
-        {
+        constraints={
             problem.column(part.term): float(point.constraints[own].max(initial=-np.inf))
             for part, own in zip(problem.constraints, problem.places(), strict=True)
         },
-        int((pull > 0.0).sum()),
-        search.stage,
-        accepted,
-        time.perf_counter() - search.began,
+        cables=int((pull > 0.0).sum()),
+        stage=search.stage,
+        accepted=accepted,
+        seconds=time.perf_counter() - search.began,
     )
 
 
@@ -376,18 +376,18 @@ def _finished(search: _Search) -> Optimum:
     states = {name: loaded[name].equilibrium.state for name in problem.used()}
     last = _step(search, evaluator.seed(design, states, 1.0), True)
     return Optimum(
-        problem,
-        design,
-        loaded,
-        search.history[0].objective,
-        last.objective,
-        last.constraints,
-        tuple(search.history),
-        search.status,
-        evaluator.evaluations,
-        evaluator.rejected,
-        evaluator.equilibria,
-        evaluator.factorisations,
-        evaluator.wasted,
-        0.0,
+        problem=problem,
+        design=design,
+        loaded=loaded,
+        objective_start=search.history[0].objective,
+        objective=last.objective,
+        constraints=last.constraints,
+        history=tuple(search.history),
+        status=search.status,
+        evaluations=evaluator.evaluations,
+        rejected=evaluator.rejected,
+        equilibria=evaluator.equilibria,
+        factorisations=evaluator.factorisations,
+        wasted=evaluator.wasted,
+        stiffness=0.0,
     )

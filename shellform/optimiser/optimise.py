@@ -299,24 +299,24 @@ def begin(
     pull = problem.shell.cables(start).tension(point.states[base])
     mean = float(np.mean(pull)) if len(pull) else 0.0
     search = Search(
-        problem,
-        solver,
-        evaluator,
-        bounded,
-        evaluations,
-        mean if mean > 0.0 else 1.0,  # N: what cables that all are slack may be given
-        point.objective,
-        inner,
-        softest,
-        asked,
-        _least_tension(problem, start, asked),
-        None,
-        False,
-        progress,
-        keep,
-        judging,
-        began,
-        Models(evaluator, solver, mean),
+        problem=problem,
+        solver=solver,
+        evaluator=evaluator,
+        bounded=bounded,
+        evaluations=evaluations,
+        tension=mean if mean > 0.0 else 1.0,  # N: what cables that all are slack may be given
+        objective_start=point.objective,
+        inner=inner,
+        softest=softest,
+        asked=asked,
+        least=_least_tension(problem, start, asked),
+        groups=None,
+        always_guarded=False,
+        progress=progress,
+        keep=keep,
+        judging=judging,
+        began=began,
+        models=Models(evaluator, solver, mean),
     )
     it = Iterate(
         point,

@@ -180,7 +180,17 @@ def _candidate(
     nothing = float("nan")
     if optimum is None:
         return CandidateSection(
-            name, shell, None, nothing, nothing, nothing, 0, nothing, rods_mass(shell), why, up
+            section=name,
+            shell=shell,
+            optimum=None,
+            objective=nothing,
+            deviation_max=nothing,
+            deviation_mean=nothing,
+            cables=0,
+            utilisation=nothing,
+            mass=rods_mass(shell),
+            why=why,
+            rounded_up=up,
         )
     base = problem.design_load.name
     state = optimum.states[base]
@@ -199,15 +209,15 @@ def _candidate(
             ]
         )
     return CandidateSection(
-        name,
-        shell,
-        optimum,
-        float(objective),
-        float(away.max()),
-        float(away.mean()),
-        int(optimum.design.present.sum()),
-        used,
-        rods_mass(shell),
-        why,
-        up,
+        section=name,
+        shell=shell,
+        optimum=optimum,
+        objective=float(objective),
+        deviation_max=float(away.max()),
+        deviation_mean=float(away.mean()),
+        cables=int(optimum.design.present.sum()),
+        utilisation=used,
+        mass=rods_mass(shell),
+        why=why,
+        rounded_up=up,
     )

@@ -345,15 +345,15 @@ def record(search: Search, point: Evaluated, stage: float, accepted: bool, phase
         if own.stop <= len(point.constraints) - in_mind(search)
     }
     step = Step(
-        search.evaluator.evaluations,
-        point.objective,
-        terms,
-        constraints,
-        int((pull > 0.0).sum()),
-        stage,
-        accepted,
-        time.perf_counter() - search.began,
-        phase,
+        evaluation=search.evaluator.evaluations,
+        objective=point.objective,
+        terms=terms,
+        constraints=constraints,
+        cables=int((pull > 0.0).sum()),
+        stage=stage,
+        accepted=accepted,
+        seconds=time.perf_counter() - search.began,
+        phase=phase,
     )
     if search.progress is not None:
         search.progress(step)
@@ -375,23 +375,23 @@ def finish(search: Search, it: Iterate) -> Optimum:
     loaded = follow(shell, design, {"none": none, **problem.loads})
     last = _judged(search, design, loaded, it.phase)
     return Optimum(
-        problem,
-        design,
-        loaded,
-        search.objective_start,
-        last.objective,
-        last.constraints,
-        it.history,
-        it.status,
-        evaluator.evaluations,
-        evaluator.rejected,
-        evaluator.equilibria,
-        evaluator.factorisations,
-        evaluator.wasted,
-        it.stiffness,
-        None if search.asked is None else search.asked.after(it.samples + 1),
-        it.fallen,
-        {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios},
+        problem=problem,
+        design=design,
+        loaded=loaded,
+        objective_start=search.objective_start,
+        objective=last.objective,
+        constraints=last.constraints,
+        history=it.history,
+        status=it.status,
+        evaluations=evaluator.evaluations,
+        rejected=evaluator.rejected,
+        equilibria=evaluator.equilibria,
+        factorisations=evaluator.factorisations,
+        wasted=evaluator.wasted,
+        stiffness=it.stiffness,
+        asked=None if search.asked is None else search.asked.after(it.samples + 1),
+        fallen=it.fallen,
+        mind={} if it.mind is None else {each.number: each.least for each in it.mind.scenarios},
     )
 
 

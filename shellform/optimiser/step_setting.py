@@ -116,20 +116,20 @@ def setting(evaluator: Evaluator, point: Evaluated) -> Setting:
         own_forces = _forces(evaluator, assembly, state, point, sp.csr_array(rates)[:, other])
         right = sp.csc_array(sp.hstack([pull, own_forces]))
     return Setting(
-        evaluator,
-        assembly,
-        point,
-        state,
-        cables,
-        present,
-        count,
-        each,
-        other,
-        length,
-        cables.tension(state)[:count],
-        pull,
-        right,
-        rates,
+        evaluator=evaluator,
+        assembly=assembly,
+        point=point,
+        state=state,
+        cables=cables,
+        present=present,
+        tensions=count,
+        each=each,
+        other=other,
+        length=length,
+        tension=cables.tension(state)[:count],
+        pull=pull,
+        right=right,
+        rates=rates,
     )
 
 

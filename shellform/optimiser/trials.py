@@ -36,18 +36,18 @@ _COARSE = 0.5  # the first load step of a search for the end of a branch
 def task(search: Search, it: Iterate, model: StepModel) -> Task:
     """What the next step is asked for."""
     return Task(
-        search.solver,
-        model,
-        it.window,
-        search.tension,
-        search.bounded,
-        it.tensioned,
-        search.models.guards(it.point) if it.guarded else [],
-        it.climbing,
-        search.groups,
-        it.excess * it.window**2,
-        max(search.least if it.phase == "thin" else 0.0, search.solver.least_tension * search.tension),
-        in_mind(search),
+        solver=search.solver,
+        model=model,
+        window=it.window,
+        tension=search.tension,
+        bounded=search.bounded,
+        tensioned=it.tensioned,
+        guards=search.models.guards(it.point) if it.guarded else [],
+        climbing=it.climbing,
+        groups=search.groups,
+        excess=it.excess * it.window**2,
+        least=max(search.least if it.phase == "thin" else 0.0, search.solver.least_tension * search.tension),
+        aims=in_mind(search),
     )
 
 

@@ -8,6 +8,7 @@ nothing is loaded until one of them is displayed. Without OpenGL the picture is 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from html import escape
 from typing import Any
 
@@ -42,14 +43,13 @@ def gridshell_png(shell: Gridshell) -> bytes:
     """The gridshell in its target shape with all candidate cables, coloured by the curvature that its rods
     are bent to.
     """
-    net = net_maps.panel_of(shell.net, "curvature")
-    none = np.zeros(len(shell.cable_ends))
     title = f"gridshell of {len(shell.net.grid.rods)} rods, {len(shell.cable_ends)} candidate cables"
-    panel = Panel(
-        title, net.positions, net.beams, net.deviation, shell.cable_ends, none, net.supports, net.load_points,
-        net.rod_radius,
-        net.quantity, net.unit, net.edges,
-    )  # fmt: skip
+    panel = replace(
+        net_maps.panel_of(shell.net, "curvature"),
+        title=title,
+        cables=shell.cable_ends,
+        cable_forces=np.zeros(len(shell.cable_ends)),
+    )
     return _png([[panel]], Look(limit=net_maps.limit_of(panel), size=_SIZE))
 
 
@@ -94,16 +94,16 @@ def optimum_html(optimum: Optimum) -> str:
     first = optimum.problem.design_load.name
     largest = float(deviations(shell, states[first]).max())
     viewed = ViewedShell(
-        "optimum",
-        {"optimum": shell},
-        {"optimum": optimum.design},
-        {"optimum": states},
-        "optimum",
-        {name: optimum.problem.loads.get(name, none) for name in states},
-        {name: load_title(name) for name in states},
-        None,
-        max(largest, 1e-6),
-        first,
+        title="optimum",
+        shells={"optimum": shell},
+        designs={"optimum": optimum.design},
+        states={"optimum": states},
+        best="optimum",
+        loads={name: optimum.problem.loads.get(name, none) for name in states},
+        load_titles={name: load_title(name) for name in states},
+        surface=None,
+        limit=max(largest, 1e-6),
+        shown_first=first,
     )
     return _framed(view_data(viewed), viewed)
 

@@ -160,15 +160,15 @@ class Evaluator:
         objective = np.array([w * each.value.sum() for w, each in zip(self.weights, summands, strict=True)])
         values = [residuals(part, each.value) for part, each in zip(problem.constraints, kept, strict=True)]
         return Evaluated(
-            problem,
-            self.blocks.of(design).copy(),
-            design,
-            dict(states),
-            float(objective.sum()),
-            objective,
-            np.concatenate([np.zeros(0), *values]),
-            tuple(found),
-            stage,
+            problem=problem,
+            variables=self.blocks.of(design).copy(),
+            design=design,
+            states=dict(states),
+            objective=float(objective.sum()),
+            terms=objective,
+            constraints=np.concatenate([np.zeros(0), *values]),
+            measurements=tuple(found),
+            stage=stage,
         )
 
     def linearised(self, point: Evaluated) -> Linearisation:

@@ -131,14 +131,16 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
         # An element that runs against the rod has its local y axis turned round and goes the other way.
         curvature[rod.elements] = np.column_stack([np.full(len(nominal), bow[0]), rod.sense * bow[1]])
     return Errors(
-        t.cable_length * z["cable_length"],
-        np.exp(t.cable_stiffness * z["cable_stiffness"] + t.cable_stiffness_all * z["cable_stiffness_all"]),
-        supports.reshape(-1, 6),
-        length,
-        stiffness,
-        curvature,
-        _load_factors(members, t, z),
-        t.shape * members.span * z["shape"],
+        cable_length=t.cable_length * z["cable_length"],
+        cable_stiffness=np.exp(
+            t.cable_stiffness * z["cable_stiffness"] + t.cable_stiffness_all * z["cable_stiffness_all"]
+        ),
+        supports=supports.reshape(-1, 6),
+        beam_length=length,
+        beam_stiffness=stiffness,
+        beam_curvature=curvature,
+        load=_load_factors(members, t, z),
+        shape=t.shape * members.span * z["shape"],
     )
 
 

@@ -76,14 +76,14 @@ def members_of(shell: Gridshell) -> Members:
     connectors = first + np.arange(len(grid.lattice))
     held = (6 * shell.net.supports[:, None] + np.arange(3)).ravel()
     return Members(
-        tuple(rods),
-        connectors,
-        len(shell.cable_ends),
-        held,
-        zones_of(shell),
-        len(grid.crossing_nodes),
-        shell.target.positions,
-        beams.rest_length,  # edge beams come last, and are made without error
+        rods=tuple(rods),
+        connectors=connectors,
+        cables=len(shell.cable_ends),
+        held=held,
+        zone=zones_of(shell),
+        zones=len(grid.crossing_nodes),
+        places=shell.target.positions,
+        beam_length=beams.rest_length,  # edge beams come last, and are made without error
     )
 
 
@@ -103,14 +103,14 @@ def members_of_model(model: Model) -> Members:
     held = np.flatnonzero((network.fixed & (np.arange(6) < 3)).ravel())
     places = network.nodes if model.start is None else model.start.positions
     return Members(
-        rods,
-        np.flatnonzero(other),
-        len(network.cables.ends),
-        held,
-        np.arange(count),
-        count,
-        places,
-        beams.rest_length,
+        rods=rods,
+        connectors=np.flatnonzero(other),
+        cables=len(network.cables.ends),
+        held=held,
+        zone=np.arange(count),
+        zones=count,
+        places=places,
+        beam_length=beams.rest_length,
     )
 
 

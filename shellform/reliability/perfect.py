@@ -115,13 +115,13 @@ def _perfect(
         )
     soft = modes(assembly, kept[-1][1], shapes).shapes if shapes else np.zeros((0, *load.shape))
     return Perfect(
-        network,
-        members,
-        present,
-        load,
-        target,
-        np.array([share for share, _ in kept]),
-        tuple(state for _, state in kept),
-        reached == 1.0,
-        Imperfections(unloaded.state, soft),
+        network=network,
+        members=members,
+        present=present,
+        load=load,
+        start=target,
+        factors=np.array([share for share, _ in kept]),
+        states=tuple(state for _, state in kept),
+        bears=reached == 1.0,
+        imperfections=Imperfections(unloaded.state, soft),
     )

@@ -22,15 +22,15 @@ def built_design(run: Run) -> Built:
     block = run.case.title_block
     hung = run.states["unbraced"]["none"] if "unbraced" in run.states else None
     return Built(
-        run.shell_of(run.best),
-        run.designs[run.best],
-        run.states[run.best],
-        hung,
-        run.best,
-        run.case.title,
-        run.case.cable.adjustment,
-        TitleBlock(block.date, block.revision, block.author),
-        run.case.surface.origin,
+        shell=run.shell_of(run.best),
+        design=run.designs[run.best],
+        states=run.states[run.best],
+        hung=hung,
+        name=run.best,
+        title=run.case.title,
+        adjustment=run.case.cable.adjustment,
+        block=TitleBlock(block.date, block.revision, block.author),
+        origin=run.case.surface.origin,
     )
 
 

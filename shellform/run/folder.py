@@ -162,7 +162,16 @@ def read_run(folder: str | Path) -> Run:
                 )
                 for each in loads
             }
-    return Run(place, case, surface, shell, loads, designs, states, summary)
+    return Run(
+        folder=place,
+        case=case,
+        surface=surface,
+        shell=shell,
+        loads=loads,
+        designs=designs,
+        states=states,
+        summary=summary,
+    )
 
 
 @contextlib.contextmanager

@@ -320,7 +320,16 @@ def too_curved(placed: Placed, possible: Sequence[RodChoice], spacing: float, th
     least = min(possible, key=lambda each: erection_stress(net, each.section))
     stress = erection_stress(net, least.section) / least.section.material.strength
     why = Why.CURVATURE if stress > 1.0 else Why.SPACING
-    return Obstacle(why, spacing, thickness, 0.0, least, placed, sharpest(net), stress)
+    return Obstacle(
+        why=why,
+        spacing=spacing,
+        thickness=thickness,
+        factor=0.0,
+        choice=least,
+        placed=placed,
+        where=sharpest(net),
+        stress=stress,
+    )
 
 
 def sharpest(net: Net) -> Reals:

@@ -186,18 +186,18 @@ def calibrate(
     fit = _Fit(model, joint, states, scans, matches, markers, offsets)
     deviation = fit.deviation(len(fitted))
     return Calibration(
-        joint,
-        fitted,
-        tuple(name for name in first if name not in fitted),
-        fit.identifiability(first, max(noise, deviation)),
-        markers,
-        tuple(matches),
-        before,
-        distances(scans, matches, states, markers),
-        deviation,
-        tuple(states),
-        model.evaluations,
-        model.rejected,
+        joint=joint,
+        fitted=fitted,
+        held=tuple(name for name in first if name not in fitted),
+        identifiability=fit.identifiability(first, max(noise, deviation)),
+        nodes=markers,
+        matches=tuple(matches),
+        before=before,
+        after=distances(scans, matches, states, markers),
+        residual=deviation,
+        states=tuple(states),
+        evaluations=model.evaluations,
+        rejected=model.rejected,
     )
 
 

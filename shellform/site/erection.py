@@ -219,14 +219,14 @@ class _Site:
         forces = self.assembly.unbalanced(state, load)[supports, :3]
         height = float(state.positions[:, 2].max() - state.positions[supports, 2].min())
         return ErectionStep(
-            stage,
-            float(share),
-            height,
-            float(stress[worst]),
-            worst,
-            tension,
-            float(np.linalg.norm(forces, axis=1).max()),
-            state,
+            stage=stage,
+            share=float(share),
+            height=height,
+            stress=float(stress[worst]),
+            element=worst,
+            tension=tension,
+            reaction=float(np.linalg.norm(forces, axis=1).max()),
+            state=state,
         )
 
 

@@ -210,14 +210,14 @@ def adjust(shell: Gridshell, belief: Belief, goal: Reals, crew: Crew, *, noise: 
     turns = np.rint(change / crew.step).astype(np.int64)
     linear = belief.state.positions + (jacobian @ change[present]).reshape(-1, 3)
     return Adjustment(
-        turns,
-        change,
-        linear,
-        replace(belief, design=design, state=state),
-        float((away**2).sum()),
-        float(((linear - wanted) ** 2).sum()),
-        float(((state.positions - wanted) ** 2).sum()),
-        halved,
+        turns=turns,
+        change=change,
+        predicted=linear,
+        belief=replace(belief, design=design, state=state),
+        misfit_before=float((away**2).sum()),
+        misfit_predicted=float(((linear - wanted) ** 2).sum()),
+        misfit_after=float(((state.positions - wanted) ** 2).sum()),
+        halved=halved,
     )
 
 

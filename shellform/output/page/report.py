@@ -125,15 +125,15 @@ def viewed(run: ShownRun) -> ViewedShell:
     """What of the run the view shows."""
     titles = {name: words.load_title(name, _factor(run.summary, name)) for name in run.loads}
     return ViewedShell(
-        run.title,
-        run.shells,
-        run.designs,
-        run.states,
-        run.best,
-        run.loads,
-        titles,
-        run.surface,
-        run.limit,
+        title=run.title,
+        shells=run.shells,
+        designs=run.designs,
+        states=run.states,
+        best=run.best,
+        loads=run.loads,
+        load_titles=titles,
+        surface=run.surface,
+        limit=run.limit,
     )
 
 

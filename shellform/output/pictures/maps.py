@@ -73,18 +73,18 @@ def panel_of(
     cables = shell.cables(chosen)
     weight = np.zeros(len(state.positions)) if load is None else np.linalg.norm(load[:, :3], axis=1)
     return Panel(
-        f"{title}{seen.note}",
-        seen.positions,
-        shell.net.lines,
-        seen.values,
-        cables.ends,
-        cables.tension(state),
-        shell.net.supports,
-        np.flatnonzero(weight > _MARKED * weight.max(initial=0.0)),
-        chosen.radius,
-        seen.quantity,
-        seen.unit,
-        shell.net.edge_lines,
+        title=f"{title}{seen.note}",
+        positions=seen.positions,
+        beams=shell.net.lines,
+        deviation=seen.values,
+        cables=cables.ends,
+        cable_forces=cables.tension(state),
+        supports=shell.net.supports,
+        load_points=np.flatnonzero(weight > _MARKED * weight.max(initial=0.0)),
+        rod_radius=chosen.radius,
+        quantity=seen.quantity,
+        unit=seen.unit,
+        edges=shell.net.edge_lines,
     )
 
 

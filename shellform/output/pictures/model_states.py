@@ -62,16 +62,16 @@ def _draw(analysis: Analysis, title: str, quantity: str, place: Reals, colour: R
     network = analysis.model.network
     size = float(np.ptp(place, axis=0).max())
     panel = Panel(
-        title,
-        place,
-        network.beams.ends,
-        colour,
-        network.cables.ends,
-        network.cables.tension(analysis.equilibrium.state),
-        np.flatnonzero(network.fixed[:, :3].any(axis=1)),
-        np.flatnonzero(analysis.load[:, :3].any(axis=1)),
-        1e-3 * size,
-        quantity,
+        title=title,
+        positions=place,
+        beams=network.beams.ends,
+        deviation=colour,
+        cables=network.cables.ends,
+        cable_forces=network.cables.tension(analysis.equilibrium.state),
+        supports=np.flatnonzero(network.fixed[:, :3].any(axis=1)),
+        load_points=np.flatnonzero(analysis.load[:, :3].any(axis=1)),
+        rod_radius=1e-3 * size,
+        quantity=quantity,
     )
     render.picture(target, panel, Look(limit=max(float(colour.max()), 1e-9 * size)))
     return target

@@ -36,18 +36,18 @@ def panel_of(net: Net, name: str) -> Panel:
     """The net on its target, its rods coloured by one of the maps."""
     quantity, unit = _MAPS[name]
     return Panel(
-        f"net of {len(net.grid.rods)} rods, {len(net.grid.lattice)} crossings, spacing {net.spacing:g} m",
-        net.target.positions,
-        net.lines,
-        _values(net, name),
-        np.zeros((0, 2), dtype=np.int64),
-        np.zeros(0),
-        net.supports,
-        np.zeros(0, dtype=np.int64),
-        0.02 * net.spacing,
-        quantity,
-        unit,
-        net.edge_lines,
+        title=f"net of {len(net.grid.rods)} rods, {len(net.grid.lattice)} crossings, spacing {net.spacing:g} m",
+        positions=net.target.positions,
+        beams=net.lines,
+        deviation=_values(net, name),
+        cables=np.zeros((0, 2), dtype=np.int64),
+        cable_forces=np.zeros(0),
+        supports=net.supports,
+        load_points=np.zeros(0, dtype=np.int64),
+        rod_radius=0.02 * net.spacing,
+        quantity=quantity,
+        unit=unit,
+        edges=net.edge_lines,
     )
 
 

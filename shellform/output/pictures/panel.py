@@ -165,7 +165,14 @@ def scale_of(panels: Sequence[Panel], look: Look, size: tuple[int, int]) -> Scal
     letters = round(look.letters * look.dots / 72.0) or usual
     beyond = any(panel.deviation.max() > look.limit * (1.0 + 1e-9) for panel in panels)
     return Scale(
-        look.limit, beyond, max(force, 0.0), slack, reach, letters, panels[0].quantity, panels[0].unit
+        limit=look.limit,
+        beyond=beyond,
+        force=max(force, 0.0),
+        slack=slack,
+        reach=reach,
+        letters=letters,
+        quantity=panels[0].quantity,
+        unit=panels[0].unit,
     )
 
 

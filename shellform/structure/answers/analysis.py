@@ -128,26 +128,26 @@ def analyse(
         found = walk.measured(walk.state, np.inf)
     loaded = walk.drive.at(walk.reached)
     return Analysis(
-        model,
-        loaded,
-        assembly.unbalanced(found.state, loaded),
-        replace(found, factorisations=walk.spent),
-        converged,
-        tuple(walk.documented),
-        _seconds(assembly, time.perf_counter() - began),
-        message,
-        (
+        model=model,
+        load=loaded,
+        reactions=assembly.unbalanced(found.state, loaded),
+        equilibrium=replace(found, factorisations=walk.spent),
+        converged=converged,
+        increments=tuple(walk.documented),
+        seconds=_seconds(assembly, time.perf_counter() - began),
+        message=message,
+        warnings=(
             *doubts(model.network),
             *lost_moments(model.network, chosen),
             *free_to_swing(walk.swinging),
             *walk.warnings(),
             *_coarse(mesh),
         ),
-        softest,
-        critical,
-        sought,
-        walk.on_branch,
-        mesh,
+        modes=softest,
+        critical=critical,
+        critical_sought=sought,
+        on_branch=walk.on_branch,
+        critical_mesh=mesh,
     )
 
 

@@ -251,15 +251,15 @@ def make_beams(
         for name, value in [("EA", axial), ("GJ", torsion), ("EIy", bending_y), ("EIz", bending_z)]
     }
     return Beams(
-        ends,
-        numbers["EA"],
-        numbers["GJ"],
-        numbers["EIy"],
-        numbers["EIz"],
-        np.where(np.isnan(rest), length, rest),
-        np.repeat(frames[:, None], 2, axis=1),
-        np.zeros(count, dtype=np.int64) if kind is None else np.asarray(kind),
-        kinds,
+        ends=ends,
+        axial=numbers["EA"],
+        torsion=numbers["GJ"],
+        bending_y=numbers["EIy"],
+        bending_z=numbers["EIz"],
+        rest_length=np.where(np.isnan(rest), length, rest),
+        frames=np.repeat(frames[:, None], 2, axis=1),
+        kind=np.zeros(count, dtype=np.int64) if kind is None else np.asarray(kind),
+        kinds=kinds,
     )
 
 
@@ -290,7 +290,17 @@ def built_in(
         for value in (axial, torsion, bending_y, bending_z)
     )
     frames = turned.swapaxes(2, 3) @ straight.frames
-    return Beams(pairs, ea, gj, eiy, eiz, straight.rest_length, frames, straight.kind, (kind,))
+    return Beams(
+        ends=pairs,
+        axial=ea,
+        torsion=gj,
+        bending_y=eiy,
+        bending_z=eiz,
+        rest_length=straight.rest_length,
+        frames=frames,
+        kind=straight.kind,
+        kinds=(kind,),
+    )
 
 
 def joined(first: Beams, second: Beams) -> Beams:
@@ -302,7 +312,15 @@ def joined(first: Beams, second: Beams) -> Beams:
         np.concatenate([getattr(first, name), getattr(second, name)]) for name in names
     )
     return Beams(
-        ends, ea, gj, eiy, eiz, rest, frames, np.concatenate([first.kind, number[second.kind]]), kinds
+        ends=ends,
+        axial=ea,
+        torsion=gj,
+        bending_y=eiy,
+        bending_z=eiz,
+        rest_length=rest,
+        frames=frames,
+        kind=np.concatenate([first.kind, number[second.kind]]),
+        kinds=kinds,
     )
 
 
