@@ -149,6 +149,12 @@ class Design:
         put(self, "present", flags("present", self.present, (None,)))
         put(self, "rest_length", reals("rest_length", self.rest_length, (len(self.present),), positive=True))
 
+    def among_candidates(self, values: Reals) -> Reals:
+        """Values (..., p) of the present cables among those of all candidates (..., c); 0 for absent ones."""
+        result = np.zeros((*values.shape[:-1], len(self.present)))
+        result[..., self.present] = values
+        return result
+
     def __repr__(self) -> str:
         cables = f"{int(self.present.sum())} of {len(self.present)} cables"
         return f"Design({cables}, rods of {1e3 * self.radius:.4g} mm radius)"

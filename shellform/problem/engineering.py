@@ -204,12 +204,11 @@ class ModalStiffness(Term):
         def with_slopes() -> Measurement:
             weighted = 2.0 * np.abs(stiffness) * weight * motions
             rate, cables = shell.beams_by_radius(design.radius), shell.cables(design)
-            spread = np.zeros(len(shell.cable_ends))
-            spread[design.present] = bilinear_by_rest_length(cables, state, weighted, motions)
+            by_rest_length = bilinear_by_rest_length(cables, state, weighted, motions)
             return replace(
                 alone,
                 by_dof=sp.csr_array(bilinear_by_dof(assembly, state, weighted, motions)[None]),
-                by_rest_length=sp.csr_array(spread[None]),
+                by_rest_length=sp.csr_array(design.among_candidates(by_rest_length)[None]),
                 by_radius=np.array([bilinear(rate, state, weighted, motions)]),
             )
 

@@ -14,9 +14,8 @@ vault at 3 N a crossing, supports 0.075 mm off and all else in proportion, 150 s
 supports that give way is far from linear, and the predicted deviation is then too small (the mean 1.71e-3
 instead of 1.69e-3).
 
-What an optimiser needs is `measure`, and as a term `RobustMisfit`: the Gauss-Newton value d'd + tr(X'X) + k
-sqrt(var q), without the curvature, and its derivative by the rest lengths and the radius. That derivative is
-exact: for G = d(value)/dX, K L = G, the terms -L_k'(dK X_k + dF_k) hold the third derivative of the energy
+What an optimiser needs is the term `RobustMisfit`: the Gauss-Newton value d'd + tr(X'X) + k sqrt(var q), without
+the curvature, and its derivative by the rest lengths and the radius. That derivative is exact: for G = d(value)/dX, K L = G, the terms -L_k'(dK X_k + dF_k) hold the third derivative of the energy
 contracted with sum of L_k X_k', and one more adjoint solve carries their dependence on the state to the
 design.
 """
@@ -35,7 +34,6 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.scatter import Group, Realisation, groups_of, unpacked
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.terms import LoadedDesign, Measurement, Term, distance_squares
-from shellform.structure.answers.sensitivity import by_rest_length
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.parts import Part
 from shellform.structure.elements.state import State, moved
@@ -88,16 +86,6 @@ class MisfitSample:
     lost: int
 
 
-@dataclass(frozen=True)
-class RobustValue:
-    """The robust value, m², and its derivative (c,), m, by the rest lengths of all candidate cables (0 for
-    absent ones).
-    """
-
-    value: float
-    by_rest_length: Reals
-
-
 def spread(shell: Gridshell, design: Design, state: State, load: Reals, tolerances: Tolerances) -> Spread:
     """The scatter of the misfit at the stable equilibrium `state` of the design under the dead `load` (n, 6).
     Raises NotConverged where it isn't stable.
@@ -134,31 +122,6 @@ def spread(shell: Gridshell, design: Design, state: State, load: Reals, toleranc
     )
 
 
-def measure(
-    shell: Gridshell,
-    design: Design,
-    state: State,
-    load: Reals,
-    tolerances: Tolerances,
-    *,
-    deviations: float = 1.0,
-) -> RobustValue:
-    """d'd + tr(X'X) + `deviations` times the Gauss-Newton deviation of the misfit, and its exact derivative
-    by the rest lengths. Raises NotConverged.
-    """
-    require_number(deviations, least=0.0, where="deviations", give=_DEVIATIONS)
-    line = _Line(shell, design, state, load, tolerances)
-    part = line.partial(deviations)
-    adjoint = line.solved(part.by_state)
-    columns = by_rest_length(line.assembly, state, shell.cables(design))
-    result = np.zeros(len(design.present))
-    result[design.present] = part.by_rest_length - columns.T @ adjoint[line.assembly.free]
-    return RobustValue(part.value, result)
-
-
-_DEVIATIONS = "how many standard deviations are added, such as 1"
-
-
 @dataclass(frozen=True)
 class RobustMisfit(Term):
     """The misfit d'd, m², that is kept in spite of scatter under the load case `load`: the Gauss-Newton mean
@@ -172,18 +135,17 @@ class RobustMisfit(Term):
     deviations: float = 1.0
 
     def __post_init__(self) -> None:
-        require_number(self.deviations, least=0.0, where="robust.deviations", give=_DEVIATIONS)
+        give = "how many standard deviations are added, such as 1"
+        require_number(self.deviations, least=0.0, where="robust.deviations", give=give)
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m². Raises NotConverged where the state isn't stable."""
         line = _Line(at.shell, at.design, at.state, at.load, self.tolerances)
         part = line.partial(self.deviations)
-        by_rest = np.zeros(len(at.design.present))
-        by_rest[at.design.present] = part.by_rest_length
         return Measurement(
             np.array([part.value]),
             sp.csr_array(part.by_state[None]),
-            sp.csr_array(by_rest[None]),
+            sp.csr_array(at.design.among_candidates(part.by_rest_length)[None]),
             np.array([part.by_radius]),
             squares=distance_squares(at),
         )

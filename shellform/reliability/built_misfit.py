@@ -108,12 +108,10 @@ class BuiltMisfit(Term):
             by_dof -= change
             by_rest = by_rest + pulls
             by_radius += stiffer
-        row = np.zeros(len(design.present))
-        row[design.present] = -by_rest
         return Measurement(
             value,
             sp.csr_array(by_dof[None]),
-            sp.csr_array(row[None]),
+            sp.csr_array(design.among_candidates(-by_rest)[None]),
             np.array([-by_radius]),
             squares=distance_squares(at),
         )

@@ -7,7 +7,7 @@ r = p' - f'(x) - K u, u the places of its supports that are off. It moves by dx 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -95,7 +95,7 @@ def moved_by_cause(
     some = [
         errors_of(
             nominal.members,
-            replace(Tolerances(), **{name: getattr(tolerances, name)}),
+            tolerances.only(name),
             variables(nominal.members, seed, number),
         )
         for name in causes

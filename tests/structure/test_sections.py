@@ -20,13 +20,12 @@ from shellform.structure.answers.sensitivity import (
     by_rest_length,
     by_stiffness,
     direct,
-    end_force_rows,
+    element_columns,
     gradients,
     predicted,
     respond,
     state_by_design,
     stiffness_rate,
-    stress_rows,
     tension_rows,
 )
 from shellform.structure.elements.beam import make_beams
@@ -182,7 +181,15 @@ def rows(assembly, network, state):
     for k, (node, axis) in enumerate([(n, a) for n in (3, 8) for a in range(3)]):
         picked[k, np.flatnonzero(assembly.free == 6 * node + axis)] = 1.0
     tensions = tension_rows(assembly, state, network.cables).toarray()
-    return np.vstack([picked, tensions, end_force_rows(assembly, state, network.beams).toarray()])
+    return np.vstack(
+        [picked, tensions, beam_rows(assembly, network.beams, network.beams.local_forces_by_dof(state))]
+    )
+
+
+def beam_rows(assembly, beams, by_dof):
+    """Rows (m q, f) on the free degrees of freedom from derivatives (m, q, 12) of q values of each beam."""
+    each = np.repeat(beams.dofs(), by_dof.shape[1], axis=0)
+    return element_columns(assembly, each, by_dof.reshape(len(each), -1)).toarray().T
 
 
 def test_sensitivities_to_rest_length_radius_connector_and_load_match_solved_neighbours():
@@ -255,9 +262,8 @@ def test_stresses_answer_to_the_radius_and_the_load_as_solved_neighbours_do():
     for end in range(2):
         rates = stress_by_size(section, forces[:, 0], forces[:, 2 + 3 * end], forces[:, 3 + 3 * end])[0]
         partial[end::2, 0] += np.where(network.beams.of_kind("rod"), rates, 0.0)
-    total = gradients(
-        response, stress_rows(assembly, state, network.beams, {"rod": section}).toarray(), partial
-    )
+    by_dof = own @ network.beams.local_forces_by_dof(state)
+    total = gradients(response, beam_rows(assembly, network.beams, by_dof), partial)
 
     def stresses(model, shape, under):
         return end_stress(model.beams, model.beams.local_forces(solved(model, under)), {"rod": shape}).ravel()

@@ -17,23 +17,20 @@ condenses K to the few degrees of freedom that they touch.
 
 A design variable is a column of df/ds: `by_rest_length` for cables, `by_stiffness` for whatever the beams'
 stiffness depends on (a rod's radius or another size, a connector's EA, GJ or EI), `by_load` for the load
-factor. A measure is a row of ∂g/∂x: `tension_rows`, `end_force_rows`, `stress_rows`, or rows of its own.
+factor. A measure is a row of ∂g/∂x: `tension_rows`, `reaction_rows`, or rows of its own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Indices, Reals
-from shellform.structure.answers.results import end_stress_by_force
 from shellform.structure.elements.beam import Beams
 from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.parts import Part
-from shellform.structure.elements.sections import Section
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite, Symmetric
@@ -124,25 +121,7 @@ def tension_rows(assembly: Assembly, state: State, cables: Cables) -> sp.csr_arr
     """Derivative (c, f), N/m, of the tensions by the free degrees of freedom at fixed rest lengths; they add
     -EA l/l0² by their own.
     """
-    return _rows(assembly, cables.dofs()[:, None, :], cables.tension_by_position(state)[:, None, :])
-
-
-def end_force_rows(assembly: Assembly, state: State, beams: Beams) -> sp.csr_array:
-    """Derivative (7 m, f) of N, Mx_a, My_a, Mz_a, Mx_b, My_b, Mz_b of each beam by the free degrees of
-    freedom at fixed stiffness.
-    """
-    rates = beams.local_forces_by_dof(state)
-    return _rows(assembly, beams.dofs()[:, None, :], rates)
-
-
-def stress_rows(
-    assembly: Assembly, state: State, beams: Beams, sections: Mapping[str, Section]
-) -> sp.csr_array:
-    """Derivative (2 m, f), Pa/m and Pa/rad, of the largest fibre stresses at both ends of each beam by the
-    free degrees of freedom.
-    """
-    by_force = end_stress_by_force(beams, beams.local_forces(state), sections)
-    return _rows(assembly, beams.dofs()[:, None, :], by_force @ beams.local_forces_by_dof(state))
+    return sp.csr_array(element_columns(assembly, cables.dofs(), cables.tension_by_position(state)).T)
 
 
 def reaction_rows(assembly: Assembly, state: State, dofs: Indices) -> sp.csr_array:
@@ -238,17 +217,6 @@ def predicted(assembly: Assembly, response: Response, change: Reals) -> State:
     step = np.zeros(6 * assembly.count)
     step[assembly.free] = state_change(response, change)
     return moved(response.state, assembly.chords.corrected(response.state, step.reshape(-1, 6)))
-
-
-def _rows(assembly: Assembly, dofs: np.ndarray, values: Reals) -> sp.csr_array:
-    """Rows (m q, f) from values (m, q, k) at degrees of freedom (m, 1, k)."""
-    columns = np.broadcast_to(assembly.number[dofs], values.shape)
-    taken = columns >= 0
-    rows = np.broadcast_to(
-        np.arange(values.shape[0] * values.shape[1]).reshape(values.shape[:2])[:, :, None], values.shape
-    )
-    shape = (values.shape[0] * values.shape[1], len(assembly.free))
-    return sp.csr_array((values[taken], (rows[taken], columns[taken])), shape=shape)
 
 
 def _dense(matrix: Reals | sp.csc_array) -> Reals:
