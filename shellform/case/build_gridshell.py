@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.case.build_rod import given_section, layered, rod_material, stock
+from shellform.case.build_rod import given_section, layered, rod_material, section_of_sizes, stock
 from shellform.case.case import (
     Case,
     ConcreteEntry,
@@ -30,7 +30,7 @@ from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace, m
 from shellform.gridshell.layers import single
 from shellform.gridshell.loads import Region
 from shellform.net.net import Net
-from shellform.structure.elements.sections import Material, Rectangle, Round, Tube
+from shellform.structure.elements.sections import Material, Round
 from shellform.surface.shape.target import Surface
 
 
@@ -64,12 +64,9 @@ def edge_beam(entry: EdgeBeamEntry, rod: Rod) -> EdgeBeam:
         own.density if entry.density is None else entry.density,
         own.strength if entry.strength is None else entry.strength,
     )
-    if entry.width is not None and entry.height is not None:
-        return EdgeBeam(Rectangle(entry.width, entry.height, material))
-    if entry.radius is not None:
-        return EdgeBeam(
-            Round(entry.radius, material) if entry.wall is None else Tube(entry.radius, entry.wall, material)
-        )
+    section = section_of_sizes(entry, material)
+    if section is not None:
+        return EdgeBeam(section)
     # The round rod of a lath's or a tube's area stands for it in a bundle.
     radius = math.sqrt(single(rod.section).constants[0] / math.pi)
     return EdgeBeam(Bundle(radius, 19 if entry.rods is None else entry.rods, entry.composite, material))

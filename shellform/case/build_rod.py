@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from shellform.case.edge_entries import EdgeBeamEntry
 from shellform.case.entries import OwnRodEntry, StockRodEntry
 from shellform.gridshell.catalogue import Catalogue, label, named, radius_as_stiff, read_catalogue
 from shellform.gridshell.gridshell import Rod
@@ -23,7 +24,7 @@ def rod_material(entry: OwnRodEntry | StockRodEntry) -> Material:
 
 def given_section(entry: OwnRodEntry | StockRodEntry) -> Section | None:
     """The section that the case's rods have whatever the net; None where the net's curvature decides."""
-    section = _of_a_lath(entry)
+    section = _of_one_layer(entry)
     return None if section is None else layered(entry, section)
 
 
@@ -38,10 +39,14 @@ def stock(entry: OwnRodEntry | StockRodEntry, source: str) -> Catalogue:
     return replace(found, sections=tuple(layered(entry, each) for each in found.sections))
 
 
-def _of_a_lath(entry: OwnRodEntry | StockRodEntry) -> Section | None:
+def _of_one_layer(entry: OwnRodEntry | StockRodEntry) -> Section | None:
     if isinstance(entry, StockRodEntry):
         return None if entry.section is None else named(read_catalogue(entry.catalogue), entry.section)
-    material = rod_material(entry)
+    return section_of_sizes(entry, rod_material(entry))
+
+
+def section_of_sizes(entry: OwnRodEntry | EdgeBeamEntry, material: Material) -> Section | None:
+    """The lath, the round rod or the tube whose sizes an entry gives; None where it gives none."""
     if entry.width is not None and entry.height is not None:
         return Rectangle(entry.width, entry.height, material)
     if entry.radius is None:

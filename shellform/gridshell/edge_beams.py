@@ -30,14 +30,14 @@ from shellform.gridshell.loads import GRAVITY
 from shellform.net.net import Net
 from shellform.structure.elements.beam import Beams, built_in, joined
 from shellform.structure.elements.rotation import matrices
-from shellform.structure.elements.sections import Material, Section, mass_per_length, stiffness
+from shellform.structure.elements.sections import Circular, Material, Section, mass_per_length, stiffness
 
 EDGE, CLAMP = "edge", "clamp"  # kinds of beams
 _RINGS = 12  # of a bundle, whose rods are counted from the middle: 469 rods
 
 
 @dataclass(frozen=True)
-class Bundle:
+class Bundle(Circular):
     """A bundle of `count` solid round rods of `radius`, m, of which `composite` (0 to 1) says how far they
     act together."""
 
@@ -97,16 +97,6 @@ class Bundle:
         """γ d + r, twice."""
         outermost = self.composite * float(np.linalg.norm(self._places, axis=1).max()) + self.radius
         return outermost, outermost
-
-    def bending(self, about_y: Reals, about_z: Reals) -> Reals:
-        """|M| (γ d + r) / I."""
-        return np.asarray(np.hypot(about_y, about_z) * (self.fibres[0] / self.constants[2]))
-
-    def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
-        """Along the moment."""
-        moment = np.hypot(about_y, about_z)
-        share = self.fibres[0] / self.constants[2] / np.where(moment > 0.0, moment, 1.0)
-        return np.asarray(about_y * share), np.asarray(about_z * share)
 
     def bending_by_size(self, about_y: Reals, about_z: Reals) -> list[Reals]:
         """The stress falls with the radius' cube."""

@@ -134,8 +134,9 @@ def mass_per_length(section: Section) -> float:
     return section.material.density * section.constants[0]
 
 
-class _Circular(ABC):
-    """A section whose bending stress doesn't ask in which direction it is bent; `radius`, m, is the outer one."""
+class Circular(ABC):
+    """A section whose bending stress doesn't ask in which direction it is bent; `radius`, m, is the outer one, unless
+    its `fibres` say otherwise."""
 
     radius: float
 
@@ -150,18 +151,18 @@ class _Circular(ABC):
         return self.radius, self.radius
 
     def bending(self, about_y: Reals, about_z: Reals) -> Reals:
-        """|M| r / I."""
-        return np.hypot(about_y, about_z) * (self.radius / self.constants[2])
+        """|M| c / I, c the distance of the outermost fibre."""
+        return np.hypot(about_y, about_z) * (self.fibres[0] / self.constants[2])
 
     def bending_by_moment(self, about_y: Reals, about_z: Reals) -> tuple[Reals, Reals]:
         """Along the moment."""
         moment = np.hypot(about_y, about_z)
-        share = self.radius / self.constants[2] / np.where(moment > 0.0, moment, 1.0)
+        share = self.fibres[0] / self.constants[2] / np.where(moment > 0.0, moment, 1.0)
         return np.asarray(about_y * share), np.asarray(about_z * share)
 
 
 @dataclass(frozen=True)
-class Round(_Circular):
+class Round(Circular):
     """A solid round rod of `radius`, m."""
 
     radius: float
@@ -198,7 +199,7 @@ class Round(_Circular):
 
 
 @dataclass(frozen=True)
-class Tube(_Circular):
+class Tube(Circular):
     """A round tube of outer `radius` and wall `thickness`, m."""
 
     radius: float
