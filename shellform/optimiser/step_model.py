@@ -88,9 +88,8 @@ class StepModel:
 
     def predicted(self, y: Reals) -> State:
         """Where the change to y takes the design load's equilibrium, to first order."""
-        whole = np.zeros(6 * self.assembly.count)
-        whole[self.assembly.free] = self.answers.moved(y - self.origin)
-        return moved(self.state, self.assembly.chords.corrected(self.state, whole.reshape(-1, 6)))
+        step = self.assembly.by_node(self.answers.moved(y - self.origin))
+        return moved(self.state, self.assembly.chords.corrected(self.state, step))
 
     def constraints_at(self, y: Reals) -> Reals:
         """(k,): the constraints' linear model. Linear in y: in the rest lengths a cable that dies leaps to

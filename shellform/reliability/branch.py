@@ -146,10 +146,8 @@ class Branch:
 
     def _solved(self, factor: Factor, balance: Balance, load: Reals) -> Reals | None:
         """Newton's step (n, 6), no spin beyond TURN; None where it leads nowhere."""
-        step = np.zeros(6 * self.assembly.count)
-        free = self.assembly.free
-        step[free] = factor.solve((load - balance.force).ravel()[free])
-        change = step.reshape(-1, 6)
+        unbalanced = (load - balance.force).ravel()[self.assembly.free]
+        change = self.assembly.by_node(factor.solve(unbalanced))
         spin = float(np.abs(change[:, 3:]).max())
         if not spin <= _FAR_OFF:
             return None

@@ -31,6 +31,11 @@ def test_what_is_free_is_what_elements_touch_and_supports_do_not_hold():
     assert assembly.turns.tolist() == assembly.matrix.diagonal[[3, 4, 5, 9, 10, 11]].tolist()
 
 
+def test_values_of_the_free_degrees_of_freedom_stand_at_their_nodes_and_held_ones_have_none():
+    found = built().by_node(np.arange(1.0, 14.0))
+    assert found.tolist() == [[0.0] * 6, [*range(1, 7)], [*range(7, 13)], [0.0, 13.0, 0.0, 0.0, 0.0, 0.0]]
+
+
 def test_a_node_s_arm_is_the_mean_of_its_beams_lengths_and_1_m_without():
     assembly = built()
     assert assembly.arms.tolist() == [2.0, 2.5, 3.0, 1.0]

@@ -8,6 +8,7 @@ import pytest
 from shellform.errors import NotConverged
 from shellform.structure.elements.state import at_rest
 from shellform.structure.solve import equilibrium
+from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import LostBranch, _minimum, _Relaxation, find_equilibrium, newton
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.residual import Drowned
@@ -16,7 +17,7 @@ from shellform.structure.solve.residual import Drowned
 class Line:
     """An assembly of one node of which x is free: residuals and steps are given, one after the other."""
 
-    count, free = 1, np.array([0])
+    count, free, by_node = 1, np.array([0]), Assembly.by_node
 
     def __init__(self, steps):
         self.steps, self.matrix = iter(steps), self

@@ -214,9 +214,8 @@ def predicted(assembly: Assembly, response: Response, change: Reals) -> State:
     """Where the equilibrium goes with a `change` (s,) of the design variables, to first order: a start for
     the next one.
     """
-    step = np.zeros(6 * assembly.count)
-    step[assembly.free] = state_change(response, change)
-    return moved(response.state, assembly.chords.corrected(response.state, step.reshape(-1, 6)))
+    step = assembly.by_node(state_change(response, change))
+    return moved(response.state, assembly.chords.corrected(response.state, step))
 
 
 def _dense(matrix: Reals | sp.csc_array) -> Reals:

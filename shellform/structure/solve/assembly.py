@@ -94,6 +94,12 @@ class Assembly:
         other.clock = dict.fromkeys(self.clock, 0.0)
         return other
 
+    def by_node(self, values: Reals) -> Reals:
+        """Values (f,) of the free degrees of freedom as (n, 6) of the nodes, 0 where these are held."""
+        every = np.zeros(6 * self.count)
+        every[self.free] = values
+        return every.reshape(-1, 6)
+
     @property
     def beams(self) -> list[Beams]:
         """The parts that are beams."""

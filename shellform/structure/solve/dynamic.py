@@ -85,9 +85,7 @@ def dynamic(
         except NotPositiveDefinite:
             step *= _CUT
             continue
-        whole = np.zeros(6 * assembly.count)
-        whole[assembly.free] = change
-        motion = whole.reshape(-1, 6)
+        motion = assembly.by_node(change)
         trial = moved(state, assembly.chords.corrected(state, motion))
         then = assembly.evaluate(trial)
         far = float(np.abs(motion[:, 3:]).max(initial=0.0)) > TURN

@@ -182,14 +182,12 @@ def newton(
             return Equilibrium(state, now.energy, residual, spent, stable, negative)
         if not np.isfinite(residual):
             break
-        step = np.zeros(6 * assembly.count)
         unbalanced = (load - now.force).ravel()[assembly.free]
-        step[assembly.free] = turning.solve(
-            assembly.matrix.factor_indefinite(held(assembly, now)), now, unbalanced
-        )
+        factor = assembly.matrix.factor_indefinite(held(assembly, now))
+        step = assembly.by_node(turning.solve(factor, now, unbalanced))
         if not np.isfinite(step).all() or np.abs(step).max() > _FAR:
             break
-        state = moved(state, step.reshape(-1, 6))
+        state = moved(state, step)
     raise NotConverged(
         f"Newton's iteration found no equilibrium (smallest residual {least:.1e})",
         state=best,
@@ -320,9 +318,7 @@ class _Relaxation:
         return True
 
     def _advance(self, direction: Reals, downhill: float) -> bool:
-        whole = np.zeros(6 * self.assembly.count)
-        whole[self.assembly.free] = direction
-        step = whole.reshape(-1, 6)
+        step = self.assembly.by_node(direction)
         turn, shift = float(np.abs(step[:, 3:]).max()), float(np.abs(step[:, :3]).max())
         if not np.isfinite(
             turn + shift
