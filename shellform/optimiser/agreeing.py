@@ -34,9 +34,9 @@ def leaving_some(search: Search) -> Search:
 
 
 def pausing(search: Search, it: Iterate) -> bool:
-    """Whether thinning is to ask a sample, so few being left of the cables that were `counted` at the last one: those
-    that few structures with errors as they are have let go are too many as a rule, and where a fresh sample
-    says so soon a few lengths make up for them."""
+    """Whether thinning is to ask a fresh sample now: where trials know no enlarged errors, each time a quarter of the
+    cables that were `counted` at the last sample has gone. Such trials let go too many as a rule, and a few lengths make
+    up for that only where it is seen soon."""
     if search.asked is None or search.asked.trusted or search.asked.confirmed is None:
         return False
     return taut_count(search, it.point) < _PAUSE * it.counted

@@ -98,9 +98,11 @@ def optimise(
     judging: Judging | None = None,
     resume: Checkpoint | None = None,
 ) -> Optimum:
-    """The best design found from `start` within a number of design `evaluations`, and up to a fifth more where
-    a fresh sample of structures as built disagrees with it; with `safety` one that stands as built under the problem's loads, no less likely than `initial` (None: the start); with
-    MovingAsymptotes by the paper's own method (moving_asymptotes.py), whatever stands.
+    """The best design found from `start` within a number of design `evaluations`.
+
+    With `safety` it stands as built under the problem's loads, no less likely than `initial` (None: the start), and up to
+    a fifth more evaluations are spent where a fresh sample disagrees with it. With MovingAsymptotes for a `solver` it is
+    found by the paper's own method (moving_asymptotes.py), whether it stands or not.
 
     `progress(step)` is called at each trial, `judging(done, most)` while structures of a design are drawn, and
     `keep(checkpoint)` before each trial: with `resume` the same call goes on from there to the same result.

@@ -69,9 +69,9 @@ def tried(
     """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness,
     each with its cables optimised.
 
-    `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
-    section; `solver`, what made the optimum, of which the stiffness that it kept is asked here too. What was asked of the optimum as built is asked of each. Raises InputError where no section
-    that the net allows is stiff enough.
+    `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed section; `solver`
+    is what made the optimum. The stiffness that the optimum kept and what was asked of it as built are asked of each.
+    Raises InputError where no section that the net allows is stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}

@@ -219,7 +219,8 @@ class Evaluator:
     def evaluate(
         self, design: Design, near: Mapping[str, State], stage: float, *, lead: bool = False
     ) -> Evaluated:
-        """The design's values, its equilibria sought from the states `near` them; where those of further loads turn out too far off, with `lead` from the design load's, along the load's own path.
+        """The design's values in the equilibria that Newton's method finds from the states `near` them. Where one of a
+        further load isn't found from there, with `lead` the load is followed from the design load's equilibrium.
         Raises OffBranch."""
         self.evaluations += 1
         before = self.factorisations

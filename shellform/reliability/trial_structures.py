@@ -25,7 +25,7 @@ from scipy.special import ndtr, ndtri
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.tolerances import Tolerances
+from shellform.gridshell.tolerances import LARGEST_SHARE, Tolerances
 from shellform.reliability.drawing import PERFECT, drawn
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import Safety, allowed, critical_on_halved, paths
@@ -70,10 +70,14 @@ class Required:
 
 @dataclass(frozen=True)
 class Demand:
-    """What is required in each `trial` of a search, and of fresh samples at its end, `confirmed`: None where they
-    are left to whoever judges what it finds; whether trials are `trusted`: what they confirm seldom falls in a fresh
-    sample, since their errors are enlarged as far as they can be; and whether fresh samples `spare` some of those that
-    may fall, since what a search has chosen among many is at the edge of falling."""
+    """What a search asks of structures as built.
+
+    - `trial`: of those on which it tries each design; `confirmed`: of a fresh sample at its end, None where that is left
+      to whoever judges what it finds.
+    - `trusted`: whether errors are enlarged in trials as was asked for, so that what they confirm seldom falls later.
+    - `spare`: whether fewer may fall in a fresh sample than of a finished design's, for what was chosen among many is at
+      the edge of falling.
+    """
 
     trial: Required
     confirmed: Required | None
@@ -122,13 +126,13 @@ def demand(
     judging: Judging | None = None,
 ) -> Demand:
     """What is asked of designs that come after `start`, in trials and of fresh samples.
-    Errors are enlarged in trials as far as the start itself bears the design load with them: few structures
-    at the edge of falling can't tell one design from another. Where it doesn't bear them as large as they are asked
-    for, numbers make up for it: a search that tries hundreds of designs on a dozen structures with errors as they are finds one
-    for that dozen. The fresh sample is as large as the one by which a finished design is judged: what forty confirmed fell in three
-    of two hundred. Where as many may fall as of the start, those of the start are counted that a finished design is
-    judged by: that is what is asked for, and another sample has a tenth more of them or less. Raises NotConverged where the start
-    has no unloaded equilibrium."""
+
+    Errors are enlarged in trials as far as is asked for, or half as much, or not at all: the first with which the start
+    bears the design load, for few structures at the edge of falling can't tell one design from another. Where they are
+    enlarged less, more structures make up for it: a search that tries hundreds of designs on a dozen finds one for that
+    dozen. The fresh sample is as large as the one that judges a finished design: of what forty confirmed, three of two
+    hundred fell. Where as many may fall as of the start, that judge's structures are counted: another sample has up to a
+    tenth more of them. Raises NotConverged where the start has no unloaded equilibrium."""
     trial, many = None, max(MOST, safety.tried)
     for factor, tries in ((safety.enlarged, safety.tried), (0.5 * (1.0 + safety.enlarged), many)):
         own = replace(safety, enlarged=factor, tried=tries)
@@ -171,7 +175,6 @@ def required(
     safety: Safety,
     *,
     design_load: str = "design",
-    first: int = 0,
     judging: Judging | None = None,
 ) -> Required:
     """What is asked of designs that come after `start`: under the design load what the probability says for
@@ -179,7 +182,7 @@ def required(
     under other loads likewise, by `Safety.required`. Raises NotConverged where it has no unloaded
     equilibrium."""
     own = {name: load for name, load in loads.items() if load.any()}
-    every = Required(safety, own, design_load, {name: safety.tried for name in own}, first)
+    every = Required(safety, own, design_load, {name: safety.tried for name in own})
     return _shown(every, tried(shell, start, every, critical=False, judging=judging))
 
 
@@ -293,9 +296,9 @@ def to_bear(
 
 
 def aims(asked: Required, found: JudgedTrial) -> dict[int, float]:
-    """The same where the whole sample was judged already, and a search is at its end: of those that fall as many as
-    have to stand, and a few more, under the smaller load first, where fewer may. Those that bear most are named, from the
-    one that bears least on. (Before thinning all of them are aimed for: it spends what reserve that gives.)"""
+    """As `to_bear`, from a whole sample that was judged already, at the end of a search: of the structures that fall
+    those that bear most, as many as have to stand and a few more, under the smaller load first. (Before thinning
+    `to_bear` names all of them: thinning spends the reserve that this gives.)"""
     _, shares = largest_on_path(asked)
     names = sorted(shares, key=lambda each: shares[each])
     return _aims(asked, found, {name: _nearest(found, name, asked.fallen[name]) for name in names})
@@ -367,8 +370,8 @@ def confirm(
 
 
 def _sparing(asked: Required) -> Required:
-    """The same with one less that may fall than the probability allows; where under a further load as many may as
-    of the start, what its number and another's differ by in one sample is spared, one deviation of the difference."""
+    """The same with one less that may fall than the probability allows. Where under a further load as many may fall as of
+    the start, fewer by a standard deviation of the difference of two such numbers."""
     fallen = {}
     for name, count in asked.fallen.items():
         known = _known(asked.safety, name, asked.design_load)
@@ -388,12 +391,6 @@ def _known(safety: Safety, name: str, design_load: str) -> int:
 
 def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
     """The same causes with deviations larger by a factor, as far as shares go."""
-    most = 0.5  # the largest share that tolerances take
-    return Tolerances(
-        **{
-            each.name: factor * getattr(tolerances, each.name)
-            if each.name in ("cable_length", "supports", "marks")
-            else float(np.minimum(factor * getattr(tolerances, each.name), most))
-            for each in fields(Tolerances)
-        }
-    )
+    lengths = ("cable_length", "supports", "marks")
+    most = {each.name: np.inf if each.name in lengths else LARGEST_SHARE for each in fields(Tolerances)}
+    return Tolerances(**{name: min(factor * getattr(tolerances, name), own) for name, own in most.items()})
