@@ -153,7 +153,8 @@ class Evaluator:
         """
         problem, assembly = self.problem, self.assembly(design)
         try:
-            found = [self._measured(term, design, states, stage, assembly) for term in problem.terms]
+            places = [self._at(term, design, states, stage, assembly) for term in problem.terms]
+            found = [self._measured(term, at) for term, at in zip(problem.terms, places, strict=True)]
         except (NotPositiveDefinite, NotConverged) as error:
             raise OffBranch(str(error)) from error
         summands, kept = found[: len(problem.minimise)], found[len(problem.minimise) :]
@@ -321,18 +322,16 @@ class Evaluator:
         self.factorisations += factorisations
         self.equilibria += 1
 
-    def _measured(
-        self, term: Term, design: Design, states: Mapping[str, State], stage: float, assembly: Assembly
-    ) -> Measurement:
+    def _measured(self, term: Term, at: LoadedDesign) -> Measurement:
         """The term's measurement. One that needs no equilibrium is the same whatever the states: a search goes
         back to designs in other states, and drawn structures that it keeps in mind take longer than all else."""
-        if not term.load:
-            for known, other, found in self._known:
-                if known is term and other is design:
-                    return found
-        found = measured(term, self._at(term, design, states, stage, assembly))
-        if not term.load:
-            self._known = [*self._known[1 - _KNOWN :], (term, design, found)]
+        if term.load:
+            return measured(term, at)
+        for known, design, found in self._known:
+            if known is term and design is at.design:
+                return found
+        found = measured(term, at)
+        self._known = [*self._known[1 - _KNOWN :], (term, at.design, found)]
         return found
 
     def _at(

@@ -205,6 +205,7 @@ def test_a_design_of_which_a_term_cannot_be_measured_is_off_the_branch(evaluator
 
     evaluator.problem.terms = ["term"]
     monkeypatch.setattr(evaluator, "assembly", lambda design: None)
+    monkeypatch.setattr(evaluator, "_at", lambda *_: None)
     monkeypatch.setattr(evaluator, "_measured", measured)
     with pytest.raises(OffBranch):
         evaluator.seed("design", {}, 1.0)
@@ -295,18 +296,17 @@ def test_what_needs_no_equilibrium_is_kept_of_the_last_sixteen_designs(evaluator
 
     monkeypatch.setattr(evaluation, "measured", measure)
     own, soft = SimpleNamespace(load=""), SimpleNamespace(load="wet")
-    states = {"wet": None}
     designs = [f"design {k}" for k in range(17)]
     for design in designs[:16]:
-        evaluator._measured(own, design, states, 1.0, None)
+        evaluator._measured(own, SimpleNamespace(design=design))
     for design in designs[:16]:
-        assert evaluator._measured(own, design, states, 1.0, None) == f" of {design}"
+        assert evaluator._measured(own, SimpleNamespace(design=design)) == f" of {design}"
     assert measured == designs[:16]
     for design in (designs[16], designs[1], designs[0]):
-        evaluator._measured(own, design, states, 1.0, None)
+        evaluator._measured(own, SimpleNamespace(design=design))
     assert measured[16:] == [designs[16], designs[0]], "the first of them is forgotten"
     for _ in range(2):
-        evaluator._measured(soft, designs[0], states, 1.0, None)
+        evaluator._measured(soft, SimpleNamespace(design=designs[0]))
     assert measured[18:] == [designs[0]] * 2
 
 
