@@ -1,4 +1,4 @@
-"""From a case to its design problem, the engineer's limits included, and what each design shows of them.
+"""From a case to its design problem, the engineer's limits included.
 
 Every limit but the deviation's holds under every load case, and those that matter before concrete comes also without load. The
 critical load factor F is kept by a load case "critical NAME", F times the load case, that every accepted
@@ -11,7 +11,6 @@ path ends before F isn't feasible.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,6 @@ from shellform.case.case import Case
 from shellform.errors import NotConverged, require_known
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.net.grid import CONNECTOR
 from shellform.problem.constraints import AtLeast, AtMost, Constraint
 from shellform.problem.engineering import (
     ConnectorTurn,
@@ -43,7 +41,6 @@ from shellform.reliability.trial_structures import SEED
 from shellform.structure.answers import results
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.beam import Beams
-from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 
 # of the initial design's softest mode under the design load, that is left at the critical factor asked for
@@ -147,26 +144,6 @@ def _stiffness(shell: Gridshell, start: Design, load: Reals) -> float:
             remedy="Choose a denser grid, thicker rods or stiffer cables.",
         )
     return found
-
-
-def shown(shell: Gridshell, design: Design, state: State, load: Reals) -> dict[str, Any]:
-    """What a design shows of the limited quantities in a state under the load, for its part of the
-    summary.
-    """
-    beams, cables = shell.beams(design.radius), shell.cables(design)
-    pull = cables.tension(state)
-    turn = results.twist(beams.local_deformations(state))[beams.of_kind(CONNECTOR)]
-    push = assemble(shell.network(design)).unbalanced(state, load)[shell.net.supports]
-    return {
-        "stress_utilisation_max": float(shell.utilisation(design, state).max()),
-        "connector_turn_max": float(np.abs(turn).max(initial=0.0)),
-        "uplift_max": max(0.0, -float(push[:, 2].min())),
-        "thrust_max": float(np.hypot(*push[:, :2].T).max()),
-        "edge_utilisation_max": edge_utilisation(shell, beams, beams.local_forces(state)),
-        "cable_force_max": float(pull.max(initial=0.0)),
-        "cable_force_min": float(pull.min()) if len(pull) else 0.0,
-        "cables_slack": int((pull <= 0.0).sum()),
-    }
 
 
 def edge_utilisation(shell: Gridshell, beams: Beams, forces: Reals) -> float:

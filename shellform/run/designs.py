@@ -11,13 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.case.build_problem import shown
+from shellform.case.build_problem import edge_utilisation
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.net.grid import CONNECTOR
 from shellform.problem.paths import deviations, follow
 from shellform.records.summary import DesignRecord, LoadRecord, Summary, write_summary
 from shellform.run.figures import write_states
 from shellform.run.workspace import Workspace
+from shellform.structure.answers import results
 from shellform.structure.elements.state import State, extended
 from shellform.structure.model import Model, write_model
 from shellform.structure.network import assemble
@@ -118,16 +120,19 @@ def write_design(
         cable_force_sum=float(pull.sum()),
         cable_force_max=float(pull.max(initial=0.0)),
         loads={
-            each: _under(shell, design, loaded[each], load, float(load[:, 2].sum() / weight))
+            each: load_record(shell, design, loaded[each], load, float(load[:, 2].sum() / weight))
             for each, load in loads.items()
         },
     )
 
 
-def _under(shell: Gridshell, design: Design, loaded: Loaded, load: Reals, factor: float) -> LoadRecord:
-    """The record of a design under a load, so many times the design load."""
+def load_record(shell: Gridshell, design: Design, loaded: Loaded, load: Reals, factor: float) -> LoadRecord:
+    """The record of a design under a `load` (n, 6), which is so many times the design load."""
     state = loaded.equilibrium.state
-    away = deviations(shell, state)
+    away, pull = deviations(shell, state), shell.cables(design).tension(state)
+    beams = shell.beams(design.radius)
+    turn = results.twist(beams.local_deformations(state))[beams.of_kind(CONNECTOR)]
+    push = assemble(shell.network(design)).unbalanced(state, load)[shell.net.supports]
     return LoadRecord(
         factor=round(factor, 12) + 0.0,  # no -0
         deviation_max=float(away.max()),
@@ -137,8 +142,15 @@ def _under(shell: Gridshell, design: Design, loaded: Loaded, load: Reals, factor
         on_branch=loaded.on_branch,
         residual=loaded.equilibrium.residual,
         rod_utilisation_max=float(shell.bending_utilisation(design, state).max()),
-        slack=slack_names(shell.cables(design).tension(state)),
-        **shown(shell, design, state, load),
+        stress_utilisation_max=float(shell.utilisation(design, state).max()),
+        connector_turn_max=float(np.abs(turn).max(initial=0.0)),
+        uplift_max=max(0.0, -float(push[:, 2].min())),
+        thrust_max=float(np.hypot(*push[:, :2].T).max()),
+        edge_utilisation_max=edge_utilisation(shell, beams, beams.local_forces(state)),
+        cable_force_max=float(pull.max(initial=0.0)),
+        cable_force_min=float(pull.min()) if len(pull) else 0.0,
+        cables_slack=int((pull <= 0.0).sum()),
+        slack=slack_names(pull),
     )
 
 

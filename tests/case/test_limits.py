@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.case.build_problem import case_problem, shown
+from shellform.case.build_problem import case_problem
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.reactions import reactions
 from shellform.optimiser import rounding
 from shellform.records.progress import Kind
 from shellform.reliability.built_misfit import PAIRS
+from shellform.run.designs import load_record
 from shellform.run.folder import read_run
 from shellform.run.optimising import _solver
 from shellform.run.run import run_case
@@ -210,38 +211,39 @@ def test_limits_that_can_t_be_are_refused_when_the_problem_is_made(shell, loads)
 
 def test_what_is_shown_of_a_design_without_load_is_its_prestress(shell, loads):
     design = shell.design()
-    unloaded = sf.follow(shell, design, {"none": loads["none"]})["none"].equilibrium.state
-    seen = shown(shell, design, unloaded, loads["none"])
-    assert seen["cables_slack"] == 0
-    assert seen["cable_force_min"] > 1.0
-    assert 0.7 < seen["stress_utilisation_max"] < 0.8
+    unloaded = sf.follow(shell, design, {"none": loads["none"]})["none"]
+    seen = load_record(shell, design, unloaded, loads["none"], 0.0)
+    assert seen.cables_slack == 0
+    assert seen.cable_force_min > 1.0
+    assert 0.7 < seen.stress_utilisation_max < 0.8
 
 
 def test_what_is_shown_of_a_loaded_design_is_what_its_supports_cables_and_connectors_bear(shell, loads):
     rest = shell.design().rest_length.copy()
     rest[5] = 1.2 * shell.cable_lengths[5]
     design, load = dataclasses.replace(shell.design(), rest_length=rest), loads["design"]
-    state = sf.follow(shell, design, {"design": load})["design"].equilibrium.state
-    seen = shown(shell, design, state, load)
+    loaded = sf.follow(shell, design, {"design": load})["design"]
+    state = loaded.equilibrium.state
+    seen = load_record(shell, design, loaded, load, 1.0)
     pull = shell.cables(design).tension(state)
-    assert (seen["cable_force_max"], seen["cable_force_min"]) == (pull.max(), pull.min())
-    assert seen["cables_slack"] == np.count_nonzero(pull <= 0.0) >= 1
+    assert (seen.cable_force_max, seen.cable_force_min) == (pull.max(), pull.min())
+    assert seen.cables_slack == np.count_nonzero(pull <= 0.0) >= 1
     bears = np.array([each.force for each in reactions(shell, design, state, load).supports])
-    assert seen["uplift_max"] == pytest.approx(max(-bears[:, 2].min(), 0.0))
-    assert seen["thrust_max"] == pytest.approx(np.sqrt((bears[:, :2] ** 2).sum(axis=1)).max())
+    assert seen.uplift_max == pytest.approx(max(-bears[:, 2].min(), 0.0))
+    assert seen.thrust_max == pytest.approx(np.sqrt((bears[:, :2] ** 2).sum(axis=1)).max())
     # A force on the support itself goes straight into it: the state is the same, what holds it isn't.
     pushed, push = load.copy(), [40.0, -30.0, 20.0]
     pushed[shell.net.supports[3], :3] += push
     bears[3] -= push
-    told = shown(shell, design, state, pushed)
-    assert told["uplift_max"] == pytest.approx(-bears[:, 2].min())
-    assert told["thrust_max"] == pytest.approx(np.sqrt((bears[:, :2] ** 2).sum(axis=1)).max())
-    assert told["thrust_max"] > 2.0 * seen["thrust_max"]
+    told = load_record(shell, design, loaded, pushed, 1.0)
+    assert told.uplift_max == pytest.approx(-bears[:, 2].min())
+    assert told.thrust_max == pytest.approx(np.sqrt((bears[:, :2] ** 2).sum(axis=1)).max())
+    assert told.thrust_max > 2.0 * seen.thrust_max
     # frames that lay along x in the flat grid turn against each other, nearly all about the connector
     one, other = (matrices(state.quaternions[shell.net.grid.crossing_nodes[:, k]])[:, :, 0] for k in (0, 1))
     turn = np.arccos(np.clip(np.sum(one * other, axis=1), -1.0, 1.0))
-    assert seen["connector_turn_max"] == pytest.approx(turn.max(), rel=0.02)
-    assert seen["edge_utilisation_max"] == 0.0
+    assert seen.connector_turn_max == pytest.approx(turn.max(), rel=0.02)
+    assert seen.edge_utilisation_max == 0.0
 
 
 def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
