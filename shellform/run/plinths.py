@@ -10,13 +10,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from shellform.errors import InputError
 from shellform.net.edges import LOW
 from shellform.run.sizes import first_spacing
 from shellform.surface.shape.cut import cut_off
-from shellform.surface.shape.target import Surface, curvature
+from shellform.surface.shape.target import Surface, sharpest_bend
 
 _SHARP = 2.0  # spacings: a radius to which hardly a net is bent
 _BETTER = 1.4  # times the radius, for which the feet are cut off
@@ -43,7 +41,7 @@ class Plinths:
 
 def plinths_for(surface: Surface) -> Plinths | None:
     """The plinths with which a surface that is bent too sharply at its feet goes on; None where none help."""
-    radius = _least_radius(surface)
+    _, radius = sharpest_bend(surface)
     if radius > _SHARP * first_spacing(surface)[0]:
         return None
     lowest = float(surface.vertices[:, 2].min())
@@ -53,13 +51,6 @@ def plinths_for(surface: Surface) -> Plinths | None:
         rest = cut_off(surface, round(above, 6))
     except InputError:
         return None
-    if _least_radius(rest) < _BETTER * radius:
+    if sharpest_bend(rest)[1] < _BETTER * radius:
         return None
     return Plinths(rest, round(above, 6), above - lowest, radius)
-
-
-def _least_radius(surface: Surface) -> float:
-    """To which it is bent inside its edge, m."""
-    bent = np.abs(curvature(surface)).max(axis=1)
-    bent[np.concatenate(surface.boundary)] = 0.0
-    return 1.0 / max(float(bent.max()), 1e-12)

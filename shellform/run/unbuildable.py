@@ -24,7 +24,7 @@ from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_trial import NEEDED, STRESSED
 from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
-from shellform.surface.shape.target import Surface, curvature
+from shellform.surface.shape.target import Surface, sharpest_bend
 
 SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _RATHER = 1.5  # times the least radius, where that alone isn't the reason
@@ -199,14 +199,14 @@ def refused(
     concrete, m, that was found to stand."""
     if failure is None or failure.why is Why.NET:
         error = None if failure is None else failure.error
-        most, radius = _most_curved(surface)
+        most, radius = sharpest_bend(surface)
         spacing = 0.0 if failure is None else failure.spacing
         needed = max(COVERED * spacing, _RATHER * radius)
         if failure is not None:
             needed = max(needed, _rounding(surface, failure, wish))
         return Unbuildable(
             f"reason: {Why.NET.value}. No net of {spacing:g} m covers it{'' if error is None else f' ({_said(error)})'}; it is "
-            f"curved most at {_at(most)}, to a radius of {radius:.3g} m",
+            f"curved most at {_at(surface.vertices[most])}, to a radius of {radius:.3g} m",
             why=Why.NET,
             where="net.spacing",
             remedy=f"Round the surface there to {needed:.2g} m or more.",
@@ -336,13 +336,6 @@ def sharpest(net: Net) -> Reals:
     """Where its rods are bent most (3,), m."""
     most = int(np.argmax(net.curvature.max(axis=1)))
     return np.asarray(net.target.positions[net.grid.rod_ends[most]].mean(axis=0))
-
-
-def _most_curved(surface: Surface) -> tuple[Reals, float]:
-    bent = np.abs(curvature(surface)).max(axis=1)
-    bent[np.concatenate(surface.boundary)] = 0.0
-    at = int(np.argmax(bent))
-    return surface.vertices[at], 1.0 / max(float(bent[at]), 1e-12)
 
 
 def _at(point: Reals) -> str:

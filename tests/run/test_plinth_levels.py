@@ -7,6 +7,7 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.run import plinths
+from shellform.surface.shape import target
 
 
 @pytest.fixture
@@ -22,7 +23,7 @@ def feet(monkeypatch):
                 raise InputError("nothing is left", where="surface")
             return ("rest", above)
 
-        monkeypatch.setattr(plinths, "_least_radius", lambda own: radius if own is surface else rest)
+        monkeypatch.setattr(plinths, "sharpest_bend", lambda own: (0, radius if own is surface else rest))
         monkeypatch.setattr(plinths, "first_spacing", lambda own: (spacing, "so"))
         monkeypatch.setattr(plinths, "cut_off", cut_off)
         return plinths.plinths_for(surface)
@@ -50,8 +51,8 @@ def test_plinths_are_for_feet_bent_to_two_spacings_that_are_the_reason(feet):
     assert feet(1.0, 9.0, can_be_cut=False) is None
 
 
-def test_a_surface_s_least_radius_is_that_inside_its_edge(monkeypatch):
+def test_a_surface_is_bent_most_inside_its_edge(monkeypatch):
     surface = SimpleNamespace(boundary=[np.array([0]), np.array([2])])
     bent = np.array([[9.0, 1.0], [0.1, -0.8], [3.0, 0.0], [0.5, 0.2]])
-    monkeypatch.setattr(plinths, "curvature", lambda own: bent.copy())
-    assert plinths._least_radius(surface) == pytest.approx(1.25)
+    monkeypatch.setattr(target, "curvature", lambda own: bent.copy())
+    assert target.sharpest_bend(surface) == (1, pytest.approx(1.25))

@@ -23,6 +23,7 @@ from shellform.run.unbuildable import (
     refused,
     too_curved,
 )
+from shellform.surface.shape import target
 
 NEEDED = 1.5
 
@@ -177,7 +178,7 @@ SURFACE = SimpleNamespace(
 @pytest.fixture
 def bent(monkeypatch):
     """A surface that is bent most at its edge, which doesn't count, and then to half a metre."""
-    monkeypatch.setattr(unbuildable, "curvature", lambda surface: BENT)
+    monkeypatch.setattr(target, "curvature", lambda surface: BENT)
     return SURFACE
 
 

@@ -128,6 +128,14 @@ def largest_curvature(surface: Surface) -> float:
     return float(np.percentile(bent[inner], 99.5)) if inner.any() else 0.0
 
 
+def sharpest_bend(surface: Surface) -> tuple[int, float]:
+    """The vertex inside its edge at which the surface is bent most, mesh noise included, and to what radius, m."""
+    bent = np.abs(curvature(surface)).max(axis=1)
+    bent[np.concatenate(surface.boundary)] = 0.0
+    most = int(np.argmax(bent))
+    return most, 1.0 / max(float(bent[most]), 1e-12)
+
+
 def width(surface: Surface) -> float:
     """The least extent, m, of its plan in any direction, to within a hundredth of the largest: what a shell spans."""
     turns = np.linspace(0.0, np.pi, 180, endpoint=False)
