@@ -21,7 +21,7 @@ import sys
 from pathlib import Path
 
 from shellform.case.case import load_case
-from shellform.case.entries import LimitsEntry
+from shellform.case.limit_entries import LimitsEntry
 from shellform.errors import InputError, NotConverged
 from shellform.records.progress import Event
 from shellform.run.folder import Run, read_run

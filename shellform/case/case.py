@@ -28,20 +28,19 @@ from shellform.case.entries import (
     FiguresEntry,
     JointEntry,
     JointsWeightEntry,
-    LimitsEntry,
     LoadCaseEntry,
     LoadEntry,
     NetEntry,
     OptimiseEntry,
     OwnRodEntry,
     PointsEntry,
-    RobustEntry,
     RodsWeightEntry,
     SheetEntry,
     StockRodEntry,
     SurfaceEntry,
     TitleBlockEntry,
 )
+from shellform.case.limit_entries import LimitsEntry, RobustEntry
 from shellform.case.older_names import with_present_names
 from shellform.case.safety_entries import SafetyEntry, TolerancesEntry
 from shellform.case.wrong_entries import refusal

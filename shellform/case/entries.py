@@ -12,7 +12,6 @@ from pydantic import (
     ConfigDict,
     Field,
     NonNegativeFloat,
-    NonNegativeInt,
     PositiveFloat,
     PositiveInt,
     field_validator,
@@ -182,7 +181,7 @@ class LoadEntry(Entry):
 
     force: PositiveFloat = Field(description="on each loaded crossing, N")
     every: PositiveInt = Field(1, description="2: every second crossing of the checkerboard")
-    additional: float = Field(1.2, ge=1.0, description="factor of the additional load case")
+    additional: float = Field(1.2, ge=1.0, lt=100.0, description="factor of the additional load case")
     openings: list[_Polygon] = Field([], description="plan polygons without load, m")
 
 
@@ -271,7 +270,9 @@ class OptimiseEntry(Entry):
         "method it goes to the others",
     )
     rest_length_min: PositiveFloat = Field(0.01, description="bound (3), m")
-    rest_length_max: float = Field(1.1, gt=1.0, description="bound (3), times the initial rest length")
+    rest_length_max: float = Field(
+        1.1, gt=1.0, lt=100.0, description="bound (3), times the initial rest length"
+    )
     radius_min: PositiveFloat | None = Field(None, description="bound (4), m; left out: half the start's")
     misfit_rms_additional: PositiveFloat = Field(
         description="constraint (6) as root mean square distance a node, m"
@@ -342,31 +343,6 @@ class FiguresEntry(Entry):
     )
 
 
-class LimitsEntry(Entry):
-    """What an engineer limits besides constraints (5) and (6), each under every load case and without load, but the
-    deviation, which counts where the concrete hardens; left out: not limited.
-    """
-
-    deviation: PositiveFloat | None = Field(
-        None, description="largest distance of a node from its place under the design load, m"
-    )
-    built_deviation: PositiveFloat | None = Field(None, description="the same as built, at worst, m")
-    utilisation: PositiveFloat | None = Field(
-        None, description="largest fibre stress of the rods over their strength, erection stress included"
-    )
-    connector_turn: PositiveFloat | None = Field(
-        None, description="of two crossing rods against each other from the flat grid, rad"
-    )
-    uplift: NonNegativeFloat | None = Field(
-        None, description="force with which a support may have to hold a rod's end down, N"
-    )
-    thrust: PositiveFloat | None = Field(None, description="horizontal force that a support may bear, N")
-    slack_min: PositiveFloat | None = Field(None, description="least tension of every cable, N")
-    slack_loads: list[str] = Field(
-        ["none"], description="load cases in which slack_min holds; none: before any load"
-    )
-
-
 class TitleBlockEntry(Entry):
     """What drawings and models for others say of who drew them and when."""
 
@@ -381,19 +357,3 @@ class TitleBlockEntry(Entry):
             return value and datetime.date.fromisoformat(str(value)).isoformat()
         except ValueError as error:
             raise ValueError(f"{str(value)!r} is no day; write it like 2026-05-31") from error
-
-
-class RobustEntry(Entry):
-    """How far the shape may be moved by what [tolerances] says that a structure is off by."""
-
-    deviations: NonNegativeFloat = Field(
-        1.0,
-        description="standard deviations that are added to the mean misfit where it is limited",
-    )
-    limit: PositiveFloat | None = Field(
-        None, description="of that misfit under the design load, as root mean square distance a node, m"
-    )
-    samples: NonNegativeInt = Field(
-        0, description="drawn structures solved anew to check mean and deviation; 0: none"
-    )
-    seed: NonNegativeInt = Field(0, description="of the drawing")

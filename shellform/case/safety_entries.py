@@ -58,9 +58,10 @@ class SafetyEntry(Entry):
     critical_factor: float = Field(
         1.25,
         ge=0.0,
+        lt=100.0,
         description="of the perfect structure under the design load, with rod elements halved; 0: not asked",
     )
-    critical_further: dict[str, Annotated[float, Field(gt=1.0)]] = Field(
+    critical_further: dict[str, Annotated[float, Field(gt=1.0, lt=100.0)]] = Field(
         {}, description="the same of further load cases, by name: { half = 1.2 }"
     )
     drawn: PositiveInt = Field(200, description="structures of the design to build")

@@ -14,6 +14,8 @@ from pydantic import BaseModel, Tag, ValidationError
 
 from shellform.errors import InputError
 
+_FACTOR = 100.0  # the largest upper bound of shares and factors: from there on they can only be per cents
+
 
 def refusal(error: ValidationError, root: type[BaseModel], where: str = "") -> InputError:
     """What to say of wrong entries of what is of `root`'s kind, in the file that `where` names."""
@@ -50,7 +52,16 @@ def _in_words(error: Any, root: type[BaseModel]) -> tuple[str, str]:
     message = message[:1].lower() + message[1:]
     if kind == "value_error":
         return f"{entry}: {message}", ""
-    return f"{entry}: {message} (found {error['input']!r})", f"Give {entry}{meaning}."
+    return f"{entry}: {message} (found {error['input']!r})", f"Give {entry}{meaning}.{_if_per_cents(error)}"
+
+
+def _if_per_cents(error: Any) -> str:
+    """What to write of a share or factor too large that its hundredth would suit: of 97, or "97", 0.97."""
+    bound = error.get("ctx", {}).get("lt", error.get("ctx", {}).get("le"))
+    if bound is None or bound > _FACTOR or not float(error["input"]) > 1.0:
+        return ""
+    share = float(error["input"]) / 100.0
+    return f" For {float(error['input']):g} % write {share:g}." if share < bound else ""
 
 
 @dataclass(frozen=True)

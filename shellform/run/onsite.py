@@ -193,7 +193,9 @@ def replay(
     Writes replay.csv. Raises InputError, NotConverged.
     """
     require_count(rounds, where="--replay", give="a number of rounds, such as 3")
-    require_number(slip, least=0.0, most=1.0, where="--slip", give="metres, such as 0.00005, or 0 for none")
+    require_number(
+        slip, least=0.0, most=1.0, where="--slip", give="a share of a turn, such as 0.05, or 0 for none"
+    )
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
     nodes = (

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.case.entries import RobustEntry
+from shellform.case.limit_entries import RobustEntry
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem import robust

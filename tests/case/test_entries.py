@@ -2,6 +2,7 @@
 
 import datetime
 from dataclasses import fields
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -20,6 +21,7 @@ from shellform.case.safety_entries import SafetyEntry
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 
+SCALE_MODEL = Path(__file__).parent.parent.parent / "scripts/scale_model.toml"
 ROD = {"young": 40e9, "strength": 255e6}
 LINE = [(0.0, 0.0), (1.0, 0.5)]
 TUBE = "needs a radius larger than it"
@@ -345,3 +347,49 @@ def test_a_date_that_is_none_is_refused_with_how_to_write_one(tmp_path):
         InputError, match=r"title_block.date: '31.5.2026' is no day; write it like 2026-05-31"
     ):
         made(tmp_path, title_block={"date": "31.5.2026"})
+
+
+@pytest.mark.parametrize(
+    ("setting", "remedy"),
+    [
+        ("limits.utilisation=97", "For 97 % write 0.97."),
+        ("limits.utilisation=120", "For 120 % write 1.2."),
+        ("load.additional=120", "For 120 % write 1.2."),
+        ("cable.rest_ratio=99", "For 99 % write 0.99."),
+        ("optimise.rest_length_max=110", "For 110 % write 1.1."),
+        ("optimise.misfit=70", "For 70 % write 0.7."),
+        ("optimise.stiffness_min=8", "For 8 % write 0.08."),
+        ("safety.probability_design=99", "For 99 % write 0.99."),
+        ("safety.probability_design='99'", "For 99 % write 0.99."),
+        ("safety.confidence=95", "For 95 % write 0.95."),
+        ("safety.critical_factor=125", "For 125 % write 1.25."),
+        ("safety.critical_further={ additional = 110 }", "For 110 % write 1.1."),
+        ("tolerances.rod_stiffness=3", "For 3 % write 0.03."),
+    ],
+)
+def test_shares_and_factors_in_per_cent_are_refused_with_the_number_to_write(setting, remedy):
+    entry, _, _ = setting.partition("=")
+    with pytest.raises(InputError, match=entry) as refused:
+        load_case(SCALE_MODEL, [setting])
+    assert refused.value.remedy.endswith(remedy)
+
+
+@pytest.mark.parametrize(
+    "setting", ["safety.probability_design=1", "tolerances.load_each=0.6", "load.additional=0.5"]
+)
+def test_no_per_cents_are_read_into_a_share_that_is_only_too_large(setting):
+    with pytest.raises(InputError) as refused:
+        load_case(SCALE_MODEL, [setting])
+    assert "% write" not in refused.value.remedy
+
+
+def test_a_factor_or_share_of_the_strength_that_may_be_meant_is_taken():
+    case = load_case(SCALE_MODEL, ["limits.utilisation=2", "safety.critical_factor=20", "load.additional=3"])
+    assert (case.limits.utilisation, case.safety.critical_factor, case.load.additional) == (2.0, 20.0, 3.0)
+
+
+def test_a_limit_on_the_connectors_turn_in_degrees_is_refused_with_the_radians():
+    assert load_case(SCALE_MODEL, ["limits.connector_turn=1.57"]).limits.connector_turn == 1.57
+    for degrees, radians in ((23, "0.401"), (90, "1.57")):
+        with pytest.raises(InputError, match=f"limits.connector_turn.*write {radians}$"):
+            load_case(SCALE_MODEL, [f"limits.connector_turn={degrees}"])

@@ -3,7 +3,7 @@
 import math
 from pathlib import Path
 
-from shellform.case.entries import LimitsEntry
+from shellform.case.limit_entries import LimitsEntry
 from shellform.records.summary import read_summary
 from shellform.records.words import number
 from shellform.run.folder import read_run

@@ -1,0 +1,64 @@
+"""The case file's tables [limits] and [robust]: what an engineer limits."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, field_validator
+
+from shellform.case.entries import Entry
+
+_BROKEN = 2.0  # times the rods' strength: what is beyond can only be per cents
+
+
+class LimitsEntry(Entry):
+    """What an engineer limits besides constraints (5) and (6), each under every load case and without load, but the
+    deviation, which counts where the concrete hardens; left out: not limited.
+    """
+
+    deviation: PositiveFloat | None = Field(
+        None, description="largest distance of a node from its place under the design load, m"
+    )
+    built_deviation: PositiveFloat | None = Field(None, description="the same as built, at worst, m")
+    utilisation: PositiveFloat | None = Field(
+        None,
+        le=_BROKEN,
+        description="largest fibre stress of the rods over their strength, erection stress included",
+    )
+    connector_turn: PositiveFloat | None = Field(
+        None, description="of two crossing rods against each other from the flat grid, rad"
+    )
+    uplift: NonNegativeFloat | None = Field(
+        None, description="force with which a support may have to hold a rod's end down, N"
+    )
+    thrust: PositiveFloat | None = Field(None, description="horizontal force that a support may bear, N")
+    slack_min: PositiveFloat | None = Field(None, description="least tension of every cable, N")
+    slack_loads: list[str] = Field(
+        ["none"], description="load cases in which slack_min holds; none: before any load"
+    )
+
+    @field_validator("connector_turn")
+    @classmethod
+    def _less_than_a_right_angle(cls, turn: float | None) -> float | None:
+        if turn is not None and turn >= 0.5 * math.pi:
+            raise ValueError(
+                f"{turn:g} rad limit nothing, since crossing rods lie on each other at 1.57; "
+                f"if degrees are meant, write {math.radians(turn):.3g}"
+            )
+        return turn
+
+
+class RobustEntry(Entry):
+    """How far the shape may be moved by what [tolerances] says that a structure is off by."""
+
+    deviations: NonNegativeFloat = Field(
+        1.0,
+        description="standard deviations that are added to the mean misfit where it is limited",
+    )
+    limit: PositiveFloat | None = Field(
+        None, description="of that misfit under the design load, as root mean square distance a node, m"
+    )
+    samples: NonNegativeInt = Field(
+        0, description="drawn structures solved anew to check mean and deviation; 0: none"
+    )
+    seed: NonNegativeInt = Field(0, description="of the drawing")
