@@ -26,7 +26,7 @@ import numpy as np
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged, require_file
 from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence, to_sew
-from shellform.surface.readers.draft import Draft
+from shellform.surface.readers.draft import Draft, require_mesh_size
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
 from shellform.surface.readers.stated import line_without_number
@@ -162,8 +162,12 @@ def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[
     triangles (t, 3), counterclockwise.
 
     The triangles number the outlines' points first, one outline after the other, then these. Edges are about
-    `size`, m, long (left out: as those of the outline nearby). Raises InputError where outlines cross.
+    `size`, m, long (left out: as those of the outline nearby). Raises InputError where outlines cross, and for a size with
+    which the triangles would be too many.
     """
+    if size is not None:
+        sides = np.ptp(np.vstack(outlines), axis=0)
+        require_mesh_size(size, *sides, where="size", give="metres, such as a fortieth of the span")
     with (
         session(),
         errors(Path("plan"), "its outline can't be meshed", "Check that it doesn't cross itself."),

@@ -24,6 +24,7 @@ from scipy.sparse.linalg import SuperLU, splu
 from shellform.arrays import Flags, Indices, Reals, flags, indices, reals
 from shellform.errors import InputError, NotConverged, require_number
 from shellform.surface.bounded import bounded_minimum
+from shellform.surface.readers.draft import require_mesh_size
 
 if TYPE_CHECKING:  # which load gmsh and numba
     from shellform.surface.shape.target import Surface
@@ -161,7 +162,10 @@ def thrust_shell(
             remedy="Reverse their order." if len(corners) > 2 else "Give x and y of each corner, m.",
         )
     require_number(sag, above=0.0, below=0.5, where="sag", give="a share of the span, such as 0.1")
-    require_number(size, above=0.0, where="size", give="metres, such as a fortieth of the span")
+    # before the outline is divided, which alone can be too much
+    require_mesh_size(
+        size, *np.ptp(corners, axis=0), where="size", give="metres, such as a fortieth of the span"
+    )
     line, corner = _divided(corners, size)
     stands = np.ones(len(line), dtype=bool) if supports is None else _standing(supports, corner, len(line))
     holes = [_corners(f"openings[{k}]", each) for k, each in enumerate(openings)]

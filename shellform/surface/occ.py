@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import InputError, ShellformError, require_number
-from shellform.surface.readers.draft import MOST_TRIANGLES
+from shellform.errors import InputError, ShellformError
+from shellform.surface.readers.draft import require_mesh_size
 from shellform.surface.units import turned_up
 
 if TYPE_CHECKING:  # target.py loads numba, which a reader's process does without
@@ -199,12 +199,6 @@ def mesh_faces(
     Of a solid, only the triangles of its upper or lower `side`. `before_mesh` is told about how many triangles the mesh
     will have.
     """
-    require_number(
-        size,
-        above=0.0,
-        where="surface.size",
-        give="the triangles' size in metres, such as 0.01, or leave it out",
-    )
     if not gmsh.model.getEntities(2):
         raise InputError(
             "makes no surface",
@@ -212,15 +206,8 @@ def mesh_faces(
             remedy="Give a file with at least one face, or let build make one, as surfaces/dome.py does.",
         )
     spans = np.sort(extent())
-    expected = 2.5 * spans[2] * spans[1] / size**2
-    if expected > MOST_TRIANGLES:
-        raise InputError(
-            f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {spans[2]:.3g} × "
-            f"{spans[1]:.3g} m",
-            where="surface.size",
-            value=size,
-            remedy="Choose a larger mesh size, or check the surface's unit.",
-        )
+    give = "the triangles' size in metres, such as 0.01, or leave it out"
+    expected = require_mesh_size(size, spans[2], spans[1], where="surface.size", give=give)
     before_mesh(expected)
     gmsh.option.setNumber("Mesh.MeshSizeMin", size)
     gmsh.option.setNumber("Mesh.MeshSizeMax", size)

@@ -11,6 +11,7 @@ import pytest
 from shellform.errors import InputError, NotConverged
 from shellform.surface import cad
 from shellform.surface.occ import gmsh, session, silence
+from shellform.surface.readers import draft
 from shellform.surface.readers.reading import read_surface
 
 ROOT = Path(__file__).parent.parent.parent
@@ -186,10 +187,23 @@ def test_a_mesh_size_that_is_no_length_is_refused(size):
 
 
 def test_a_mesh_of_millions_of_triangles_is_refused_before_it_is_made():
-    with pytest.raises(InputError, match=r"more than 2,000,000 triangles.*Choose a larger mesh size"):
-        cad.build_surface(DOME, size=1e-5)
+    for size in (1e-5, 1e-300):
+        with pytest.raises(InputError, match=r"more than 2,000,000 triangles.*Give 0\.00089 m or more"):
+            cad.build_surface(DOME, size=size)
     with pytest.raises(InputError, match=r"more than 2,000,000 triangles.*check the surface's unit"):
         cad.import_surface(DATA / "dome_mm.brep", size=0.01)
+    square = np.array([(0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (0.0, 1.0)])
+    with pytest.raises(InputError, match=r"more than 2,000,000 triangles.*Give 0\.0023 m or more"):
+        cad.mesh_plan([square], size=1e-6)
+
+
+def test_a_mesh_size_that_is_named_as_possible_is_taken(monkeypatch):
+    monkeypatch.setattr(draft, "MOST_TRIANGLES", 2000)
+    with pytest.raises(InputError, match="more than 2,000 triangles") as refused:
+        cad.build_surface(DOME, size=0.001)
+    named = float(refused.value.remedy.split()[1])
+    found = len(cad.build_surface(DOME, size=named).triangles)
+    assert 1000 < found <= 2000
 
 
 @pytest.mark.parametrize(

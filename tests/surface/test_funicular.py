@@ -224,6 +224,7 @@ def test_a_load_of_the_plan_needs_no_rounds_and_gives_a_flatter_foot():
         ({"outline": SQUARE[:2]}, "at least three corners"),
         ({"sag": 0.6}, "sag"),
         ({"size": 0.0}, "size"),
+        ({"size": 1e-6}, r"more than 2,000,000 triangles on a surface of .* Give 0\.\d+ m or more"),
         ({"rise": -1.0}, "rise"),
         ({"supports": [(0, 9)]}, r"supports\(0, 1\) is out of range \(found 9\)"),
         ({"supports": [0, 1]}, "supports has the wrong shape"),

@@ -4,6 +4,7 @@ file's objects.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
-from shellform.errors import InputError, how_many
+from shellform.errors import InputError, how_many, require_number
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000
 _NAMES_TOLD = 12
+_TRIANGLES = 2.5  # in a square of the mesh size, with what a surface's rise adds to its plan
 _ENTRIES = ("surface.layer", "surface.object")
 
 
@@ -124,6 +126,24 @@ def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
             remedy="Export a coarser mesh.",
         )
     return Draft(np.vstack(points), faces)
+
+
+def require_mesh_size(size: float, length: float, width: float, *, where: str, give: str) -> float:
+    """About how many triangles of that size, m, a surface of `length` × `width`, m, gets. Raises InputError where these are
+    too many, with the size that is possible, and for what is no size; `give` is what to give instead."""
+    require_number(size, above=0.0, where=where, give=give)
+    length, width = float(length), float(width)  # NumPy's warn where they overflow
+    expected = _TRIANGLES * (length / size) * (width / size)
+    if expected > MOST_TRIANGLES:
+        possible = math.sqrt(_TRIANGLES * length * width / MOST_TRIANGLES)
+        rounded = 10.0 ** (math.floor(math.log10(possible)) - 1)  # up to two digits
+        raise InputError(
+            f"would give more than {MOST_TRIANGLES:,} triangles on a surface of {length:.3g} × {width:.3g} m",
+            where=where,
+            value=size,
+            remedy=f"Give {math.ceil(possible / rounded) * rounded:.2g} m or more, or check the surface's unit.",
+        )
+    return expected
 
 
 def check_points(points: Reals, where: str) -> None:
