@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import require_known
+from shellform.errors import require_count, require_known
 from shellform.gridshell.gridshell import Design
 from shellform.problem.evaluation import Evaluator, Linearisation, OffBranch, not_carried
 from shellform.problem.paths import follow, without_slack
@@ -149,6 +149,7 @@ def compare(
     the problem. Raises InputError for another method and NotConverged where the start doesn't bear all loads.
     """
     require_known(method, METHODS, where="method", what="is no known method")
+    require_count(evaluations, where="evaluations", give="a number of designs to try, such as 200")
     plain = Plain(problem, start)
 
     def counted(function: Any) -> Any:

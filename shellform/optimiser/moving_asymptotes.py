@@ -35,7 +35,7 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import NotConverged, require_number
+from shellform.errors import NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
 from shellform.optimiser.optimum import Checkpoint, Optimum, Step
@@ -75,8 +75,11 @@ class MovingAsymptotes:
     def __post_init__(self) -> None:
         for each in fields(self):
             value = getattr(self, each.name)
-            give = f"a positive number, or leave it out for {each.default}"
-            require_number(value, above=0.0, where=f"solver.{each.name}", give=give)
+            where, otherwise = f"solver.{each.name}", f"or leave it out for {each.default}"
+            if each.name in ("rows", "starts", "stage"):
+                require_count(value, where=where, give=f"a whole number, {otherwise}")
+            else:
+                require_number(value, above=0.0, where=where, give=f"a positive number, {otherwise}")
 
 
 @dataclass(frozen=True)

@@ -48,6 +48,7 @@ from functools import partial
 import numpy as np
 
 from shellform.arrays import Indices
+from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.minding import as_borne, finely
@@ -109,6 +110,7 @@ def optimise(
 
     Raises NotConverged where the start doesn't carry the design load, with the paper's advice.
     """
+    require_count(evaluations, where="evaluations", give="a number of designs to try, such as 100")
     solver = solver or SequentialConvex()
     with dense_on_one():
         if isinstance(solver, MovingAsymptotes):
@@ -171,6 +173,7 @@ def polish(
     the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
     doesn't bear the loads.
     """
+    require_count(evaluations, where="evaluations", give="a number of designs to try, such as 20")
     found = _polished(best, solver, evaluations, groups, progress, judging)
     if groups is not None or found.design is best.design:
         return found

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from shellform.errors import InputError, require_number
+from shellform.errors import InputError, require_count, require_number
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,10 @@ class SequentialConvex:
             if value is None:
                 continue
             where, otherwise = f"solver.{each.name}", f"or leave it out for {each.default}"
-            if each.name in _MAY_BE_ZERO:
+            least = 0 if each.name in _MAY_BE_ZERO else 1
+            if each.name in _COUNTS:
+                require_count(value, least=least, where=where, give=f"a whole number, {otherwise}")
+            elif least == 0:
                 require_number(value, least=0.0, where=where, give=f"0 or a positive number, {otherwise}")
             else:
                 require_number(value, above=0.0, where=where, give=f"a positive number, {otherwise}")
@@ -133,6 +136,17 @@ class SequentialConvex:
             )
 
 
+_COUNTS = (
+    "most_cables",
+    "guards",
+    "batch",
+    "candidates",
+    "failures",
+    "repairs",
+    "stiffenings",
+    "many",
+    "model_evaluations",
+)
 _MAY_BE_ZERO = (
     "thin",
     "stiffness",

@@ -165,6 +165,7 @@ def sample(
     linear one lies.
     """
     require_count(count, where="sample.count", give="a number of structures to draw, such as 100")
+    require_count(seed, least=0, where="sample.seed", give="a whole number, such as 1")
     line = _Line(shell, design, state, load, tolerances)
     rng = np.random.default_rng(seed)
     found: list[float] = []

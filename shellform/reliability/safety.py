@@ -66,6 +66,7 @@ class Safety:
         for name, usual in (("drawn", 60), ("tried", 12)):
             give = f"a number of structures, such as {usual}"
             require_count(getattr(self, name), where=f"safety.{name}", give=give)
+        require_count(self.seed, least=0, where="safety.seed", give="a whole number, such as 1")
         give = "a share of the start's stiffness, such as 0.5"
         require_number(self.stiffness, above=0.0, where="safety.stiffness", give=give)
         give = "a factor of the errors, such as 1.5"

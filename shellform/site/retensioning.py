@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shellform.arrays import Indices, Reals, indices, reals
-from shellform.errors import InputError, NotConverged, require_number
+from shellform.errors import InputError, NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.site.turns import Crew as Crew  # what an adjustment is asked with
 from shellform.site.turns import whole_turns
@@ -240,6 +240,8 @@ def replay(
     Surveys of the `nodes` have `noise`, m, a coordinate; each turned cable misses its change by `slip` of it
     (one standard deviation). It ends after `rounds`, or where no turn is worth taking. Raises NotConverged.
     """
+    require_count(rounds, where="rounds", give="a number of rounds, such as 3")
+    require_count(seed, least=0, where="seed", give="a whole number, such as 1")
     rng = np.random.default_rng(seed)
     wanted = reals("goal", goal, (shell.node_count, 3))
     wrong = reals("errors", errors, (len(belief.design.present),))

@@ -187,11 +187,48 @@ def test_a_term_or_variable_whose_shapes_are_not_those_that_it_says_is_refused(c
         (lambda: sf.SequentialConvex(window=0.0), r"solver\.window"),
         (lambda: sf.SequentialConvex(stiffness=-1.0), r"solver\.stiffness"),
         (lambda: sf.SequentialConvex(shrink=1.5), "must shrink"),
+        (lambda: sf.SequentialConvex(batch=2.5), r"solver\.batch: must be a whole number"),
+        (lambda: sf.SequentialConvex(most_cables=40.0), r"solver\.most_cables: must be a whole number"),
+        (lambda: sf.MovingAsymptotes(stage=8.0), r"solver\.stage: must be a whole number"),
+        (lambda: sf.Safety(sf.Tolerances(), seed=-1), r"safety\.seed: must be at least 0"),
     ],
 )
 def test_limits_bounds_and_settings_that_make_no_sense_are_refused(make, said):
     with pytest.raises(sf.InputError, match=said):
         make()
+
+
+@pytest.mark.parametrize(
+    ("ask", "where"),
+    [
+        (lambda count: sf.optimise(None, None, evaluations=count), "evaluations"),
+        (
+            lambda count: sf.optimise(None, None, solver=sf.MovingAsymptotes(), evaluations=count),
+            "evaluations",
+        ),
+        (lambda count: sf.polish(None, evaluations=count), "evaluations"),
+        (lambda count: sf.comparison.compare(None, None, evaluations=count), "evaluations"),
+        (
+            lambda count: sf.retensioning.replay(*[None] * 6, noise=1e-4, rounds=count, seed=0),
+            "rounds",
+        ),
+        (lambda count: sf.nesting.cut(None, laths=count), "laths"),
+        (lambda count: sf.render.film([], [], rate=count), "rate"),
+    ],
+)
+@pytest.mark.parametrize("count", [2.0, 0, "2", None])
+def test_a_count_that_is_none_is_refused_before_anything_is_computed(ask, where, count):
+    with pytest.raises(sf.InputError, match=f"{where}: must be") as refused:
+        ask(count)
+    assert "such as" in refused.value.remedy
+
+
+def test_seeds_that_are_none_are_refused_before_anything_is_drawn():
+    for seed in (1.0, -1):
+        with pytest.raises(sf.InputError, match="seed: must be"):
+            sf.retensioning.replay(*[None] * 6, noise=1e-4, rounds=1, seed=seed)
+        with pytest.raises(sf.InputError, match=r"sample\.seed: must be"):
+            sf.robust.sample(*[None] * 5, count=1, seed=seed)
 
 
 @dataclass(frozen=True)

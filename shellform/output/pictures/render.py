@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shellform.arrays import Reals
+from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.output.pictures import maps, painter
 from shellform.output.pictures.images import FILMS, write_film, write_png
@@ -94,6 +95,7 @@ def film(
     """A film of the panels, `rate` a second, with one scale and camera, as .gif or .mp4, one file for each
     path.
     """
+    require_count(rate, where="rate", give="pictures a second, such as 12")
     for path in paths:
         door(path, *FILMS)
     frames = list(painter.drawn(single(panels, look or Look(size=(960, 600)))))

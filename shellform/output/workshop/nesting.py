@@ -21,7 +21,7 @@ from itertools import pairwise
 import binpacking
 import numpy as np
 
-from shellform.errors import InputError, require_number
+from shellform.errors import InputError, require_count, require_number
 from shellform.net.grid import Grid, GridRod
 
 STOCK = 6.0  # m
@@ -82,6 +82,7 @@ def cut(grid: Grid, *, stock: float = STOCK, kerf: float = KERF, laths: int = 1)
     require_number(
         kerf, least=0.0, below=stock, where="rod.kerf", give="a saw cut's width in metres, such as 0.003"
     )
+    require_count(laths, where="laths", give="how many laths each rod is of, such as 2")
     pieces: list[Piece] = []
     spliced = 0
     for number, rod in [each for each in enumerate(grid.rods) for _ in range(laths)]:
