@@ -166,6 +166,23 @@ def test_modes_of_an_unstable_state_have_a_negative_stiffness():
     assert (modes(assembly, beyond, 3).stiffness < 0.0).sum() >= 1
 
 
+@pytest.mark.parametrize("count", [1, 2, 5])
+def test_modes_of_an_unstable_state_are_the_lowest_of_the_dense_tangent(count):
+    """A column of 20 elements under thirty times its critical load: its lowest mode lies far below the ones near nothing."""
+    assembly, start, load = column(20)
+    beyond = newton(assembly, start, 300.0 * load).state
+    tangent = assembly.matrix.full(assembly.evaluate(beyond).tangent).toarray()
+    arm = np.where(assembly.free % 6 < 3, 1.0, 1.0 / 20.0)
+    exact, shapes = np.linalg.eigh(tangent / np.outer(arm, arm))
+    assert (exact < 0.0).sum() > 5
+    assert np.abs(exact).min() < 0.5 * abs(exact[0])
+    found = modes(assembly, beyond, count)
+    np.testing.assert_allclose(found.stiffness, exact[:count], rtol=1e-6)
+    lowest = (shapes[:, 0] / arm, found.shapes[0].ravel()[assembly.free])
+    cosine = lowest[0] @ lowest[1] / np.linalg.norm(lowest[0]) / np.linalg.norm(lowest[1])
+    assert abs(cosine) == pytest.approx(1.0, abs=1e-6) or exact[1] - exact[0] < 1e-3 * abs(exact[0])
+
+
 def test_a_stiffening_structure_has_no_linearised_critical_factor():
     # A taut straight strip pulled along its axis gets stiffer.
     assembly, start, load = column()

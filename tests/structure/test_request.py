@@ -21,6 +21,7 @@ SOUND = {
     "method": "path",
     "lead": (6, 2, -0.05),
     "limit": 30,
+    "mode_count": 3,
     "count": 7,
 }
 
@@ -34,6 +35,7 @@ def test_sound_requests_pass_to_their_bounds():
         {"lead": (0, 0, 2.0)},
         {"increments": 1_000_000},
         {"increments": 1, "limit": 1},
+        {"mode_count": 0},
     ):
         check_request(**SOUND | other)
 
@@ -54,6 +56,8 @@ def test_sound_requests_pass_to_their_bounds():
         ({"lead": (6, 2, np.inf)}, "--lead"),
         ({"lead": (6, 2, np.nan)}, "--lead"),
         ({"limit": 0}, "--limit"),
+        ({"mode_count": -1}, "--modes"),
+        ({"mode_count": 2.0}, "--modes"),
         ({"increments": 1_000_001}, "--increments"),
     ],
 )

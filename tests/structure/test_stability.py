@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from shellform.errors import InputError
+from shellform.errors import InputError, NotConverged
 from shellform.structure.answers import stability
 from shellform.structure.answers.stability import critical_load, linearised_factor, modes
 from shellform.structure.solve.factorisation import NotPositiveDefinite
@@ -33,7 +33,18 @@ class Diagonal:
 
     def factor_indefinite(self, values):
         self.indefinite.append(values)
-        return self._solver(values)
+        found = self._solver(values)
+        found.negative = int((values < 0.0).sum())
+        return found
+
+    def raised(self, values, places, by):
+        raised = values.copy()
+        raised[places] += by
+        return raised
+
+    @property
+    def diagonal(self):
+        return slice(None)
 
     def _solver(self, values):
         return SimpleNamespace(solve=lambda right: right / (values if right.ndim == 1 else values[:, None]))
@@ -69,7 +80,7 @@ def body(monkeypatch):
     return Diagonal(free=np.array([0, 1, 8, 9, 15, 16]), count=3)
 
 
-def test_the_softest_modes_are_those_nearest_to_nothing_per_mass_the_most_unstable_first(body):
+def test_the_softest_modes_are_the_lowest_per_mass_the_most_unstable_first(body):
     found = modes(body, [7.0, -3.0, 2.0, 40.0, 1.0, 100.0], 3)
     assert found.stiffness == pytest.approx([-3.0, 2.0, 4.0])
     assert len(body.indefinite) == 1
@@ -94,9 +105,9 @@ def test_a_mode_s_largest_translation_is_1_and_its_turns_keep_their_share(body):
     assert body.indefinite == []
 
 
-@pytest.mark.parametrize("count", [0, 6, 7])
+@pytest.mark.parametrize("count", [0, 6, 7, 2.0])
 def test_a_number_of_modes_that_there_aren_t_is_refused_with_one_that_there_is(body, count):
-    with pytest.raises(InputError, match=r"must be between 1 and 5 .*Ask for 3, say"):
+    with pytest.raises(InputError, match=r"must be (between 1 and 5|a whole number) .*Give 3, say"):
         modes(body, np.ones(6), count)
     modes(body, np.arange(1.0, 7.0), 5)
     body.free = body.free[:1]
@@ -108,17 +119,41 @@ def test_a_number_of_modes_that_there_aren_t_is_refused_with_one_that_there_is(b
 def test_as_many_modes_are_found_as_are_asked_for_though_they_are_almost_all(size, count):
     values = np.arange(1.0, size + 1.0)
     mass = sp.csc_array(sp.diags_array(np.ones(size)))
-    found, _ = stability._lowest(
+    found, _ = stability._nearest(
         sp.csc_array(sp.diags_array(values)), lambda right: right / values, mass, count
     )
     assert np.sort(found) == pytest.approx(values[:count])
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5])
+@pytest.mark.parametrize("size", [6, 40])
+def test_modes_of_an_unstable_state_are_the_lowest_however_far_from_nothing(monkeypatch, size, count):
+    """Nearest to nothing lie 0.5 and -1; the lowest are -300, -20, -1 in this order."""
+    values = np.array([0.5, -20.0, 3.0, -1.0, -300.0, *np.linspace(400.0, 900.0, size - 5)])
+    mass = np.ones(size)
+    mass[4] = 2.0
+    monkeypatch.setattr(stability, "ResidualNorm", lambda _: SimpleNamespace(mass_shape=mass))
+    body = Diagonal(free=6 * np.arange(size), count=size)
+    found = modes(body, values, count)
+    assert found.stiffness == pytest.approx([-150.0, -20.0, -1.0, 0.5, 3.0][:count])
+    places = [np.flatnonzero(shape[:, 0].round(4)).tolist() for shape in found.shapes]
+    assert places == [[4], [1], [3], [0], [2]][:count]
+
+
+def test_a_tangent_that_no_shift_makes_positive_definite_has_no_modes(body, monkeypatch):
+    def never(values):
+        raise NotPositiveDefinite
+
+    monkeypatch.setattr(body, "factor", never)
+    with pytest.raises(NotConverged, match="no shift makes the tangent positive definite"):
+        modes(body, [-7.0, -3.0, 2.0, 40.0, 1.0, 100.0], 1)
 
 
 @pytest.mark.parametrize("size", [8, 40])
 def test_eigenvalues_nearest_to_nothing_are_found_densely_and_by_iteration(size):
     values = np.array([5.0, -2.0, 0.5, 9.0, *np.linspace(20.0, 60.0, size - 4)])
     mass = np.array([1.0, 4.0, 1.0, 0.5, *[1.0] * (size - 4)])
-    found, vectors = stability._lowest(
+    found, vectors = stability._nearest(
         sp.csc_array(sp.diags_array(values)),
         lambda right: right / values,
         sp.csc_array(sp.diags_array(mass)),

@@ -23,6 +23,7 @@ def check_request(
     method: str,
     lead: Lead | None,
     limit: int,
+    mode_count: int,
     count: int,
 ) -> None:
     """Raises InputError for numbers, methods and leads that make no sense on `count` nodes."""
@@ -35,6 +36,7 @@ def check_request(
         )
     require_known(method, METHODS, where="--method", what="unknown method")
     require_count(limit, where="--limit", give="a number of iterations, such as 100")
+    require_count(mode_count, least=0, where="--modes", give="a number of modes, such as 3, or 0 for none")
     if lead is not None and not (
         0 <= lead[0] < count and lead[1] in (0, 1, 2) and np.isfinite(lead[2]) and lead[2] != 0.0
     ):

@@ -4,7 +4,9 @@ Three looks at the same question, from the tangent K of the equilibrium and its 
 
 Modes. The softest shapes solve K v = w M v with the mass of the implicit dynamic relaxation (1 for a
 translation, the square of an element length for a rotation), by Lanczos iteration with shift-invert about 0:
-each step is one solve with the factor of K.
+each step is one solve with the factor of K. That gives the eigenvalues nearest to 0, which are the lowest where K is
+positive definite. Elsewhere its factor tells how many are negative; where some of them lie farther off, the iteration is
+made again about a shift below all, from where K - shift M is positive definite.
 
 Linearised critical factor. Between two equilibria at factors f0 < f1 of one load the tangent changes from K0
 to K1; carried on at the same rate it becomes singular where
@@ -20,6 +22,7 @@ is located by bisection.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +30,7 @@ import scipy.sparse as sp
 from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
 
 from shellform.arrays import Reals
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError, NotConverged, require_count
 from shellform.structure.elements.state import State
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium
@@ -40,6 +43,8 @@ from shellform.work_clock import Work, told
 
 _LANCZOS = 200  # restarts; an eigenvalue that stands out takes a few
 _SHARP = 1e-9  # relative, of a mode's stiffness; its shape is as good
+_LOWER = 4.0  # times the shift that isn't below all eigenvalues yet; …
+_SHIFTS = 60  # … as often, that is by 36 digits
 _DENSE = 12  # degrees of freedom up to which Lanczos vectors don't fit
 
 
@@ -68,25 +73,30 @@ class Critical:
 
 
 def modes(assembly: Assembly, state: State, count: int) -> Modes:
-    """The `count` softest modes of the tangent at the state. Raises InputError for a bad count,
-    NotConverged.
+    """The `count` modes of the tangent at the state with the lowest stiffness, unstable ones first. Raises InputError for a
+    bad count, NotConverged.
     """
     size = len(assembly.free)
-    if not 1 <= count < size:
+    if size < 2:
         raise InputError(
-            f"must be between 1 and {size - 1}",
-            where="modes",
-            value=count,
-            remedy=f"Ask for {min(3, size - 1)}, say." if size > 1 else "Leave out some supports.",
+            "one that moves only one way has no modes", where="modes", remedy="Leave out some supports."
         )
+    require_count(count, where="modes", give=f"{min(3, size - 1)}, say", most=size - 1)
     balance = assembly.evaluate(state)
     values = held(assembly, balance)
+    solve: Callable[[Reals], Reals]
+    negative = 0
     try:
         solve = assembly.matrix.factor(values).solve
     except NotPositiveDefinite:
-        solve = assembly.matrix.factor_indefinite(values).solve
-    mass = ResidualNorm(assembly).mass_shape
-    stiffness, vectors = _lowest(assembly.matrix.full(values), solve, sp.diags_array(mass).tocsc(), count)
+        indefinite = assembly.matrix.factor_indefinite(values)
+        solve, negative = indefinite.solve, indefinite.negative
+    shape = ResidualNorm(assembly).mass_shape
+    tangent, mass = assembly.matrix.full(values), sp.diags_array(shape).tocsc()
+    stiffness, vectors = _nearest(tangent, solve, mass, count)
+    if (stiffness < 0.0).sum() < negative:
+        solve, shift = _from_below(assembly, values, shape, float(np.abs(stiffness).max()))
+        stiffness, vectors = _nearest(tangent, solve, mass, count, shift)
     order = np.argsort(stiffness)
     flat = np.zeros((count, 6 * assembly.count))
     flat[:, assembly.free] = vectors[:, order].T
@@ -165,19 +175,39 @@ def critical_load(
     return None
 
 
+def _from_below(
+    assembly: Assembly, values: Reals, mass: Reals, size: float
+) -> tuple[Callable[[Reals], Reals], float]:
+    """The solve with K - shift M and a shift below all eigenvalues, by the factor that is positive definite first; `size`
+    is that of the known ones. Raises NotConverged."""
+    matrix, shift = assembly.matrix, -2.0 * (size or 1.0)
+    for _ in range(_SHIFTS):
+        try:
+            return matrix.factor(matrix.raised(values, matrix.diagonal, -shift * mass)).solve, shift
+        except NotPositiveDefinite:
+            shift *= _LOWER
+    raise NotConverged(
+        "The modes were not found: no shift makes the tangent positive definite",
+        remedy="Ask for those of a state nearer to its stable branch.",
+    )
+
+
 def _start(size: int) -> Reals:
     """A fixed start that is orthogonal to no mode in practice keeps results repeatable."""
     return np.cos(1.7 * np.arange(size))
 
 
 @told(Work.EIGENVECTORS)
-def _lowest(tangent: sp.csc_array, solve, mass: sp.csc_array, count: int) -> tuple[Reals, Reals]:  # type: ignore[no-untyped-def]
-    """The `count` eigenvalues of (K, M) nearest to 0 and their vectors (f, count)."""
+def _nearest(  # type: ignore[no-untyped-def]
+    tangent: sp.csc_array, solve, mass: sp.csc_array, count: int, shift: float = 0.0
+) -> tuple[Reals, Reals]:
+    """The `count` eigenvalues of (K, M) nearest to the `shift`, and their vectors (f, count); `solve` is with
+    K - shift M."""
     size = tangent.shape[0]
     if size <= max(_DENSE, 2 * count + 2):
         root = 1.0 / np.sqrt(mass.diagonal())
         values, vectors = np.linalg.eigh(root[:, None] * tangent.toarray() * root)
-        nearest = np.argsort(np.abs(values))[:count]
+        nearest = np.argsort(np.abs(values - shift))[:count]
         return values[nearest], root[:, None] * vectors[:, nearest]
     inverse = LinearOperator((size, size), matvec=solve, dtype=float)
     try:
@@ -185,7 +215,7 @@ def _lowest(tangent: sp.csc_array, solve, mass: sp.csc_array, count: int) -> tup
             tangent,
             count,
             M=mass,
-            sigma=0.0,
+            sigma=shift,
             OPinv=inverse,
             v0=_start(size),
             ncv=min(size, max(_DENSE, 2 * count + 8)),
