@@ -107,15 +107,15 @@ def test_a_goal_between_two_points_is_met_exactly_and_a_point_short_path_says_so
 
 def test_a_goal_that_lies_too_far_off_to_turn_to_is_met_by_smaller_steps(monkeypatch):
     assembly, start, load, _ = lee()
-    whole, missed = path._Path.at_factor, []
+    whole, missed = path.Walk.at_factor, []
 
     def at_factor(walk, here, there, goal):
         if not missed:
             missed.append(there.factor)
-            raise path._Missed
+            raise path.Missed
         return whole(walk, here, there, goal)
 
-    monkeypatch.setattr(path._Path, "at_factor", at_factor)
+    monkeypatch.setattr(path.Walk, "at_factor", at_factor)
     assert list(follow(assembly, start, forces(load), goal=1.0))[-1].factor == 1.0
     assert missed[0] > 1.0
 

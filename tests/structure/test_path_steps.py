@@ -1,5 +1,6 @@
 """Paths of one spring whose load is known at every place: where they end, and which points they tell."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,11 +11,12 @@ from shellform.structure.elements.state import at_rest
 from shellform.structure.solve import path
 from shellform.structure.solve.equilibrium import Equilibrium
 from shellform.structure.solve.loading import forces
-from shellform.structure.solve.path import _Here, _Missed, _Path, follow
+from shellform.structure.solve.path import follow
+from shellform.structure.solve.walk import Missed, OnPath, Walk
 
 
 class Curve:
-    """Stands in for `_Path`: one coordinate x, at which the load factor is f(x) and so many pivots are negative."""
+    """Stands in for `Walk`: one coordinate x, at which the load factor is f(x) and so many pivots are negative."""
 
     def __init__(self, load, negative=lambda x: 0, *, most=np.inf, iterations=4):
         self.load, self.negatives, self.most, self.iterations = load, negative, most, iterations
@@ -29,21 +31,22 @@ class Curve:
         return self
 
     def point(self, state, factor, iterations):
-        return self.at(0.0)
+        here = self.at(0.0)
+        return replace(here, rate=abs(here.rate))
 
-    def at(self, x):
+    def at(self, x, way=1.0):
         x = float(x)
         rate = (self.load(x + 1e-6) - self.load(x - 1e-6)) / 2e-6
         negative = self.negatives(x)
         found = Equilibrium(x, 0.0, 1e-9, 1, negative == 0, negative)
-        return _Here(x, self.load(x), found, np.array([1.0 / rate]), rate, self.iterations, 0.0)
+        return OnPath(x, self.load(x), found, np.array([1.0 / rate]), way * rate, self.iterations, 0.0)
 
-    def step(self, here, size, last):
+    def step(self, here, size):
         self.sizes.append(size)
         if abs(size) > self.most:
-            raise _Missed
-        onward = float(np.sign(last[0]) if last is not None else self.direction * np.sign(here.tangent[0]))
-        return self.at(here.state + onward * abs(size))
+            raise Missed
+        way = float(np.sign(here.rate * here.tangent[0]))
+        return self.at(here.state + way * abs(size), way)
 
     def between(self, before, after):
         return np.array([after - before])
@@ -60,14 +63,17 @@ class Curve:
             else:
                 high = middle
         found = self.at(high)
-        return _Here(high, goal, found.equilibrium, found.tangent, found.rate, 4, 0.0)
+        return OnPath(high, goal, found.equilibrium, found.tangent, found.rate, 4, 0.0)
 
-    located = _Path.located
-    gave_up = _Path.gave_up
+    def by_load(self, here, end):
+        return None
+
+    located = Walk.located
+    gave_up = Walk.gave_up
 
 
 def followed(monkeypatch, curve, **how):
-    monkeypatch.setattr(path, "_Path", lambda *given: curve.begun(*given[-2:]))
+    monkeypatch.setattr(path, "Walk", lambda *given: curve.begun(*given[-2:]))
     monkeypatch.setattr(path, "with_twice_the_digits", lambda _: None)
     monkeypatch.setattr(path, "ResidualNorm", lambda _: None)
     start = at_rest(np.zeros((1, 3)))
@@ -139,6 +145,71 @@ def test_a_step_that_is_missed_is_cut_to_a_quarter_until_a_millionth_of_the_firs
     assert told.value.iterations == 7
 
 
+class Kinked(Curve):
+    """As `Curve`, with a place that steps don't get over, and beyond which the load leads to a `landing`."""
+
+    def __init__(self, load, *, wall, landing=None):
+        super().__init__(load)
+        self.wall, self.landing, self.ends = wall, landing, []
+
+    def step(self, here, size):
+        found = super().step(here, size)
+        if here.state < self.wall < found.state:
+            raise Missed
+        return found
+
+    def by_load(self, here, end):
+        self.ends.append((here, end))
+        return None if self.landing is None else self.at(self.landing)
+
+
+def test_a_path_whose_steps_don_t_get_over_a_kink_goes_on_by_a_quarter_of_the_first_step_s_load(monkeypatch):
+    curve = Kinked(lambda x: 2.0 * x, wall=0.21, landing=0.24)
+    points = followed(monkeypatch, curve, goal=1.0, first=0.1)
+    ((here, end),) = curve.ends
+    assert here.state == pytest.approx(0.21, abs=1e-6)
+    assert end - here.factor == pytest.approx(0.25 * 0.1)
+    assert next(each.factor for each in points if each.factor > 0.4201) == 0.48
+    assert points[-1].factor == 1.0
+    fewest = int(np.argmin(curve.sizes))
+    assert curve.sizes[fewest + 1] == pytest.approx(0.25 * 0.05), "with steps as long as that"
+
+
+def test_the_load_alone_leads_no_farther_than_to_the_goal(monkeypatch):
+    curve = Kinked(lambda x: 2.0 * x, wall=0.499, landing=0.5)
+    assert followed(monkeypatch, curve, goal=1.0, first=0.1)[-1].factor == 1.0
+    assert [end for _, end in curve.ends] == [1.0]
+
+
+def test_a_path_that_the_load_leads_nowhere_either_is_given_up_where_it_is(monkeypatch):
+    with pytest.raises(NotConverged, match=r"could not be followed further \(load factor 0\.42\)"):
+        followed(monkeypatch, Kinked(lambda x: 2.0 * x, wall=0.21), goal=1.0)
+    led = Kinked(lambda x: 2.0 * x, wall=0.21, landing=0.3)
+    with pytest.raises(NotConverged, match="could not be followed further"):
+        followed(monkeypatch, led, lead=(0, 2, 0.75))
+    assert led.ends == [], "a displacement that leads does so alone"
+
+
+def test_a_step_back_over_a_kink_is_missed(monkeypatch):
+    """With as many negative eigenvalues the load goes on as before; found beyond a kink, a point of less load lies behind."""
+    curve = Curve(lambda x: 2.0 * x if x > -0.01 else 9.0 * x)
+    ahead = curve.step
+    back = []
+
+    def step(here, size):
+        found = ahead(here, size)
+        if size > 0.02:
+            back.append(size)
+            return curve.at(here.state - size)
+        return found
+
+    curve.step = step
+    points = followed(monkeypatch, curve, goal=1.0, first=0.1)
+    factors = [each.factor for each in points]
+    assert back
+    assert factors == sorted(factors)
+
+
 def test_a_led_path_ends_at_its_displacement_with_a_last_step_that_goes_no_farther(monkeypatch):
     curve = Curve(lambda x: 2.0 * x, iterations=1)
     points = followed(monkeypatch, curve, lead=(0, 2, 0.75))
@@ -160,13 +231,13 @@ def test_the_goal_of_a_path_of_pulls_against_the_load_is_less_than_nothing(monke
 
 def test_only_a_free_displacement_leads_and_counts_from_the_start():
     walk = SimpleNamespace(assembly=SimpleNamespace(free=np.array([1, 8, 14])))
-    assert (_Path.number(walk, (1, 2, -0.5)), _Path.number(walk, (2, 2, 1.0))) == (1, 2)
+    assert (Walk.number(walk, (1, 2, -0.5)), Walk.number(walk, (2, 2, 1.0))) == (1, 2)
     with pytest.raises(InputError, match="only a free displacement can lead") as told:
-        _Path.number(walk, (1, 1, -0.5))
+        Walk.number(walk, (1, 1, -0.5))
     assert told.value.value == (1, 1)
     walk.start = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]]))
     there = at_rest(np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 2.25]]))
-    assert _Path.displacement(walk, there, (1, 2, -0.5)) == -0.75
+    assert Walk.displacement(walk, there, (1, 2, -0.5)) == -0.75
 
 
 def test_a_first_step_beyond_a_peak_and_a_valley_is_cut_until_it_meets_the_peak(monkeypatch):

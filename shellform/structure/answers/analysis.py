@@ -1,12 +1,11 @@
 """The analysis of a model: how it comes to its load, and what there is to tell of it then
 (documentation/reference/model.md).
 
-Four ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the
-stable branch and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole
-increments without help, dynamic relaxation lets the network move until it comes to rest (dynamic.py). A path goes
-through limit points, loads falling and rising, to where the factor first comes to its goal or a led displacement
-to its own (path.py). Where relaxation doesn't come to rest under moments that have no potential, the path of that
-increment is followed instead, and a warning says so.
+Four ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the stable branch
+and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole increments without help,
+dynamic relaxation lets the network move until it comes to rest (dynamic.py). A path goes through limit points, loads
+falling and rising, to where the factor first comes to its goal or a led displacement to its own (path.py). Where relaxation
+doesn't come to rest under moments that have no potential, the path is followed instead, and a warning says so.
 """
 
 from __future__ import annotations
@@ -36,8 +35,9 @@ from shellform.structure.solve.dynamic import dynamic
 from shellform.structure.solve.equilibrium import TOLERANCE, Equilibrium, find_equilibrium, newton, stability
 from shellform.structure.solve.extended import fit_for
 from shellform.structure.solve.loading import Drive, advance, turns_half
-from shellform.structure.solve.path import Lead, follow
+from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import Drowned, Turning
+from shellform.structure.solve.walk import Lead
 
 LIMIT = 1000  # factorisations of one relaxation
 _COARSE = 0.005  # of a critical factor, the error above which it is told

@@ -10,7 +10,7 @@ from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
 from shellform.structure.network import Network
-from shellform.structure.solve.path import Lead
+from shellform.structure.solve.walk import Lead
 
 _MOST = 1_000_000  # increments: of the smallest structure they take 15 minutes
 METHODS = ("relaxation", "dynamic", "newton", "path")

@@ -1,0 +1,300 @@
+"""One step of a path after the other (path.py): Newton's steps of a given length, to a given factor, or by the load alone.
+
+Where a cable goes slack or taut a path has a kink, and may bend there by more than a right angle. Newton's steps of a fixed
+length then go to and fro between both sides, however short they are. On a stable branch the load alone gets over it (loading.py):
+it grows on either side. Which way the path goes on tells the factor: with as many negative eigenvalues it grows, or falls, as before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from shellform.arrays import Indices, Reals
+from shellform.errors import InputError, NotConverged
+from shellform.structure.elements import rotation
+from shellform.structure.elements.state import State, moved
+from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.equilibrium import TURN, Equilibrium
+from shellform.structure.solve.factorisation import Indefinite
+from shellform.structure.solve.loading import Drive, advance, kinked
+from shellform.structure.solve.residual import STAGNANT, ResidualNorm, Turning, held, overturned
+
+_ITERATIONS = 12  # of Newton in one step
+_BISECTIONS = 30
+_LOCATED = 1e-7  # of the factor, as near as an event is located
+
+Lead = tuple[int, int, float]
+"""A degree of freedom that leads: the node, the axis 0 to 2, its displacement, m."""
+
+
+@dataclass(frozen=True)
+class PathPoint:
+    """A converged point of the path: load `factor`; `equilibrium`; `rate`, the change of the factor with the
+    path's length (1/m, negative where the load falls); `event`: "", "limit point" or "bifurcation"."""
+
+    factor: float
+    equilibrium: Equilibrium
+    rate: float
+    event: str = ""
+
+
+@dataclass(frozen=True)
+class OnPath:
+    """A point with what the next step needs: `tangent` (f,), the change of the free degrees of freedom with
+    the factor.
+    """
+
+    state: State
+    factor: float
+    equilibrium: Equilibrium
+    tangent: Reals
+    rate: float
+    iterations: int
+    turned: float
+
+    @property
+    def negative(self) -> int:
+        """How many pivots of the tangent are."""
+        return self.equilibrium.negative
+
+    def point(self) -> PathPoint:
+        """What is told of it."""
+        return PathPoint(self.factor, self.equilibrium, self.rate)
+
+
+Doubted = tuple[float, OnPath] | None
+"""A step that may have leapt, and where it led."""
+
+
+class Missed(Exception):
+    """A step found no point, or a `doubted` one, with its size, that may lie beyond a leap."""
+
+    def __init__(self, doubted: Doubted = None) -> None:
+        self.doubted = doubted
+
+
+class Walk:
+    """The path of the `assembly` under a `drive` from the state `start`, and what was found of it on the way: `spent`
+    factorisations, the `largest` factor come to, and whether only rotations move (`by_turns`). The number of the degree of
+    freedom that is `led` among the free ones, None where none is; the `direction` of the first step, 1 or -1."""
+
+    def __init__(
+        self, assembly: Assembly, start: State, drive: Drive, tolerance: float, goal: float, lead: Lead | None
+    ) -> None:
+        self.assembly, self.drive, self.tolerance, self.start = assembly, drive, tolerance, start
+        self.measure = ResidualNorm(assembly)
+        self.turning = Turning(assembly, drive.load + drive.base)
+        self.moving = assembly.free % 6 < 3
+        self.by_turns = False
+        self.spent = 0
+        self.largest = abs(goal) if lead is None else 0.0  # of the factors come to
+        self.led = None if lead is None else self.number(lead)
+        self.direction = 1.0 if lead is not None or goal > 0.0 else -1.0
+
+    def number(self, lead: Lead) -> int:
+        """OnPath among the free degrees of freedom of the one that leads."""
+        found = np.flatnonzero(self.assembly.free == 6 * lead[0] + lead[1])
+        if not len(found):
+            raise InputError(
+                "is held or doesn't exist; only a free displacement can lead",
+                where="path",
+                value=lead[:2],
+                remedy="Choose a node that is free along that axis.",
+            )
+        return int(found[0])
+
+    def displacement(self, state: State, lead: Lead) -> float:
+        """Of the degree of freedom that leads, m, since the start."""
+        return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
+
+    def between(self, before: State, after: State) -> Reals:
+        """Translations (t,) of the free degrees of freedom from one state to the other; rotation vectors where
+        nothing else moves.
+        """
+        if self.by_turns:
+            back = before.quaternions * [1.0, -1.0, -1.0, -1.0]
+            turned = rotation.to_vectors(rotation.product(after.quaternions, back))
+            return turned.ravel()[self._flat()]
+        return (after.positions - before.positions).ravel()[self._flat()]
+
+    def point(self, state: State, factor: float, iterations: int) -> OnPath:
+        """The equilibrium `state` at a load factor, with the tangent of the path there. Raises InputError where nothing
+        moves under the load."""
+        balance = self.assembly.evaluate(state)
+        matrix = self._factor(balance)
+        tangent = self.turning.solve(matrix, balance, self._drive(state))
+        residual = self.measure.residual(balance, self.drive.at(factor))
+        found = Equilibrium(
+            state, balance.energy, residual, self.spent, matrix.negative == 0, matrix.negative
+        )
+        speed = float(np.linalg.norm(tangent[self.moving]))
+        if speed == 0.0 and not self.spent > 1:  # twisted, a straight rod has no other path than its turns
+            self.moving, self.by_turns = self.assembly.free % 6 >= 3, True
+            speed = float(np.linalg.norm(tangent[self.moving]))
+        if speed == 0.0:
+            raise InputError(
+                "nothing moves under this load", where="path", remedy="Choose a load that acts on free nodes."
+            )
+        return OnPath(state, factor, found, tangent, 1.0 / speed, iterations, balance.turned)
+
+    def step(self, here: OnPath, size: float) -> OnPath:
+        """The point at `size` from `here`. Raises Missed."""
+        tangent, led = here.tangent, self.led
+        if led is None:
+            change = float(np.copysign(size, here.rate)) / float(np.linalg.norm(tangent[self.moving]))
+        else:
+            if tangent[led] == 0.0:
+                raise Missed
+            change = size / float(tangent[led])
+        state, factor = self._moved(here.state, change * tangent, change), here.factor + change
+        before = np.inf
+        for iteration in range(1, _ITERATIONS + 1):
+            balance = self.assembly.evaluate(state)
+            unbalanced = (self.drive.at(factor) - balance.force).ravel()[self.assembly.free]
+            done = np.zeros(len(self.assembly.free))
+            done[self.moving] = self.between(here.state, state)
+            gap = size - done[led] if led is not None else size * size - float(done @ done)
+            size_kept = abs(gap) <= 1e-6 * (abs(size) if led is not None else size * size)
+            residual = self.measure.residual(balance, self.drive.at(factor))
+            if size_kept and self._balanced(residual, before, balance, state, factor):
+                return self._settled(here, state, factor, iteration)
+            before = residual
+            if not residual < 1e12:
+                raise Missed
+            matrix = self._factor(balance)
+            by_forces = self.turning.solve(matrix, balance, unbalanced)
+            by_factor = self.turning.solve(matrix, balance, self._drive(state))
+            if led is not None:
+                slope, rest = by_factor[led], gap - by_forces[led]
+            else:
+                slope, rest = 2.0 * float(done @ by_factor), gap - 2.0 * float(done @ by_forces)
+            if slope == 0.0:
+                raise Missed
+            shift = float(rest / slope)
+            state, factor = self._moved(state, by_forces + shift * by_factor, shift), factor + shift
+        raise Missed
+
+    def at_factor(self, here: OnPath, there: OnPath, goal: float) -> OnPath:
+        """The point at the factor `goal` between two points: Newton's steps from the nearer one. Raises
+        Missed where they turn too far.
+        """
+        near = here if abs(here.factor - goal) < abs(there.factor - goal) else there
+        state = self._moved(near.state, (goal - near.factor) * near.tangent, goal - near.factor)
+        before = np.inf
+        for iteration in range(1, _ITERATIONS + 1):
+            balance = self.assembly.evaluate(state)
+            residual = self.measure.residual(balance, self.drive.at(goal))
+            if self._balanced(residual, before, balance, state, goal):
+                return self._settled(here, state, goal, iteration)
+            before = residual
+            if not residual < 1e12:
+                break
+            unbalanced = (self.drive.at(goal) - balance.force).ravel()[self.assembly.free]
+            state = self._moved(state, self.turning.solve(self._factor(balance), balance, unbalanced), 0.0)
+        if there.equilibrium.stable:
+            reached = self.by_load(here, goal)
+            if reached is not None and reached.factor == goal:
+                return reached
+        return there  # the factor is close to a turning point: the path goes on and comes by again
+
+    def located(self, here: OnPath, size: float, there: OnPath) -> PathPoint | None:
+        """The point between two where the number of negative eigenvalues changes."""
+        low, high, before, near = 0.0, 1.0, here, there
+        total = size if self.led is not None else float(np.linalg.norm(self.between(here.state, there.state)))
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            try:
+                found = self.step(here, middle * total)
+            except Missed:
+                return None
+            if found.negative == here.negative:
+                low, before = middle, found
+            else:
+                high, near = middle, found
+            if (
+                abs(near.rate) * (high - low) * abs(total) < _LOCATED * max(abs(near.factor), 1e-300)
+                and high - low < 1e-3
+            ):
+                break
+        kind = "limit point" if before.rate * near.rate < 0.0 else "bifurcation"
+        return replace(near.point(), event=kind)
+
+    def gave_up(self, here: OnPath, what: str) -> NotConverged:
+        """The refusal to go on from a point, saying `what` failed."""
+        return NotConverged(
+            f"{what} (load factor {here.factor:.6g})",
+            state=here.state,
+            residual=here.equilibrium.residual,
+            iterations=self.spent,
+            remedy="Take a smaller first step, lead another displacement, or allow more points.",
+        )
+
+    def _settled(self, here: OnPath, state: State, factor: float, iterations: int) -> OnPath:
+        """The converged point, its rate signed by which way along the path the factor grows. Raises Missed where
+        an element has turned too far on the way.
+        """
+        found = self.point(state, factor, iterations)
+        if overturned(self.assembly, here.state, here.turned, state, found.turned):
+            raise Missed
+        self.largest = max(self.largest, abs(factor))
+        onward = float(np.sign(found.tangent[self.moving] @ self.between(here.state, state))) or 1.0
+        if found.negative == here.negative and kinked(self.assembly, here.state, state):
+            onward = float(np.sign(here.rate))  # a path may bend there by more than a right angle
+        return replace(found, rate=onward * abs(found.rate))
+
+    def by_load(self, here: OnPath, end: float) -> OnPath | None:
+        """The point to which the load alone leads on the stable branch from `here`, at the factor `end` or where that branch
+        ends before; None where `here` isn't stable, or nothing is reached."""
+        if not here.equilibrium.stable:
+            return None
+        found = advance(
+            self.assembly,
+            here.state,
+            self.drive,
+            begin=here.factor,
+            end=end,
+            tolerance=self.tolerance,
+            stay=True,
+            heeding=True,
+        )
+        self.spent += found.factorisations
+        if found.share == 0.0:
+            return None
+        factor = end if found.on_branch else here.factor + found.share * (end - here.factor)
+        return self._settled(here, found.equilibrium.state, factor, _ITERATIONS)
+
+    def _balanced(
+        self, residual: float, before: float, balance: Balance, state: State, factor: float
+    ) -> bool:
+        """Whether a state of the path is in equilibrium after a step from the residual `before`. The load that counts
+        is the largest on the way, for it falls to nothing on it.
+        """
+        whole = self.drive.at(max(self.largest, abs(factor)))
+        stagnant = residual > STAGNANT * before
+        load = self.drive.at(factor)
+        return self.measure.balanced(residual, balance, state, load, self.tolerance, stagnant, whole=whole)
+
+    def _factor(self, balance: Balance) -> Indefinite:
+        self.spent += 1
+        return self.assembly.matrix.factor_indefinite(held(self.assembly, balance))
+
+    def _drive(self, state: State) -> Reals:
+        drive = self.drive.load
+        if self.drive.moves_supports:
+            drive = drive - self.assembly.force_along(state, self.drive.imposed)
+        return drive.ravel()[self.assembly.free]
+
+    def _moved(self, state: State, change: Reals, factor: float) -> State:
+        whole = factor * self.drive.imposed.ravel()
+        whole[self.assembly.free] = change
+        step = whole.reshape(-1, 6)
+        turn = float(np.abs(step[:, 3:]).max(initial=0.0))
+        if not turn <= 2.0 * TURN:  # also where it isn't a number
+            raise Missed
+        return moved(state, self.assembly.chords.corrected(state, step))
+
+    def _flat(self) -> Indices:
+        free = self.assembly.free[self.moving]
+        return 3 * (free // 6) + free % 3
