@@ -264,11 +264,11 @@ class _Search:
             tell=self._say,
         )
         self.angles, self.allowance.angle = near or self.angles, best.angle
-        self.say(
-            f"net at {best.angle:g}° and {spacing:g} m: {len(best.net.grid.lattice)} crossings, "
-            f"rods bend to a radius of {bends_to(best.net):.3g} m"
-        )
         placed = replace(best, net=stand(best.net, self.surface, self.edges))
+        self.say(
+            f"net at {best.angle:g}° and {spacing:g} m: {len(placed.net.grid.lattice)} crossings, "
+            f"rods bend to a radius of {bends_to(placed.net):.3g} m"
+        )
         refuse_tipping(placed.net)
         return placed
 

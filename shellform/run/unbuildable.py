@@ -84,16 +84,16 @@ class Tips(InputError):
 
 
 class Why(Enum):
-    """Which of a shell's needs isn't met."""
+    """Which of a shell's needs isn't met, in words."""
 
-    NET = "spacing and curvature"
-    SPACING = "spacing"
-    CURVATURE = "curvature"
-    STRENGTH = "strength"
-    EDGES = "strength of edge beams"
-    CABLES = "strength of cables"
-    STABILITY = "stability"
-    SCATTER = "stability of structures as built"
+    NET = "no net covers it"
+    SPACING = "its rods are too thick for their spacing"
+    CURVATURE = "its rods are bent too much"
+    STRENGTH = "its rods aren't strong enough"
+    EDGES = "its edge beams aren't strong enough"
+    CABLES = "its cables aren't strong enough"
+    STABILITY = "it isn't stable enough"
+    SCATTER = "it isn't stable enough as built"
 
 
 @dataclass(frozen=True)
@@ -184,7 +184,7 @@ def refuse_tipping(net: Net) -> None:
     if len(feet) > 2 and away[1] > _IN_A_LINE * apart:
         return
     raise Tips(
-        f"reason: supports. Its edge comes to the ground at {_at(net.target.positions[net.supports[0]])} and "
+        f"the surface's edge comes to the ground at {_at(net.target.positions[net.supports[0]])} and "
         f"{_at(net.target.positions[net.supports[-1]])} only, in one line, about which it tips",
         where="edges",
         remedy="Bring its edge down to the ground elsewhere too, or write a case that says in [[edges.stretch]] what else "
@@ -205,7 +205,7 @@ def refused(
         if failure is not None:
             needed = max(needed, _rounding(surface, failure, wish))
         return Unbuildable(
-            f"reason: {Why.NET.value}. No net of {spacing:g} m covers it{'' if error is None else f' ({_said(error)})'}; it is "
+            f"no net of {spacing:g} m covers the surface{'' if error is None else f' ({_said(error)})'}; it is "
             f"curved most at {_at(surface.vertices[most])}, to a radius of {radius:.3g} m",
             why=Why.NET,
             where="net.spacing",
@@ -222,7 +222,7 @@ def refused(
     place = "" if failure.where is None else f" at {_at(failure.where)}"
     if failure.why is Why.SPACING:
         return InputError(
-            f"reason: spacing. Rods of {choice.label} are too thick for a spacing of {failure.spacing:g} m",
+            f"rods of {choice.label} are too thick for a spacing of {failure.spacing:g} m",
             where="--spacing",
             remedy=f"Give --spacing {least_spacing(choice):g} or more, or thinner rods with --rod.",
         )
@@ -230,13 +230,14 @@ def refused(
         placed = failure.placed
         bends = 0.0 if placed is None else 1.0 / max(placed.net.quality.curvature_max, 1e-12)
         loaded = failure.why is Why.STRENGTH and failure.factor > 0.0
+        done = "bent" if failure.why is Why.CURVATURE else "stressed"
         allowed = (
             f" and with {1e3 * failure.thickness:.3g} mm of concrete, where {STRESSED:.0%} is allowed"
             if loaded
             else ""
         )
         return Unbuildable(
-            f"reason: {failure.why.value}. {choice.label} of {choice.catalogue} would be stressed to {stress:.0%} of its "
+            f"{choice.label} of {choice.catalogue} would be {done} to {stress:.0%} of its "
             f"strength{place}, at a spacing of {failure.spacing:g} m{allowed}",
             why=failure.why,
             where="rod",
@@ -251,7 +252,7 @@ def refused(
     bearing = {Why.EDGES: "edge beams", Why.CABLES: "cables"}.get(failure.why, "rods")
     falls = failure.factor < NEEDED or failure.why is Why.SCATTER
     what = (
-        f"reason: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
+        f"The shell doesn't stand: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
         f"{failure.spacing:g} m; with {1e3 * failure.thickness:.3g} mm of concrete it stands up to {failure.factor:.2f} × its load, "
         f"where {NEEDED:g} is needed, its {bearing} at {stress:.0%} of {'what they may bear' if failure.why is Why.CABLES else 'their strength'}"
         f"{f', and gives way first{place}' if falls else ''}"
@@ -294,7 +295,7 @@ def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float 
     if wanted < _WORTH * radius:
         return None
     return Unbuildable(
-        f"reason: curvature. At {_at(sharpest(net))} rods bend to a radius of {radius:.3g} m: those that can, {choice.label} of "
+        f"at {_at(sharpest(net))} rods bend to a radius of {radius:.3g} m: those that can, {choice.label} of "
         f"{choice.catalogue} for one, stand up to {failure.factor:.2f} × the load of {1e3 * failure.thickness:.3g} mm of concrete "
         f"at {failure.spacing:g} m, where {NEEDED:g} is needed",
         why=Why.CURVATURE,

@@ -13,6 +13,7 @@ from shellform.run import first_design, first_trial, next_trial, unbuildable
 from shellform.run.first_design import _Search
 from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
+from shellform.run.sizes import Placed
 from shellform.run.unbuildable import Obstacle, Why
 
 Choice = namedtuple("Choice", "section")
@@ -356,3 +357,54 @@ def test_how_much_of_the_strength_is_allowed_is_told_of_rods_that_the_load_break
     told = unbuildable.refused(None, failure, SimpleNamespace(rod=None)).what
     assert "to 99% of its strength, at a spacing of 0.5 m" in told
     assert told.endswith(" and with 50 mm of concrete, where 95% is allowed") is is_told
+
+
+@pytest.mark.parametrize(
+    ("why", "words"),
+    [
+        (Why.STABILITY, "The shell doesn't stand: it isn't stable enough. The stiffest"),
+        (Why.SCATTER, "The shell doesn't stand: it isn't stable enough as built. The stiffest"),
+        (Why.EDGES, "The shell doesn't stand: its edge beams aren't strong enough. The stiffest"),
+        (Why.CABLES, "The shell doesn't stand: its cables aren't strong enough. The stiffest"),
+    ],
+)
+def test_a_shell_that_falls_is_refused_in_sentences(monkeypatch, why, words):
+    monkeypatch.setattr(unbuildable, "_crease", lambda *_: None)
+    choice = SimpleNamespace(label="a rod", catalogue="a catalogue", section=None)
+    failure = Obstacle(why, 0.5, 0.05, 0.9, choice, None, stress=0.6)
+    assert str(unbuildable.refused(None, failure, SimpleNamespace(rod=None))).startswith(words)
+
+
+def test_a_surface_that_no_net_covers_is_refused_in_sentences(monkeypatch):
+    monkeypatch.setattr(unbuildable, "sharpest_bend", lambda _: (1, 0.3))
+    monkeypatch.setattr(unbuildable, "_rounding", lambda *_: 4.0)
+    surface = SimpleNamespace(vertices=np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.5]]))
+    failure = Obstacle(Why.NET, 0.5, 0.05, error=sf.InputError("it folds there"))
+    assert str(unbuildable.refused(surface, failure, SimpleNamespace(rod=None))) == (
+        "net.spacing: no net of 0.5 m covers the surface (it folds there); it is curved most at (1, 2, 0.5) m, to a radius of "
+        "0.3 m. Round the surface there to 4 m or more."
+    )
+    choice = SimpleNamespace(label="a rod", catalogue="a catalogue")
+    monkeypatch.setattr(unbuildable, "least_spacing", lambda _: 0.8)
+    thick = Obstacle(Why.SPACING, 0.5, 0.05, choice=choice)
+    assert str(unbuildable.refused(None, thick, SimpleNamespace(rod=None))).startswith(
+        "--spacing: rods of a rod are too thick for a spacing of 0.5 m. Give --spacing 0.8 or more"
+    )
+
+
+def test_a_search_tells_the_crossings_of_the_net_that_it_proposes(monkeypatch):
+    """Rods that run beside an edge are left out where the net is stood up: 257 crossings of 259."""
+    pulled, stood = (SimpleNamespace(grid=SimpleNamespace(lattice=range(count))) for count in (259, 257))
+    monkeypatch.setattr(
+        first_design, "least_bent_net", lambda *_, **__: (Placed(pulled, 30.0, (0.0, 0.0)), None)
+    )
+    monkeypatch.setattr(first_design, "stand", lambda net, *_: stood if net is pulled else None)
+    monkeypatch.setattr(first_design, "refuse_tipping", lambda _: None)
+    monkeypatch.setattr(first_design, "bends_to", lambda net: float(len(net.grid.lattice)))
+    said = []
+    search = SimpleNamespace(
+        surface=None, wish=SimpleNamespace(angle=30.0), allowance=SimpleNamespace(), edges=None,
+        angles=(), say=said.append, _say=said.append,
+    )  # fmt: skip
+    assert _Search._net(search, 0.5, 0.02).net is stood
+    assert said == ["net at 30° and 0.5 m: 257 crossings, rods bend to a radius of 257 m"]

@@ -228,7 +228,7 @@ def test_a_crease_is_told_as_the_reason_where_the_rods_that_follow_it_bear_too_l
     failure = Obstacle(Why.STABILITY, 0.5, 0.05, 0.1, thin, placed, np.zeros(3), 0.5)
     told = refused(surface, failure, DesignWish())
     assert isinstance(told, Unbuildable)
-    assert told.what.startswith("reason: curvature. At (")
+    assert told.what.startswith("at (")
     assert told.radius > 1.3 / placed.net.quality.curvature_max
     thick = refused(surface, replace(failure, factor=1.2), DesignWish(), bears=0.04)
     assert "--thickness 0.04" in thick.remedy
@@ -556,7 +556,9 @@ def test_models_begin_with_thinner_concrete_and_shells_with_what_is_usual():
 def test_a_search_ends_at_the_same_place_once_its_work_is_done():
     said = []
     wish = DesignWish(rod="gfrp_rods/40 mm", spacing=0.8, angle=45.0)
-    with pytest.raises((InputError, NotConverged), match="reason: "):
+    with pytest.raises(
+        (InputError, NotConverged), match=r"^The shell doesn't stand: it|would be stressed to"
+    ):
         first_design(dish(), replace(wish, thickness=0.4), said.append, Allowance(1))
     assert sum("stands up to" in each for each in said) == 1
 
@@ -608,7 +610,7 @@ def test_a_flat_surface_is_refused_whichever_way_it_lies_and_one_with_the_rise_n
 
 
 def test_rods_that_break_are_refused_with_their_stress_and_place_and_without_them_it_goes_on():
-    with pytest.raises(InputError, match="curvature") as refused:
+    with pytest.raises(InputError, match="rod: ⌀ 14 mm of gfrp_rods would be bent to") as refused:
         first_design(barrel(), DesignWish(rod="gfrp_rods/14 mm", angle=45.0, spacing=0.2))
     assert "%" in refused.value.what
     assert " at (" in refused.value.what
@@ -620,7 +622,7 @@ def test_rods_that_break_are_refused_with_their_stress_and_place_and_without_the
 def test_concrete_that_no_single_layer_bears_is_refused_and_the_thickness_named_stands():
     wish = DesignWish(rod="gfrp_rods/40 mm", spacing=0.8, thickness=0.4, angle=45.0)
     surface = dish()
-    with pytest.raises(NotConverged, match="stability") as refused:
+    with pytest.raises(NotConverged, match="isn't stable enough") as refused:
         first_design(surface, wish)
     bears = float(re.search(r"--thickness ([\d.]+)", refused.value.remedy).group(1))
     found = first_design(surface, DesignWish(wish.rod, wish.spacing, bears, wish.angle))

@@ -185,7 +185,7 @@ def bent(monkeypatch):
 def test_where_no_net_covers_a_surface_it_is_to_be_rounded_where_it_is_bent_most_inside_its_edge(bent):
     told = refused(bent, None, DesignWish())
     assert (told.why, told.spacing, told.radius) == (Why.NET, 0.0, pytest.approx(0.75))
-    assert "No net of 0 m covers it; it is curved most at (1.5, 2, 3) m, to a radius of 0.5 m" in told.what
+    assert "no net of 0 m covers the surface; it is curved most at (1.5, 2, 3) m, to a radius of 0.5 m" in told.what
     assert told.remedy == "Round the surface there to 0.75 m or more."
 
 
@@ -197,7 +197,7 @@ def test_it_is_to_be_rounded_to_three_spacings_and_to_what_rods_need_that_bear_t
     failure = Obstacle(Why.NET, spacing, 0.05, error=InputError("hangs over", where="net"))
     told = refused(bent, failure, DesignWish())
     assert told.radius == pytest.approx(radius)
-    assert f"No net of {spacing:g} m covers it (hangs over)" in told.what
+    assert f"no net of {spacing:g} m covers the surface (hangs over)" in told.what
 
 
 @pytest.mark.parametrize(
@@ -237,7 +237,7 @@ def test_a_crease_is_the_reason_where_rounding_lets_rods_bend_a_third_less(monke
         assert not isinstance(found, Unbuildable)
         return
     assert (found.why, found.radius, found.bears, found.spacing) == (Why.CURVATURE, wanted, 0.02, 0.5)
-    assert "At (0.5, 1, 2) m rods bend to a radius of 1.25 m" in found.what
+    assert "at (0.5, 1, 2) m rods bend to a radius of 1.25 m" in found.what
     assert "up to 0.70 × the load of 50 mm of concrete at 0.5 m, where 1.5 is needed" in found.what
     thick = refused(None, failure, DesignWish(), bears=0.025)
     assert not isinstance(thick, Unbuildable), "half of what was asked for stands without"
