@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from shellform.arrays import Reals, reals, regular
+from shellform.arrays import Reals, indices, reals
 from shellform.errors import InputError, require_number
 from shellform.structure.elements.sections import Section, stiffness
 from shellform.structure.model import Model, parse_model
 
-_HELD = {"pinned": [True] * 3 + [False] * 3, "fixed": [True] * 6}
+_FIXED = {"pinned": [True] * 3 + [False] * 3, "fixed": [True] * 6}
 Rod = Section | Sequence[float] | Reals
 """A section of a material, or its stiffnesses (EA, GJ, EI_y, EI_z), N and N·m²."""
 
@@ -58,8 +58,11 @@ def from_arrays(
     `cable` the axial stiffness EA, N; `supports` are node numbers, pinned, or each with "pinned" or "fixed";
     `loads` by name (n, 3), N; `rest_lengths` (c,), m, of the cables (left out: as they are drawn). Raises
     InputError naming what is wrong."""
-    places = _numbers("nodes", nodes, 3)
-    beams, ties = _pairs("rods", rods, len(places)), _pairs("cables", cables, len(places))
+    places = reals("nodes", nodes, (None, 3))
+    beams, ties = (
+        indices(name, ends, (None, 2), below=len(places))
+        for name, ends in (("rods", rods), ("cables", cables))
+    )
     rest = None if rest_lengths is None else reals("rest_lengths", rest_lengths, (None,))
     if rest is not None and len(rest) != len(ties):
         raise InputError(
@@ -75,7 +78,7 @@ def from_arrays(
             value=type(loads).__name__,
             remedy='Give arrays by name: {"snow": forces}.',
         )
-    forces = {name: _numbers(f"loads[{name!r}]", force, 3) for name, force in (loads or {}).items()}
+    forces = {name: reals(f"loads[{name!r}]", force, (None, 3)) for name, force in (loads or {}).items()}
     for name, force in forces.items():
         if len(force) != len(places):
             raise InputError(
@@ -87,9 +90,12 @@ def from_arrays(
     return _built(
         range(len(places)),
         places.tolist(),
-        [(a, b, {}) for a, b in beams],
-        [(a, b, {} if rest is None else {"rest_length": float(rest[k])}) for k, (a, b) in enumerate(ties)],
-        _held(supports),
+        [(a, b, {}) for a, b in beams.tolist()],
+        [
+            (a, b, {} if rest is None else {"rest_length": float(rest[k])})
+            for k, (a, b) in enumerate(ties.tolist())
+        ],
+        _supported(supports),
         {name: dict(enumerate(force.tolist())) for name, force in forces.items()},
         rod,
         cable,
@@ -201,7 +207,7 @@ def _built(
         require_number(cable, above=0.0, where="cable", give="their axial stiffness EA, N, such as 187.0")
     of_rods = {} if rod is None else _stiffnesses(rod)
     for node, how in held.items():
-        if not isinstance(how, str) or how not in _HELD:
+        if not isinstance(how, str) or how not in _FIXED:
             raise InputError(
                 "is no way to hold a node",
                 where=f"supports[{node}]",
@@ -223,7 +229,7 @@ def _built(
                 }
                 for a, b, own in cables
             ],
-            "supports": [{"node": int(node), "fixed": _HELD[how]} for node, how in sorted(held.items())],
+            "supports": [{"node": int(node), "fixed": _FIXED[how]} for node, how in sorted(held.items())],
             "loads": {
                 name: [
                     {"node": int(node), "force": list(map(float, force))}
@@ -254,7 +260,7 @@ def _stiffnesses(rod: Any) -> dict[str, float]:
     return dict(zip(("EA", "GJ", "EIy", "EIz"), values.tolist(), strict=True))
 
 
-def _held(supports: Mapping[int, str] | Sequence[int]) -> dict[int, str]:
+def _supported(supports: Mapping[int, str] | Sequence[int]) -> dict[int, str]:
     """How each support is held, by the node's number. Raises InputError for what are no numbers: a flag isn't one."""
     strange: list[object] = []
     try:
@@ -274,42 +280,6 @@ def _held(supports: Mapping[int, str] | Sequence[int]) -> dict[int, str]:
 
 def _length(places: Sequence[Sequence[float]], a: int, b: int) -> float:
     return float(np.linalg.norm(np.subtract(places[b], places[a])))
-
-
-def _numbers(name: str, given: ArrayLike, width: int) -> np.ndarray:
-    try:
-        values = np.asarray(given, dtype=float)
-    except (TypeError, ValueError) as error:
-        raise InputError("must be numbers", where=name, remedy=f"Give rows of {width} numbers.") from error
-    if values.ndim != 2 or values.shape[1] != width:
-        raise InputError(
-            f"needs rows of {width} numbers",
-            where=name,
-            value=values.shape,
-            remedy=f"Give an array of shape (any, {width}).",
-        )
-    return values
-
-
-def _pairs(name: str, given: ArrayLike, count: int) -> list[tuple[int, int]]:
-    values = regular(name, given, (None, 2))
-    if values.size == 0:
-        return []
-    if values.ndim != 2 or values.shape[1] != 2 or not np.issubdtype(values.dtype, np.integer):
-        raise InputError(
-            "needs pairs of node numbers",
-            where=name,
-            value=values.shape,
-            remedy="Give integers of shape (any, 2), nodes counted from 0.",
-        )
-    if values.min() < 0 or values.max() >= count:
-        raise InputError(
-            f"names a node that isn't there: there are {count}",
-            where=name,
-            value=int(values.min() if values.min() < 0 else values.max()),
-            remedy="Nodes are counted from 0.",
-        )
-    return [(int(a), int(b)) for a, b in values]
 
 
 def _three(where: str, given: Any, remedy: str) -> list[float]:

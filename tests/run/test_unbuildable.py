@@ -185,7 +185,10 @@ def bent(monkeypatch):
 def test_where_no_net_covers_a_surface_it_is_to_be_rounded_where_it_is_bent_most_inside_its_edge(bent):
     told = refused(bent, None, DesignWish())
     assert (told.why, told.spacing, told.radius) == (Why.NET, 0.0, pytest.approx(0.75))
-    assert "no net of 0 m covers the surface; it is curved most at (1.5, 2, 3) m, to a radius of 0.5 m" in told.what
+    assert (
+        "no net of 0 m covers the surface; it is curved most at (1.5, 2, 3) m, to a radius of 0.5 m"
+        in told.what
+    )
     assert told.remedy == "Round the surface there to 0.75 m or more."
 
 
