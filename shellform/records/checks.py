@@ -18,7 +18,7 @@ from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below,
 from shellform.records.optimisation import OptimisationRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import constraint_title, load_title, number
+from shellform.records.words import constraint_titles, load_title, number
 
 BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made
 _AT_LEAST = ("softness", "slackness")  # of which as much is demanded, not at most
@@ -259,11 +259,12 @@ def _of_the_optimiser(
     if record is None:
         return []
     found = []
+    titles = constraint_titles(record.constraints)
     for name, value in record.constraints.items():
         cell = replace(_constraint(name, value), remedy=_EVALUATIONS)
         limit = "at least what is demanded" if name.partition(".")[0] in _AT_LEAST else "up to the limit"
         cells = {design: cell if design == "optimised" else UNASKED for design in designs}
-        found.append(Check(f"Optimiser: {constraint_title(name)}", limit, cells))
+        found.append(Check(f"Optimiser: {titles[name]}", limit, cells))
     if record.cables_max is not None:
         most = record.cables_max.asked
         cells = {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from shellform.records.failures import RareRecord
 from shellform.records.summary import BuiltShapeRecord, DesignRecord, StandingRecord, Summary
@@ -64,11 +64,17 @@ def design_title(name: str) -> str:
     return TITLES.get(name, name)
 
 
-def constraint_title(name: str) -> str:
-    """A constraint of the optimiser in words: its quantity, and its load case if it has one."""
-    kind, _, load = name.partition(".")
-    words = _CONSTRAINTS.get(kind, kind.replace("_", " "))
-    return f"{words}, {'no' if load == 'none' else load} load" if load else words
+def constraint_titles(names: Iterable[str]) -> dict[str, str]:
+    """The optimiser's constraints in words, by name: their quantity, and their load case where they have one. Those under the
+    design load name none, which is told where the same quantity is limited under other loads too."""
+    parts = {name: name.partition(".")[::2] for name in names}
+    elsewhere = {kind for kind, load in parts.values() if load}
+    titles = {}
+    for name, (kind, load) in parts.items():
+        under = load or ("design" if kind in elsewhere else "")
+        words = _CONSTRAINTS.get(kind, kind.replace("_", " "))
+        titles[name] = f"{words}, {'no' if under == 'none' else under} load" if under else words
+    return titles
 
 
 def number(value: float, digits: int = 3) -> str:

@@ -19,7 +19,7 @@ from shellform.output.page.first_answers import answers
 from shellform.output.page.shown_run import ShownRun
 from shellform.records.check import Cell
 from shellform.records.summary import BuiltShapeRecord, StandingRecord, VerdictRecord
-from shellform.records.words import constraint_title, number
+from shellform.records.words import constraint_titles, number
 from shellform.structure.elements.state import State
 from tests.net.edge_shells import barrel
 from tests.records.made import optimisation, summary
@@ -157,12 +157,15 @@ def test_no_two_curves_of_a_chart_look_alike():
     assert chart.svg.count('again"') == 3
 
 
-def test_a_constraint_of_the_unloaded_state_is_told_in_words():
-    assert [constraint_title(f"utilisation{each}") for each in ("", ".none", ".additional")] == [
-        "rods' stress",
-        "rods' stress, no load",
-        "rods' stress, additional load",
-    ]
+def test_constraints_of_one_quantity_are_told_apart_by_their_loads():
+    names = ["utilisation.none", "utilisation", "cable_force", "utilisation.additional", "misfit.additional"]
+    assert constraint_titles(names) == {
+        "utilisation.none": "rods' stress, no load",
+        "utilisation": "rods' stress, design load",
+        "cable_force": "cable forces",
+        "utilisation.additional": "rods' stress, additional load",
+        "misfit.additional": "misfit, additional load",
+    }
 
 
 @pytest.mark.parametrize(("first", "last", "largest"), [(0, 60, 0.37), (200, 263, 410.0), (3, 9, 2.2e-4)])

@@ -179,10 +179,8 @@ def _charts(history: Sequence[Step]) -> list[charts.Chart]:
     at = [float(step.evaluation) for step in steps]
     terms = {"objective": [step.objective for step in steps]}
     terms |= {name.replace("_", " "): [step.terms[name] for step in steps] for name in steps[0].terms}
-    limits = {
-        words.constraint_title(name): [step.constraints[name] for step in steps]
-        for name in steps[0].constraints
-    }
+    titles = words.constraint_titles(steps[0].constraints)
+    limits = {title: [step.constraints[name] for step in steps] for name, title in titles.items()}
     found = [charts.line_chart("Objective and its terms", at, terms)]
     if limits:
         title = "Constraints: beyond the limit, as a share of it (allowed up to 0; cut at −1.5 and 1)"

@@ -27,7 +27,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.output.pictures.curves import read_history as read_history
 from shellform.output.pictures.legend import Ramp, Word
-from shellform.records.words import constraint_title
+from shellform.records.words import constraint_titles
 from shellform.written import door, whole
 
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
@@ -86,7 +86,8 @@ def constraint_history(
     """
     at, lines = _columns(evaluation, constraints)
     figure, axes = _figure()
-    _curves(axes, at, {constraint_title(name): line for name, line in lines.items()})
+    titles = constraint_titles(lines)
+    _curves(axes, at, {titles[name]: line for name, line in lines.items()})
     values = np.concatenate(list(lines.values()))
     highest, lowest = float(np.nanmax(values, initial=0.0)), float(np.nanmin(values, initial=0.0))
     if highest > _WIDE:
