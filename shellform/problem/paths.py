@@ -22,7 +22,8 @@ def follow(
     shell: Gridshell, design: Design, loads: Mapping[str, Reals], *, stay: bool = False
 ) -> dict[str, Loaded]:
     """The documented path of a design: unloaded from the target shape by relaxation, then each load case on
-    its own from there, step by step (loading.py). `shellform analyse` goes the same way.
+    its own from there, step by step (loading.py), heeding what a step may leap over. `shellform analyse` goes the same
+    way.
 
     The cases, forces (n, 6), N and Nm, are solved side by side on the cores. With `stay` snap-through isn't followed.
     Raises InputError for forces of another shape, NotConverged where no equilibrium is found.
@@ -40,7 +41,7 @@ def follow(
             own = idle.pop()
         except IndexError:
             own = first.beside()
-        found = apply_load(own, unloaded.state, none, load, stay=stay)
+        found = apply_load(own, unloaded.state, none, load, stay=stay, heeding=True)
         idle.append(own)
         return found
 

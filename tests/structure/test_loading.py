@@ -236,6 +236,9 @@ def test_supports_take_the_free_nodes_along_by_the_tangent_where_that_folds_noth
         (1.0, 1.0, -0.1, True),
         (-1.0, -1.0, 0.1, True),
         (1.0, -1.0, 0.0, False),
+        (1.0, 4.0, 1.0, False),  # stands still at one place
+        (10.0, 1.0, 5.0, False),  # its slope falls below nothing beyond its end only …
+        (1.0, 10.0, 5.0, False),  # … and before its begin
         (2.0, 23.5 * 2.0, 6.0 * 2.0, True),  # von Mises' x (1 - x) (1 - x/2) from 0 to 5
     ],
 )

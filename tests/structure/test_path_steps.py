@@ -190,6 +190,49 @@ def test_a_path_that_the_load_leads_nowhere_either_is_given_up_where_it_is(monke
     assert led.ends == [], "a displacement that leads does so alone"
 
 
+def doubtful(monkeypatch, way):
+    """A path whose steps turn out as `way` says by their size, beside a kink: "leaps", "back", "missed" or nothing."""
+    curve = Curve(lambda x: 2.0 * x)
+    ahead = curve.step
+
+    def step(here, size):
+        found = ahead(here, size)
+        if way(size) == "missed":
+            raise Missed
+        return curve.at(here.state - 0.5 * size) if way(size) == "back" else found
+
+    curve.step, curve.assembly = step, None
+    monkeypatch.setattr(path, "kinked", lambda *_: True)
+    monkeypatch.setattr(
+        path, "turns_between", lambda before, after, mean: way(curve.sizes[-1]) == "leaps" and mean > 0.0
+    )
+    return curve
+
+
+def test_of_the_doubted_steps_over_a_kink_the_shortest_is_taken_once_a_shorter_one_is_missed(monkeypatch):
+    """Steps of 0.05 and 0.0125 are doubted, one of a sixteenth of that leads back, and none shorter leads on."""
+    ways = {0.05: "leaps", 0.0125: "leaps", 0.003125: "back"}
+
+    def way(size):
+        return next((how for known, how in ways.items() if abs(size - known) < 1e-9), "missed")
+
+    curve = doubtful(monkeypatch, way)
+    with pytest.raises(NotConverged, match="within 5 points"):
+        followed(monkeypatch, curve, goal=1.0, first=0.1, most=5)
+    assert curve.sizes[:4] == pytest.approx([0.05, 0.0125, 0.003125, 0.00078125])
+    assert curve.sizes[4] == pytest.approx(0.0125), "from 0.0125 on"
+
+
+def test_a_doubted_step_is_taken_where_a_shorter_one_would_be_the_last(monkeypatch):
+    curve = doubtful(monkeypatch, lambda size: "leaps")
+    sizes = [
+        0.05 * 0.25**k for k in range(10)
+    ]  # of which a quarter of the last is less than a millionth of the first
+    with pytest.raises(NotConverged, match=f"within 10 points .load factor {2.0 * sizes[-1]:.6g}"):
+        followed(monkeypatch, curve, goal=1.0, first=0.1, most=10)
+    assert curve.sizes == pytest.approx(sizes)
+
+
 def test_a_step_back_over_a_kink_is_missed(monkeypatch):
     """With as many negative eigenvalues the load goes on as before; found beyond a kink, a point of less load lies behind."""
     curve = Curve(lambda x: 2.0 * x if x > -0.01 else 9.0 * x)

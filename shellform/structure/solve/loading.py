@@ -101,14 +101,22 @@ def apply_load(
     smallest: float = SMALLEST,
     tolerance: float = TOLERANCE,
     stay: bool = False,
+    heeding: bool = False,
     report: Reached | None = None,
 ) -> Loaded:
     """The equilibrium under the load `after` (n, 6), reached from the equilibrium `start` under the load
     `before`; see `advance`.
     """
-    drive = forces(after - before, base=before)
     return advance(
-        assembly, start, drive, step=step, smallest=smallest, tolerance=tolerance, stay=stay, report=report
+        assembly,
+        start,
+        forces(after - before, base=before),
+        step=step,
+        smallest=smallest,
+        tolerance=tolerance,
+        stay=stay,
+        heeding=heeding,
+        report=report,
     )
 
 
