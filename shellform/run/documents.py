@@ -31,6 +31,7 @@ def built_design(run: Run) -> Built:
         adjustment=run.case.cable.adjustment,
         block=TitleBlock(block.date, block.revision, block.author),
         origin=run.case.surface.origin,
+        loads=run.loads,
     )
 
 

@@ -16,6 +16,7 @@ import shellform as sf
 from shellform import tables
 from shellform.errors import InputError
 from shellform.gridshell.layers import TwoLayers
+from shellform.gridshell.reactions import reactions
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
 from shellform.output.workshop.setting_out import support_plan
@@ -296,17 +297,23 @@ def test_a_survey_that_finds_each_crossing_where_the_schedule_expects_it_finds_n
     np.testing.assert_allclose(places, built.states["none"].positions[nodes], atol=1e-6)
 
 
-def test_the_rods_press_on_their_supports_with_the_load(shell):
+def test_supports_are_pressed_on_with_all_of_the_load_also_what_stands_on_them(shell):
     load = 0.3 * shell.point_load(6.9, every=2)
+    load[shell.net.supports, 2] = -0.1
     loads = {"none": np.zeros_like(load), "design": load}
     found = sf.follow(shell, shell.design(), loads)
     built = schedules.Built(
-        shell, shell.design(), {name: each.equilibrium.state for name, each in found.items()}
+        shell,
+        shell.design(),
+        {name: each.equilibrium.state for name, each in found.items()},
+        loads=loads,
     )
     table = schedules.supports(built)
     for name, weight in (("erected", 0.0), ("design", float(load[:, 2].sum()))):
         total = [sum(table.column(f"{name}: on the support along {axis} [N]")) for axis in "xyz"]
         assert total == pytest.approx([0.0, 0.0, weight], abs=1e-4)
+    held = reactions(shell, built.design, built.states["design"], load).supports
+    assert table.column("design: on the support along z [N]") == pytest.approx([-s.force[2] for s in held])
 
 
 def test_splices_are_told_with_the_moment_that_they_bear(built, net):

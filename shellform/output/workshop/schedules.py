@@ -27,7 +27,7 @@ round loses stability (erection.py), and no cable pulls more than 5.0 N on the w
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +67,8 @@ class Built:
     the job's `title`; `block`: what the title block says of who drew it and when.
     `hung`: the state in which cables are hung in, the erected grid before bracing (None: the target). `adjustment`, m:
     the turnbuckles' range, by which cables are let out from the lengths that they are cut to (None: each is cut for
-    itself). `origin` (3,), m: where coordinates count from in those of a survey (None: the file's)."""
+    itself). `origin` (3,), m: where coordinates count from in those of a survey (None: the file's). `loads` (n, 6), N,
+    of the states: what stands on a support goes straight into it (left out: nothing does)."""
 
     shell: Gridshell
     design: Design
@@ -78,6 +79,7 @@ class Built:
     adjustment: float | None = None
     block: TitleBlock = TitleBlock()
     origin: tuple[float, float, float] | None = None
+    loads: Mapping[str, Reals] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if "none" not in self.states:
@@ -283,17 +285,19 @@ def clashing_supports(built: Built) -> list[tuple[int, int, float]]:
 
 
 def support_forces(built: Built) -> dict[str, Reals]:
-    """With which force (n, 3), N, rods act on each node at each load, in order; away from supports that is the
-    load."""
+    """With which force (n, 3), N, the shell and what stands on its supports act on the ground at each node and load,
+    in order: the reactions' opposite, nothing away from supports."""
     assembly = assemble(built.shell.network(built.design))
+    none = np.zeros((built.shell.node_count, 6))
     return {
-        name: -assembly.evaluate(built.states[name], tangent=False).force[:, :3] for name in _in_order(built)
+        name: -assembly.unbalanced(built.states[name], built.loads.get(name, none))[:, :3]
+        for name in _in_order(built)
     }
 
 
 def supports(built: Built) -> Table:
     """The supports: which end of which rod, where its axis stands, how it leaves the ground: bearing from x
-    and rise, rad; and with which force the rod acts on it at each load."""
+    and rise, rad; and which force acts on it at each load."""
     grid, place = built.grid, built.shell.target.positions
     ends = {
         int(rod.nodes[side]): (name, word, place[rod.nodes[inner]] - place[rod.nodes[side]])
@@ -315,20 +319,13 @@ def supports(built: Built) -> Table:
         near = ", ".join(f"S{b if a == support else a}" for a, b, _ in clashes if support in (a, b))
         rows.append((f"S{support}", rod, side, x, y, z, bearing, rise, near, *forces))
     heads = [
-        "support",
-        "rod",
-        "end",
-        "x [m]",
-        "y [m]",
-        "z [m]",
-        "bearing of the rod [rad]",
-        "rise of the rod [rad]",
-        "clashes with",
-    ]
+        "support", "rod", "end", "x [m]", "y [m]", "z [m]",
+        "bearing of the rod [rad]", "rise of the rod [rad]", "clashes with",
+    ]  # fmt: skip
     heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
     notes = (
-        "Supports stand where they are: before, during and after the pour. Forces are those of the rods' "
-        "ends on them, and at the feet of edge beams (E0, E1, …) those of the beams.",
+        "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them, "
+        "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
         f"Supports whose axes are nearer than {1e3 * shoe_width(built):.3g} mm, the width of a shoe (three rod "
         "diameters), clash: "
         + (", ".join(f"S{a} and S{b}, {1e3 * apart:.1f} mm" for a, b, apart in clashes) or "none")
