@@ -387,11 +387,11 @@ def test_marks_and_splices_stand_on_the_rod_strips_where_they_are_on_the_rods(bu
                 for mark in strokes
                 if mark.layer == layer and abs(np.mean(mark.points, axis=0)[1] - y) < 1e-9
             ]
-            for layer in ("CROSSINGS", "SUPPORTS")
+            for layer in ("CROSSINGS", "SPLICES")
         }
         assert at["CROSSINGS"] == pytest.approx((1e3 * rod.marks).tolist())
         cuts = sorted(starts[number] - {0.0})
-        assert sorted(at["SUPPORTS"]) == pytest.approx([cut - 0.08 * 55.0 for cut in cuts])
+        assert sorted(at["SPLICES"]) == pytest.approx([cut - 0.08 * 55.0 for cut in cuts])
         for layer, told in (
             ("FIRST_MARKS", [f"{mark:.1f}" for mark in 1e3 * rod.marks]),
             ("CROSSING_NUMBERS", [str(k) for k in rod.crossings]),
@@ -400,7 +400,7 @@ def test_marks_and_splices_stand_on_the_rod_strips_where_they_are_on_the_rods(bu
             assert [mark.text for mark in own] == told
             assert [mark.place[0] for mark in own] == pytest.approx((1e3 * rod.marks).tolist())
             assert all((mark.place[1] > y) == (layer == "FIRST_MARKS") for mark in own)
-        own = [mark for mark in words_on(sheet, "SUPPORT_NUMBERS") if y - 0.5 * 55.0 < mark.place[1] < y]
+        own = [mark for mark in words_on(sheet, "SPLICES") if y - 0.5 * 55.0 < mark.place[1] < y]
         assert sorted(mark.text for mark in own) == sorted(f"splice {cut:.1f}" for cut in cuts)
     assert len(words_on(sheet, "ROD_NAMES")) == 6
 

@@ -2,15 +2,18 @@
 and 1.5 m along v, rods going on past them by as much.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from shellform.gridshell.layers import TwoLayers
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import drawings, layout, setting_out
 from shellform.output.workshop.marks import Ring, Sheet, Span, Stroke, Words, box_of, free, overlap, square
 from shellform.output.workshop.nesting import Bar, Cutting, Piece
+from shellform.structure.elements.sections import Material, Round
 
 GRID = lattice_grid(
     np.array([(i, j) for i in range(3) for j in range(3)]), spacing=(2.0, 1.5), gap=0.05, elements=2, tail=1
@@ -36,6 +39,7 @@ def built():
         net=SimpleNamespace(grid=GRID, edges=(), supports=np.array([0, len(GRID.flat) - 1])),
         node_count=len(GRID.flat),
         cable_ends=ends,
+        rod=SimpleNamespace(section=Round(0.01, Material(40e9, 15e9))),
     )
     design = SimpleNamespace(present=np.array([True, True, False]), radius=0.01)
     return SimpleNamespace(grid=GRID, shell=shell, design=design)
@@ -90,6 +94,20 @@ def test_spans_tell_the_crossings_rows_and_the_rods_ends(built):
     ]
 
 
+def test_edge_beams_that_lie_beside_the_flat_rods_make_the_flat_grid_no_wider(built, monkeypatch):
+    monkeypatch.setattr(layout, "label", lambda *_: "")
+    flat = np.vstack([GRID.flat, [(40.0, -30.0, 2.0), (50.0, 60.0, 3.0)]])
+    rod = SimpleNamespace(section=None, resized=lambda _: SimpleNamespace(section=None))
+
+    def drawn(grid):
+        net = SimpleNamespace(grid=grid, edges=(), supports=np.array([0]), notes=())
+        return layout.flat_grid(
+            SimpleNamespace(grid=grid, design=built.design, shell=SimpleNamespace(net=net, rod=rod))
+        )
+
+    assert drawn(replace(GRID, flat=flat)) == drawn(GRID)
+
+
 def test_segments_are_counted_wherever_the_grid_begins():
     """Crossings 3 to 5 along u and -2 to 1 along v."""
     lattice = np.array([(i, j) for i in range(3, 6) for j in range(-2, 2)])
@@ -131,13 +149,13 @@ def test_rods_are_told_with_their_marks_and_splices_one_under_the_other(built):
     assert [mark.text for mark in on(sheet.marks, "CUT_LENGTHS", Words)] == [
         "L = 8000.0", "L = 8000.0", "L = 6000.0", "L = 6000.0", "L = 6000.0",
     ]  # fmt: skip
-    splices = on(sheet.marks, "SUPPORT_NUMBERS", Words)
+    splices = on(sheet.marks, "SPLICES", Words)
     assert [(mark.text, mark.place[0]) for mark in splices] == [
         ("splice 5000.0", 5000.0),
         ("splice 3750.0", 3750.0),
     ]
     assert [mark.place[1] for mark in splices] == pytest.approx([-0.24 * S, -3 * 0.75 * S - 0.24 * S])
-    strokes = on(sheet.marks, "SUPPORTS", Stroke)
+    strokes = on(sheet.marks, "SPLICES", Stroke)
     np.testing.assert_allclose(
         [np.mean(stroke.points, axis=0) for stroke in strokes], [(5000.0, 0.0), (3750.0, -3 * 0.75 * S)]
     )
@@ -158,6 +176,23 @@ def test_rods_are_told_with_their_marks_and_splices_one_under_the_other(built):
     assert sheet.notes[1] == "Cut from bars of 6000 mm as schedules/bars.csv says."
     assert sheet.notes[2].startswith("Red: splices")
     assert len(layout.rod_strips(built, Cutting(9.0, 0.0, (), 0), 0, 1).notes) == 2
+
+
+def test_splices_of_two_laths_near_each_other_are_told_one_below_the_other(built):
+    """In U1 at 5 m and 1 m further on, and at 0.5 m; words of 13 letters are 1.9 m long."""
+    pieces = (Piece(1, 2, 3, 0.5, 4.5), Piece(1, 2, 2, 5.0, 3.0), Piece(1, 2, 2, 6.0, 2.0))
+    rod = SimpleNamespace(section=TwoLayers(built.shell.rod.section))
+    laths = SimpleNamespace(grid=GRID, shell=SimpleNamespace(rod=rod))
+    sheet = layout.rod_strips(laths, Cutting(6.0, 0.003, (Bar(pieces, 0.0),), 1), 1, 3)
+    words = on(sheet.marks, "SPLICES", Words)
+    assert [(mark.text, mark.place) for mark in words] == [
+        ("splice 500.0", (500.0, pytest.approx(-0.24 * S))),
+        ("splice 5000.0", (5000.0, pytest.approx(-0.24 * S))),
+        ("splice 6000.0", (6000.0, pytest.approx(-0.38 * S))),
+    ]
+    others = [mark for mark in sheet.marks if isinstance(mark, Words)]
+    assert not any(overlap(a.box, b.box) for a in words for b in others if a is not b)
+    assert sheet.notes[-1].startswith("Each rod is two laths")
 
 
 def test_levels_are_told_in_order_and_words_give_way_upwards():

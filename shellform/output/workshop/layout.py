@@ -17,11 +17,13 @@ import numpy as np
 from shellform.arrays import Reals
 from shellform.errors import how_many
 from shellform.gridshell.catalogue import label
+from shellform.gridshell.layers import layers_of
 from shellform.net.grid import GridRod
 from shellform.net.notes import NoteKind
 from shellform.output.workshop.block_schedule import block_marks
 from shellform.output.workshop.marks import (
     MM,
+    Box,
     Mark,
     Ring,
     Sheet,
@@ -49,7 +51,10 @@ def flat_grid(built: Built) -> Sheet:
         marks += _rod(built, name, rod, s)
     marks += block_marks(built.shell)
     marks += _ends(built, s, marks)
-    low, high = MM * grid.flat[:, :2].min(axis=0), MM * grid.flat[:, :2].max(axis=0)
+    of_rods = (
+        MM * grid.flat[np.concatenate([rod.nodes for rod in grid.rods]), :2]
+    )  # edge beams aren't laid out flat
+    low, high = of_rods.min(axis=0), of_rods.max(axis=0)
     for direction in "uv":
         marks += _lanes(built, direction, names, low, high, s)
     marks += _spans(built, low, high, s)
@@ -282,24 +287,40 @@ def rod_strips(built: Built, cutting: Cutting, first: int = 0, last: int | None 
                 "CROSSING_NUMBERS", (mark, y - 0.09 * s), height, str(crossing), 0.0, "middle", "top"
             )
             marks += [above, below]
-        for place in cuts.get(number, []):
-            marks.append(
-                Stroke("SUPPORTS", ((place - 0.08 * s, y - 0.08 * s), (place + 0.08 * s, y + 0.08 * s)))
-            )
-            marks.append(
-                Words(
-                    "SUPPORT_NUMBERS",
-                    (place, y - 0.13 * s - height),
-                    height,
-                    f"splice {place:.1f}",
-                    0.0,
-                    "middle",
-                    "top",
-                )
-            )
+        marks += _splices(sorted(set(cuts.get(number, []))), y, s, height)
     notes = (
         "Above each rod: distance of the mark from its first end (left). Below: number of the crossing.",
         f"Cut from bars of {MM * cutting.stock:g} mm as schedules/bars.csv says.",
         *(["Red: splices of rods that are longer than the stock."] if cuts else []),
+        *(
+            ["Each rod is two laths, marked alike; from which pieces each is made: schedules/bars.csv."]
+            if layers_of(built.shell.rod.section) == 2
+            else []
+        ),
     )
     return Sheet("Rods", tuple(marks), height, notes)
+
+
+def _splices(places: Sequence[float], y: float, s: float, height: float) -> list[Mark]:
+    """A stroke through the rod at each of the places, and below it where it is; of two near each other one a line
+    lower."""
+    marks: list[Mark] = []
+    taken: list[Box] = []
+    for place in places:
+        lines = [
+            Words(
+                "SPLICES",
+                (place, y - 0.24 * s - 0.14 * s * line),
+                height,
+                f"splice {place:.1f}",
+                0.0,
+                "middle",
+                "top",
+            )
+            for line in range(2)
+        ]
+        words = next((each for each in lines if free(each, taken)), lines[0])
+        taken.append(words.box)
+        marks.append(Stroke("SPLICES", ((place - 0.08 * s, y - 0.08 * s), (place + 0.08 * s, y + 0.08 * s))))
+        marks.append(words)
+    return marks

@@ -40,6 +40,7 @@ PENS = {
     "FIRST_MARKS": Pen("#6a3d9a", 0.18),
     "SUPPORTS": Pen("#000000", 0.35),
     "SUPPORT_NUMBERS": Pen("#b00020", 0.18),
+    "SPLICES": Pen("#b00020", 0.35),
     "CABLES": Pen("#007a5a", 0.35),
     "CABLE_NAMES": Pen("#00543e", 0.18),
     "LEADERS": Pen("#9a9a9a", 0.09, dashed=True),
