@@ -3,6 +3,7 @@
 import ast
 import re
 import sys
+from dataclasses import replace
 
 import gmsh
 import numpy as np
@@ -79,6 +80,15 @@ def test_the_3dm_file_has_rods_cables_and_supports_on_layers_in_metres(folder, b
     assert len(found["supports"]) == len(built.shell.net.supports)
     assert len(found["crossings"]) == len(grid.lattice)
     assert len(found["target"]["target"].Geometry.Vertices) == len(vault.vertices)
+
+
+def test_the_3dm_file_says_from_where_its_coordinates_count(built, vault, tmp_path):
+    moved = replace(built, origin=(430000.0, 81000.25, 400.0))
+    for case, told in ((moved, " ".join(moved.origin_notes)), (built, None)):
+        exports.write_3dm(tmp_path / "model.3dm", case, vault)
+        model = rhino3dm.File3dm.Read(str(tmp_path / "model.3dm"))
+        (target,) = (each for each in model.Objects if each.Attributes.Name == "target")
+        assert dict(target.Attributes.GetUserStrings()).get("coordinates") == told
 
 
 def test_what_the_3dm_file_s_objects_say_of_themselves_is_true_under_each_load(folder, built):

@@ -213,7 +213,9 @@ def test_elevations_show_the_shell_from_the_front_and_above_it_from_the_side():
     grid = SimpleNamespace(rods=(SimpleNamespace(direction="v", nodes=np.arange(3)),))
     net = SimpleNamespace(edges=(), supports=np.array([0, 2]))
     shell = SimpleNamespace(net=net, target=SimpleNamespace(positions=place))
-    marks = setting_out.elevations(SimpleNamespace(grid=grid, shell=shell)).marks
+    marks = setting_out.elevations(
+        SimpleNamespace(grid=grid, shell=shell, origin=None, origin_notes=())
+    ).marks
     front, side = on(marks, "RODS_V", Stroke)
     up = 2500.0 + 0.3 * 5000.0  # the height, and a gap of the width's share
     np.testing.assert_allclose(front.points, [(1000.0, 0.0), (3000.0, 2500.0), (6000.0, 750.0)])

@@ -19,7 +19,7 @@ from shellform.gridshell.layers import TwoLayers
 from shellform.gridshell.reactions import reactions
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
-from shellform.output.workshop.setting_out import support_plan
+from shellform.output.workshop.setting_out import elevations, support_plan
 from shellform.site.measurements import read_places
 from shellform.structure.elements.sections import Material, Rectangle
 
@@ -455,9 +455,11 @@ def test_the_files_speak_of_millimetres_and_degrees(built, tmp_path):
 def test_coordinates_that_count_from_a_survey_s_origin_say_so_wherever_they_are_listed(built):
     moved = replace(built, origin=(430000.0, 81000.25, 400.0))
     told = "Coordinates count from (430000, 81000.25, 400) m: add it for those of the survey."
-    for make in (schedules.supports, schedules.survey, support_plan):
+    for make in (schedules.supports, schedules.survey, support_plan, elevations):
         assert told in make(moved).notes
         assert not any("count from" in note for note in make(built).notes)
+    assert "of the surface's file" in elevations(built).notes[0]
+    assert "file" not in elevations(moved).notes[0]
 
 
 def test_a_shoe_is_three_times_as_wide_as_the_rod_s_larger_side():

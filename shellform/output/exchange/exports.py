@@ -126,6 +126,7 @@ def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "d
         items.append(Item("crossings", str(k), point[None], strings=strings))
     about = {"job": built.title, "design": built.name, "load": load, "date": built.block.date}
     about |= {"revision": built.block.revision, "author": built.block.author}
+    about |= {"coordinates": " ".join(built.origin_notes)}
     told = {name: value for name, value in about.items() if value}
     items.append(Item("target", "target", target.vertices, target.triangles, told))
     with whole(path, ".3dm") as partial:

@@ -156,8 +156,11 @@ def elevations(built: Built) -> Sheet:
         )
         marks.append(Words("DIMENSIONS", (left, crown + up + 3.0 * height), 1.3 * height, title))
     notes = (
-        "The shell as it is to stand (the target), by the rods' axes. Levels are z in mm of the surface's file.",
+        "The shell as it is to stand (the target), by the rods' axes. Levels are z in mm of the surface's file."
+        if built.origin is None
+        else "The shell as it is to stand (the target), by the rods' axes. Levels are z in mm.",
         "Where it is expected at each stage: schedules/survey.csv.",
+        *built.origin_notes,
     )
     return Sheet("Elevations", tuple(marks), height, notes)
 
