@@ -14,17 +14,17 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from shellform.arrays import Indices, Reals, read_arrays
+from shellform.arrays import Damaged, Reals, read_arrays
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import InputError, how_many, require_count, require_known, require_number
+from shellform.errors import InputError, how_many, require_count, require_file, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.site import calibration, erection, measurements, retensioning
-from shellform.site.scans import Scan, match, read_points
+from shellform.site.scans import Scan, read_points
+from shellform.site.surveys import doubtful, read_survey
 from shellform.structure.elements.state import State
-from shellform.surface.units import unit_factor
 from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
@@ -142,8 +142,8 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
     goal = run.states[name][options.load].positions
-    nodes, places, doubts = _surveyed(measured, shell, belief.state, options)
-    learnt = retensioning.learn(shell, belief, nodes, places, noise=options.noise)
+    seen = read_survey(measured, shell, belief.state, unit=options.unit)
+    learnt = retensioning.learn(shell, belief, seen.nodes, seen.places, noise=options.noise)
     step = retensioning.adjust(shell, learnt, goal, options.crew, noise=options.noise)
     where = made(output or run.folder / "schedules")
     files = [where / each for each in ("turns.csv", "predicted.csv", "belief.npz")]
@@ -163,8 +163,9 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     count = int(np.count_nonzero(step.turns))
     size = len(goal)
     lines = [
-        *doubts,
-        f"{how_many(len(places), 'node was', 'nodes were')} seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
+        *seen.doubts,
+        *doubtful(seen, belief, learnt, noise=options.noise),
+        f"{how_many(len(seen.nodes), 'node was', 'nodes were')} seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
         f"should be (root mean square)",
         f"{how_many(count, 'cable', 'cables')} to turn, {how_many(int(np.abs(step.turns).sum()), 'turn', 'turns')} "
         f"of {1e3 * options.step:g} mm; "
@@ -194,7 +195,7 @@ def replay(
     """
     require_count(rounds, where="--replay", give="a number of rounds, such as 3")
     require_number(
-        slip, least=0.0, most=1.0, where="--slip", give="a share of a turn, such as 0.05, or 0 for none"
+        slip, least=0.0, most=1.0, where="--slip", give="a share of each turn, such as 0.05, or 0 for none"
     )
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
@@ -295,7 +296,14 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     design, state = run.designs[name], run.states[name][options.load]
     if options.after is None:
         return name, shell, retensioning.drawn(shell, design, state, load, length_error=options.length_error)
-    data = read_arrays(options.after)
+    remedy = "Name the schedules/belief.npz of the round before."
+    require_file(options.after)
+    try:
+        data = read_arrays(options.after)
+    except Damaged as error:
+        raise InputError(
+            "isn't what shellform survey leaves", where=str(options.after), remedy=remedy
+        ) from error
     lacking = {
         "rest_length",
         "present",
@@ -310,8 +318,13 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
             "was not left by shellform survey: it lacks what a belief has",
             where=str(options.after),
             value=", ".join(sorted(lacking)),
-            remedy="Name the schedules/belief.npz of the round before.",
+            remedy=remedy,
         )
+    if (
+        data["positions"].shape != state.positions.shape
+        or data["rest_length"].shape != design.rest_length.shape
+    ):
+        raise InputError("belongs to another run", where=str(options.after), remedy=remedy)
     if str(data["origin"]) != f"{name}/{options.load}" or not np.array_equal(data["present"], design.present):
         raise InputError(
             "belongs to another design or load case",
@@ -322,41 +335,6 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
     there = State(data["positions"], data["quaternions"])
     return name, shell, retensioning.Belief(known, data["covariance"], there, load)
-
-
-def _surveyed(
-    path: Path, shell: Gridshell, expected: State, options: Survey
-) -> tuple[Indices, Reals, list[str]]:
-    """Nodes, their places in the model's axes, and what is doubtful. Points without names are laid onto the
-    crossings by a rigid motion.
-    """
-    if measurements.has_column(path, "node") or measurements.has_column(path, "crossing"):
-        metres = unit_factor(options.unit, where="--unit")
-        nodes, places = measurements.read_places(path, shell)
-        places = metres * places
-        seen = np.isfinite(places).all(axis=1)
-        if not seen.any():
-            raise InputError(
-                "no node was seen", where=str(path), remedy="Give at least one node a measured place."
-            )
-        nodes, places = nodes[seen], places[seen]
-        away = np.linalg.norm(places - expected.positions[nodes], axis=1)
-        worst = int(np.argmax(away))
-        if away[worst] > 0.5 * shell.net.spacing:
-            raise InputError(
-                f"node {nodes[worst]} lies {1e3 * away[worst]:.1f} mm from where it is expected, more than "
-                f"half a spacing",
-                where=str(path),
-                remedy="Check the unit, the axes and the numbering; leave the columns node and crossing out "
-                "to have points laid onto the model.",
-            )
-        return nodes, places, []
-    points = read_points(path, unit=options.unit)
-    crossings = shell.net.grid.crossing_nodes[:, 1]
-    found = match(points, expected.positions[crossings], reach=0.5 * shell.net.spacing)
-    places = found.places(points)
-    seen = np.isfinite(places).all(axis=1)
-    return crossings[seen], places[seen], list(found.doubts)
 
 
 def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, goal: Reals) -> str:

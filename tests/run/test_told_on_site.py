@@ -61,7 +61,9 @@ def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
     )  # fmt: skip
     asked = []
     monkeypatch.setattr(onsite, "_believed", lambda *_: ("polished", SHELL, belief))
-    monkeypatch.setattr(onsite, "_surveyed", lambda *_: ([1, 3], [0, 0], ["One point is far."]))
+    seen = SimpleNamespace(nodes=[1, 3], places=[0, 0], doubts=("One point is far.",))
+    monkeypatch.setattr(onsite, "read_survey", lambda *_, unit: seen)
+    monkeypatch.setattr(onsite, "doubtful", lambda *_, noise: [f"Noise is {noise}."])
     monkeypatch.setattr(onsite.retensioning, "learn", lambda *how, noise: asked.append(noise) or learnt)
 
     def adjust(shell, belief, goal, crew, *, noise):
@@ -71,12 +73,12 @@ def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
 
     monkeypatch.setattr(onsite.retensioning, "adjust", adjust)
     found = onsite.survey(tmp_path, tmp_path / "survey.csv", options)
-    assert found.lines[0] == "One point is far."
-    assert "2 nodes were seen; the grid lies 5.000 mm from" in found.lines[1]
-    assert found.lines[2].startswith(second)
-    assert len(found.lines) == lines + 1
+    assert found.lines[:2] == ["One point is far.", "Noise is 0.0002."]
+    assert "2 nodes were seen; the grid lies 5.000 mm from" in found.lines[2]
+    assert found.lines[3].startswith(second)
+    assert len(found.lines) == lines + 2
     if halved:
-        assert "halved 2 times" in found.lines[3]
+        assert "halved 2 times" in found.lines[4]
     assert asked[0] == 0.2e-3
     assert (asked[1][0].step, asked[1][0].largest, asked[1][0].cables) == (0.5e-3, 0.002, 20)
     with (tmp_path / "schedules/predicted.csv").open(encoding="utf-8", newline="") as file:
@@ -87,46 +89,6 @@ def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
     with np.load(tmp_path / "schedules/belief.npz") as kept:
         assert str(kept["origin"]) == "polished/wet"
         np.testing.assert_array_equal(kept["positions"], now.state.positions)
-
-
-@pytest.mark.parametrize(("unit", "metre"), [("m", 1.0), ("mm", 1e3)])
-def test_named_nodes_are_taken_as_far_as_they_were_seen_and_refused_beyond_half_a_spacing(
-    monkeypatch, tmp_path, unit, metre
-):
-    def read(by):
-        places = POSITIONS[[1, 2, 4]] + [[0.0, 0.0, 0.0], [0.0, 0.0, by], [np.nan, 0.0, 0.0]]
-        return lambda path, shell: (np.array([1, 2, 4]), metre * places)
-
-    monkeypatch.setattr(onsite.measurements, "has_column", lambda path, name: name == "crossing")
-    monkeypatch.setattr(onsite.measurements, "read_places", read(-0.199))
-    nodes, places, doubts = onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit=unit))
-    assert (nodes.tolist(), doubts) == ([1, 2], [])
-    np.testing.assert_allclose(places, [[1.0, 0.0, 0.0], [2.0, 0.0, -0.199]])
-    monkeypatch.setattr(onsite.measurements, "read_places", read(-0.201))
-    with pytest.raises(InputError, match=r"node 2 lies 201\.0 mm from"):
-        onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit=unit))
-    with pytest.raises(InputError, match="isn't a known unit"):
-        onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit="mile"))
-    nowhere = np.full((1, 3), np.nan)
-    monkeypatch.setattr(onsite.measurements, "read_places", lambda *_: (np.array([1]), nowhere))
-    with pytest.raises(InputError, match="no node was seen"):
-        onsite._surveyed(tmp_path, SHELL, STATE, Survey())
-
-
-def test_points_without_names_are_laid_onto_the_crossings_within_half_a_spacing(monkeypatch, tmp_path):
-    asked = []
-
-    def match(points, expected, *, reach):
-        asked.append((points, expected.tolist(), reach))
-        places = np.array([[1.0, 2.0, 3.0], [np.nan, 0.0, 0.0], [4.0, 5.0, 6.0]])
-        return SimpleNamespace(places=lambda points: places, doubts=("far",))
-
-    monkeypatch.setattr(onsite.measurements, "has_column", lambda path, name: False)
-    monkeypatch.setattr(onsite, "read_points", lambda path, *, unit: unit)
-    monkeypatch.setattr(onsite, "match", match)
-    nodes, places, doubts = onsite._surveyed(tmp_path, SHELL, STATE, Survey(unit="cm"))
-    assert asked == [("cm", POSITIONS[[1, 3, 4]].tolist(), 0.2)]
-    assert (nodes.tolist(), places.tolist(), doubts) == ([1, 4], [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], ["far"])
 
 
 def test_a_replay_tells_what_is_left_after_each_round_and_draws_lengths_of_the_error_that_is_given(
@@ -211,6 +173,16 @@ def test_the_round_after_goes_on_from_what_was_believed_of_the_same_design_and_l
     for changes in ({"origin": "initial/wet"}, {"present": np.array([True, True, True])}, {"load": "none"}):
         with pytest.raises(InputError, match="another design or load case"):
             believed(**changes)
+    for changes in ({"positions": POSITIONS[1:]}, {"rest_length": np.array([1.0, 2.0])}):
+        with pytest.raises(InputError, match=r"belongs to another run\. Name the schedules/belief"):
+            believed(**changes)
+    for file, what in (
+        ("no.npz", "no such file"),
+        ("text.npz", r"isn't what .* leaves\. Name the schedules/belief"),
+    ):
+        (tmp_path / "text.npz").write_text("cable,turns\n", encoding="utf-8")
+        with pytest.raises(InputError, match=what):
+            onsite._believed(run, Survey(load="wet", after=tmp_path / file))
     del kept["radius"], kept["covariance"]
     with pytest.raises(InputError, match=r"lacks what a belief has.*covariance, radius"):
         believed()
@@ -224,5 +196,5 @@ def test_the_round_after_goes_on_from_what_was_believed_of_the_same_design_and_l
 
 @pytest.mark.parametrize("slip", [-0.01, 1.01, np.nan])
 def test_a_turn_s_error_is_a_share_of_it(run, tmp_path, slip):
-    with pytest.raises(InputError, match="--slip"):
+    with pytest.raises(InputError, match=r"--slip.*a share of each turn"):
         onsite.replay(tmp_path, Survey(), rounds=1, seed=0, slip=slip)
