@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import tomli_w
 
-from shellform.arrays import Damaged, Reals, read_arrays
+from shellform.arrays import Reals, read_arrays
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import InputError, how_many, require_count, require_file, require_known, require_number
+from shellform.errors import Damaged, InputError, how_many, require_count, require_file, require_known, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.site import calibration, erection, measurements, retensioning
@@ -320,18 +320,19 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
             value=", ".join(sorted(lacking)),
             remedy=remedy,
         )
-    if (
-        data["positions"].shape != state.positions.shape
-        or data["rest_length"].shape != design.rest_length.shape
-    ):
-        raise InputError("belongs to another run", where=str(options.after), remedy=remedy)
-    if str(data["origin"]) != f"{name}/{options.load}" or not np.array_equal(data["present"], design.present):
+    if str(data["origin"]) != f"{name}/{options.load}":
         raise InputError(
             "belongs to another design or load case",
             where=str(options.after),
             value=str(data["origin"]),
             remedy="Give the --design and --load of that round.",
         )
+    if (
+        data["positions"].shape != state.positions.shape
+        or data["rest_length"].shape != design.rest_length.shape
+        or not np.array_equal(data["present"], design.present)
+    ):
+        raise InputError("belongs to another run", where=str(options.after), remedy=remedy)
     known = replace(design, rest_length=data["rest_length"], radius=float(data["radius"]))
     there = State(data["positions"], data["quaternions"])
     return name, shell, retensioning.Belief(known, data["covariance"], there, load)

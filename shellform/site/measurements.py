@@ -61,6 +61,15 @@ def cells_of(file: Path, numbered: list[tuple[int, str]], delimiter: str) -> lis
     return rows
 
 
+def too_many_cells(file: Path, line: int, cells: int, columns: int) -> InputError:
+    """What a line with more cells than the file has columns is refused with: numbers with decimal commas have two."""
+    return InputError(
+        f"has {cells} cells for {columns} columns",
+        where=f"{file}, line {line}",
+        remedy="Give each line a cell for each column, empty ones too, and write numbers with decimal points.",
+    )
+
+
 def read_table(
     path: str | Path, needed: tuple[str, ...], optional: tuple[str, ...] = (), *, empty: tuple[str, ...] = ()
 ) -> list[MeasuredRow]:
@@ -95,11 +104,7 @@ def read_table(
     rows = []
     for (number, _), cells in zip(kept[1:], lines[1:], strict=True):
         if len(cells) > len(names):
-            raise InputError(
-                f"has {len(cells)} cells for {len(names)} columns",
-                where=f"{file}, line {number}",
-                remedy="Give each line a cell for each column, empty ones too.",
-            )
+            raise too_many_cells(file, number, len(cells), len(names))
         values = {}
         for name in [each for each in (*needed, *optional) if each in names]:
             place = names.index(name)

@@ -20,7 +20,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
-from shellform.site.measurements import cells_of, text_of
+from shellform.site.measurements import cells_of, text_of, too_many_cells
 from shellform.structure.elements.state import State
 from shellform.surface.units import unit_factor
 
@@ -101,11 +101,14 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
     rows = cells_of(file, numbered, delimiter)
     columns = [0, 1, 2]
     names = [each.strip().lower() for each in rows[0]] if rows else []
-    if {"x", "y", "z"} <= set(names):
+    named = {"x", "y", "z"} <= set(names)
+    if named:
         columns = [names.index(each) for each in "xyz"]
         rows, numbered = rows[1:], numbered[1:]
     found = []
     for (line, _), row in zip(numbered, rows, strict=True):
+        if named and len(row) > len(names):
+            raise too_many_cells(file, line, len(row), len(names))
         cells = [row[k].strip() if k < len(row) else "" for k in columns]
         if any(cells):
             try:
@@ -115,7 +118,11 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
                     "must be three numbers",
                     where=f"{file}, line {line}",
                     value=cells,
-                    remedy="Name the columns x, y, z in the first line.",
+                    remedy="Write them with decimal points: 0.0125."
+                    if any("," in cell for cell in cells)
+                    else "Write three numbers, or none where a marker is hidden."
+                    if named
+                    else "Name the columns x, y, z in the first line.",
                 ) from error
     if not found:
         raise InputError(

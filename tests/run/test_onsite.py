@@ -275,7 +275,7 @@ def test_bad_options_are_refused(folder, tmp_path):
         ({"length_error": 1e308}, "--length-error"),
         ({"load": "storm"}, "--load"),
         ({"design": "best"}, "--design"),
-        ({"after": tmp_path / "none.npz"}, "isn't there"),
+        ({"after": tmp_path / "none.npz"}, "no such file"),
     ):
         with pytest.raises(InputError, match=said):
             onsite.survey(folder, good, onsite.Survey(**options))

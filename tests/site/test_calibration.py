@@ -202,6 +202,10 @@ def test_scans_are_read_in_their_unit_with_or_without_names(tmp_path):
         ("1,2\n", "line 1"),
         ("# none\n", "no points"),
         ("1,2,nan\n", "not finite"),
+        ("x;y;z\n1,5;2,5;3,5\n", "line 2: must be three numbers.*decimal points"),
+        ("x,y,z\n1,5,2,5,3,5\n", "line 2: has 6 cells for 3 columns.*decimal points"),
+        ("x,y,z\n1,,3\n", "line 2: must be three numbers.*or none where a marker is hidden"),
+        ("east,north,up\n1,2,3\n", "line 1: must be three numbers.*Name the columns"),
         ('1,2,3\n"4,5,6\n7,8,9\n', "line 2: can't be parted into cells"),
         (f'1,2,3\n4,5,"{200_000 * "6"}"\n', "line 2: can't be parted into cells.*field limit"),
     ]:
