@@ -29,6 +29,10 @@ from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
 
+_ABOVE = (
+    1.5  # times the noise: of the hundreds of coordinates of a scan their deviation is told to a few percent
+)
+
 
 @dataclass(frozen=True)
 class SiteResult:
@@ -70,7 +74,13 @@ def calibrate(
     write_text(files[1], tomli_w.dumps({"joint": joint}))
     seen = 1e3 * found.after[np.isfinite(found.after)]
     line = f"distances to the model: {seen.mean():.3f} mm on average, {seen.max():.3f} mm at most"
-    return SiteResult([*found.sentences(), line], files)
+    lines = [*found.sentences(), line]
+    if found.residual > _ABOVE * noise:
+        lines.append(
+            f"doubtful: that is {1e3 * found.residual:.2f} mm a coordinate, {found.residual / noise:.1f} times --noise: check that "
+            "each scan has the load that it was taken under, and --design the grid that was built"
+        )
+    return SiteResult(lines, files)
 
 
 def _built(
@@ -274,6 +284,7 @@ def erect(
         stage=np.array([each.stage for each in done.steps]),
     )
     worst, last = done.worst, done.steps[-1]
+    breaks = "rods break on the way: give the supports other --way points, or choose thinner or stronger rods"
     return SiteResult(
         [
             f"{len(done.steps)} steps: {', '.join(dict.fromkeys(each.stage for each in done.steps))}",
@@ -282,6 +293,7 @@ def erect(
             f"{1e-6 * last.stress:.0f} MPa in the end",
             f"largest cable tension {max(each.tension for each in done.steps):.3g} N, largest force on a "
             f"support {max(each.reaction for each in done.steps):.3g} N",
+            *([breaks] if worst.stress > done.strength else []),
         ],
         files,
     )

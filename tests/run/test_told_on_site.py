@@ -125,11 +125,11 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
     steps = [
         step("moving", 0.5, 80e6, 1.0, 40.0), step("moving", 1.0, 120e6, 7.5, 30.0), step("loading", 1.0, 60e6, 2.0, 9.0)
     ]  # fmt: skip
-    asked = []
+    asked, strength = [], 240e6
 
     def erect(shell, own, **how):
         asked.append((own, how["load"], how["weight"], how["lift"], how["step"]))
-        return SimpleNamespace(steps=steps, worst=steps[1], strength=240e6, table=lambda: "table")
+        return SimpleNamespace(steps=steps, worst=steps[1], strength=strength, table=lambda: "table")
 
     monkeypatch.setattr(onsite.erection, "erect", erect)
     found = onsite.erect(tmp_path, load="wet", lift="none", step=0.125)
@@ -139,6 +139,29 @@ def test_an_erection_tells_its_worst_stress_and_the_largest_forces(monkeypatch, 
         "largest rod stress 120 MPa, 0.50 of the strength, at 1.00 of moving; 60 MPa in the end",
         "largest cable tension 7.5 N, largest force on a support 40 N",
     ]
+    strength = 119e6
+    assert onsite.erect(tmp_path, load="wet", lift="none", step=0.125).lines[3:] == [
+        "rods break on the way: give the supports other --way points, or choose thinner or stronger rods"
+    ]
+
+
+@pytest.mark.parametrize(("residual", "doubtful"), [(0.29e-3, False), (0.32e-3, True)])
+def test_a_calibration_that_leaves_more_than_the_noise_is_doubtful(
+    monkeypatch, run, tmp_path, residual, doubtful
+):
+    found = SimpleNamespace(
+        joint=SimpleNamespace(axial=1.0, torsion=2.0, bending=3.0, gap=0.004),
+        after=np.array([[0.001], [np.nan], [0.003]]),
+        residual=residual,
+        sentences=lambda: ["torsion = 2"],
+        table=lambda: "",
+    )
+    monkeypatch.setattr(onsite, "_built", lambda *_, **__: (SHELL, None, {}, tmp_path))
+    monkeypatch.setattr(onsite.calibration, "calibrate", lambda *_, **__: found)
+    lines = onsite.calibrate(tmp_path, [], noise=0.2e-3).lines
+    assert lines[:2] == ["torsion = 2", "distances to the model: 2.000 mm on average, 3.000 mm at most"]
+    assert len(lines) == 2 + doubtful
+    assert not doubtful or "0.32 mm a coordinate, 1.6 times --noise" in lines[2]
 
 
 def test_a_design_and_a_load_are_those_named_or_the_usual_and_there(run):
