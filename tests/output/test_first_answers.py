@@ -7,6 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from shellform.gridshell.catalogue import label
+from shellform.gridshell.edge_beams import EdgeBeam
 from shellform.gridshell.layers import TwoLayers
 from shellform.output.page import first_answers
 from shellform.output.page.first_answers import answers
@@ -164,6 +166,7 @@ def shell_of(section, strength):
     )
     return SimpleNamespace(
         net=net,
+        edge=None,
         cables=lambda design: cables,
         cable_ends=np.zeros((8, 2)),
         rod=SimpleNamespace(
@@ -200,6 +203,20 @@ def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, 
     assert buy.detail == (
         "3 rods, 5 connectors, 4 supports, 3 cables of 4.75 m in all, cut to 2 different lengths"
     )
+
+
+@pytest.mark.parametrize(("density", "told"), [(7850.0, " (58.9 kg)"), (0.0, "")])
+def test_edge_beams_are_bought_too(density, told):
+    """Two of 2 and of 1 m, of 50 × 50 mm: 19.6 kg/m."""
+    shell = shell_of(Rectangle(0.05, 0.035, Material(12e9, 0.75e9)), 24e6)
+    place = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.0]])
+    shell.net.edges = tuple(SimpleNamespace(ends=np.array(ends)) for ends in ([(0, 1), (1, 2)], [(2, 3)]))
+    shell.net.target = SimpleNamespace(positions=place)
+    steel = Rectangle(0.05, 0.05, Material(210e9, 81e9, density))
+    shell.edge = EdgeBeam(steel)
+    none = SimpleNamespace(designs={}, documents=None)
+    *_, buy = answers(shell, "best", SimpleNamespace(radius=0.02), {}, none)
+    assert buy.detail.endswith(f"4.75 m in all, 2 edge beams of 3 m in all{told}, {label(steel)}")
 
 
 def test_nothing_is_told_of_a_design_that_was_not_examined_and_no_share_of_an_unknown_strength():

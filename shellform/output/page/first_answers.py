@@ -12,6 +12,7 @@ import numpy as np
 
 from shellform.errors import how_many
 from shellform.gridshell.catalogue import label
+from shellform.gridshell.edge_beams import lengths, mass
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
@@ -87,19 +88,29 @@ def answers(
         found.append(_is_safe(main, more, as_built, math.isfinite(shell.rod.strength)))
     if shell.net.stretches:
         found.append(_stands_on(shell.net, more))
-    mass, laths = mass_per_length(section) * float(rods.sum()), layers_of(section)
-    weight = f" ({number(mass)} kg)" if mass > 0.0 else ""
-    lengths = None if summary.documents is None else summary.documents.cut_lengths
-    cut = "" if lengths is None else f", cut to {lengths} different lengths"
+    heavy, laths = mass_per_length(section) * float(rods.sum()), layers_of(section)
+    weight = f" ({number(heavy)} kg)" if heavy > 0.0 else ""
+    cut_to = None if summary.documents is None else summary.documents.cut_lengths
+    cut = "" if cut_to is None else f", cut to {cut_to} different lengths"
     found.append(
         Answer(
             "What to buy?",
             f"{number(laths * float(rods.sum()))} m of {'rod' if laths == 1 else 'laths, two a rod'}{weight}",
             f"{len(rods)} rods, {len(shell.net.grid.lattice)} connectors, {len(shell.net.supports)} supports, "
-            f"{how_many(len(cables.ends), 'cable', 'cables')} of {number(float(cables.rest_length.sum()))} m in all{cut}",
+            f"{how_many(len(cables.ends), 'cable', 'cables')} of {number(float(cables.rest_length.sum()))} m in all{cut}{_beams(shell)}",
         )
     )
     return found
+
+
+def _beams(shell: Gridshell) -> str:
+    """The edge beams to buy, which may be heavier than all rods."""
+    if shell.edge is None or not shell.net.edges:
+        return ""
+    heavy = mass(shell.net, shell.edge)
+    length, weight = number(float(lengths(shell.net).sum())), f" ({number(heavy)} kg)" if heavy > 0.0 else ""
+    count = how_many(len(shell.net.edges), "edge beam", "edge beams")
+    return f", {count} of {length} m in all{weight}, {label(shell.edge.section)}"
 
 
 def _slack(main: LoadRecord | None, row: DesignRecord | None) -> str:
