@@ -60,7 +60,10 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     exports.write_exports(run.folder / "models", built, run.surface, run.loads)
     if exports.no_step():
         report(Event("documents", f"no STEP file: {exports.no_step()}", Kind.NOTE))
-    notes = cutting_notes(cutting, schedules.rod_names(run.net.grid))
+    notes = (
+        *cutting_notes(cutting, schedules.rod_names(run.net.grid)),
+        *schedules.cutting_of_cables(built)[1:],
+    )
     for note in notes[1:]:
         report(Event("documents", note, Kind.NOTE))
     return DocumentsRecord(

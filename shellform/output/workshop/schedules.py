@@ -44,6 +44,7 @@ from shellform.output.workshop.block_schedule import block_table
 from shellform.output.workshop.edge_schedule import edge_names, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.splice_schedule import cutting_notes, splice_table
+from shellform.output.workshop.turnbuckles import turnbuckle_notes
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -260,15 +261,13 @@ def cut_counts(built: Built) -> dict[str, int]:
 
 
 def cutting_of_cables(built: Built) -> tuple[str, ...]:
-    """To how many lengths cables are cut, in words; nothing where each is cut for itself."""
-    counts = cut_counts(built)
-    if built.adjustment is None or "cut_lengths" not in counts:
+    """To how many lengths cables are cut, and what their turnbuckles can't reach; nothing where each is cut for itself."""
+    if built.adjustment is None or not built.design.present.any():
         return ()
-    return (
-        f"Cut to {counts['cut_lengths']} different lengths, the fewest for {counts['rest_lengths']} "
-        "different rest lengths and turnbuckles that "
-        f"let a cable out by {1e3 * built.adjustment:g} mm from its cut length.",
-    )
+    ties = built.shell.cables(built.design)
+    hung = ties.lengths(built.hung or built.shell.target)
+    count = cut_counts(built)["rest_lengths"]
+    return turnbuckle_notes(ties.rest_length, hung, built.adjustment, lengths=count)
 
 
 def shoe_width(built: Built) -> float:
