@@ -143,11 +143,27 @@ def test_the_edge_s_lengths_are_added_up_by_kind(used, beams, told):
         edges=beams,
         supports=range(14),
     )
-    answer = first_answers._stands_on(net, replace(MORE, edge_utilisation_max=used))
+    answer = first_answers._stands_on(net, replace(MORE, edge_utilisation_max=used), {})
     assert answer.words == "3.75 m on the ground, 4 m on edge beams, 0.5 m free"
     assert answer.detail == "14 supports" + (
         "; edge beams, drawn dark, at 42 % of their strength" if told else ""
     )
+
+
+def test_what_supports_have_to_take_is_told_of_the_worst_load():
+    net = SimpleNamespace(stretches=[SimpleNamespace(kind="ground", length=2.0)], edges=(), supports=range(3))
+    loads = {
+        "none": replace(MORE, uplift_max=350.0, thrust_max=40.0),
+        "design": replace(MORE, uplift_max=20.0, thrust_max=125.0),
+        "older": replace(MORE, uplift_max=None, thrust_max=None),
+    }
+    told = first_answers._stands_on(net, None, loads).detail
+    assert (
+        told
+        == "3 supports, held down with up to 350 N and pushed sideways by up to 125 N each, erected or loaded"
+    )
+    del loads["none"], loads["design"]
+    assert first_answers._stands_on(net, None, loads).detail == "3 supports"
 
 
 def shell_of(section, strength):

@@ -87,7 +87,7 @@ def answers(
     if more is not None:
         found.append(_is_safe(main, more, as_built, math.isfinite(shell.rod.strength)))
     if shell.net.stretches:
-        found.append(_stands_on(shell.net, more))
+        found.append(_stands_on(shell.net, more, {} if row is None else row.loads))
     heavy, laths = mass_per_length(section) * float(rods.sum()), layers_of(section)
     weight = f" ({number(heavy)} kg)" if heavy > 0.0 else ""
     cut_to = None if summary.documents is None else summary.documents.cut_lengths
@@ -132,15 +132,27 @@ def _listed(names: Sequence[str], most: int = 8) -> str:
     )
 
 
-def _stands_on(net: Net, more: LoadRecord | None) -> Answer:
-    """The lengths of the edge by kind."""
+def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord]) -> Answer:
+    """The lengths of the edge by kind, and what its supports have to take at most under any of the loads."""
     lengths: dict[str, float] = {}
     for each in net.stretches:
         lengths[each.kind] = lengths.get(each.kind, 0.0) + each.length
     words = ", ".join(f"{number(length)} m {_EDGES[kind]}" for kind, length in lengths.items())
     used = None if more is None else more.edge_utilisation_max
     beams = f"; edge beams, drawn dark, at {100 * used:.0f} % of their strength" if net.edges and used else ""
-    return Answer("What does its edge stand on?", words, f"{len(net.supports)} supports{beams}")
+    needs = [
+        f"{what} {number(most)} N"
+        for what, most in (
+            ("held down with up to", max((each.uplift_max or 0.0 for each in loads.values()), default=0.0)),
+            (
+                "pushed sideways by up to",
+                max((each.thrust_max or 0.0 for each in loads.values()), default=0.0),
+            ),
+        )
+        if most > 0.0
+    ]
+    taken = f", {' and '.join(needs)} each, erected or loaded" if needs else ""
+    return Answer("What does its edge stand on?", words, f"{len(net.supports)} supports{taken}{beams}")
 
 
 def _how_far(main: LoadRecord, notes: Sequence[str]) -> Answer:
