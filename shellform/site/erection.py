@@ -142,7 +142,14 @@ def erect(
     locked, shell = shell, _sliding(shell)
     unbraced = replace(design, present=np.zeros(len(design.present), dtype=bool))
     site = _Site(shell, unbraced)
-    erected = find_equilibrium(site.assembly, shell.target, own).state
+    try:
+        erected = find_equilibrium(site.assembly, shell.target, own).state
+    except NotConverged as error:
+        raise NotConverged(
+            "The erected grid doesn't stand under the weight before it is braced",
+            state=error.state,
+            remedy="Give a smaller weight, N, downwards negative.",
+        ) from error
     steps = _taken_down(site, erected, way, carried, own, step)
     state, now = (
         erected,

@@ -26,6 +26,7 @@ class MeasuredRow:
 
 
 _NAMED = re.compile(r"[A-Za-z]+(\d+)")  # as drawings and schedules name cables: C12
+_STRETCH = 1.01  # times a rod's length: its ends get no farther apart before it breaks
 _TABLE = "Give a table as CSV in UTF-8, with a head line."
 
 
@@ -233,7 +234,23 @@ def read_way(path: str | Path, shell: Gridshell) -> list[Reals]:
                 value=lacking[0],
                 remedy="Give every support a row in each stop.",
             )
+    for stop, places in stops.items():
+        _refuse_far_ends(stop, places, path, shell)
     return [np.array([stops[stop][node] for node in supports]) for stop in sorted(stops)]
+
+
+def _refuse_far_ends(stop: float, places: dict[int, list[float]], path: str | Path, shell: Gridshell) -> None:
+    """Raises InputError where a stop puts a rod's supports farther apart than the rod is long."""
+    for number, rod in enumerate(shell.net.grid.rods):
+        ends = [places[int(node)] for node in rod.nodes[[0, -1]] if int(node) in places]
+        apart = math.dist(*ends) if len(ends) == 2 else 0.0
+        if apart > rod.length * _STRETCH:
+            raise InputError(
+                f"stop {stop:g} puts the ends of {rod.direction.upper()}{number} {apart:.4g} m apart, farther than it is long",
+                where=str(path),
+                value=round(rod.length, 6),
+                remedy="Give metres, each support at its own node.",
+            )
 
 
 def _number(cell: str, where: str, may_be_empty: bool) -> float:

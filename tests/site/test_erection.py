@@ -132,6 +132,8 @@ def test_erections_that_can_t_be_are_refused(shell):
         erect(shell, design, step=0.0)
     with pytest.raises(InputError, match="every cable of the design once"):
         erect(shell, design, groups=[[0, 1]], step=1.0)
+    with pytest.raises(NotConverged, match=r"doesn't stand under the weight.*smaller weight"):
+        erect(shell, design, weight=1e4 * shell.point_load(1.0), step=1.0)
     with pytest.raises(NotConverged, match="bears 0"):
         erect(shell, shell.unbraced(), load=shell.point_load(30.0), step=0.5)
     with pytest.raises(NotConverged, match="loses stability"):

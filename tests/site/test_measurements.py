@@ -23,7 +23,14 @@ from shellform.site.measurements import (
 SHELL = SimpleNamespace(
     node_count=6,
     net=SimpleNamespace(
-        grid=SimpleNamespace(crossing_nodes=np.array([[0, 3], [1, 5]])), supports=np.array([4, 2])
+        grid=SimpleNamespace(
+            crossing_nodes=np.array([[0, 3], [1, 5]]),
+            rods=(
+                SimpleNamespace(direction="u", nodes=np.array([2, 0, 4]), length=6.0),
+                SimpleNamespace(direction="v", nodes=np.array([2, 3, 5]), length=0.1),
+            ),
+        ),
+        supports=np.array([4, 2]),
     ),
 )
 
@@ -136,9 +143,14 @@ def test_supports_on_their_way_come_in_the_order_of_the_net_s_stop_after_stop(wr
         ("1,3,0,0,0\n", r"line 2: node: is no support \(found 3\). Supports: 4, 2"),
         ("1,4,0,0,0\n1,4,0,0,0\n", r"line 3: node: is there twice in one stop \(found 4\)"),
         ("1,2,0,0,0\n", r"stop 1 lacks 1 support \(found 4\)"),
+        (
+            "1,2,0,0,0\n1,4,0,6.07,0\n",
+            r"stop 1 puts the ends of U0 6.07 m apart, farther than it is long \(found 6.0\)",
+        ),
     ]:
         with pytest.raises(InputError, match=said):
             read_way(written(head + text), SHELL)
+    assert len(read_way(written(head + "1,2,0,0,0\n1,4,0,6.05,0\n"), SHELL)) == 1
 
 
 def test_noise_is_between_a_nanometre_and_a_kilometre():
