@@ -15,6 +15,9 @@ from shellform.gridshell.reactions import Reactions, Support, reactions
 from shellform.net.edges import stand
 from shellform.output.exchange.opensees import opensees_script
 from shellform.output.workshop.edge_schedule import edge_table
+from shellform.output.workshop.marks import Words, overlap
+from shellform.output.workshop.schedules import Built
+from shellform.output.workshop.setting_out import support_plan
 from shellform.problem.paths import follow
 from shellform.structure.answers.sensitivity import reaction_rows
 from shellform.structure.elements.sections import Material, Rectangle, isotropic
@@ -248,6 +251,19 @@ def test_stiffer_edge_beams_hold_the_shape_better(arches, solved):
         for each in (solved["none"], state)
     ]
     assert off[1] < off[0]
+
+
+def test_edge_beams_are_named_beside_their_middles_on_the_plan_of_supports(arches):
+    shell, _ = arches
+    state = shell.target
+    sheet = support_plan(Built(shell, shell.design(), {"none": state, "design": state}))
+    words = [mark for mark in sheet.marks if isinstance(mark, Words) and mark.layer == "EDGE_BEAMS"]
+    assert [each.text for each in words] == ["E0", "E1"]
+    for each, line in zip(words, shell.net.edges, strict=True):
+        middle = 1e3 * state.positions[line.nodes[len(line.nodes) // 2], :2]
+        assert np.linalg.norm(np.array(each.place) - middle) < 1e3 * shell.net.spacing
+    others = [mark for mark in sheet.marks if isinstance(mark, Words)]
+    assert not any(overlap(a.box, b.box) for a in words for b in others if a is not b)
 
 
 def test_edge_beams_weigh_what_they_are_long(arches):

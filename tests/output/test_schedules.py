@@ -507,7 +507,7 @@ def test_supports_of_rods_and_of_edge_beams_lead_from_their_feet_to_the_next_nod
     assert first[:6] == ("S1", "U0", "first", 1.0, 2.0, 0.5)
     assert first[6:9] == (pytest.approx(np.pi / 2.0), pytest.approx(np.arctan2(4.0, 3.0)), "S0, S2")
     assert first[9:] == (0.0,) * 6
-    assert second[:6] == ("S2", "U0", "second", 12.0, 2.0, 3.0)
+    assert second[:6] == ("S2", "U0, E0", "second, first", 12.0, 2.0, 3.0)
     assert second[6:9] == (pytest.approx(np.arctan2(4.0, -3.0)), pytest.approx(0.0), "S1")
     assert second[9:] == (4.0, -8.0, 12.0, 40.0, -80.0, 120.0)
     assert table.columns[9:] == tuple(

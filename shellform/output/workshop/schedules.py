@@ -306,7 +306,8 @@ def supports(built: Built) -> Table:
     for name, line in zip(edge_names(built.shell.net), built.shell.net.edges, strict=True):
         for tip, inner, word in ((0, 1, "first"), (-1, -2, "second")):
             foot, following = (int(node) for node in line.nodes[[tip, inner]])
-            ends.setdefault(foot, (name, word, place[following] - place[foot]))
+            names, words, along = ends.get(foot, ("", "", place[following] - place[foot]))
+            ends[foot] = f"{names}, {name}" if names else name, f"{words}, {word}" if words else word, along
     pushes = support_forces(built)
     rows, clashes = [], clashing_supports(built)
     for support, node in enumerate(built.shell.net.supports.tolist()):
@@ -324,7 +325,8 @@ def supports(built: Built) -> Table:
     heads += [f"{_stage(name)}: on the support along {axis} [N]" for name in pushes for axis in "xyz"]
     notes = (
         "Supports stand where they are: before, during and after the pour. Forces are those of the rods' ends on them, "
-        "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself.",
+        "at the feet of edge beams (E0, E1, …) those of the beams, with the load that stands on the support itself. Of beams that "
+        "meet in one the direction is the first one's.",
         f"Supports whose axes are nearer than {1e3 * shoe_width(built):.3g} mm, the width of a shoe (three rod "
         "diameters), clash: "
         + (", ".join(f"S{a} and S{b}, {1e3 * apart:.1f} mm" for a, b, apart in clashes) or "none")

@@ -43,11 +43,17 @@ def support_plan(built: Built) -> Sheet:
     for name, line in zip(edge_names(built.shell.net), built.shell.net.edges, strict=True):
         path = place[np.append(line.ends[:, 0], line.ends[-1, 1]), :2]
         marks.append(Stroke("EDGE_BEAMS", tuple(point_of(p) for p in path)))
-        ends |= {int(foot): ends.get(int(foot), name) for foot in line.nodes[[0, -1]]}
+        for foot in dict.fromkeys(line.nodes[[0, -1]].tolist()):
+            ends[foot] = f"{ends[foot]}, {name}" if foot in ends else name
     supports = built.shell.net.supports
     middle, rows = place[supports, :2].mean(axis=0), []
     height = 0.13 * s
     taken = [box_of(square(place[node, :2], 0.05 * s)) for node in supports]
+    for name, line in zip(edge_names(built.shell.net), built.shell.net.edges, strict=True):
+        here = place[line.nodes[len(line.nodes) // 2], :2]
+        words = _clear(name, here, here - middle, height, taken, "EDGE_BEAMS")
+        taken.append(words.box)
+        marks.append(words)
     for number, node in enumerate(supports.tolist()):
         here = place[node]
         marks.append(square(here[:2], 0.05 * s))
@@ -88,17 +94,19 @@ def support_plan(built: Built) -> Sheet:
     )
 
 
-def _clear(text: str, here: Reals, away: Reals, height: float, taken: Sequence[Box]) -> Words:
-    """A support's number beside it, outwards, as far off as it takes to lie on no other."""
+def _clear(
+    text: str, here: Reals, away: Reals, height: float, taken: Sequence[Box], layer: str = "SUPPORT_NUMBERS"
+) -> Words:
+    """A support's number beside it, outwards, as far off as it takes to lie on no other; or an edge beam's name."""
     out = away / (np.linalg.norm(away) or 1.0)
     side = "left" if out[0] > 0.3 else "right" if out[0] < -0.3 else "middle"
     foot = "bottom" if out[1] > 0.3 else "top" if out[1] < -0.3 else "middle"
-    words = Words("SUPPORT_NUMBERS", point_of(here + height * out), height, text, 0.0, side, foot)
+    words = Words(layer, point_of(here + height * out), height, text, 0.0, side, foot)
     for step in range(1, 40):
         if free(words, taken):
             break
         words = Words(
-            "SUPPORT_NUMBERS",
+            layer,
             point_of(here + (1.0 + 0.5 * step) * height * out),
             height,
             text,
