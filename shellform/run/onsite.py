@@ -18,7 +18,15 @@ from shellform.arrays import Reals, read_arrays
 from shellform.case.build_gridshell import gridshell
 from shellform.case.build_net import net_of, surface_of
 from shellform.case.case import load_case
-from shellform.errors import Damaged, InputError, how_many, require_count, require_file, require_known, require_number
+from shellform.errors import (
+    Damaged,
+    InputError,
+    how_many,
+    require_count,
+    require_file,
+    require_known,
+    require_number,
+)
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run, refuse_unknown
 from shellform.site import calibration, erection, measurements, retensioning
