@@ -18,6 +18,8 @@ STRAY = 0.01  # of the span from where a step was expected to end: the state bel
 ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
 _PATIENCE = 10  # factorisations of one step
 _FAR_OFF = 5.0  # rad, a step that leads nowhere
+_EASED, _HALF = 0.1, 0.5  # of a mass that is left after a step, at first and at most
+_LEAST, _MOST = 0.01, 1e4  # of the first mass: less is none, and more leads nowhere
 
 Foreseen = tuple[Reals, ...] | None  # deformations of each part of beams
 
@@ -31,6 +33,28 @@ class Here:
     state: State
     balance: Balance
     factor: Factor
+
+
+class Mass:
+    """What is added to tangents that aren't positive definite, N/m, times the shape of implicit dynamic relaxation's mass
+    (equilibrium.py). It begins with what the `largest` force, N, takes away of the stiffness across an element of a
+    usual `length`, m, and is a tenth after each step, or more where a tenth has been too little."""
+
+    def __init__(self, largest: float, length: float) -> None:
+        self.value = 0.0
+        self._first = self._next = largest / length
+        self._left = _EASED
+
+    def grow(self) -> bool:
+        """Makes it larger; False where that leads nowhere."""
+        self.value = self.value / self._left if self.value > 0.0 else self._next
+        self._left = min(self._left**0.5, _HALF)
+        return 0.0 < self.value <= _MOST * self._first
+
+    def ease(self) -> None:
+        """Makes it smaller after a step, in the end none."""
+        self._next = _LEAST * self._first
+        self.value = self._left * self.value if self._left * self.value > self._next else 0.0
 
 
 class Branch:
@@ -88,30 +112,43 @@ class Branch:
         return found if stray <= STRAY * self.span else None
 
     def newton(
-        self, begin: State, load: Reals, *, limit: int, tolerance: float, foreseen: Foreseen = None
+        self,
+        begin: State,
+        load: Reals,
+        *,
+        limit: int,
+        tolerance: float,
+        foreseen: Foreseen = None,
+        damped: bool = False,
     ) -> Here | None:
         """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent that is made
-        positive definite, that of the equilibrium included; None where one isn't. Where rounding leaves more than
+        positive definite, that of the equilibrium included; None where one isn't. `damped`: those on the way that aren't
+        are made so by a mass, which shortens steps. Where rounding leaves more than
         the tolerance, what it leaves counts as none as far as it would on the way. Tangents on the way are those of
         the deformations that were `foreseen`, by the step that led to `begin` and then by each one
         (Assembly.tangent_of); the equilibrium's is its own."""
-        own, state, before, factor = self.assembly, begin, np.inf, None
+        own, state, before, factor, mass = self.assembly, begin, np.inf, None, None
         for _ in range(limit):
             balance = own.evaluate(state, tangent=False)
+            if damped and mass is None:
+                mass = Mass(balance.largest, float(own.arms.mean()))
             residual = self.measure.residual(balance, load)
             if residual <= tolerance:
                 return self.at(state)
             # A step that has brought so much brings as much again with the tangent that it was made with.
-            if factor is None or residual * (residual / before) > tolerance:
+            heavy = mass is not None and mass.value > 0.0
+            if factor is None or heavy or residual * (residual / before) > tolerance:
                 balance = replace(balance, tangent=self._tangent(state, balance, foreseen))
                 noise = self.measure.rounding(balance, state, load) if residual > STAGNANT * before else 0.0
                 if residual <= min(noise, ON_THE_WAY):
                     return self.at(state)
-                factor = self._factor(balance)
+                factor = self._factor(balance, mass)
             before = residual
             change = None if factor is None else self._solved(factor, balance, load)
             if change is None:
                 return None
+            if mass is not None:
+                mass.ease()
             foreseen = self.foreseen(state, balance.turned, change)
             state = moved(state, change)
         return None
@@ -136,13 +173,19 @@ class Branch:
         factor = self._factor(balance)
         return None if factor is None else Here(state, balance, factor)
 
-    def _factor(self, balance: Balance) -> Factor | None:
-        """Of the balance's tangent; None where it isn't positive definite."""
-        self.spent += 1
-        try:
-            return self.assembly.matrix.factor(held(self.assembly, balance))
-        except NotPositiveDefinite:
-            return None
+    def _factor(self, balance: Balance, mass: Mass | None = None) -> Factor | None:
+        """Of the balance's tangent; None where it isn't positive definite, or with a `mass` that may grow no more."""
+        matrix, values = self.assembly.matrix, held(self.assembly, balance)
+        while True:
+            raised = values
+            if mass is not None and mass.value > 0.0:
+                raised = matrix.raised(values, matrix.diagonal, mass.value * self.measure.mass_shape)
+            self.spent += 1
+            try:
+                return matrix.factor(raised)
+            except NotPositiveDefinite:
+                if mass is None or not mass.grow():
+                    return None
 
     def _solved(self, factor: Factor, balance: Balance, load: Reals) -> Reals | None:
         """Newton's step (n, 6), no spin beyond TURN; None where it leads nowhere."""

@@ -37,7 +37,7 @@ FAR = 0.05  # of the span from the perfect structure
 STEP = 1.0  # of the load: most structures bear it whole, and others are followed in smaller steps
 MARKED = 1 / 512  # of the load, next to a factor at which it counts on which side a structure falls
 SOUGHT = 3.0  # load factor up to which a structure's limit is sought
-_RELAXING = 15  # of the unloaded state, before it is relaxed instead
+_RELAXING = 25  # steps to the unloaded state, before it is relaxed instead
 _BESIDE = 10  # factorisations from the perfect structure's loaded state
 _RELAXATIONS = 150  # factorisations of a relaxation: what takes more has none
 SNAPS = 3  # local ones, that a structure may go on after
@@ -247,8 +247,10 @@ class Loading(Branch):
         moved."""
         none = np.zeros_like(self.load)
         begin, foreseen = self._taken_along(self.nominal.unloaded, none, self.bench.unloaded)
-        found = self.newton(begin, none, limit=_RELAXING, tolerance=ON_THE_WAY, foreseen=foreseen)
-        if found is not None:
+        found = self.newton(
+            begin, none, limit=_RELAXING, tolerance=ON_THE_WAY, foreseen=foreseen, damped=True
+        )
+        if found is not None and self._farthest(found.state, begin) <= STRAY * self.span:
             return found
         # By small steps then, from where the errors took the perfect structure, or if that fails from the target.
         for near in (begin, moved(self.nominal.start, self.errors.supports)):

@@ -300,18 +300,19 @@ def test_an_equilibrium_is_beside_within_a_hundredth_of_the_span_of_where_its_ta
 def test_an_unloaded_state_that_newton_s_steps_do_not_find_is_relaxed_from_there_or_from_the_target(
     monkeypatch,
 ):
-    start = at_rest(PLACES)
+    start, along = at_rest(PLACES), away(0.0)
     supports = np.zeros((3, 6))
     supports[0, 0] = 0.01
-    found = ["direct"]
+    direct, astray = (here(away(0.01 * SPAN * share)) for share in (0.99, 1.01))
+    found = [direct]
     asked, settled = [], []
 
-    def newton(state, load, *, limit, tolerance, foreseen=None):
-        settled.append((load.any(), limit, foreseen))
+    def newton(state, load, *, limit, tolerance, foreseen=None, damped=False):
+        settled.append((load.any(), limit, foreseen, damped))
         return found.pop(0)
 
     def find(assembly, near, load, *, limit):
-        asked.append((near if isinstance(near, str) else near.positions[0, 0], load.any(), limit))
+        asked.append(("taken along" if near is along else near.positions[0, 0], load.any(), limit))
         if lost:
             lost.pop()
             raise NotConverged("lost", iterations=40)
@@ -321,17 +322,17 @@ def test_an_unloaded_state_that_newton_s_steps_do_not_find_is_relaxed_from_there
     loading = loading_of(
         bench=SimpleNamespace(unloaded="factor"),
         errors=SimpleNamespace(supports=supports),
-        _taken_along=lambda state, load, factor: ("taken along", "foreseen"),
+        _taken_along=lambda state, load, factor: (along, "foreseen"),
         newton=newton,
     )
     loading.nominal.start = start
     lost = []
-    assert loading._unloaded() == "direct"
-    assert (asked, settled) == ([], [(False, 15, "foreseen")])
-    found[:] = [None, "relaxed at last"]
+    assert loading._unloaded() is direct
+    assert (asked, settled) == ([], [(False, 25, "foreseen", True)])
+    found[:] = [astray, "relaxed at last"]
     assert loading._unloaded() == "relaxed at last"
     assert asked == [("taken along", False, 150)]
-    assert (settled[-1], loading.spent) == ((False, 2, None), 25)
+    assert (settled[-1], loading.spent) == ((False, 2, None, False), 25)
     found[:], lost[:] = [None, "from the target"], ["once"]
     assert loading._unloaded() == "from the target"
     assert asked[-1] == (pytest.approx(0.01), False, 150), "with its supports where they are"
