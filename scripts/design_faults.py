@@ -1,14 +1,15 @@
-"""SIGKILL, Ctrl-C and SIGTERM to a design at random moments of all its stages and phases, each resumed to the end; and
-the same design undisturbed.
+"""SIGKILL, Ctrl-C and SIGTERM to a design at random moments of all its stages and phases, each resumed to the
+end; and the same design undisturbed.
 
     scripts/design_faults.py [--kills 60] [--folder DIR] [--seed 1] [--set ENTRY=VALUE …]
 
-Passes when every disturbed run ends like the undisturbed one, with the same bytes but for seconds, and with no
-traceback, torn or further file, and when what Ctrl-C stops ends with status 130. The case is the vault with wide cells, whose search is led by structures that fall
-before it thins.
+Passes when every disturbed run ends like the undisturbed one, with the same bytes but for seconds, and with
+no traceback, torn or further file, and when what Ctrl-C stops ends with status 130. The case is the vault
+with wide cells, whose search is led by structures that fall before it thins.
 
-Each run is a process forked from this one, which has loaded the program: what a kill leaves is the same, and a run
-is begun again in no time. Moments are counted in processor time, which other work on the machine doesn't change.
+Each run is a process forked from this one, which has loaded the program: what a kill leaves is the same, and
+a run is begun again in no time. Moments are counted in processor time, which other work on the machine
+doesn't change.
 """
 
 from __future__ import annotations
@@ -124,8 +125,8 @@ def run(folder: Path, settings: list[str], *, times: Counter[str] | None = None)
 def disturbed(
     folder: Path, settings: list[str], places: set[str], moment: float, how: signal.Signals
 ) -> tuple[int, str]:
-    """Runs the design until it has been in one of the stages for so many seconds of processor time, and sends it the
-    signal: how it ended (a signal as a negative number), and the stage."""
+    """Runs the design until it has been in one of the stages for so many seconds of processor time, and sends
+    it the signal: how it ended (a signal as a negative number), and the stage."""
     job, since = begin(folder, settings), None
     while True:
         now = stage_of(folder)

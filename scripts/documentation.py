@@ -2,9 +2,10 @@
 
     scripts/docs [FOLDER]
 
-What can be read from the package is written by it: commands from their options, the case file from its schema,
-the keys of summary.json from its records, the public names from their docstrings, verification from the cases that `shellform verify` runs, speed from
-scripts/benchmark.json. The rest stands in shellform/documentation as it is.
+What can be read from the package is written by it: commands from their options, the case file from its
+schema, the keys of summary.json from its records, the public names from their docstrings, verification from
+the cases that `shellform verify` runs, speed from scripts/benchmark.json. The rest stands in
+shellform/documentation as it is.
 """
 
 from __future__ import annotations

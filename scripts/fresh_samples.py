@@ -1,8 +1,8 @@
 """Whether the share of structures that stand, as runs tell it, agrees with fresh samples of the same designs.
 
-The design to build of each RUN is drawn again under a seed of its own, as often as before, under each load; the
-table has both counts with Clopper and Pearson's bounds, both at the confidence of the run, and says whether
-they overlap.
+The design to build of each RUN is drawn again under a seed of its own, as often as before, under each load;
+the table has both counts with Clopper and Pearson's bounds, both at the confidence of the run, and says
+whether they overlap.
 
 Run: PYTHONPATH=. python scripts/fresh_samples.py RUN ... [--seed 977]
 Status 1 where bounds don't overlap.

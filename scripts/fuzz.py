@@ -4,10 +4,10 @@ a processor, and leaves no torn file.
     scripts/fuzz.py [--count 10000] [--seed 1] [--kind KIND …]
 
 Good files of each kind are damaged at random: bits turned, pieces cut, doubled, moved and filled with junk,
-numbers made huge, negative, not a number, values of JSON exchanged for others or for one another, keys swapped and
-doubled, references led round in circles, text written as other systems do. A child process reads them, so
-that a crash or a hang costs nobody anything but is counted. What fails is kept in a folder that is named at
-the end.
+numbers made huge, negative, not a number, values of JSON exchanged for others or for one another, keys
+swapped and doubled, references led round in circles, text written as other systems do. A child process reads
+them, so that a crash or a hang costs nobody anything but is counted. What fails is kept in a folder that is
+named at the end.
 """
 
 from __future__ import annotations
@@ -167,7 +167,8 @@ _WORDS = [
 
 
 def damaged(data: bytes, chance: random.Random, *, numbers: bool = False) -> bytes:
-    """A file's bytes after one to four accidents, to its `numbers` alone where a command is to go on from them."""
+    """A file's bytes after one to four accidents, to its `numbers` alone where a command is to go on from
+    them."""
     for _ in range(chance.choice([1, 1, 1, 2, 4])):
         data = (_number if numbers else chance.choice(_ACCIDENTS))(data, chance)
     return data
@@ -535,8 +536,8 @@ def _line(chance: random.Random, files: dict[str, list[Path]], place: Path) -> N
 
 
 def _command(*words: str | Path) -> None:
-    """A command line in this process. Raises InputError where it ends with the status of bad input or of no result,
-    and what it raises itself."""
+    """A command line in this process. Raises InputError where it ends with the status of bad input or of no
+    result, and what it raises itself."""
     from shellform.cli import program
     from shellform.errors import InputError
 

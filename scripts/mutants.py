@@ -1,22 +1,26 @@
-"""Small faults planted one at a time, and whether the tests notice: signs, factors, comparisons, least and most.
+"""Small faults planted one at a time, and whether the tests notice: signs, factors, comparisons, least and
+most.
 
-    python scripts/mutants.py [--count 200] [--seed 1] [--rooms optimiser output/workshop ...] [--output FILE.json]
+    python scripts/mutants.py [--count 200] [--seed 1] [--rooms optimiser output/workshop ...] [--output
+    FILE.json]
                               [--quick] [--tests TEST-FILE ...]
 
-The likeliest test files of a fault are those of the same room that name the module, then others that do, then all of
-the room. They are run once without any fault, in one process, which tells what fails anyhow and is left out, and
-which of the package's functions each test calls. Then the process is forked for each fault: the child puts the
-faulty function in the sound one's place and runs the tests that call it, those that do so themselves before those
-whose fixtures do, and the quickest first. A fault that no test notices is listed with its line; what nobody could
-notice stands with its reason in scripts/mutants.toml. Status 1 where fewer than 90 % of the others are caught.
+The likeliest test files of a fault are those of the same room that name the module, then others that do, then
+all of the room. They are run once without any fault, in one process, which tells what fails anyhow and is
+left out, and which of the package's functions each test calls. Then the process is forked for each fault: the
+child puts the faulty function in the sound one's place and runs the tests that call it, those that do so
+themselves before those whose fixtures do, and the quickest first. A fault that no test notices is listed with
+its line; what nobody could notice stands with its reason in scripts/mutants.toml. Status 1 where fewer than
+90 % of the others are caught.
 
-A fault in a compiled loop, or where nothing can be put in its place, is planted in a copy of the repository, and whole
-test files are run on it, each in a process of its own: minutes for each fault, left out by --quick. What is compiled
-here is copied along. A compiled loop lies inlined in others' machine code, too, whose own files don't change: a fault
-in one is run with a cache of its own. A test that notices is run without any fault, too.
+A fault in a compiled loop, or where nothing can be put in its place, is planted in a copy of the repository,
+and whole test files are run on it, each in a process of its own: minutes for each fault, left out by --quick.
+What is compiled here is copied along. A compiled loop lies inlined in others' machine code, too, whose own
+files don't change: a fault in one is run with a cache of its own. A test that notices is run without any
+fault, too.
 
-The tools that are at hand (mutmut, cosmic-ray) run all tests on each fault or know one process's modules; here
-a compiled loop has to be compiled anew, and the tests take a quarter of an hour.
+The tools that are at hand (mutmut, cosmic-ray) run all tests on each fault or know one process's modules;
+here a compiled loop has to be compiled anew, and the tests take a quarter of an hour.
 """
 
 from __future__ import annotations
@@ -157,8 +161,8 @@ def _is_text(node: ast.BinOp) -> bool:
 
 
 def listed() -> set[str]:
-    """The names of the faults that stand in mutants.toml with a reason. Raises ValueError where one is for a line that
-    isn't there any more."""
+    """The names of the faults that stand in mutants.toml with a reason. Raises ValueError where one is for a
+    line that isn't there any more."""
     known = set(tomllib.loads(KNOWN.read_text(encoding="utf-8"))) if KNOWN.is_file() else set()
     gone = known - {fault.name for file in (ROOT / "shellform").rglob("*.py") for fault in faults(file)}
     if gone:
@@ -278,8 +282,9 @@ def _lines(code: CodeType) -> tuple[int, int]:
 
 
 class Planter:
-    """A plug-in for pytest that runs the tests as they are, and then on each of the `faults` in a process forked
-    from there. `rows` are what becomes of each, told to `told`; `rest` those that couldn't be planted."""
+    """A plug-in for pytest that runs the tests as they are, and then on each of the `faults` in a process
+    forked from there. `rows` are what becomes of each, told to `told`; `rest` those that couldn't be
+    planted."""
 
     def __init__(self, faults: Sequence[Fault], told: TextIO) -> None:
         self.faults, self.told = faults, told
@@ -350,8 +355,8 @@ class Planter:
         return True
 
     def _noticed(self, fault: Fault, items: Mapping[str, pytest.Item], last: pytest.Item) -> str | None:
-        """What notices a fault, as `_forked`. A test in which a forked process dies or waits for ever without any fault
-        too, for a thread that wasn't forked with it, is left out from then on."""
+        """What notices a fault, as `_forked`. A test in which a forked process dies or waits for ever without
+        any fault too, for a thread that wasn't forked with it, is left out from then on."""
         while True:
             chosen = [items[name] for name in self._calling(fault)]
             told = self._forked(fault, chosen, last)
@@ -387,8 +392,8 @@ class Planter:
     def _forked(
         self, fault: Fault, items: Sequence[pytest.Item], last: pytest.Item, *, planted: bool = True
     ) -> str | None:
-        """The test that notices a fault, "" where none does; None where it can't be planted. With nothing `planted`,
-        the test that fails there anyhow."""
+        """The test that notices a fault, "" where none does; None where it can't be planted. With nothing
+        `planted`, the test that fails there anyhow."""
         if not items:
             return None
         reading, writing = os.pipe()
@@ -451,7 +456,8 @@ def _function(fault: Fault) -> tuple[int, int]:
 
 
 def is_compiled(fault: Fault) -> bool:
-    """Whether it lies in a compiled loop, or outside of all functions in a file of such, from where loops take it."""
+    """Whether it lies in a compiled loop, or outside of all functions in a file of such, from where loops
+    take it."""
     text = (ROOT / fault.file).read_text(encoding="utf-8")
     if _LOOP not in text:
         return False
@@ -495,8 +501,8 @@ def caught_by(fault: Fault, copy: Path, files: Sequence[str], left_out: Sequence
 
 
 def failed(copy: Path, files: Sequence[str], cache: str | None = None, left_out: Sequence[str] = ()) -> str:
-    """The first test in the `files` that fails, but for those `left_out`, with compiled loops in a `cache` where
-    given, else beside the copy's modules."""
+    """The first test in the `files` that fails, but for those `left_out`, with compiled loops in a `cache`
+    where given, else beside the copy's modules."""
     if not files:
         return ""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "--no-header", "--tb=no", "-p", "no:cacheprovider"]
@@ -517,7 +523,8 @@ def failed(copy: Path, files: Sequence[str], cache: str | None = None, left_out:
 
 
 def noticed(fault: Fault, copy: Path, sound: dict[str, bool]) -> str:
-    """The test that notices a fault and passes without it; "" where there is none. `sound` remembers which pass."""
+    """The test that notices a fault and passes without it; "" where there is none. `sound` remembers which
+    pass."""
     while True:
         files = [name for name in likeliest(fault) if sound.get(name, True)]
         told = caught_by(fault, copy, files, [name for name, passes in sound.items() if not passes])

@@ -1,8 +1,9 @@
 """What a page has to keep, seen in a headless Chromium: `python scripts/page_bars.py PAGE...`.
 
-Each page, a run's, a study's or the documentation's, is opened as on a laptop, light and dark, and on a phone: it is smaller than 8 MB, asks for
-nothing but files beside it, says no error, doesn't scroll sideways, draws first within 2 s, and axe-core finds nothing wrong with it. axe-core is
-fetched by npm into a folder that is thrown away. Needs playwright and a Chromium.
+Each page, a run's, a study's or the documentation's, is opened as on a laptop, light and dark, and on a
+phone: it is smaller than 8 MB, asks for nothing but files beside it, says no error, doesn't scroll sideways,
+draws first within 2 s, and axe-core finds nothing wrong with it. axe-core is fetched by npm into a folder
+that is thrown away. Needs playwright and a Chromium.
 """
 
 from __future__ import annotations

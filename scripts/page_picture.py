@@ -1,5 +1,5 @@
-"""Draws the documentation's pictures of pages: `python scripts/page_picture.py DIR`, where DIR is a run with a
-report.html, or a study with a study.html whose picture is named as the folder; needs playwright and a
+"""Draws the documentation's pictures of pages: `python scripts/page_picture.py DIR`, where DIR is a run with
+a report.html, or a study with a study.html whose picture is named as the folder; needs playwright and a
 Chromium."""
 
 import io

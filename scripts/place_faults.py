@@ -1,11 +1,12 @@
-"""A design and a study in places that are against them: two at once on a folder, a disk that is full, folders that can't
-be written, no home, a terminal that knows ASCII alone, and 600 MB of memory.
+"""A design and a study in places that are against them: two at once on a folder, a disk that is full, folders
+that can't be written, no home, a terminal that knows ASCII alone, and 600 MB of memory.
 
     scripts/place_faults.py [--folder DIR] [--only WORD …] [--set ENTRY=VALUE …]
 
-Passes when nothing ends in a traceback or with another status than 0, 2, 3 and, once the place is as it should be, the same
-command gives the same bytes as a run that was never disturbed (but for seconds). Disks and folders are mounted in a name space of
-their own, which needs Linux and `unshare` of util-linux, and no rights.
+Passes when nothing ends in a traceback or with another status than 0, 2, 3 and, once the place is as it
+should be, the same command gives the same bytes as a run that was never disturbed (but for seconds). Disks
+and folders are mounted in a name space of their own, which needs Linux and `unshare` of util-linux, and no
+rights.
 """
 
 from __future__ import annotations
@@ -50,7 +51,8 @@ _TOLD = "TRACEBACK"
 
 @dataclass(frozen=True)
 class Job:
-    """A command by `name` whose `words` follow `shellform`; the `whole` folder is what it gives undisturbed."""
+    """A command by `name` whose `words` follow `shellform`; the `whole` folder is what it gives
+    undisturbed."""
 
     name: str
     words: tuple[str, ...]
@@ -110,7 +112,8 @@ def ended(
     given: Mapping[str, str] | None = None,
     limit: Callable[[], None] | None = None,
 ) -> int | str:
-    """The status with which the job ends on a folder, or what was wrong with it; its words are added to `log`."""
+    """The status with which the job ends on a folder, or what was wrong with it; its words are added to
+    `log`."""
     return _ended(job.command(folder), log, _environment(without, given or {}), limit)
 
 

@@ -9,8 +9,8 @@ Run: PYTHONPATH=. python scripts/strangers.py FOLDER [--files OTHER ...] [--only
      [--processor 150] [--rows FILE]
      [--do make check net new design] [--until safety] [--quick] [--way-out]
  or: PYTHONPATH=. python scripts/strangers.py --report FILE ...
-prints the documentation's table of the rows in files that `--rows` wrote, the last one of each shell and step.
-Each row says of which build it is: a digest of the package's modules.
+prints the documentation's table of the rows in files that `--rows` wrote, the last one of each shell and
+step. Each row says of which build it is: a digest of the package's modules.
 """
 
 from __future__ import annotations
@@ -469,8 +469,8 @@ STRANGERS = (
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: `status` (None: broken off), what it `printed`, its last `words`, the `seconds` that it
-    took, and those of processors."""
+    """How a command ended: `status` (None: broken off), what it `printed`, its last `words`, the `seconds`
+    that it took, and those of processors."""
 
     status: int | None
     printed: str
@@ -525,8 +525,8 @@ def measured(
     processor: float | None = None,
     way_out: Sequence[str] = (),
 ) -> dict[str, Any]:
-    """One row: what each of the steps in `do` came to; `design` with the further options `quick`, `new` with those
-    that let it take a `way_out`."""
+    """One row: what each of the steps in `do` came to; `design` with the further options `quick`, `new` with
+    those that let it take a `way_out`."""
     row: dict[str, Any] = {"name": file.name, "build": build()}
     logs = folder / "logs"
     logs.mkdir(exist_ok=True)
@@ -627,8 +627,8 @@ def build() -> str:
 
 
 def report(files: Sequence[Path]) -> str:
-    """The documentation's table of the rows in the files: the last one of each shell and step; none of designs of
-    another case than the last that `new` wrote."""
+    """The documentation's table of the rows in the files: the last one of each shell and step; none of
+    designs of another case than the last that `new` wrote."""
     proposals: dict[str, dict[str, Any]] = {}
     designs: dict[str, dict[str, Any]] = {}
     latest = ""

@@ -1,10 +1,12 @@
-"""SIGKILL, Ctrl-C and SIGTERM to a study and SIGKILL to its workers at random moments, again and again, until it has
-ended; and the same study undisturbed.
+"""SIGKILL, Ctrl-C and SIGTERM to a study and SIGKILL to its workers at random moments, again and again, until
+it has ended; and the same study undisturbed.
 
     scripts/study_faults.py [--kills 30] [--folder DIR] [--seed 1] [--until STAGE]
 
-Passes when both tables, the lists of designs and what the run folders hold are the same to the byte (but for seconds),
-no design has two rows, every file of the folders can be read, no traceback was told and Ctrl-C ended with status 130. The designs are real ones: a dome of about 1,200 degrees of freedom, from surface to optimised cables.
+Passes when both tables, the lists of designs and what the run folders hold are the same to the byte (but for
+seconds), no design has two rows, every file of the folders can be read, no traceback was told and Ctrl-C
+ended with status 130. The designs are real ones: a dome of about 1,200 degrees of freedom, from surface to
+optimised cables.
 """
 
 from __future__ import annotations

@@ -1,11 +1,13 @@
 """What a study costs besides its designs: one command, a few numbers each.
 
-    scripts/study_measure.py soak [--designs 200]     real small designs on two workers and on one, in turns: throughput, memory over time
-    scripts/study_measure.py thousand [--designs 1000] [--unjudged] a whole study of a small dome, 1,500 degrees of freedom, 15 evaluations each,
+    scripts/study_measure.py soak [--designs 200]     real small designs on two workers and on one, in turns:
+    throughput, memory over time scripts/study_measure.py thousand [--designs 1000] [--unjudged] a whole study
+    of a small dome, 1,500 degrees of freedom, 15 evaluations each,
                                                       judged as built or with nothing asked of them as built
     scripts/study_measure.py overhead                 the engine's time a design, with designs that take none
     scripts/study_measure.py table [--rows 100000]    a table of so many rows: written, opened, filtered
-    scripts/study_measure.py many [--workers 1000]    so many workers in one process, with designs that sleep: what limits them
+    scripts/study_measure.py many [--workers 1000]    so many workers in one process, with designs that sleep:
+    what limits them
 
 Ratios are taken between turns of the same run, since machines are shared: what disturbs one worker's turn
 disturbs the next turn of two.
@@ -56,8 +58,8 @@ def nothing(job: Job, before: Outcome | None = None) -> Outcome:
 
 
 async def asleep(job: Job, before: Outcome | None = None) -> Outcome:
-    """As `nothing`, after about the seconds that the case names its spacing: a thread for each of a thousand workers would keep the
-    machine busy with handing the interpreter around."""
+    """As `nothing`, after about the seconds that the case names its spacing: a thread for each of a thousand
+    workers would keep the machine busy with handing the interpreter around."""
     await asyncio.sleep(job.case.net.spacing * random.uniform(0.5, 1.5))
     return nothing(job)
 

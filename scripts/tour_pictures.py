@@ -1,5 +1,5 @@
-"""Makes the documentation's pictures from a finished run of scripts/scale_model_radius.toml, small enough to be kept beside
-the code.
+"""Makes the documentation's pictures from a finished run of scripts/scale_model_radius.toml, small enough to
+be kept beside the code.
 
 scripts/shellform design scripts/scale_model_radius.toml --output runs/scale_model
 python scripts/tour_pictures.py runs/scale_model

@@ -25,8 +25,8 @@ _KINDS = {"image/png": "png", "text/html": "html"}
 
 
 def load_ipython_extension(ipython):  # typed in the stub
-    """Nets, gridshells and optima show their picture, and where HTML is shown a view to be turned and picked in
-    (`%load_ext shellform`; done by itself where IPython runs).
+    """Nets, gridshells and optima show their picture, and where HTML is shown a view to be turned and picked
+    in (`%load_ext shellform`; done by itself where IPython runs).
     """
     for kind, ending in _KINDS.items():
         formatter = ipython.display_formatter.formatters[kind]

@@ -1,4 +1,5 @@
-"""`python -m shellform`, and the command `shellform`: what has to be done before and after the program itself."""
+"""`python -m shellform`, and the command `shellform`: what has to be done before and after the program
+itself."""
 
 from __future__ import annotations
 

@@ -4,10 +4,11 @@ all later ones.
 The first compilation takes seconds in which nothing else would be seen to happen, so it is announced, once a
 process, unless the environment has SHELLFORM_QUIET, which processes hand on to those that they start.
 
-The cache lies beside the package, or in the user's home where the package can't be written; where neither can,
-in a temporary folder of this process and those that it starts. Processes that compile side by side take turns at a
-function's entry, each machine code has a file of its own name, and it is there before the entry names it: Numba's own
-entry could name the code that another process, or an older version of the function, left under the same number.
+The cache lies beside the package, or in the user's home where the package can't be written; where neither
+can, in a temporary folder of this process and those that it starts. Processes that compile side by side take
+turns at a function's entry, each machine code has a file of its own name, and it is there before the entry
+names it: Numba's own entry could name the code that another process, or an older version of the function,
+left under the same number.
 """
 
 from __future__ import annotations

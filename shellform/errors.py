@@ -51,7 +51,8 @@ def how_many(count: int, one: str, many: str) -> str:
 
 
 def unreadable(error: Exception) -> str:
-    """That a file can't be read, and why: of the system's errors their words alone, without number and path."""
+    """That a file can't be read, and why: of the system's errors their words alone, without number and
+    path."""
     system = error.strerror if isinstance(error, OSError) else None
     return f"can't be read: {system or error}"
 
@@ -89,7 +90,8 @@ def require_number(
 
 
 def require_count(value: int, *, where: str, give: str, least: int = 1, most: float = math.inf) -> None:
-    """Raises InputError for what is no whole number from `least` to `most`; `give` is what to give instead."""
+    """Raises InputError for what is no whole number from `least` to `most`; `give` is what to give
+    instead."""
     try:
         fits = least <= operator.index(value) <= most
     except TypeError as error:
@@ -125,7 +127,8 @@ def _between(above: float, least: float, below: float, most: float) -> str:
 
 
 def not_installed(what: str, extra: str, error: ImportError) -> InputError:
-    """That `what` was asked for needs a library of the optional dependencies `extra`, which can't be loaded."""
+    """That `what` was asked for needs a library of the optional dependencies `extra`, which can't be
+    loaded."""
     return InputError(
         f"{what}: the library {error.name or 'asked for'} can't be loaded ({error})",
         remedy=f'Install it with: pip install "shellform[{extra}]".',

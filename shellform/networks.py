@@ -1,9 +1,9 @@
 """Networks of one's own as models: from plain arrays, from networkx graphs, from COMPAS graphs and meshes.
 
 None of these libraries is imported: what they document is used, `graph.nodes(data=True)` and
-`graph.edges(data=True)` of networkx, `nodes()` or `vertices()`, `edges()`, `node_attribute` and its likes of COMPAS.
-The result is a model (structure/model.py) that `analyse` solves and `write_model` writes, with the keys that its
-nodes had. SI units: m, N.
+`graph.edges(data=True)` of networkx, `nodes()` or `vertices()`, `edges()`, `node_attribute` and its likes of
+COMPAS. The result is a model (structure/model.py) that `analyse` solves and `write_model` writes, with the
+keys that its nodes had. SI units: m, N.
 """
 
 from __future__ import annotations
@@ -103,9 +103,10 @@ def from_arrays(
 
 
 def from_networkx(graph: Any, *, rod: Rod | None = None, cable: float | None = None) -> OwnNetwork:
-    """A networkx graph: nodes have their place as `pos` (x, y, z) or as x, y and z, may have a `support` ("pinned",
-    "fixed" or true) and a `load` (fx, fy, fz), N, which makes the load case "load"; edges are rods, or cables where
-    their `kind` is "cable", which may have a `rest_length`, m. Raises InputError naming the node or edge."""
+    """A networkx graph: nodes have their place as `pos` (x, y, z) or as x, y and z, may have a `support`
+    ("pinned", "fixed" or true) and a `load` (fx, fy, fz), N, which makes the load case "load"; edges are
+    rods, or cables where their `kind` is "cable", which may have a `rest_length`, m. Raises InputError naming
+    the node or edge."""
     if not callable(getattr(graph, "nodes", None)) or not callable(getattr(graph, "edges", None)):
         raise InputError(
             "is no graph: it has no nodes() and edges()",
@@ -119,9 +120,9 @@ def from_networkx(graph: Any, *, rod: Rod | None = None, cable: float | None = N
 
 
 def from_compas(data: Any, *, rod: Rod | None = None, cable: float | None = None) -> OwnNetwork:
-    """A COMPAS graph, network or mesh: attributes x, y and z, `support` (or `is_support`, `is_anchor`) and `load`
-    of nodes or vertices, `kind` and `rest_length` of edges, as for networkx. Raises InputError naming the node or
-    edge."""
+    """A COMPAS graph, network or mesh: attributes x, y and z, `support` (or `is_support`, `is_anchor`) and
+    `load` of nodes or vertices, `kind` and `rest_length` of edges, as for networkx. Raises InputError naming
+    the node or edge."""
     kind = next((each for each in ("node", "vertex") if hasattr(data, f"{each}_attribute")), None)
     if kind is None or not callable(getattr(data, "edges", None)):
         raise InputError(
@@ -244,7 +245,8 @@ def _built(
 
 
 def _stiffnesses(rod: Any) -> dict[str, float]:
-    """A rod's stiffnesses by their names in the model file. Raises InputError for what are no four of them."""
+    """A rod's stiffnesses by their names in the model file. Raises InputError for what are no four of
+    them."""
     given = stiffness(rod) if hasattr(rod, "constants") else rod
     try:
         values = np.asarray(given, dtype=float)
@@ -261,7 +263,8 @@ def _stiffnesses(rod: Any) -> dict[str, float]:
 
 
 def _supported(supports: Mapping[int, str] | Sequence[int]) -> dict[int, str]:
-    """How each support is held, by the node's number. Raises InputError for what are no numbers: a flag isn't one."""
+    """How each support is held, by the node's number. Raises InputError for what are no numbers: a flag isn't
+    one."""
     strange: list[object] = []
     try:
         held = dict(supports) if isinstance(supports, Mapping) else dict.fromkeys(supports, "pinned")

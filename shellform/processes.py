@@ -14,8 +14,8 @@ _PR_SET_PDEATHSIG = 1  # linux/prctl.h
 
 
 def end_with(parent: int) -> None:
-    """Has the system end this process with the `parent`, by its number, however that ends: Linux alone can, and other
-    systems leave such a process until its work is done."""
+    """Has the system end this process with the `parent`, by its number, however that ends: Linux alone can,
+    and other systems leave such a process until its work is done."""
     if sys.platform != "linux":
         return
     ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -1,9 +1,8 @@
 """Tables that leave the house: CSV files, and one workbook of them; the door to openpyxl.
 
 Values are in SI units, said in the column's head: "length [m]"; `for_the_workshop` makes mm and degrees of
-them. An empty cell means that the value isn't
-known. Words that a spreadsheet would take for a formula, which may run programs, begin with an apostrophe: then
-it takes them for words.
+them. An empty cell means that the value isn't known. Words that a spreadsheet would take for a formula, which
+may run programs, begin with an apostrophe: then it takes them for words.
 """
 
 from __future__ import annotations
@@ -85,8 +84,8 @@ def for_the_workshop(table: Table) -> Table:
 
 
 def table_text(table: Table, *, exact: bool = False, line_end: str = "\n") -> str:
-    """The table as CSV: heads, then rows, numbers to six decimals (mm to three) or, if they are to be `exact`, with all
-    their digits.
+    """The table as CSV: heads, then rows, numbers to six decimals (mm to three) or, if they are to be
+    `exact`, with all their digits.
     """
     text = io.StringIO()
     writer = csv.writer(text, lineterminator=line_end)

@@ -2,8 +2,8 @@
 
 So an interrupted run leaves nothing half-written, and a full disc or a closed folder is told in one sentence.
 Beside its place a file has a name of its own that can't be foreseen and nothing had before: two processes
-never write to the same one, and no symbolic link in a folder that somebody else made leads a writer elsewhere. A
-writer holds a lock on it, which ends with its process: what is left without one may be deleted.
+never write to the same one, and no symbolic link in a folder that somebody else made leads a writer
+elsewhere. A writer holds a lock on it, which ends with its process: what is left without one may be deleted.
 """
 
 from __future__ import annotations
@@ -118,8 +118,8 @@ def write_text(path: str | Path, text: str, ending: str = "") -> None:
 
 
 def encoded(text: str, where: str) -> bytes:
-    """Text in UTF-8. The bytes of a path or an option that Python couldn't read, for it was told that the system knows
-    fewer letters, come out as they were given. Raises InputError where they are no UTF-8.
+    """Text in UTF-8. The bytes of a path or an option that Python couldn't read, for it was told that the
+    system knows fewer letters, come out as they were given. Raises InputError where they are no UTF-8.
     """
     try:
         content = text.encode("utf-8", errors="surrogateescape")
@@ -150,8 +150,8 @@ def refusal(path: Path, error: OSError) -> InputError:
 
 
 def folder(path: str | Path) -> Path:
-    """Makes a folder and those above it. Raises InputError where that can't be done, and where its name is no UTF-8,
-    so that no page could name it."""
+    """Makes a folder and those above it. Raises InputError where that can't be done, and where its name is no
+    UTF-8, so that no page could name it."""
     place = Path(path)
     encoded(str(place), "the folder")
     try:

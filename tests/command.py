@@ -59,7 +59,8 @@ def shellform_process(*arguments, env=None, before=None, timeout=300):
 
 
 def begin(*arguments, **settings):
-    """A command's process, to be stopped on its way: Ctrl-C reaches it even where this one doesn't hear it."""
+    """A command's process, to be stopped on its way: Ctrl-C reaches it even where this one doesn't hear
+    it."""
     return subprocess.Popen(
         [sys.executable, "-m", "shellform", *map(str, arguments)],
         stderr=subprocess.PIPE,

@@ -11,8 +11,9 @@ from shellform.structure.solve.equilibrium import find_equilibrium
 
 
 def misfit_and_force(shell, force, *, most=20.0, rms=0.005, variables=()):
-    """Misfit and cable force under `force`, N, on every second crossing: cables of at most `most`, N, and a root
-    mean square distance of at most `rms`, m, under 1.2 times that load; None for no such limit and load."""
+    """Misfit and cable force under `force`, N, on every second crossing: cables of at most `most`, N, and a
+    root mean square distance of at most `rms`, m, under 1.2 times that load; None for no such limit and
+    load."""
     wet = shell.point_load(force, every=2)
     limits = [sf.AtMost(most, sf.CableForces("wet"))]
     return sf.Problem(
@@ -33,8 +34,8 @@ def solved(shell, design, near, load):
 
 
 def assert_gradient_as_re_solved(shell, design, state, load, term):
-    """The derivative of a term of one value under the load "wet" along a random change of all rest lengths, and by the
-    radius, is that of differences of re-solved equilibria (Richardson's, of fourth order)."""
+    """The derivative of a term of one value under the load "wet" along a random change of all rest lengths,
+    and by the radius, is that of differences of re-solved equilibria (Richardson's, of fourth order)."""
     problem = sf.Problem(
         shell,
         sf.LoadCase("wet", load),

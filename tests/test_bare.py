@@ -1,4 +1,5 @@
-"""The first day on a bare Debian, as start.md has it: scripts/bare builds its container, or says why it can't."""
+"""The first day on a bare Debian, as start.md has it: scripts/bare builds its container, or says why it
+can't."""
 
 import re
 import subprocess

@@ -1,5 +1,5 @@
-"""Networks of one's own: the same model from arrays, from networkx, from COMPAS, whose documented calls stand-ins
-answer here; and honest errors."""
+"""Networks of one's own: the same model from arrays, from networkx, from COMPAS, whose documented calls
+stand-ins answer here; and honest errors."""
 
 from types import SimpleNamespace
 

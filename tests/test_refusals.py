@@ -32,8 +32,8 @@ from shellform.surface.funicular import thrust_shell
 ROOT = Path(__file__).parent.parent
 CASE = ROOT / "scripts/vault.toml"
 KINDS = {"InputError", "Damaged", "NotConverged", "NoNet"}
-# Nobody outside meets the search's own; another process or the analysis has said what to do already; and no remedy
-# is known to work where no surface near a crumpled one is smooth.
+# Nobody outside meets the search's own; another process or the analysis has said what to do already; and no
+# remedy is known to work where no surface near a crumpled one is smooth.
 EXCUSED = {
     "cli/analyse.py": 1,
     "run/first_refusal.py": 1,

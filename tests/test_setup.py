@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 SETUP = Path(__file__).parent.parent / "scripts/setup"
-# In place of a virtual environment's Python: notes what it is asked for, and lets the locked install fail as told.
+# In place of a virtual environment's Python: notes what it is asked for, and lets the locked install fail as
+# told.
 PYTHON = """#!/usr/bin/env bash
 echo "$*" >> "$CALLS"
 case "$*" in *--require-hashes*) if [ -n "$FAILS" ]; then echo "$FAILS"; exit 1; fi ;; esac

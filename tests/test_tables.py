@@ -1,4 +1,5 @@
-"""Tables that go to the workshop: their units, their digits, and words that no spreadsheet may take for a formula."""
+"""Tables that go to the workshop: their units, their digits, and words that no spreadsheet may take for a
+formula."""
 
 import csv
 import io

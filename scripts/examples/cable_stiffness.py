@@ -1,4 +1,5 @@
-"""How much is a stiffer wire worth? Tightened by the same share, too stiff ones pull the shell out of shape."""
+"""How much is a stiffer wire worth? Tightened by the same share, too stiff ones pull the shell out of
+shape."""
 
 from pathlib import Path
 

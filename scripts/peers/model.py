@@ -1,5 +1,5 @@
-"""What the peers read of a model file (documentation/reference/model.md): plain NumPy, for Pythons that don't have
-shellform.
+"""What the peers read of a model file (documentation/reference/model.md): plain NumPy, for Pythons that don't
+have shellform.
 """
 
 from __future__ import annotations

@@ -41,8 +41,8 @@ def counted_from(surface: Surface, origin: Sequence[float]) -> Surface:
 
 
 def distant_origin(surface: Surface, sides: float) -> tuple[float, float, float] | None:
-    """A round origin near a surface that lies more than so many of its larger `sides` away from its own, m; None for
-    others."""
+    """A round origin near a surface that lies more than so many of its larger `sides` away from its own, m;
+    None for others."""
     lowest, side = surface.vertices.min(axis=0), float(surface.size.max())
     if float(np.abs(surface.vertices).max()) <= sides * side:
         return None

@@ -1,11 +1,11 @@
 """From a case to its design problem, the engineer's limits included.
 
-Every limit but the deviation's holds under every load case, and those that matter before concrete comes also without load. The
-critical load factor F is kept by a load case "critical NAME", F times the load case, that every accepted
-design bears on its stable branch, its softest mode keeping a share of the initial design's stiffness under
-the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is followed by stable
-states again: in the end the perfect structure's path is followed closely (refinement.py), and a design whose
-path ends before F isn't feasible.
+Every limit but the deviation's holds under every load case, and those that matter before concrete comes also
+without load. The critical load factor F is kept by a load case "critical NAME", F times the load case, that
+every accepted design bears on its stable branch, its softest mode keeping a share of the initial design's
+stiffness under the design load (engineering.py: ModalStiffness). Load steps can pass a bifurcation that is
+followed by stable states again: in the end the perfect structure's path is followed closely (refinement.py),
+and a design whose path ends before F isn't feasible.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ def case_problem(
     case: Case, shell: Gridshell, loads: Mapping[str, Reals], start: Design, *, frees_radius: bool = True
 ) -> Problem:
     """The problem (2) to (6) of the case on the shell, with its limits; `start` is the initial design. With
-    the radius fixed its share goes to the others in proportion, and by the paper's method that of the shape as built."""
+    the radius fixed its share goes to the others in proportion, and by the paper's method that of the shape
+    as built."""
     entry = case.optimise
     shares: list[tuple[float, Term]] = [
         (entry.misfit, Misfit("design")),
@@ -109,7 +110,8 @@ def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[V
 
 
 def _engineers(case: Case, shell: Gridshell, loads: Mapping[str, Reals]) -> list[Constraint]:
-    """The limits on rods, connectors, supports and slack cables; those on the shape are thinning's (solver.py)."""
+    """The limits on rods, connectors, supports and slack cables; those on the shape are thinning's
+    (solver.py)."""
     entry = case.limits
     found: list[Constraint] = []
     for name in loads:

@@ -260,7 +260,8 @@ def shipped_surfaces() -> Path:
 
 
 def check_script(path: Path, *, allow_scripts: bool) -> None:
-    """Raises InputError for a builder script whose code isn't that of a shipped one, unless that is allowed."""
+    """Raises InputError for a builder script whose code isn't that of a shipped one, unless that is
+    allowed."""
     if path.suffix == ".py" and path.is_file() and not allow_scripts and not _shipped(path):
         raise InputError(
             "is a Python script from outside the shipped surfaces and isn't run unasked",

@@ -16,8 +16,8 @@ from shellform.written import whole
 
 @dataclass(frozen=True)
 class Example:
-    """A shipped case: what it is `about`, its `files` in the folder of the cases, the `surface` that they name
-    ("" for none), and the `command` to begin with.
+    """A shipped case: what it is `about`, its `files` in the folder of the cases, the `surface` that they
+    name ("" for none), and the `command` to begin with.
     """
 
     about: str

@@ -12,8 +12,8 @@ _BROKEN = 2.0  # times the rods' strength: what is beyond can only be per cents
 
 
 class LimitsEntry(Entry):
-    """What an engineer limits besides constraints (5) and (6), each under every load case and without load, but the
-    deviation, which counts where the concrete hardens; left out: not limited.
+    """What an engineer limits besides constraints (5) and (6), each under every load case and without load,
+    but the deviation, which counts where the concrete hardens; left out: not limited.
     """
 
     deviation: PositiveFloat | None = Field(

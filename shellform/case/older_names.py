@@ -1,6 +1,6 @@
-"""Entries of case files written before 0.4, run folders' among them, under the names that they have now: what a
-structure is off by stands in [tolerances] alone, critical factors in [safety], and what errors do to the shape has a share
-`built_misfit` of the objective.
+"""Entries of case files written before 0.4, run folders' among them, under the names that they have now: what
+a structure is off by stands in [tolerances] alone, critical factors in [safety], and what errors do to the
+shape has a share `built_misfit` of the objective.
 """
 
 from __future__ import annotations

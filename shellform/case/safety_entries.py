@@ -13,7 +13,8 @@ _Share = Annotated[float, Field(ge=0.0, le=LARGEST_SHARE)]
 
 
 def _deviation(unit: str, name: str) -> Any:
-    """The field of a standard deviation: its unit, the source of its size, and what holds where it is left out."""
+    """The field of a standard deviation: its unit, the source of its size, and what holds where it is left
+    out."""
     words = f"{unit}: {SOURCES[name]}; left out: by the shell's size"
     return Field(None, description=words)
 

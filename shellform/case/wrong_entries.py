@@ -1,5 +1,5 @@
-"""What pydantic finds wrong with a case file, or another of its kind, in words: the entry, what is wrong with it,
-the value, and the remedy that the schema knows.
+"""What pydantic finds wrong with a case file, or another of its kind, in words: the entry, what is wrong with
+it, the value, and the remedy that the schema knows.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ def refusal(error: ValidationError, root: type[BaseModel], where: str = "") -> I
 
 def _in_words(error: Any, root: type[BaseModel]) -> tuple[str, str]:
     """One validation error in words: the entry of the file of `root`'s kind, what is wrong and the value; and
-    the remedy, the nearest known name or what the entry is. What a table's own check says has its remedy in it.
+    the remedy, the nearest known name or what the entry is. What a table's own check says has its remedy in
+    it.
     """
     kind = error["type"]
     place = _place(error["loc"], root)
@@ -66,9 +67,9 @@ def _if_per_cents(error: Any) -> str:
 
 @dataclass(frozen=True)
 class _Place:
-    """An entry: its `name` as the file has it, the `table` in which it stands, the schema's `meaning` of it, and
-    the `kinds` of which it may be. Where the table is one of several kinds, `sign` is the entry that tells which, and
-    `elsewhere` the names that the others alone have."""
+    """An entry: its `name` as the file has it, the `table` in which it stands, the schema's `meaning` of it,
+    and the `kinds` of which it may be. Where the table is one of several kinds, `sign` is the entry that
+    tells which, and `elsewhere` the names that the others alone have."""
 
     name: str
     table: Any
@@ -111,8 +112,8 @@ def _place(parts: Sequence[int | str], root: type[BaseModel]) -> _Place:
 
 
 def _told_apart(tag: str, choices: dict[str, Any], name: str) -> tuple[str, frozenset[str]]:
-    """The entry of the table called `name` by which its kind `tag` is told from the other choices, and the entries that
-    those alone have."""
+    """The entry of the table called `name` by which its kind `tag` is told from the other choices, and the
+    entries that those alone have."""
     tables = {each: _table(choice) for each, choice in choices.items()}
     own = tables[tag]
     others = {entry for each in tables.values() for entry in each} - own.keys()

@@ -1,9 +1,9 @@
-"""Ctrl-C that isn't lost: it raises KeyboardInterrupt where the program is, and once more at the next step that is
-reported where that was swallowed.
+"""Ctrl-C that isn't lost: it raises KeyboardInterrupt where the program is, and once more at the next step
+that is reported where that was swallowed.
 
 Python drops an exception that is raised within a destructor, a weak reference's callback or a function that a
-library in C calls back (threadpoolctl's search for libraries is one), and some libraries take every exception for
-an error of their own.
+library in C calls back (threadpoolctl's search for libraries is one), and some libraries take every exception
+for an error of their own.
 """
 
 from __future__ import annotations

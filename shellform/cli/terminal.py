@@ -41,8 +41,8 @@ class Spinner:
 
 
 def refusal_words(error: Exception) -> tuple[str, int] | None:
-    """What is said of an error, and the status with which it ends a command; None for one that is no one's but
-    ours."""
+    """What is said of an error, and the status with which it ends a command; None for one that is no one's
+    but ours."""
     if isinstance(error, InputError):
         return f"refused: {error}", 2
     if isinstance(error, NotConverged):

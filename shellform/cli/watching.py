@@ -1,8 +1,8 @@
 """`design --watch`: a command done again whenever one of its files changes, until Ctrl-C.
 
 Files are looked at twice a second, by size and time, and taken up once they are as they were half a second
-before: whoever saves may still be writing. A run under way ends at its next event when a file changes; what it
-has computed is kept, as after Ctrl-C.
+before: whoever saves may still be writing. A run under way ends at its next event when a file changes; what
+it has computed is kept, as after Ctrl-C.
 """
 
 from __future__ import annotations

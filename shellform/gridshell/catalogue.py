@@ -165,8 +165,8 @@ def _checked(where: str, make: Callable[[], Any]) -> Any:
 
 
 def label(section: Section, places: int = 6) -> str:
-    """What a section is called, in mm to so many decimal places (two are as exact as rods are made): "⌀ 10 mm",
-    "⌀ 42 × 3.5 mm", "50 × 35 mm", "2 layers of 50 × 35 mm", "19 rods ⌀ 10 mm"."""
+    """What a section is called, in mm to so many decimal places (two are as exact as rods are made): "⌀ 10
+    mm", "⌀ 42 × 3.5 mm", "50 × 35 mm", "2 layers of 50 × 35 mm", "19 rods ⌀ 10 mm"."""
 
     def mm(size: float) -> str:
         return f"{round(1e3 * size, places):g}"
@@ -240,8 +240,8 @@ def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, floa
 
 
 def radius_as_stiff(rod: Rod, section: Section) -> float:
-    """The radius, m, of a rod similar to `rod` that is as stiff as the section: between two of different shape the
-    stiffness about the weaker axis counts."""
+    """The radius, m, of a rod similar to `rod` that is as stiff as the section: between two of different
+    shape the stiffness about the weaker axis counts."""
     own = np.array(rod.stiffness[2:])
     return rod.radius * float((np.array(stiffness(section)[2:]) / own).min()) ** 0.25
 

@@ -2,10 +2,10 @@
 
 They follow the lines that the net has for them (net/edges.py) in straight elements, and are made in their
 final curve, so that they are without stress in the target. Each rod's end is clamped to the beam's axis by a
-short beam, half the gap long or longer where ends share a node, without stress in the target too: the rods are bent first,
-then clamped. It is as stiff as the edge beam, but never stiffer between its ends than a rod half the gap long: nothing gives
-way there that counts, and stiffer ones would leave more to rounding than the load. Where an edge beam has a foot it is
-pinned.
+short beam, half the gap long or longer where ends share a node, without stress in the target too: the rods
+are bent first, then clamped. It is as stiff as the edge beam, but never stiffer between its ends than a rod
+half the gap long: nothing gives way there that counts, and stiffer ones would leave more to rounding than the
+load. Where an edge beam has a foot it is pinned.
 
 A bundle of n rods of radius r, packed as close as circles pack round a middle one, has with the distances d
 of their axes from the bundle's
@@ -117,8 +117,9 @@ class EdgeBeam:
 
 
 def edge_beams(net: Net, edge: EdgeBeam | None, rod: tuple[float, float, float, float]) -> Beams | None:
-    """The elements of the net's edge beams, then their clamps, no stiffer than a `rod` (EA, N; GJ, EI_y, EI_z, N·m²) half
-    the gap long; None where it has none. Raises InputError where the net has edge beams, but nothing is said of what they are."""
+    """The elements of the net's edge beams, then their clamps, no stiffer than a `rod` (EA, N; GJ, EI_y,
+    EI_z, N·m²) half the gap long; None where it has none. Raises InputError where the net has edge beams, but
+    nothing is said of what they are."""
     if not net.edges:
         return None
     if edge is None:
@@ -152,8 +153,8 @@ def _built(
 def _no_stiffer(
     edge: Sequence[float], rod: Sequence[float], reach: Reals, shortest: float
 ) -> tuple[Reals, Reals, Reals, Reals]:
-    """EA, GJ, EI_y, EI_z (c,) of clamps that reach (c, 3), m: the edge beam's, but between their ends, EA/L, GJ/L and
-    12 EI/L³, at most those of a rod so short, m."""
+    """EA, GJ, EI_y, EI_z (c,) of clamps that reach (c, 3), m: the edge beam's, but between their ends, EA/L,
+    GJ/L and 12 EI/L³, at most those of a rod so short, m."""
     times = np.linalg.norm(reach, axis=1) / shortest
     axial, torsion, about_y, about_z = (
         np.minimum(most, own * times**power)

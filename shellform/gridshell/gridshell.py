@@ -234,7 +234,8 @@ class Gridshell:
 
     def beams(self, radius: float) -> Beams:
         """Rods of the radius, m, and connectors; what locks rods in two layers; then edge beams and their
-        clamps, whatever the radius. The same for the same radius, made once: one evaluation asks a dozen times.
+        clamps, whatever the radius. The same for the same radius, made once: one evaluation asks a dozen
+        times.
         """
         made = self._made.get(radius)
         if made is None:

@@ -6,10 +6,11 @@ they are, forces grow with s², bending and torsion stiffness with s⁴, as thos
 follows its rods therefore has their EA and EI (the mean of both axes) in the paper's proportions, and a gap
 of their depth across the surface.
 
-Where rods are pulled out of their right angle, such a joint bends both in the surface. With a couple GJ Δ / gap at an
-angle Δ between them and half of it on each side, GJ in the proportion k to a round rod's EI, that stresses them to k E Δ / 4
-whatever their depth: nearly half of the strength of GFRP at Δ = 0.5, all of steel's at 0.3. Rods that turn on their
-joints, in swivel couplers or on bolts that are tightened afterwards, are spared that (`swivelling`).
+Where rods are pulled out of their right angle, such a joint bends both in the surface. With a couple GJ Δ /
+gap at an angle Δ between them and half of it on each side, GJ in the proportion k to a round rod's EI, that
+stresses them to k E Δ / 4 whatever their depth: nearly half of the strength of GFRP at Δ = 0.5, all of
+steel's at 0.3. Rods that turn on their joints, in swivel couplers or on bolts that are tightened afterwards,
+are spared that (`swivelling`).
 """
 
 from __future__ import annotations
@@ -50,13 +51,14 @@ def following(rod: Rod) -> Joint:
 
 
 def swivelling(joint: Joint) -> Joint:
-    """The same with a tenth of its torsion stiffness: a swivel coupler, or a bolt that is tightened after bending."""
+    """The same with a tenth of its torsion stiffness: a swivel coupler, or a bolt that is tightened after
+    bending."""
     return replace(joint, torsion=_TURNING * joint.torsion)
 
 
 def turning_stress(net: Net, material: Material) -> float:
-    """To what share of their strength rods of a `material` are bent in the surface by joints that follow them, where the
-    net's right angles are sheared most."""
+    """To what share of their strength rods of a `material` are bent in the surface by joints that follow
+    them, where the net's right angles are sheared most."""
     sheared = 0.5 * math.pi - net.quality.shear_angle_min
     return 0.25 * (_PAPER.torsion / _RODS.stiffness[2]) * sheared * material.young / material.strength
 
@@ -79,8 +81,8 @@ class JointDoubt:
 
 
 def doubts(joint: Joint, rod: Rod) -> tuple[JointDoubt, ...]:
-    """What of the joint doesn't fit its rods: stiffness more than four times off, a gap half as wide again, or
-    less than the rods are deep. Joints that turn more easily fit any rods."""
+    """What of the joint doesn't fit its rods: stiffness more than four times off, a gap half as wide again,
+    or less than the rods are deep. Joints that turn more easily fit any rods."""
     fitting, stiffness = following(rod), (1.0 / _OFF, _OFF)
     usual = {"axial": stiffness, "torsion": (0.0, _OFF), "bending": stiffness, "gap": (_NARROW, _WIDE)}
     return tuple(

@@ -14,8 +14,8 @@ also pulls one and pushes the other with F = γ E A a/2 Δκ, which bears the mo
 γ says how far they act together (EN 1995-1-1, annex B): 1 as if glued, 0 as if loose. In the surface and in
 torsion they bend and turn beside each other as before. B is added by beams of its own along the rods' (kind
 "lock"), built into the target without stress: what the laths bear of bending into the shape stays in them.
-The largest fibre stress is in a corner of one of both, and the sum of what they bore when they were locked and
-since:
+The largest fibre stress is in a corner of one of both, and the sum of what they bore when they were locked
+and since:
 
     σ = |N| / 2A + σ_lath(M_y / 2, M_z / 2) + |M| / (a A).
 """

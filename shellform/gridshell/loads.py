@@ -33,7 +33,8 @@ class Region:
     """Where something lies on the surface: everywhere, but for what its limits take away.
 
     - `openings`: plan polygons, m, outside all of which it lies; `inside`: inside one of which.
-    - `half`: a direction in plan, rad from x: the half towards it, from the middle of the surface's extent along it.
+    - `half`: a direction in plan, rad from x: the half towards it, from the middle of the surface's extent
+      along it.
     - `strip`: a direction in plan, rad, and the lowest and highest place along it, m from the origin.
     - `ring`: lowest and highest level, m.
     """

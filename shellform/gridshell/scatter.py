@@ -1,4 +1,5 @@
-"""Tolerances to first order: independent normal variables z of mean 0 and deviation 1, a group for each cause.
+"""Tolerances to first order: independent normal variables z of mean 0 and deviation 1, a group for each
+cause.
 
 A group gives what the equilibrium needs: the derivatives F (6 n, k) of the internal forces by its variables
 at a fixed state and, for multipliers y_k, how y_k'F_k changes with the state and with the cables' rest
@@ -71,7 +72,8 @@ class Group(Protocol):
 @dataclass(frozen=True)
 class Stiffness:
     """Stiffness of `part`'s elements, each on its own or all `together`; the part has the derivative for a
-    stiffness. `chosen` are the elements' numbers among all beams or cables; of beams all four constants vary."""
+    stiffness. `chosen` are the elements' numbers among all beams or cables; of beams all four constants
+    vary."""
 
     name: str
     part: Beams | Cables

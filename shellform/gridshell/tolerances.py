@@ -57,14 +57,14 @@ class Tolerances:
     """Standard deviations; 0 leaves a cause out.
 
     In m:
-    - `cable_length` of each cable; `supports`: of each coordinate of each support; `marks`: of each crossing's place
-      along each rod, its ends included.
+    - `cable_length` of each cable; `supports`: of each coordinate of each support; `marks`: of each
+      crossing's place along each rod, its ends included.
 
     Relative:
-    - `cable_stiffness` of each cable, `rod_stiffness` of each rod (all four constants), `connectors` of each connector;
-      `cable_stiffness_all` and `connectors_all` of all together.
-    - `load_each` of what each crossing carries, `load_all` of the whole load, `load_uneven` of one half of the plan
-      against the other, in either direction of two at right angles.
+    - `cable_stiffness` of each cable, `rod_stiffness` of each rod (all four constants), `connectors` of each
+      connector; `cable_stiffness_all` and `connectors_all` of all together.
+    - `load_each` of what each crossing carries, `load_all` of the whole load, `load_uneven` of one half of
+      the plan against the other, in either direction of two at right angles.
     - `rod_bow`: rise of each rod's own arc over its length, about either axis.
     - `shape`: amplitude of each of the softest modes over the span.
     """

@@ -81,17 +81,18 @@ def pull_net(
     tuning: NetTuning | None = None,
     progress: Pulling | None = None,
 ) -> Net:
-    """The Chebyshev net on the surface, of rods `spacing` m apart along u (`spacing_v` along v), the two layers `gap` m
-    apart.
+    """The Chebyshev net on the surface, of rods `spacing` m apart along u (`spacing_v` along v), the two
+    layers `gap` m apart.
 
-    - It lies at the `angle`, rad, of the u rods against the x axis in plan, where its origin is, and the `offset` of that
-      from the middle of the plan, in spacings along u and v; or along `guides`, two curves in plan, (k, 2) m each, that
-      cross at the origin and along which the u rod and the v rod through it run.
-    - Rods end at the surface's edge, at the `ground` level, m, and at the closed curve `outline` (k, 2), m in plan; joints
-      nearer to the end than `merge` spacings are left out.
-    - The `method` "pull" relaxes the grid, of so many `elements` a segment, on sliding springs of `spring_density`, EI/s³,
-      rising, and `shear_stiffness`, EI/s a radian (pull.py), from the compass net or the flat grid (`start`); "compass"
-      leaves the compass net as it is. `tuning` of the numbers behind it: left out, as most nets need it.
+    - It lies at the `angle`, rad, of the u rods against the x axis in plan, where its origin is, and the
+      `offset` of that from the middle of the plan, in spacings along u and v; or along `guides`, two curves
+      in plan, (k, 2) m each, that cross at the origin and along which the u rod and the v rod through it run.
+    - Rods end at the surface's edge, at the `ground` level, m, and at the closed curve `outline` (k, 2), m in
+      plan; joints nearer to the end than `merge` spacings are left out.
+    - The `method` "pull" relaxes the grid, of so many `elements` a segment, on sliding springs of
+      `spring_density`, EI/s³, rising, and `shear_stiffness`, EI/s a radian (pull.py), from the compass net or
+      the flat grid (`start`); "compass" leaves the compass net as it is. `tuning` of the numbers behind it:
+      left out, as most nets need it.
 
     Raises InputError for settings that can't work on this surface, NoNet for surfaces too curved for one net,
     Stalled where the pull fails.
@@ -249,8 +250,8 @@ def _origin(
 
 
 def _middle(surface: Surface, finder: Finder) -> Reals:
-    """The middle of the plan (2,): its centroid, or where that lies off the surface, as in the bend of an L, the place
-    farthest from the edge."""
+    """The middle of the plan (2,): its centroid, or where that lies off the surface, as in the bend of an L,
+    the place farthest from the edge."""
     corners = surface.vertices[surface.triangles]
     areas = triangle_areas(surface.vertices, surface.triangles)
     centroid = np.asarray(areas @ corners.mean(axis=1) / areas.sum())[:2]

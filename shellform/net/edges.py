@@ -41,8 +41,8 @@ KINDS = (*HELD, "beam", "free")
 LOW = 0.02  # of the larger extent in plan: an edge no higher over the ground stands on it
 _LONGEST = 0.5  # of the spacing: edge beams' elements aren't longer
 _STEEP = 0.1  # fall over length in plan: edges that stand on the ground, but unevenly, fall less
-# of the spacing: ends nearer to each other share a node of the edge beam, whose elements would drown the load in what
-# rounding leaves of forces: their stiffness goes with the third power of how short they are
+# of the spacing: ends nearer to each other share a node of the edge beam, whose elements would drown the load
+# in what rounding leaves of forces: their stiffness goes with the third power of how short they are
 _CLOSE = 0.2
 
 

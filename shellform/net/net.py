@@ -63,8 +63,8 @@ class Net:
     """A grid of rods that lies on a surface.
 
     - `grid`: flat; `target`: its state on the surface, (n,) nodes.
-    - `supports` (s,): the nodes that are held, which are the rods' ends, but for those on edge beams and free ones
-      (edges.py), and the edge beams' feet.
+    - `supports` (s,): the nodes that are held, which are the rods' ends, but for those on edge beams and free
+      ones (edges.py), and the edge beams' feet.
     - `quality`: how good it is; `notes`: what was left out.
     - `attempts` at it, the last of which gave it; none where the first did.
     - `edges`: the edge beams; `stretches`: what the edge is, part after part (none: not asked).

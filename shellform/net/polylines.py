@@ -10,8 +10,8 @@ from shellform.arrays import Flags, Reals
 
 
 def nearest(points: Reals, curve: Reals) -> tuple[Reals, Reals]:
-    """The distances (k,), m, of points (k, d) from a polyline (p, d), and the arc lengths (k,), m, along it of
-    its places nearest to them. A polygon is `closed` before."""
+    """The distances (k,), m, of points (k, d) from a polyline (p, d), and the arc lengths (k,), m, along it
+    of its places nearest to them. A polygon is `closed` before."""
     away, at, passed = np.full(len(points), np.inf), np.zeros(len(points)), 0.0
     for a, b in pairwise(curve):
         side = b - a

@@ -38,10 +38,10 @@ class NetNumbers:
     - `distance_max`, `distance_mean`: of crossings (the middle between their two nodes) from the surface.
     - `spacing_error_max`: largest |chord between neighbouring crossings / spacing - 1|.
     - `shear_angle_min`: smallest angle between the two rods of a crossing.
-    - `curvature_max`: largest resultant curvature of a rod; `curvature_out_of_plane_max` and `curvature_in_plane_max`:
-      its parts out of and in the surface's tangent plane.
-    - `pull_max`, `pull_mean`: what the springs still pull, in EI/s² of the rods, the paper's measure of how forced the
-      grid is.
+    - `curvature_max`: largest resultant curvature of a rod; `curvature_out_of_plane_max` and
+      `curvature_in_plane_max`: its parts out of and in the surface's tangent plane.
+    - `pull_max`, `pull_mean`: what the springs still pull, in EI/s² of the rods, the paper's measure of how
+      forced the grid is.
     - `uncovered_area`, m²: farther from any rod than three quarters of the spacing.
     - `gaussian_curvature`, rad: of the surface, added up over the net's cells.
     - `factorisations` that the pulling took.

@@ -25,8 +25,8 @@ class Rim:
 
     - `points` (k, 3), m; `along` (k + 1,), m: its arc lengths.
     - `opening`: whether it goes round one.
-    - `cut`: whether the net was cut off along it, from its first point, which is on the surface's edge, to its last;
-      else it goes round.
+    - `cut`: whether the net was cut off along it, from its first point, which is on the surface's edge, to
+      its last; else it goes round.
     - `kinds` and `names` (k,) of its points; `found` (k,): whether the geometry decided these.
     """
 

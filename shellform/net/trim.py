@@ -3,8 +3,8 @@
 Each rod is cut where it leaves what is to be built; its parts inside become rods whose ends are supports. The
 cuts are found on the bent rod by the Illinois method, so that supports lie on the edge. A joint nearer to an
 end than a set fraction of the spacing is left out, so that no end piece is so short that its support and the
-joint fight. A rod that runs beside the edge is left out with its joints, where most of it keeps none: it would bend
-out there as it likes; so is one on which fewer than two joints remain.
+joint fight. A rod that runs beside the edge is left out with its joints, where most of it keeps none: it
+would bend out there as it likes; so is one on which fewer than two joints remain.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ from shellform.structure.network import connected
 
 _SHORTEST_ELEMENT = 0.35  # of the ordinary element's length; a shorter last one is joined to its neighbour
 _FEWEST = 2  # joints on a rod
-# a rod that has no joint over more than so many spacings, and over more than this share of it, runs beside the edge
+# a rod that has no joint over more than so many spacings, and over more than this share of it, runs beside
+# the edge
 _FREE, _FREE_SHARE = 2.5, 0.4
 _CUT = 1e-9  # of the spacing: how near to the edge rods are cut
 _CUTTINGS = 30  # steps of the Illinois method
@@ -256,14 +257,15 @@ def _keep(
 
 
 def _loose(piece: _Piece, arcs: list[float], step: float) -> bool:
-    """Whether with joints at the `arcs` too long a part of the rod is free: over so many steps, m, and so much of it. Beside
-    an opening rods that go on far beyond it stay."""
+    """Whether with joints at the `arcs` too long a part of the rod is free: over so many steps, m, and so
+    much of it. Beside an opening rods that go on far beyond it stay."""
     free = float(np.diff(np.sort([piece.start, *arcs, piece.end])).max())
     return len(arcs) > 0 and free > max(_FREE * step, _FREE_SHARE * (piece.end - piece.start))
 
 
 def _largest(joints: list[dict[int, float]], remaining: set[int]) -> set[int]:
-    """Of the `remaining` crossings those of the largest connected part of the grid; `joints` are those of each piece of rod."""
+    """Of the `remaining` crossings those of the largest connected part of the grid; `joints` are those of
+    each piece of rod."""
     if not remaining:
         return remaining
     numbers = {crossing: k for k, crossing in enumerate(sorted(remaining))}

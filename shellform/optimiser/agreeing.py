@@ -1,11 +1,11 @@
 """A search that goes on until a fresh sample agrees with it (scenario optimisation).
 
-A search chooses its designs by their luck with the structures that it tries them on. So what thinning ends with
-is drawn anew, as often as a finished design is. The structures of this sample that fall and have to stand are
-kept in mind (minding.py) and lead the search on; those under the design load are among what it is judged by
-from then on, and another sample, that no step has seen, judges what comes of it. Going back to earlier designs
-(going_back.py) gives away cables that a few lengths make up for: it is left for where the evaluations that are
-granted for this are spent.
+A search chooses its designs by their luck with the structures that it tries them on. So what thinning ends
+with is drawn anew, as often as a finished design is. The structures of this sample that fall and have to
+stand are kept in mind (minding.py) and lead the search on; those under the design load are among what it is
+judged by from then on, and another sample, that no step has seen, judges what comes of it. Going back to
+earlier designs (going_back.py) gives away cables that a few lengths make up for: it is left for where the
+evaluations that are granted for this are spent.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ _LEFT = 0.4  # of all evaluations, that thinning leaves where trials know no enl
 
 
 def leaving_some(search: Search) -> Search:
-    """The search with as many evaluations as thinning may take. What few structures with errors as they are have
-    confirmed falls in a fresh sample as a rule, and the fewer cables are left, the less can be led."""
+    """The search with as many evaluations as thinning may take. What few structures with errors as they are
+    have confirmed falls in a fresh sample as a rule, and the fewer cables are left, the less can be led."""
     if search.asked is None or search.asked.trusted:
         return search
     return replace(search, evaluations=search.evaluations - int(_LEFT * search.evaluations))
 
 
 def pausing(search: Search, it: Iterate) -> bool:
-    """Whether thinning is to ask a fresh sample now: where trials know no enlarged errors, each time a quarter of the
-    cables that were `counted` at the last sample has gone. Such trials let go too many as a rule, and a few lengths make
-    up for that only where it is seen soon."""
+    """Whether thinning is to ask a fresh sample now: where trials know no enlarged errors, each time a
+    quarter of the cables that were `counted` at the last sample has gone. Such trials let go too many as a
+    rule, and a few lengths make up for that only where it is seen soon."""
     if search.asked is None or search.asked.trusted or search.asked.confirmed is None:
         return False
     return taut_count(search, it.point) < _PAUSE * it.counted
@@ -45,10 +45,10 @@ def pausing(search: Search, it: Iterate) -> bool:
 def agreed(search: Search, it: Iterate) -> tuple[bool, Iterate]:
     """Whether a fresh sample agrees that the last design stands, and the iterate.
 
-    Where one disagrees, turns follow: what falls in it leads a descent, and another sample judges what that comes to.
-    Where thinning has ended they go on after a sample has agreed, too, as long as each leads to a better design with
-    which one agrees. A turn that finds no step is followed by one that another sample leads on, but that sample can't
-    agree: drawn often enough, a design stands by luck."""
+    Where one disagrees, turns follow: what falls in it leads a descent, and another sample judges what that
+    comes to. Where thinning has ended they go on after a sample has agreed, too, as long as each leads to a
+    better design with which one agrees. A turn that finds no step is followed by one that another sample
+    leads on, but that sample can't agree: drawn often enough, a design stands by luck."""
     if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return True, it
     asked = search.asked

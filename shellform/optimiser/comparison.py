@@ -110,8 +110,8 @@ class Plain:
 class Compared:
     """What a SciPy `method` found.
 
-    - `design`: the best feasible one without its slack cables, or the least infeasible one; `loaded`: how it carries
-      each load on the documented path, "none" first.
+    - `design`: the best feasible one without its slack cables, or the least infeasible one; `loaded`: how it
+      carries each load on the documented path, "none" first.
     - `objective` and largest `violation` where the optimiser had it.
     - `history`: (evaluation, objective, violation) of the designs on the branch.
     - `evaluations`, of which `rejected`, and `factorisations`: the work.

@@ -17,8 +17,8 @@ from shellform.reliability.trial_structures import Required
 
 def last_confirmed(search: Search, it: Iterate) -> Iterate:
     """Back to the last accepted design that is found of which a fresh sample agrees that it stands: the
-    search has chosen its designs by their luck with the structures it tried. Where none is, to the last one of which
-    it does with none spared."""
+    search has chosen its designs by their luck with the structures it tried. Where none is, to the last one
+    of which it does with none spared."""
     if search.asked is None or search.asked.confirmed is None or not it.accepted:
         return it
     for asked in (search.asked, search.asked.unspared()):
@@ -44,8 +44,8 @@ def _last_confirmed(search: Search, it: Iterate, asked: Required) -> Iterate | N
 
 def _confirmed_among(search: Search, asked: Required, accepted: Sequence[Accepted]) -> int:
     """The number of the last one that is found to be confirmed, -1 where none is: in steps of 1, 2, 4, ...
-    from the end, and between the last two of them by bisection. Structures in which one fell come first in the next:
-    what falls takes several times the work of what stands."""
+    from the end, and between the last two of them by bisection. Structures in which one fell come first in
+    the next: what falls takes several times the work of what stands."""
     fallen: list[int] = []
 
     def holds(number: int) -> bool:

@@ -46,8 +46,8 @@ _LESS = 0.01  # of what they bear may be lost where they are to bear what they d
 
 
 def ready_to_lead(search: Search, it: Iterate, fell: Design) -> Iterate | None:
-    """The iterate, at a design that stands as built, ready to be led by the structures that fall in the design
-    that `fell`; None where there are none to be followed."""
+    """The iterate, at a design that stands as built, ready to be led by the structures that fall in the
+    design that `fell`; None where there are none to be followed."""
     search = looking_closer(search)
     led = led_by(search, it, it.accepted[-1].built, falling(search, it, fell))
     return None if led.mind is None else turned(search, replace(led, phase="lead", stood=len(it.accepted)))
@@ -120,8 +120,8 @@ def led_by(search: Search, it: Iterate, design: Design, least: Mapping[int, floa
 
 def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, float]) -> Iterate:
     """With these structures in mind beside those that are, the latest first, all remembered in the `design`,
-    as far as they can be followed; the stiffness to keep goes down to the solver's own. As it was where none can, or
-    what one of them bears isn't found at the present point."""
+    as far as they can be followed; the stiffness to keep goes down to the solver's own. As it was where none
+    can, or what one of them bears isn't found at the present point."""
     known = {} if it.mind is None else {each.number: each.least for each in it.mind.scenarios}
     latest = list({**least, **known, **least}.items())
     if it.phase == "agree":  # fewest may fall under the smallest load
@@ -139,8 +139,8 @@ def minding(search: Search, it: Iterate, design: Design, least: Mapping[int, flo
 
 
 def as_borne(search: Search, it: Iterate, least: Mapping[int, float]) -> Iterate:
-    """With the structures of the numbers in `least` in mind that are to bear what they bear in the present design, as
-    far as they have to: an aim that is missed to begin with would lead the search to it instead of
+    """With the structures of the numbers in `least` in mind that are to bear what they bear in the present
+    design, as far as they have to: an aim that is missed to begin with would lead the search to it instead of
     where the objective does. As it was where none of them can be followed, or what one bears isn't found."""
     if not least:
         return it

@@ -98,11 +98,13 @@ class _Told:
 class _Search:
     """A search and where it stands, changed in place since NLopt calls back.
 
-    - `problem`, `solver`, `evaluator`, at most so many `evaluations`, whom to tell `progress` and `keep`, when it `began`, s.
+    - `problem`, `solver`, `evaluator`, at most so many `evaluations`, whom to tell `progress` and `keep`,
+      when it `began`, s.
     - `stage` of the further loads, and the `margin` before their end.
-    - `near`: points of this stage to start from, the best one last; `accepted`: its designs without their slack cables.
-    - `told`: what MMA was told in its present run, which began with the `caution`; `until`: how much that is before the
-      further loads are raised again.
+    - `near`: points of this stage to start from, the best one last; `accepted`: its designs without their
+      slack cables.
+    - `told`: what MMA was told in its present run, which began with the `caution`; `until`: how much that is
+      before the further loads are raised again.
     - `history` of all trials; `status`: why it ended.
     """
 

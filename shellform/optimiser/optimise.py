@@ -3,31 +3,36 @@
 Svanberg's method of moving asymptotes (1987, 2002) replaces a problem by a sequence of convex ones that are
 solved exactly. Directly in the rest lengths (moving_asymptotes.py) it finds as good a fit with as few cables
 in tension, but knows nothing of what holds the shell up: without its slack cables the design collapses
-(documentation/decisions.md). Here each convex problem is the model in tensions (step_model.py), exact in first
-order and with Gauss-Newton curvature; interior points and NLopt's MMA solve it within a window round the present
-design (proposal.py), and the trial is then evaluated by its true equilibria (trials.py, descent.py):
+(documentation/decisions.md). Here each convex problem is the model in tensions (step_model.py), exact in
+first order and with Gauss-Newton curvature; interior points and NLopt's MMA solve it within a window round
+the present design (proposal.py), and the trial is then evaluated by its true equilibria (trials.py,
+descent.py):
 
-- it is accepted where objective and constraints improve; the window grows where the model predicted well and shrinks where not;
-- a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window shrinks;
-- under the further loads no mode may become softer than a share of what the softest one has at the start under the design load
-  (engineering.py: ModalStiffness): deviations don't see buckling coming, its stiffness does, and designs keep away from the end of
-  their branch;
-- a start that doesn't bear the further loads climbs first: steps along the gradient of that stiffness carry its stable branch up to them;
-- where no better design is found cables are kept taut under the further loads (guards.py), and free again in turns;
-- then, with half of the evaluations at least, cables that the shell can do without are taken away in batches, the others kept
-  taut.
+- it is accepted where objective and constraints improve; the window grows where the model predicted well and
+  shrinks where not;
+- a trial whose equilibrium leaves the stable branch is given up at the first lost definiteness and the window
+  shrinks;
+- under the further loads no mode may become softer than a share of what the softest one has at the start
+  under the design load (engineering.py: ModalStiffness): deviations don't see buckling coming, its stiffness
+  does, and designs keep away from the end of their branch;
+- a start that doesn't bear the further loads climbs first: steps along the gradient of that stiffness carry
+  its stable branch up to them;
+- where no better design is found cables are kept taut under the further loads (guards.py), and free again in
+  turns;
+- then, with half of the evaluations at least, cables that the shell can do without are taken away in batches,
+  the others kept taut.
 
 Designs that are to stand as built keep more of that stiffness at first, and are judged by drawn structures,
 the same for each (trial_structures.py): after the descent, and each time cables have been taken away, before
 the others are optimised again: that serves the objective with what makes a design stand. From then on the
 stiffness is no limit but a means. A design that falls is asked for more of it, and steps towards that follow,
-until it stands; where one with less than was asked for stands, thinning goes on from there. After the descent the
-last design that stood is taken instead where that costs less; where the way to more stiffness leads to none, the
-structures that fall are kept in mind and lead it (minding.py). Where no design near one that falls stands, the
-search goes back to the last one that does, or takes fewer cables away. At the end a fresh sample judges, for the
-search has chosen its designs by their luck with the first one; what falls in it leads the search on until another
-one agrees (agreeing.py), and only where the evaluations end before it goes back. The cables that are left keep a
-tension that errors don't use up.
+until it stands; where one with less than was asked for stands, thinning goes on from there. After the descent
+the last design that stood is taken instead where that costs less; where the way to more stiffness leads to
+none, the structures that fall are kept in mind and lead it (minding.py). Where no design near one that falls
+stands, the search goes back to the last one that does, or takes fewer cables away. At the end a fresh sample
+judges, for the search has chosen its designs by their luck with the first one; what falls in it leads the
+search on until another one agrees (agreeing.py), and only where the evaluations end before it goes back. The
+cables that are left keep a tension that errors don't use up.
 
 A limit that the start breaks stops neither: no batch may break it more.
 
@@ -101,12 +106,14 @@ def optimise(
 ) -> Optimum:
     """The best design found from `start` within a number of design `evaluations`.
 
-    With `safety` it stands as built under the problem's loads, no less likely than `initial` (None: the start), and up to
-    a fifth more evaluations are spent where a fresh sample disagrees with it. With MovingAsymptotes for a `solver` it is
-    found by the paper's own method (moving_asymptotes.py), whether it stands or not.
+    With `safety` it stands as built under the problem's loads, no less likely than `initial` (None: the
+    start), and up to a fifth more evaluations are spent where a fresh sample disagrees with it. With
+    MovingAsymptotes for a `solver` it is found by the paper's own method (moving_asymptotes.py), whether it
+    stands or not.
 
-    `progress(step)` is called at each trial, `judging(done, most)` while structures of a design are drawn, and
-    `keep(checkpoint)` before each trial: with `resume` the same call goes on from there to the same result.
+    `progress(step)` is called at each trial, `judging(done, most)` while structures of a design are drawn,
+    and `keep(checkpoint)` before each trial: with `resume` the same call goes on from there to the same
+    result.
 
     Raises NotConverged where the start doesn't carry the design load, with the paper's advice.
     """
@@ -158,16 +165,16 @@ def polish(
     constraints kept; the solver's `stiffness` is a share of what `best` had to keep.
 
     The L1 term has chosen the cables and pulled on all of them; without it, each kept taut, they serve the
-    shape alone. Where a node is farther off than the solver's `deviation`, half of the objective is the farthest nodes'
-    (terms.py: Bulges). The objective never rises: where no better design is found, `best` comes back. Drawn structures that
-    the search for `best` kept in mind bear what they did, as far as they have to, and a fresh sample judges; else
-    what was asked of `best` as built in trials is asked of the polished design, and whether it stands as often is
-    left to whoever judges it, but where trials know no enlarged errors. Only the cables' lengths are varied, where
-    they are variables of their own.
+    shape alone. Where a node is farther off than the solver's `deviation`, half of the objective is the
+    farthest nodes' (terms.py: Bulges). The objective never rises: where no better design is found, `best`
+    comes back. Drawn structures that the search for `best` kept in mind bear what they did, as far as they
+    have to, and a fresh sample judges; else what was asked of `best` as built in trials is asked of the
+    polished design, and whether it stands as often is left to whoever judges it, but where trials know no
+    enlarged errors. Only the cables' lengths are varied, where they are variables of their own.
 
-    Where structures are kept in mind and evaluations are left, it is polished again from there, with what they bear
-    measured anew, as long as that gains something and brings no node beyond the `deviation`; the objective that comes
-    back counts from the start of the last round.
+    Where structures are kept in mind and evaluations are left, it is polished again from there, with what
+    they bear measured anew, as long as that gains something and brings no node beyond the `deviation`; the
+    objective that comes back counts from the start of the last round.
 
     With `groups` (c,), numbers for all candidates (grouping.py), the cables of a group keep one rest length;
     the misfit then is compared with that of `best` with averaged lengths. Raises NotConverged where that one
@@ -253,8 +260,8 @@ def _polished(
 
 
 def _shape(best: Optimum, solver: SequentialConvex) -> list[Share]:
-    """What a polished design is to serve: what the objective holds of the shape, and the farthest nodes where they are
-    beyond the solver's deviation."""
+    """What a polished design is to serve: what the objective holds of the shape, and the farthest nodes where
+    they are beyond the solver's deviation."""
     base = best.problem.design_load.name
     own = [each for each in best.problem.minimise if each.term.of_shape] or [Share(1.0, Misfit(base))]
     farthest = [] if solver.deviation is None or _farthest(best) <= solver.deviation else [Bulges(base)]

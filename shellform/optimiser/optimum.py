@@ -20,7 +20,8 @@ class Step:
     """One trial in the history.
 
     - `evaluation`: its number.
-    - `objective` and its weighted `terms` by name; `constraints` by name, the largest value of each, at most 0 where kept.
+    - `objective` and its weighted `terms` by name; `constraints` by name, the largest value of each, at most
+      0 where kept.
     - `cables` in tension under the design load; `stage`: share of the additional loads.
     - `accepted`: whether it was; `seconds` since the start.
     - `phase` of the search, "" where it has none or it isn't known.
@@ -53,19 +54,22 @@ class Optimum:
     """What an optimisation found.
 
     The design:
-    - `design`, without its slack cables, and how it carries each load on the documented path, `loaded`, "none" first.
-    - `objective`, and of the start `objective_start`; `constraints` by name, the largest value of each, at most 0 where kept.
-    - `problem` that it answers; `stiffness`, N/m, that the softest mode had to keep under the additional loads.
+    - `design`, without its slack cables, and how it carries each load on the documented path, `loaded`,
+      "none" first.
+    - `objective`, and of the start `objective_start`; `constraints` by name, the largest value of each, at
+      most 0 where kept.
+    - `problem` that it answers; `stiffness`, N/m, that the softest mode had to keep under the additional
+      loads.
 
     The search:
     - `history` of its trials; `status`: a sentence on why it ended.
-    - `evaluations` of designs, `rejected` ones among them; `equilibria`, `factorisations`, of which those in rejected
-      trials were `wasted`.
+    - `evaluations` of designs, `rejected` ones among them; `equilibria`, `factorisations`, of which those in
+      rejected trials were `wasted`.
 
     As built:
     - `asked` of what is made of it, None: nothing.
-    - `fallen`: numbers of drawn structures that have in the search; `mind`: those that it kept in mind, with the factor
-      of the largest load that each is to bear.
+    - `fallen`: numbers of drawn structures that have in the search; `mind`: those that it kept in mind, with
+      the factor of the largest load that each is to bear.
     """
 
     problem: Problem

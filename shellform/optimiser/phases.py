@@ -1,8 +1,8 @@
 """The phases of a search in their order, each from an iterate to an iterate.
 
-Climbing, where the start doesn't bear the further loads, and descending, by the objective (descent.py); being led
-by structures that fall (minding.py); thinning, which takes cables away, here; agreeing, with fresh samples of
-structures as built (agreeing.py).
+Climbing, where the start doesn't bear the further loads, and descending, by the objective (descent.py); being
+led by structures that fall (minding.py); thinning, which takes cables away, here; agreeing, with fresh
+samples of structures as built (agreeing.py).
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ _SAME = 1e-6  # relative: stiffnesses that count as equal
 
 
 def run(search: Search, it: Iterate) -> Iterate:
-    """First the branch up to the further loads, then the objective alone, then thinning, then what fresh samples say."""
+    """First the branch up to the further loads, then the objective alone, then thinning, then what fresh
+    samples say."""
     if it.phase == "climb":
         it = replace(climb(search, it), phase="descend")
     if it.phase == "descend":
@@ -83,8 +84,8 @@ def run(search: Search, it: Iterate) -> Iterate:
 
 def _stiffened(search: Search, it: Iterate) -> Iterate:
     """Ready to thin at a design with as much stiffness as makes it stand as built, since the objective alone
-    leaves no more than it has to; or at the last one that stands, with what it has, where that is better or there
-    is no other near it."""
+    leaves no more than it has to; or at the last one that stands, with what it has, where that is better or
+    there is no other near it."""
     begun = _ready_to_thin(search, it)
     if search.asked is None:
         return begun

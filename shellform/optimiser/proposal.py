@@ -8,8 +8,8 @@ are those of the window, of the variables (3), (4) and of cable forces (5) under
 Interior points (quadratic.py) solve it, and NLopt's MMA goes on from their answer. From the window's middle
 MMA's separable approximations come to the optimum only while windows are narrow: of a stiff dome's first step
 it found half of what could be gained after 2,000 evaluations, of the second a tenth. Where cables are to stay
-taut under the further loads (guards.py), cables alike keep one length (grouping.py) or many structures are kept
-in mind (minding.py), there are more constraints than MMA's dual comes to an end with.
+taut under the further loads (guards.py), cables alike keep one length (grouping.py) or many structures are
+kept in mind (minding.py), there are more constraints than MMA's dual comes to an end with.
 """
 
 from __future__ import annotations
@@ -117,7 +117,8 @@ def _from_there(
     high: Reals,
     evaluations: int,
 ) -> Reals:
-    """Where MMA comes to from a `start` (y,) that keeps the constraints: the start itself where that is lower."""
+    """Where MMA comes to from a `start` (y,) that keeps the constraints: the start itself where that is
+    lower."""
     before, _, values, _ = evaluate(start)
     found, _ = minimise(
         evaluate,
@@ -137,8 +138,9 @@ def _from_there(
 def _as_far_as_can_be(
     task: Task, curvature: Reals | LowRank, slope: Reals, rows: Reals, values: Reals, low: Reals, high: Reals
 ) -> Reals | None:
-    """The model's optimum in windows (y,) where more is asked for than a step can give. Of what limits are broken by
-    a share t remains, of what aims miss and of what guards ask for others, 0 <= t <= 1, each at its price."""
+    """The model's optimum in windows (y,) where more is asked for than a step can give. Of what limits are
+    broken by a share t remains, of what aims miss and of what guards ask for others, 0 <= t <= 1, each at its
+    price."""
     size, count = len(slope), len(task.model.point.constraints)
     limits, price = count - task.aims, task.solver.penalty
     kinds = [(slice(limits), price), (slice(count, None), price)]
@@ -166,8 +168,8 @@ def _as_far_as_can_be(
 
 
 def _at_their_price(task: Task, values: Reals) -> bool:
-    """Whether aims are missed, `values` (k,) of the constraints being at most 0 where they are met, that steps are to
-    meet as far as that is worth the price by which they are judged."""
+    """Whether aims are missed, `values` (k,) of the constraints being at most 0 where they are met, that
+    steps are to meet as far as that is worth the price by which they are judged."""
     return bool((values[len(values) - task.aims :] > 0.0).any())
 
 

@@ -1,8 +1,9 @@
 """Quadratic problems with many constraints: the door to CVXOPT's interior-point method.
 
-Its linear systems are condensed to the variables, so that constraints cost little. Where the curvature is L L'
-with few columns, they are condensed further, to those and the constraints: M = D + L L' + G' W G with diagonal
-D and W is solved with by Sherman, Morrison and Woodbury's formula, whose cost is linear in the variables.
+Its linear systems are condensed to the variables, so that constraints cost little. Where the curvature is L
+L' with few columns, they are condensed further, to those and the constraints: M = D + L L' + G' W G with
+diagonal D and W is solved with by Sherman, Morrison and Woodbury's formula, whose cost is linear in the
+variables.
 """
 
 from __future__ import annotations

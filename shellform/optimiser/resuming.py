@@ -1,5 +1,5 @@
-"""Where a search stands, handed out as a checkpoint and taken up again: the same search goes on from it to the
-same result, to the byte.
+"""Where a search stands, handed out as a checkpoint and taken up again: the same search goes on from it to
+the same result, to the byte.
 """
 
 from __future__ import annotations

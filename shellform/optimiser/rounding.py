@@ -36,8 +36,8 @@ class CandidateSection:
     """A section of the catalogue that is tried.
 
     - `section`: its name; `shell` with it; `optimum`, None where none was found; `mass`, kg, of the rods.
-    - `objective` of the problem with the free radius; `deviation_max`, `deviation_mean`, m, from the target, and stress
-      `utilisation`, under the design load; `cables`: how many.
+    - `objective` of the problem with the free radius; `deviation_max`, `deviation_mean`, m, from the target,
+      and stress `utilisation`, under the design load; `cables`: how many.
     - `why` it isn't feasible, empty where it is.
     - `rounded_up`: whether it is the one that the free radius is rounded up to.
     """
@@ -69,9 +69,9 @@ def tried(
     """The section next above the optimum's radius and `beside` of them below and above, by rising stiffness,
     each with its cables optimised.
 
-    `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed section; `solver`
-    is what made the optimum. The stiffness that the optimum kept and what was asked of it as built are asked of each.
-    Raises InputError where no section that the net allows is stiff enough.
+    `start` is the initial design, of all candidate cables; `problem_of` gives the problem with a fixed
+    section; `solver` is what made the optimum. The stiffness that the optimum kept and what was asked of it
+    as built are asked of each. Raises InputError where no section that the net allows is stiff enough.
     """
     shell = best.problem.shell
     needed = {best.problem.design_load.name, *(share.term.load for share in best.problem.minimise)} - {""}

@@ -41,12 +41,12 @@ class Search:
 
     The problem:
     - `problem`: as it was given; `inner`: without constraints on stability.
-    - `evaluator`: of the problem that is searched, with constraints on stability, and without those `bounded` by
-      the design load's tensions, which are bounds of the model.
+    - `evaluator`: of the problem that is searched, with constraints on stability, and without those `bounded`
+      by the design load's tensions, which are bounds of the model.
     - `groups` (c,): of present cables with one rest length each, None where each has its own.
 
     The start:
-    - `tension`, N: the mean of its cables; `softest`, N/m: the stiffness of its softest mode; `objective_start`.
+    - `tension`, N: its cables' mean; `softest`, N/m: its softest mode's stiffness; `objective_start`.
 
     How it is searched:
     - `solver`: its settings; `evaluations`: of designs, at the most.
@@ -54,7 +54,7 @@ class Search:
     - `models`: step models and guards, made once for each design.
 
     As built:
-    - `asked`: what is asked of designs, None where nothing is; `least`, N: the tension that cables keep for it.
+    - `asked`: what is asked of designs, None where nothing is; `least`, N: the tension kept for it.
 
     Whom to tell:
     - `progress` of steps, `keep` of checkpoints, `judging` of drawn structures; when it `began`, s.
@@ -120,7 +120,7 @@ class Iterate:
     - `stage`: share of the further loads that is borne; `margin`: what is kept from the end of their branch.
     - `window`, N.
     - `guarded`: whether cables are under further loads; `tensioned` (c,): cables that stay in tension.
-    - `excess` (k,), 1/N²: what the constraints were over their linear models at the last trial, over the window squared.
+    - `excess` (k,), 1/N²: of the constraints over their linear models at the last trial, by the window's square.
     - `climbing`: whether stability stands in for the objective.
 
     Descending:
@@ -129,13 +129,13 @@ class Iterate:
     Thinning:
     - `thrifty`: the objective up to which cables are still taken away.
     - `batch`: how many go next; `failures`: single ones in a row that can't; `needed` (c,): those that can't.
-    - `paused`: whether it waits for a fresh sample, so few being left of the cables `counted` at the last one.
+    - `paused`: whether it waits for a fresh sample; `counted`: the cables at the last one.
 
     As built:
-    - `fallen`: numbers of structures that have, the last ones first; `fell`: whether the last design judged did.
+    - `fallen`: numbers of structures that have, the last ones first; `fell`: whether the last design has.
     - `samples`: fresh ones drawn so far.
-    - `mind`: drawn structures that are to bear their loads, None where nothing but stiffness leads the search;
-      `remembered`: the design in which they were followed.
+    - `mind`: drawn structures that are to bear their loads, None where nothing but stiffness leads the
+      search; `remembered`: the design in which they were followed.
 
     Led by structures in mind:
     - `stood`, `begun`: how many designs were accepted when the last one stood, and when this turn began.
@@ -176,9 +176,9 @@ class Iterate:
 
 
 class Models:
-    """Step models and guards, made once for each design that steps start from: the last one's are kept for another try in a
-    smaller window. Of more cables than are `many` for the solver neither is dense, unless it is to be `whole`, as
-    where cables keep one length."""
+    """Step models and guards, made once for each design that steps start from: the last one's are kept for
+    another try in a smaller window. Of more cables than are `many` for the solver neither is dense, unless it
+    is to be `whole`, as where cables keep one length."""
 
     def __init__(
         self, evaluator: Evaluator, solver: SequentialConvex, reach: float, *, whole: bool = False
@@ -196,7 +196,7 @@ class Models:
         return self._model
 
     def guards(self, point: Evaluated) -> list[Guard]:
-        """Of the point's cables below the reach, N, under each further load; without load they may be slack."""
+        """Of the point's cables below the reach, N, under further loads; without load they may be slack."""
         if self._guards is None or self._guards[0] is not point:
             evaluator = self.evaluator
             shell, design = evaluator.shell, point.design
@@ -236,8 +236,8 @@ def stiff(problem: Problem, least: float) -> Problem:
 
 
 def aimed(problem: Problem, least: float, mind: FactorsAsBuilt | None) -> Problem:
-    """The problem with what leads a search beside its own limits: the stiffness, N/m, and what structures that
-    it keeps in mind are to bear."""
+    """The problem with what leads a search beside its own limits: the stiffness, N/m, and what structures
+    that it keeps in mind are to bear."""
     problem = stiff(problem, least)
     if mind is None:
         return problem
@@ -253,8 +253,8 @@ def restiffened(search: Search, it: Iterate, least: float) -> Iterate:
 
 
 def kept_in_mind(search: Search, design: Design, least: Mapping[int, float]) -> FactorsAsBuilt:
-    """The structures of the numbers in `least`, drawn as trials draw them, as scenarios of the search with the
-    factors of the largest load that they are to bear, remembered in the design. Raises NotConverged."""
+    """The structures of the numbers in `least`, drawn as trials draw them, as scenarios of the search with
+    the factors of the largest load that they are to bear, remembered in the design. Raises NotConverged."""
     assert search.asked is not None
     problem, asked, safety = search.problem, search.asked.trial, search.asked.trial.safety
     largest, _ = largest_on_path(asked)
@@ -307,7 +307,7 @@ def violation(search: Search, point: Evaluated) -> float:
 
 
 def missed(search: Search, point: Evaluated) -> float:
-    """By what share of what it is to bear a structure in mind misses it, beyond what an aim may be missed by."""
+    """By what share of its aim a structure in mind misses it, beyond what an aim may be missed by."""
     aims = len(point.constraints) - in_mind(search)
     return max(float(point.constraints[aims:].max(initial=0.0)) - _MAY_MISS, 0.0)
 

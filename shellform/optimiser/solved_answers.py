@@ -5,11 +5,12 @@ have lost definiteness, and is factorised all the same (eased_cables.py). Then
 
     dx = -K_t⁻¹ R dy,   dl = B' dx,   and chained backwards   a' dl/dy = -(K_t⁻¹ B a)' R,
 
-one solve for a direction or for a measure, however many cables there are. The Gauss-Newton matrix
-H = 2 (Q X)'(Q X) is what a soft structure makes it: few shapes move much. From products with r random
-directions Ω, two solves each, it comes as Y (Ω'Y)⁻¹ Y' with Y = H Ω (Nyström's approximation; Tropp, Yurtsever,
-Udell and Cevher 2017): positive semidefinite, never above H, and exact where H has no more than r shapes. What it leaves out bends the objective less than its least shape kept does; slopes
-and constraints are exact as before.
+one solve for a direction or for a measure, however many cables there are. The Gauss-Newton matrix H = 2 (Q
+X)'(Q X) is what a soft structure makes it: few shapes move much. From products with r random directions Ω,
+two solves each, it comes as Y (Ω'Y)⁻¹ Y' with Y = H Ω (Nyström's approximation; Tropp, Yurtsever, Udell and
+Cevher 2017): positive semidefinite, never above H, and exact where H has no more than r shapes. What it
+leaves out bends the objective less than its least shape kept does; slopes and constraints are exact as
+before.
 """
 
 from __future__ import annotations

@@ -2,8 +2,8 @@
 
 Each round replaces the problem by a convex model round the present design (step_model.py), exact in first
 order and with Gauss-Newton curvature, solves it within a window, and evaluates the trial by its true
-equilibria. CVXOPT's interior-point method solves the model, and where no constraint asks for many rows NLopt's
-MMA goes on from there (proposal.py).
+equilibria. CVXOPT's interior-point method solves the model, and where no constraint asks for many rows
+NLopt's MMA goes on from there (proposal.py).
 """
 
 from __future__ import annotations
@@ -25,8 +25,9 @@ class SequentialConvex:
       the design load (0: nothing). Deviations don't see buckling coming, its stiffness does.
     - `most_cables`: down to so many cables are taken away whatever they do for the objective, as long as
       every constraint is kept.
-    - `deviation`, m: no cable is taken away if a node then is farther than this from its place under the design load, or
-      farther than before where it was beyond it; polished, a design with a farther node is led by its farthest ones too.
+    - `deviation`, m: no cable is taken away if a node then is farther than this from its place under the
+      design load, or farther than before where it was beyond it; polished, a design with a farther node is
+      led by its farthest ones too.
 
     The trust region:
     - `smallest`: window at which no better design is to be found, which ends a turn.
@@ -36,8 +37,8 @@ class SequentialConvex:
       a constraint may be violated by.
     - `penalty`: of a violated constraint beside the objective, which is 1 at the start: a violation of a
       tenth of the limit outweighs the whole objective.
-    - `aim`: of that penalty, the price of what drawn structures that a search keeps in mind miss of what they are to bear: it
-      is made up for later more easily than a limit.
+    - `aim`: of that penalty, the price of what drawn structures that a search keeps in mind miss of what they
+      are to bear: it is made up for later more easily than a limit.
     - `near`: below a limit, as a share of it, from where on its curvature counts; farther off it would hold
       steps back for nothing.
 
@@ -57,9 +58,10 @@ class SequentialConvex:
     - `candidates`: of thousands of cables, those that are looked at for a batch.
     - `kept`: of the stiffness in any direction at the decisive load, that a batch must leave: the others'
       lengths are to make up for the rest. It only keeps trials from failing for nothing: what a design has to
-      bear, its constraints and structures as built decide, and of stiff strands each holds most of its direction.
-    - `allowance`: what all cables with little use together may cost, of the objective at the start, which is 1: a share
-      of what is left of it would forbid the more the better the shape became.
+      bear, its constraints and structures as built decide, and of stiff strands each holds most of its
+      direction.
+    - `allowance`: what all cables with little use together may cost, of the objective at the start, which is
+      1: a share of what is left of it would forbid the more the better the shape became.
     - `failures`: single cables in a row that can't go, after which thinning ends.
     - `idle`: of the cables, that may be slack under all loads before they are left out of the search, whose
       models solve for every cable in it.
@@ -71,9 +73,10 @@ class SequentialConvex:
     - `softer`: of the stiffness of a design that stands, which the next batch is asked to keep.
 
     The step's problem:
-    - `many`: cables, beyond which its answers come by solves of their own instead of dense matrices, whose time
-      grows with the cube of their number: of 1,644 those take five times as long.
-    - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA to go on from the interior points' answer.
+    - `many`: cables, beyond which its answers come by solves of their own instead of dense matrices, whose
+      time grows with the cube of their number: of 1,644 those take five times as long.
+    - `model_evaluations`: of the convex model, some 50 microseconds each, for MMA to go on from the interior
+      points' answer.
     """
 
     window: float = 0.2

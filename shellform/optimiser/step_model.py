@@ -7,9 +7,9 @@ K = K_t + B D B' the tangent, the state answers by
 
     X = dx/dt = -K_t⁻¹ B = -K⁻¹ B (I - D B' K⁻¹ B)⁻¹,     dx/dr = -K_t⁻¹ ∂f/∂r,
 
-all from one block solve with the factor of K (Woodbury; whole_answers.py), or where cables are thousands, each
-answer from a solve with a factor of K_t (solved_answers.py). The cables' lengths follow as dl = B' dx, and a
-rest length of
+all from one block solve with the factor of K (Woodbury; whole_answers.py), or where cables are thousands,
+each answer from a solve with a factor of K_t (solved_answers.py). The cables' lengths follow as dl = B' dx,
+and a rest length of
 
     l0 = EA l / (EA + t)
 
@@ -48,7 +48,8 @@ class StepModel:
     - `evaluator` of the problem; `assembly` and `state` of the point under the design load.
     - `tensions`: how many of y are tensions, c or none.
     - `shortest`, `longest` (c,), m: bounds of the rest lengths; `length` (c,), m: of the cables as they lie.
-    - `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,): the largest changes of the other values.
+    - `origin`, `lower`, `upper` (y,): the point and its bounds; `step` (y - c,): the largest changes of the
+      other values.
     - `answers`: of nodes and cables to changes of y.
     - `constraints_by_y` (k, y): derivatives.
     - `quadratics`: of each term of the objective, None where it has none.
@@ -71,8 +72,8 @@ class StepModel:
     quadratics: tuple[Quadratic | None, ...]
 
     def design(self, y: Reals) -> Design:
-        """The design of y. Its rest lengths keep their bounds, whatever the lengths are that a model leads to which
-        is linear: of a soft shell they may come below zero."""
+        """The design of y. Its rest lengths keep their bounds, whatever the lengths are that a model leads to
+        which is linear: of a soft shell they may come below zero."""
         blocks, made = self.evaluator.blocks, self.point.design
         first = self.tensions
         for block, own in zip(blocks.variables, blocks.slices, strict=True):
@@ -105,8 +106,8 @@ class StepModel:
 
 
 def step_model(evaluator: Evaluator, point: Evaluated, *, whole: bool) -> StepModel:
-    """The model at the point, with dense matrices if it is to be `whole`. Its answers take as long as the point's
-    derivatives, beside which they are worked out."""
+    """The model at the point, with dense matrices if it is to be `whole`. Its answers take as long as the
+    point's derivatives, beside which they are worked out."""
     shell, blocks, design = evaluator.shell, evaluator.blocks, point.design
     at = setting(evaluator, point)
     residuals, numbers = _sums_of_squares(evaluator, point)
@@ -141,8 +142,8 @@ def step_model(evaluator: Evaluator, point: Evaluated, *, whole: bool) -> StepMo
 
 
 def _sums_of_squares(evaluator: Evaluator, point: Evaluated) -> tuple[list[Squares], list[int | None]]:
-    """The sums of squares in the objective under the design load, with residuals of their own each; and which of them
-    each term of the objective is, None where it is none."""
+    """The sums of squares in the objective under the design load, with residuals of their own each; and which
+    of them each term of the objective is, None where it is none."""
     found: list[Squares] = []
     numbers: list[int | None] = []
     for part, measurement in zip(evaluator.problem.minimise, point.summands, strict=True):

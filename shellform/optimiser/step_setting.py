@@ -31,8 +31,8 @@ class Setting:
     - `evaluator` of the problem; `state` and `assembly` of the point.
     - `cables` (c,): the present ones, numbered `present` (c,) among the candidates; `length` (c,), m.
     - `tensions`: n, which is c or 0; `tension` (n,), N.
-    - `each`: where the rest lengths stand among the problem's variables, None where no block is these; `other` (s,):
-      which of the variables are other ones.
+    - `each`: where the rest lengths stand among the problem's variables, None where no block is these;
+      `other` (s,): which of the variables are other ones.
     - `pull` (f, n): forces on the free degrees of freedom by the tensions; `right` (f, y): by all of y.
     - `rates` (c + 1, s): of all rest lengths and the radius by the variables.
     """

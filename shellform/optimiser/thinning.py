@@ -33,8 +33,8 @@ _BLOCK = 256  # columns solved for at once
 
 @dataclass(frozen=True)
 class Budget:
-    """What cables may cost that are taken away: the `objective` that is left, and the `deviation`, m, of any node from its
-    place under the design load."""
+    """What cables may cost that are taken away: the `objective` that is left, and the `deviation`, m, of any
+    node from its place under the design load."""
 
     objective: float = np.inf
     deviation: float = np.inf
@@ -46,7 +46,8 @@ class Budget:
 
 
 def allowed(search: Search, it: Iterate) -> float:
-    """The deviation, m, to which cables may be taken away: the solver's, or the present one where that is beyond it."""
+    """The deviation, m, to which cables may be taken away: the solver's, or the present one where that is
+    beyond it."""
     most = search.solver.deviation
     return np.inf if most is None else max(most, farthest(search, it.point))
 

@@ -86,8 +86,8 @@ def attempt_without(search: Search, it: Iterate, model: StepModel, leaving: Indi
 
 def sound(search: Search, before: Accepted) -> Evaluated | None:
     """The same design in the states to which the documented path leads, without its slack cables; None where
-    it doesn't bear all loads there, breaks a constraint, or is worse than it was: of two equilibria side by side,
-    a search from design to design may have come to the other one."""
+    it doesn't bear all loads there, breaks a constraint, or is worse than it was: of two equilibria side by
+    side, a search from design to design may have come to the other one."""
     evaluator, problem = search.evaluator, search.problem
     loaded = follow(problem.shell, before.built, problem.loads, stay=True)
     evaluator.factorisations += sum(each.factorisations for each in loaded.values())
@@ -114,8 +114,9 @@ def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]
 
 
 def fresh(search: Search, it: Iterate) -> tuple[JudgedTrial, Iterate]:
-    """What a whole fresh sample says of the last accepted design, beside structures of earlier ones that fell; and the
-    iterate that knows those that fell under the design load, by which it is judged from now on."""
+    """What a whole fresh sample says of the last accepted design, beside structures of earlier ones that
+    fell; and the iterate that knows those that fell under the design load, by which it is judged from now
+    on."""
     assert search.asked is not None
     asked, built = search.asked.sample(it.samples), it.accepted[-1].built
     earlier = [number for number in it.fallen if number >= FRESH]
@@ -126,8 +127,8 @@ def fresh(search: Search, it: Iterate) -> tuple[JudgedTrial, Iterate]:
 
 
 def confirmed(search: Search, asked: Required, built: Design, first: Sequence[int]) -> JudgedTrial:
-    """Whether a fresh sample agrees that the design stands as built, as it is `asked`, its structures of the numbers
-    `first` before the others."""
+    """Whether a fresh sample agrees that the design stands as built, as it is `asked`, its structures of the
+    numbers `first` before the others."""
     found = confirm(search.problem.shell, built, asked, first=first, judging=search.judging)
     search.evaluator.factorisations += found.factorisations
     return found

@@ -1,7 +1,7 @@
 """What an optimum, or any design in its states, comes to as tables: one row a cable, rod, node or step.
 
-`pandas.DataFrame(table.records())` makes a data frame of one; `table_text` its CSV. Names and numbers are those of
-the drawings. SI units, said in the columns' heads.
+`pandas.DataFrame(table.records())` makes a data frame of one; `table_text` its CSV. Names and numbers are
+those of the drawings. SI units, said in the columns' heads.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ def cables(shell: Gridshell, design: Design, states: Mapping[str, State]) -> Tab
 
 
 def rods(shell: Gridshell, design: Design, states: Mapping[str, State]) -> Table:
-    """A row a rod: its length, and in each state how far it is off the target at most and how much of its strength
-    bending takes."""
+    """A row a rod: its length, and in each state how far it is off the target at most and how much of its
+    strength bending takes."""
     grid = shell.net.grid
     off = {name: deviations(shell, state) for name, state in states.items()}
     used = {}

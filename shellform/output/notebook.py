@@ -1,5 +1,5 @@
-"""Pictures of nets, gridshells and optima where they are displayed in Jupyter or IPython, and the page's own view
-of them, to be turned, picked in, measured and cut; it stands in a frame of its own and asks for nothing.
+"""Pictures of nets, gridshells and optima where they are displayed in Jupyter or IPython, and the page's own
+view of them, to be turned, picked in, measured and cut; it stands in a frame of its own and asks for nothing.
 
 `import shellform` in a running IPython, or `%load_ext shellform`, tells its formatter the names of the types;
 nothing is loaded until one of them is displayed. Without OpenGL the picture is made of lines.

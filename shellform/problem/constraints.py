@@ -18,8 +18,8 @@ from shellform.problem.terms import Term
 
 
 class Constraint(Protocol):
-    """lower <= every value of `term` <= upper, in the values' unit, infinite where there is no such side. Residuals are
-    shares of `scale`, positive, in the same unit."""
+    """lower <= every value of `term` <= upper, in the values' unit, infinite where there is no such side.
+    Residuals are shares of `scale`, positive, in the same unit."""
 
     @property
     def term(self) -> Term: ...

@@ -257,8 +257,9 @@ class Thrust(Term):
 
 
 def _pushes(at: LoadedDesign, axes: tuple[int, ...], name: str) -> tuple[Reals, Indices, sp.csr_array, Reals]:
-    """With what each support pushes the shell along k `axes` (s, k), N; the free degrees of freedom (f,) by which `rows`
-    (s k, f) are its derivatives, N/m; and those by the radius (s, k). Raises InputError where cables end at supports."""
+    """With what each support pushes the shell along k `axes` (s, k), N; the free degrees of freedom (f,) by
+    which `rows` (s k, f) are its derivatives, N/m; and those by the radius (s, k). Raises InputError where
+    cables end at supports."""
     shell, state, assembly = at.shell, at.state, at.assembled()
     if np.isin(shell.cables(at.design).ends, shell.net.supports).any():
         raise InputError(
@@ -314,8 +315,8 @@ def _largest(
     cables: np.ndarray | None = None,
     by_rest_length: Reals | None = None,
 ) -> Measurement:
-    """KS of `values` (k,) from their derivatives `rows` (k, q) at `dofs` (k, q), or sparse ones at `dofs` (q,),
-    `by_radius` (k,), and each by its own cable's rest length.
+    """KS of `values` (k,) from their derivatives `rows` (k, q) at `dofs` (k, q), or sparse ones at `dofs`
+    (q,), `by_radius` (k,), and each by its own cable's rest length.
     """
     weight, value = _smooth(values, SHARPNESS / unit)
     slope = np.zeros(6 * shell.node_count)

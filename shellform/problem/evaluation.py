@@ -58,9 +58,9 @@ class OffBranch(Exception):
 
 @dataclass(frozen=True)
 class Evaluated:
-    """A design on the stable branch with the values of its `problem`: `variables` (s,), `states` by load case at
-    a `stage`, `objective`, its weighted `terms`, `constraints` (k,), residuals at most 0 where met; and the
-    `measurements` of all the problem's terms."""
+    """A design on the stable branch with the values of its `problem`: `variables` (s,), `states` by load case
+    at a `stage`, `objective`, its weighted `terms`, `constraints` (k,), residuals at most 0 where met; and
+    the `measurements` of all the problem's terms."""
 
     problem: Problem
     variables: Reals
@@ -148,8 +148,8 @@ class Evaluator:
         return np.asarray(first + stage * (self.problem.loads[name] - first))
 
     def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Evaluated:
-        """The values of a design whose equilibria `states` at the stage are known. Raises OffBranch where a term
-        can't be measured.
+        """The values of a design whose equilibria `states` at the stage are known. Raises OffBranch where a
+        term can't be measured.
         """
         problem, assembly = self.problem, self.assembly(design)
         try:
@@ -179,8 +179,8 @@ class Evaluator:
         return self._linearised(point, _whole(point), self.assembly(point.design))
 
     def linearised_beside(self, point: Evaluated, work: Callable[[], Made]) -> tuple[Linearisation, Made]:
-        """The same, and what other `work` makes on another core meanwhile, which may use the `assembly` of the point's
-        design."""
+        """The same, and what other `work` makes on another core meanwhile, which may use the `assembly` of
+        the point's design."""
         assembly = self.assembly(point.design, 1)
         whole = _whole(point)  # before: drawn structures keep all cores busy by themselves
         tasks: list[Callable[[], Any]] = [lambda: self._linearised(point, whole, assembly), work]
@@ -190,7 +190,8 @@ class Evaluator:
     def _linearised(
         self, point: Evaluated, whole: Sequence[Measurement], assembly: Assembly
     ) -> Linearisation:
-        """The point with derivatives chained from those of its `whole` measurements, on an assembly of its design."""
+        """The point with derivatives chained from those of its `whole` measurements, on an assembly of its
+        design."""
         problem, blocks = point.problem, self.blocks
         terms = problem.terms
         rates = blocks.rates(point.design).multiply(blocks.unit).tocsc()
@@ -220,9 +221,9 @@ class Evaluator:
     def evaluate(
         self, design: Design, near: Mapping[str, State], stage: float, *, lead: bool = False
     ) -> Evaluated:
-        """The design's values in the equilibria that Newton's method finds from the states `near` them. Where one of a
-        further load isn't found from there, with `lead` the load is followed from the design load's equilibrium.
-        Raises OffBranch."""
+        """The design's values in the equilibria that Newton's method finds from the states `near` them. Where
+        one of a further load isn't found from there, with `lead` the load is followed from the design load's
+        equilibrium. Raises OffBranch."""
         self.evaluations += 1
         before = self.factorisations
         used = self.problem.used()
@@ -269,8 +270,8 @@ class Evaluator:
         return found
 
     def assembly(self, design: Design, number: int = 0) -> Assembly:
-        """The assembly of a design; its pattern is kept while the same cables are present. Those of other numbers have
-        factors of their own, for work side by side."""
+        """The assembly of a design; its pattern is kept while the same cables are present. Those of other
+        numbers have factors of their own, for work side by side."""
         if self._present is None or not np.array_equal(self._present, design.present):
             self._assemblies, self._present = [assemble(self.shell.network(design))], design.present
         while len(self._assemblies) <= number:
@@ -281,8 +282,8 @@ class Evaluator:
     def _tried(
         self, design: Design, near: Mapping[str, State], stage: float, order: Sequence[str], lead: bool
     ) -> list[_Tried]:
-        """The equilibria under the loads in `order`, sought side by side; after one that has none, and unless others are
-        to `lead` to it, those that haven't begun are given up."""
+        """The equilibria under the loads in `order`, sought side by side; after one that has none, and unless
+        others are to `lead` to it, those that haven't begun are given up."""
         idle = [self.assembly(design, number) for number in range(min(cores(), len(order)))]
         lost: list[str] = []
 
@@ -310,7 +311,8 @@ class Evaluator:
         return _Tried(found.state, found.factorisations, "")
 
     def _led(self, design: Design, known: State, load: Reals) -> State:
-        """The equilibrium to which the load leads from the design load's, which is `known`. Raises OffBranch."""
+        """The equilibrium to which the load leads from the design load's, which is `known`. Raises
+        OffBranch."""
         first = self.load(self.base, 1.0)
         loaded = apply_load(self.assembly(design), known, first, load, step=_LED, smallest=_LED, stay=True)
         self._count(loaded.factorisations)
@@ -323,8 +325,9 @@ class Evaluator:
         self.equilibria += 1
 
     def _measured(self, term: Term, at: LoadedDesign) -> Measurement:
-        """The term's measurement. One that needs no equilibrium is the same whatever the states: a search goes
-        back to designs in other states, and drawn structures that it keeps in mind take longer than all else."""
+        """The term's measurement. One that needs no equilibrium is the same whatever the states: a search
+        goes back to designs in other states, and drawn structures that it keeps in mind take longer than all
+        else."""
         if term.load:
             return measured(term, at)
         for known, design, found in self._known:

@@ -22,11 +22,11 @@ def follow(
     shell: Gridshell, design: Design, loads: Mapping[str, Reals], *, stay: bool = False
 ) -> dict[str, Loaded]:
     """The documented path of a design: unloaded from the target shape by relaxation, then each load case on
-    its own from there, step by step (loading.py), heeding what a step may leap over. `shellform analyse` goes the same
-    way.
+    its own from there, step by step (loading.py), heeding what a step may leap over. `shellform analyse` goes
+    the same way.
 
-    The cases, forces (n, 6), N and Nm, are solved side by side on the cores. With `stay` snap-through isn't followed.
-    Raises InputError for forces of another shape, NotConverged where no equilibrium is found.
+    The cases, forces (n, 6), N and Nm, are solved side by side on the cores. With `stay` snap-through isn't
+    followed. Raises InputError for forces of another shape, NotConverged where no equilibrium is found.
     """
     given = {name: reals(f"loads[{name!r}]", load, (shell.node_count, 6)) for name, load in loads.items()}
     none = np.zeros((shell.node_count, 6))

@@ -14,10 +14,10 @@ vault at 3 N a crossing, supports 0.075 mm off and all else in proportion, 150 s
 supports that give way is far from linear, and the predicted deviation is then too small (the mean 1.71e-3
 instead of 1.69e-3).
 
-What an optimiser needs is the term `RobustMisfit`: the Gauss-Newton value d'd + tr(X'X) + k sqrt(var q), without
-the curvature, and its derivative by the rest lengths and the radius. That derivative is exact: for G = d(value)/dX, K L = G, the terms -L_k'(dK X_k + dF_k) hold the third derivative of the energy
-contracted with sum of L_k X_k', and one more adjoint solve carries their dependence on the state to the
-design.
+What an optimiser needs is the term `RobustMisfit`: the Gauss-Newton value d'd + tr(X'X) + k sqrt(var q),
+without the curvature, and its derivative by the rest lengths and the radius. That derivative is exact: for G
+= d(value)/dX, K L = G, the terms -L_k'(dK X_k + dF_k) hold the third derivative of the energy contracted with
+sum of L_k X_k', and one more adjoint solve carries their dependence on the state to the design.
 """
 
 from __future__ import annotations

@@ -105,8 +105,8 @@ class Term(ABC):
     from this class and says `name`, `load` and `measure`, and `size` where it isn't 1.
 
     `name` heads its column in histories. `stabilises`: whether it tells how far a state is from losing its
-    stability, so that a start that doesn't bear the further loads is led along its gradient. `of_shape`: whether it
-    tells how far the whole shape is off, so that polishing serves it.
+    stability, so that a start that doesn't bear the further loads is led along its gradient. `of_shape`:
+    whether it tells how far the whole shape is off, so that polishing serves it.
     """
 
     name: ClassVar[str]
@@ -168,8 +168,8 @@ class Misfit(Term):
 
 @dataclass(frozen=True)
 class Bulges(Term):
-    """The sum over all nodes of the fourth power of the distance from the target, m⁴: the misfit's sibling that the
-    farthest nodes decide."""
+    """The sum over all nodes of the fourth power of the distance from the target, m⁴: the misfit's sibling
+    that the farthest nodes decide."""
 
     name = "bulges"
     load: str

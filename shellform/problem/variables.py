@@ -188,7 +188,8 @@ class Blocks:
             )
         self.moves_radius = bool(owners[-1])
         own = zip(self.variables, self.slices, strict=True)
-        # where the rest lengths of all cables one by one stand among the variables; None where no block is these
+        # where the rest lengths of all cables one by one stand among the variables; None where no block is
+        # these
         self.each_cable = next((place for each, place in own if each.of_each_cable), None)
 
     def values(self, design: Design) -> Reals:

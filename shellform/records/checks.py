@@ -30,10 +30,10 @@ _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or
 class Bounds:
     """What the case limits: tension `force`, N, of cables under the design load and those beyond it; root
     mean square `misfit`, m, under those beyond it; and where an engineer asked for it (None: not) the largest
-    `deviation`, m, under the design load, of the perfect structure and as `built`, `stress` over strength, connectors' `turn`, rad, `uplift` and
-    `thrust`, N, of supports under any load, least pull `slack`, N, of cables under the `slack_loads`, and by
-    load the least `critical` factor; what is asked of structures as built (`safety`); and how the case gives
-    its `rods`' size."""
+    `deviation`, m, under the design load, of the perfect structure and as `built`, `stress` over strength,
+    connectors' `turn`, rad, `uplift` and `thrust`, N, of supports under any load, least pull `slack`, N, of
+    cables under the `slack_loads`, and by load the least `critical` factor; what is asked of structures as
+    built (`safety`); and how the case gives its `rods`' size."""
 
     force: float
     misfit: float
@@ -158,9 +158,9 @@ def _edged(row: LoadRecord) -> Cell:
 
 @dataclass(frozen=True)
 class _Limit:
-    """One that an engineer set, or (5): its `title`, the `most` of what is limited (None: not limited), in the unit of the
-    case's `entry`; the `unit` in which people read it, so many of which (`times`) make one of the entry's; and a design's
-    `value`, in the entry's unit."""
+    """One that an engineer set, or (5): its `title`, the `most` of what is limited (None: not limited), in
+    the unit of the case's `entry`; the `unit` in which people read it, so many of which (`times`) make one of
+    the entry's; and a design's `value`, in the entry's unit."""
 
     title: str
     entry: str

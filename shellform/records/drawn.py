@@ -14,7 +14,8 @@ from shellform.written import write_text
 
 @dataclass(frozen=True)
 class DrawnSnap:
-    """Structure `number` came to rest after a local snap at a `factor` of the load, in which a node went `far`, m."""
+    """Structure `number` came to rest after a local snap at a `factor` of the load, in which a node went
+    `far`, m."""
 
     number: int
     factor: float
@@ -23,8 +24,8 @@ class DrawnSnap:
 
 @dataclass(frozen=True)
 class DrawnShape:
-    """Structure `number` at rest under the design load: how far, m, its nodes are from their places on the target,
-    `deviation_max` and `deviation_mean`."""
+    """Structure `number` at rest under the design load: how far, m, its nodes are from their places on the
+    target, `deviation_max` and `deviation_mean`."""
 
     number: int
     deviation_max: float
@@ -33,9 +34,9 @@ class DrawnShape:
 
 @dataclass(frozen=True)
 class DrawnPath:
-    """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, which of
-    them `stand`, the local `snaps` on their ways, and the `shapes` of some under the design load, where that lies on
-    this path."""
+    """Structures 0, 1, … under one load: the `factors` of it up to which they were followed, which of them
+    `stand`, the local `snaps` on their ways, and the `shapes` of some under the design load, where that lies
+    on this path."""
 
     factors: tuple[float, ...] = ()
     stand: tuple[bool, ...] = ()

@@ -30,8 +30,8 @@ class OptimisationRecord:
 
     - `objective_start`, `objective_end`; `status`: a sentence on why it ended.
     - `constraints`: value over limit less 1, by name; `feasible`: whether the optimised design keeps them.
-    - `iterations`, `evaluations` (so many of them `rejected`), solved `equilibria`, and `factorisations` (those of
-      rejected evaluations: `factorisations_rejected`): the work that it took.
+    - `iterations`, `evaluations` (so many of them `rejected`), solved `equilibria`, and `factorisations`
+      (those of rejected evaluations: `factorisations_rejected`): the work that it took.
     - `stiffness_min`, N/m, that the softest mode had to keep.
     - `not_polished`: why it wasn't.
     - `cables_max`, `symmetric`: what came of these wishes.
@@ -63,8 +63,8 @@ class SectionRecord:
     - `section`: its name; `rod_radius`, m; `rod_mass`, kg, of all rods.
     - `rounded_up`: whether it is the one that the free radius is rounded up to.
     - `feasible`: whether its design keeps all limits, else `why_not`.
-    - `objective`, `deviation_max`, `deviation_mean`, m, `cables` and `stress_utilisation_max`: None where it has no
-      design.
+    - `objective`, `deviation_max`, `deviation_mean`, m, `cables` and `stress_utilisation_max`: None where it
+      has no design.
     """
 
     section: str

@@ -86,7 +86,8 @@ class ModelRecord:
 class StandingRecord:
     """Of `drawn` imperfect structures `standing` bear the load; so at least the share `at_least` of all do,
     with `confidence`. Drawn from `seed`; `lowest`, the load factor that the weakest of them bears (1 where
-    all stand). Of those that stand, so many have `snapped` at a rod's end or a cell before, by `snap`, m, at the most."""
+    all stand). Of those that stand, so many have `snapped` at a rod's end or a cell before, by `snap`, m, at
+    the most."""
 
     drawn: int
     standing: int
@@ -100,10 +101,10 @@ class StandingRecord:
 
 @dataclass(frozen=True)
 class BuiltShapeRecord:
-    """The shape of so many `structures` drawn as they would be built, at rest under the load: of their nodes' largest
-    distances from the target, m, the median, `deviation_max`, and the largest, `deviation_max_worst`; the median of
-    their mean distances, `deviation_mean`. To first order each of the `causes` of error, by name, moves a node by so
-    much, m, root mean square, where it is the only one."""
+    """The shape of so many `structures` drawn as they would be built, at rest under the load: of their nodes'
+    largest distances from the target, m, the median, `deviation_max`, and the largest, `deviation_max_worst`;
+    the median of their mean distances, `deviation_mean`. To first order each of the `causes` of error, by
+    name, moves a node by so much, m, root mean square, where it is the only one."""
 
     structures: int
     deviation_max: float
@@ -126,8 +127,9 @@ class LoadRecord:
     ("none": it doesn't up to `critical_sought`, the most that was tried), `critical_factor_halved` the same
     with rod elements halved, and `critical_factor_error` what the coarser mesh is off by, as are
     `deviation_max_error`, `deviation_mean_error`, m, and `rod_utilisation_error`. `slack`: cables without
-    tension, by name; `stands` and, under the design load, `built_shape`: as built; `expected_stiffness`, N/m: the least of the softest mode on the path
-    to this load, cables counted for what they are worth under their errors."""
+    tension, by name; `stands` and, under the design load, `built_shape`: as built; `expected_stiffness`, N/m:
+    the least of the softest mode on the path to this load, cables counted for what they are worth under their
+    errors."""
 
     factor: float
     deviation_max: float

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class ThickerRodsRecord:
-    """Rods of a `radius`, m, with which so many of the `drawn` structures of the initial design are `standing`
-    under every load; the name of their `section` where they are from a catalogue."""
+    """Rods of a `radius`, m, with which so many of the `drawn` structures of the initial design are
+    `standing` under every load; the name of their `section` where they are from a catalogue."""
 
     radius: float
     standing: int

@@ -65,8 +65,9 @@ def design_title(name: str) -> str:
 
 
 def constraint_titles(names: Iterable[str]) -> dict[str, str]:
-    """The optimiser's constraints in words, by name: their quantity, and their load case where they have one. Those under the
-    design load name none, which is told where the same quantity is limited under other loads too."""
+    """The optimiser's constraints in words, by name: their quantity, and their load case where they have one.
+    Those under the design load name none, which is told where the same quantity is limited under other loads
+    too."""
     parts = {name: name.partition(".")[::2] for name in names}
     elsewhere = {kind for kind, load in parts.values() if load}
     titles = {}
@@ -126,7 +127,8 @@ def shape_notes(summary: Summary, name: str) -> list[str]:
 
 
 def spent_words(designs: Mapping[str, DesignRecord], name: str) -> str:
-    """What leaving cables away has cost the design of its shape as built, where that is much, and what keeps it."""
+    """What leaving cables away has cost the design of its shape as built, where that is much, and what keeps
+    it."""
     initial, own = (_built(designs.get(each)) for each in ("initial", name))
     if initial is None or own is None or own.deviation_mean < _SPENT * initial.deviation_mean:
         return ""
@@ -138,7 +140,8 @@ def spent_words(designs: Mapping[str, DesignRecord], name: str) -> str:
 
 
 def far_off_words(designs: Mapping[str, DesignRecord], name: str, wished: float | None) -> str:
-    """That the design is farther off its shape than was `wished` for, m, where it is, and what would require it."""
+    """That the design is farther off its shape than was `wished` for, m, where it is, and what would require
+    it."""
     row = designs[name].loads.get("design") if name in designs else None
     if row is None or wished is None or row.deviation_max <= wished:
         return ""

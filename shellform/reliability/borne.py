@@ -91,11 +91,11 @@ def borne(
     exact: float = EXACT,
     near: tuple[float, State] | None = None,
 ) -> BorneFactor:
-    """The factor up to which the structure keeps the stiffness `left`, N/m, to a relative error `exact` of it,
-    `most` where it does so beyond; `rates` are the beams as built with the derivatives of their stiffness by
-    further variables. From nothing, or from a factor and a state `near` it, of the same structure in a design
-    nearby, if Newton's steps from there keep every tangent definite. Raises NotConverged where there is no
-    unloaded equilibrium."""
+    """The factor up to which the structure keeps the stiffness `left`, N/m, to a relative error `exact` of
+    it, `most` where it does so beyond; `rates` are the beams as built with the derivatives of their stiffness
+    by further variables. From nothing, or from a factor and a state `near` it, of the same structure in a
+    design nearby, if Newton's steps from there keep every tangent definite. Raises NotConverged where there
+    is no unloaded equilibrium."""
     here, factor = _followed(loading, most, near)
     if here is None:
         raise NotConverged(
@@ -150,8 +150,8 @@ def _between(low: _Point, above: float, high: _Point | None, left: float) -> flo
 
 
 def _stiff(loading: Loading, point: _Point, left: float) -> _Point:
-    """A point before the given one with at least the stiffness `left`. Raises NotConverged where none is reached
-    from there, however near it is."""
+    """A point before the given one with at least the stiffness `left`. Raises NotConverged where none is
+    reached from there, however near it is."""
     back = _RESOLUTION
     while point.factor > 0.0 and back > _AT_ONCE:
         before = _moved(loading, point, max(0.0, point.factor - back))

@@ -1,4 +1,5 @@
-"""The stable branch of one structure under a growing load, followed step by step (standing.py has the method)."""
+"""The stable branch of one structure under a growing load, followed step by step (standing.py has the
+method)."""
 
 from __future__ import annotations
 
@@ -36,9 +37,10 @@ class Here:
 
 
 class Mass:
-    """What is added to tangents that aren't positive definite, N/m, times the shape of implicit dynamic relaxation's mass
-    (equilibrium.py). It begins with what the `largest` force, N, takes away of the stiffness across an element of a
-    usual `length`, m, and is a tenth after each step, or more where a tenth has been too little."""
+    """What is added to tangents that aren't positive definite, N/m, times the shape of implicit dynamic
+    relaxation's mass (equilibrium.py). It begins with what the `largest` force, N, takes away of the
+    stiffness across an element of a usual `length`, m, and is a tenth after each step, or more where a tenth
+    has been too little."""
 
     def __init__(self, largest: float, length: float) -> None:
         self.value = 0.0
@@ -122,10 +124,10 @@ class Branch:
         damped: bool = False,
     ) -> Here | None:
         """The equilibrium to which whole steps of Newton's lead from `begin` with every tangent that is made
-        positive definite, that of the equilibrium included; None where one isn't. `damped`: those on the way that aren't
-        are made so by a mass, which shortens steps. Where rounding leaves more than
-        the tolerance, what it leaves counts as none as far as it would on the way. Tangents on the way are those of
-        the deformations that were `foreseen`, by the step that led to `begin` and then by each one
+        positive definite, that of the equilibrium included; None where one isn't. `damped`: those on the way
+        that aren't are made so by a mass, which shortens steps. Where rounding leaves more than the
+        tolerance, what it leaves counts as none as far as it would on the way. Tangents on the way are those
+        of the deformations that were `foreseen`, by the step that led to `begin` and then by each one
         (Assembly.tangent_of); the equilibrium's is its own."""
         own, state, before, factor, mass = self.assembly, begin, np.inf, None, None
         for _ in range(limit):
@@ -154,8 +156,8 @@ class Branch:
         return None
 
     def foreseen(self, state: State, turned: float, change: Reals) -> Foreseen:
-        """The deformations to which a step (n, 6) leads by its linear system; None where they aren't known: where
-        a beam is turned far, or coordinates have twice the digits."""
+        """The deformations to which a step (n, 6) leads by its linear system; None where they aren't known:
+        where a beam is turned far, or coordinates have twice the digits."""
         if turned > 0.0 or state.tail is not None:
             return None
         return self.assembly.foreseen(state, change)
@@ -174,7 +176,8 @@ class Branch:
         return None if factor is None else Here(state, balance, factor)
 
     def _factor(self, balance: Balance, mass: Mass | None = None) -> Factor | None:
-        """Of the balance's tangent; None where it isn't positive definite, or with a `mass` that may grow no more."""
+        """Of the balance's tangent; None where it isn't positive definite, or with a `mass` that may grow no
+        more."""
         matrix, values = self.assembly.matrix, held(self.assembly, balance)
         while True:
             raised = values

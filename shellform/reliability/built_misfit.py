@@ -1,19 +1,21 @@
-"""The misfit of structures as built, to first order, as a term of a design problem: what errors of making and building do to
-the shape becomes worth something beside the perfect structure's own misfit and its cables.
+"""The misfit of structures as built, to first order, as a term of a design problem: what errors of making and
+building do to the shape becomes worth something beside the perfect structure's own misfit and its cables.
 
-A few structures are drawn once, with every cause of error, and kept while the design changes. At the perfect structure's
-equilibrium x, which structure j isn't in, it has the unbalanced forces F_j = f_j(x) - p_j, and moves by
+A few structures are drawn once, with every cause of error, and kept while the design changes. At the perfect
+structure's equilibrium x, which structure j isn't in, it has the unbalanced forces F_j = f_j(x) - p_j, and
+moves by
 
     X_j = u_j on the degrees of freedom that are held, u_j the places of its supports that are off,
     K X_j = -F_j on the free ones,
 
-K being the perfect structure's tangent. With d the distances from the target the value is the mean over j of |d + X_j|². Errors
-are drawn in pairs of opposite ones, so that what is linear in them moves the mean nowhere: else the few structures' own mean
-would be made up for, and other structures would lie farther off.
+K being the perfect structure's tangent. With d the distances from the target the value is the mean over j of
+|d + X_j|². Errors are drawn in pairs of opposite ones, so that what is linear in them moves the mean nowhere:
+else the few structures' own mean would be made up for, and other structures would lie farther off.
 
-The derivative is exact: with G_j = d(value)/dX_j and K L_j = G_j the terms -L_j'(dK X_j + dF_j) hold the third derivative of
-the energy contracted with the sum of L_j X_j', and the structures' own tangents. Spins don't commute: the derivative of a
-node's moment m has -S(m)/2 beside the symmetric tangent, and the nodes of structure j are in no equilibrium.
+The derivative is exact: with G_j = d(value)/dX_j and K L_j = G_j the terms -L_j'(dK X_j + dF_j) hold the
+third derivative of the energy contracted with the sum of L_j X_j', and the structures' own tangents. Spins
+don't commute: the derivative of a node's moment m has -S(m)/2 beside the symmetric tangent, and the nodes of
+structure j are in no equilibrium.
 """
 
 from __future__ import annotations
@@ -49,9 +51,9 @@ FIRST = 50_000  # the number from which on they are drawn: neither those that a 
 
 @dataclass(frozen=True)
 class BuiltMisfit(Term):
-    """The mean misfit, m², of structures with some `errors` under the load case `load`, to first order about the perfect
-    structure's equilibrium; their shapes have these `imperfections`. The step model takes the perfect structure's
-    misfit's curvature for its own."""
+    """The mean misfit, m², of structures with some `errors` under the load case `load`, to first order about
+    the perfect structure's equilibrium; their shapes have these `imperfections`. The step model takes the
+    perfect structure's misfit's curvature for its own."""
 
     name = "built_misfit"
     of_shape = True
@@ -92,7 +94,8 @@ class BuiltMisfit(Term):
         by_dof -= bilinear_by_dof(assembly, state, multipliers, moved.motions)
 
         def own(number: int) -> tuple[Reals, Reals, float]:
-            """What a structure's own forces at the state add to L'F by the state, the rest lengths and the radius."""
+            """What a structure's own forces at the state add to L'F by the state, the rest lengths and the
+            radius."""
             built, errors = moved.structures[number], self.errors[number]
             factor = multipliers[:, number].reshape(-1, 6)
             change = built.force_along(state, factor)
@@ -126,9 +129,9 @@ def built_misfit(
     seed: int,
     pairs: int = PAIRS,
 ) -> BuiltMisfit:
-    """The term for so many pairs of structures drawn with the `tolerances` under the `seed`; imperfections of shape follow the
-    softest modes of the `start` under the load `case`. Raises InputError for no pairs, NotConverged where the start has no
-    unloaded equilibrium."""
+    """The term for so many pairs of structures drawn with the `tolerances` under the `seed`; imperfections of
+    shape follow the softest modes of the `start` under the load `case`. Raises InputError for no pairs,
+    NotConverged where the start has no unloaded equilibrium."""
     require_count(pairs, where="built_misfit.pairs", give=f"pairs of structures, such as {PAIRS}")
     nominal = perfect(shell, start, case.force, step=TO_ITS_END)
     errors = []

@@ -1,7 +1,8 @@
 """Where errors take a perfect structure, to first order.
 
-At an equilibrium x of the perfect structure under the loads p, a structure with errors has the unbalanced forces
-r = p' - f'(x) - K u, u the places of its supports that are off. It moves by dx = K⁻¹ r, and its supports by u.
+At an equilibrium x of the perfect structure under the loads p, a structure with errors has the unbalanced
+forces r = p' - f'(x) - K u, u the places of its supports that are off. It moves by dx = K⁻¹ r, and its
+supports by u.
 """
 
 from __future__ import annotations
@@ -36,8 +37,8 @@ DRAWN = 8  # structures of each cause: what moves nodes farthest does so by far
 
 @dataclass(frozen=True)
 class Moved:
-    """Assemblies of `structures` as built, k of them, and how far each goes from a perfect structure's equilibrium,
-    `motions` (6 n, k), m and rad, supports included."""
+    """Assemblies of `structures` as built, k of them, and how far each goes from a perfect structure's
+    equilibrium, `motions` (6 n, k), m and rad, supports included."""
 
     structures: tuple[Assembly, ...]
     motions: Reals
@@ -56,9 +57,9 @@ def moved_from(
     some: Sequence[Errors],
     imperfections: Imperfections | None,
 ) -> Moved:
-    """The structures that are a perfect one, with this `assembly` and those of the candidate cables that are `present`, but
-    for `some` errors, moved from its equilibrium `state` under the dead `load` (n, 6). Raises NotPositiveDefinite where that
-    isn't stable."""
+    """The structures that are a perfect one, with this `assembly` and those of the candidate cables that are
+    `present`, but for `some` errors, moved from its equilibrium `state` under the dead `load` (n, 6). Raises
+    NotPositiveDefinite where that isn't stable."""
     (beams,), (cables,) = assembly.beams, assembly.cables
 
     def one(errors: Errors) -> tuple[Assembly, Reals]:
@@ -78,7 +79,8 @@ def moved_from(
 
 
 def solved(assembly: Assembly, state: State, right: Reals) -> Reals:
-    """K⁻¹ of the columns (6 n, k) at the free degrees of freedom, 0 at the held ones. Raises NotPositiveDefinite."""
+    """K⁻¹ of the columns (6 n, k) at the free degrees of freedom, 0 at the held ones. Raises
+    NotPositiveDefinite."""
     factor = assembly.matrix.factor(held(assembly, assembly.evaluate(state)))
     result = np.zeros_like(right)
     result[assembly.free] = factor.solve(np.asfortranarray(right[assembly.free]))
@@ -88,8 +90,8 @@ def solved(assembly: Assembly, state: State, right: Reals) -> Reals:
 def moved_by_cause(
     nominal: Perfect, tolerances: Tolerances, *, seed: int = 0, drawn: int = DRAWN
 ) -> dict[str, float]:
-    """By cause of error, the root mean square motion of a node, m, from its place in the perfect structure at the
-    end of its path, where no other cause is off; nothing where that structure isn't stable."""
+    """By cause of error, the root mean square motion of a node, m, from its place in the perfect structure at
+    the end of its path, where no other cause is off; nothing where that structure isn't stable."""
     assembly, state, load = assemble(nominal.network), nominal.states[-1], nominal.factors[-1] * nominal.load
     causes = [name for name in CAUSES if getattr(tolerances, name) > 0.0]
     some = [

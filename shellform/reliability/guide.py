@@ -3,9 +3,9 @@ cable counted for what it is worth under its tolerance (expected_cables.py).
 
 A perfect structure may count on cables that a length error of a hair leaves slack. At each state of the
 perfect path the tangent is taken with the expected law instead of the sharp one, the deviation of a cable's
-stretch being that of its own length and, to first order (first_order.py), of everything else that is off. The least
-of the lowest eigenvalues along the path is the guide; below zero, the average structure doesn't stand. It
-ranks designs; how likely they stand the sample says.
+stretch being that of its own length and, to first order (first_order.py), of everything else that is off. The
+least of the lowest eigenvalues along the path is the guide; below zero, the average structure doesn't stand.
+It ranks designs; how likely they stand the sample says.
 """
 
 from __future__ import annotations

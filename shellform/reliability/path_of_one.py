@@ -47,8 +47,8 @@ _SNAPPING, _LOOKS = 8, 8  # factorisations after which it is looked how far it h
 
 @dataclass(frozen=True)
 class Snap:
-    """A rod's end or a cell snaps beyond a load `factor`, and the structure comes to rest: how `far`, m, the node goes that
-    goes farthest."""
+    """A rod's end or a cell snaps beyond a load `factor`, and the structure comes to rest: how `far`, m, the
+    node goes that goes farthest."""
 
     factor: float
     far: float
@@ -63,7 +63,8 @@ class DrawnOutcome:
     - `far`, m: how far a node ends from the perfect structure's place, inf where it fell.
     - `state`: its last one on the branch; `snaps`: local ones on the way.
     - `factorisations` spent.
-    - `resting`: its state at rest under a share of the load, where that was asked for; None where it fell before.
+    - `resting`: its state at rest under a share of the load, where that was asked for; None where it fell
+      before.
     """
 
     number: int
@@ -96,8 +97,8 @@ class Bench:
 
     @cached_property
     def unloaded(self) -> Factor | None:
-        """The factor of the unloaded perfect structure's tangent, from which each drawn one begins; None where
-        it isn't positive definite, which it is to within the friction of numbers that `held` adds."""
+        """The factor of the unloaded perfect structure's tangent, from which each drawn one begins; None
+        where it isn't positive definite, which it is to within the friction of numbers that `held` adds."""
         return self._factor(self.nominal.unloaded)
 
     @cached_property
@@ -117,8 +118,8 @@ class Bench:
 
 
 class Loading(Branch):
-    """One structure under way: the perfect one of the `bench` built with these `errors`, its `number` under a seed, and
-    the local `snaps` that it has gone on after so far."""
+    """One structure under way: the perfect one of the `bench` built with these `errors`, its `number` under a
+    seed, and the local `snaps` that it has gone on after so far."""
 
     def __init__(self, bench: Bench, errors: Errors, number: int) -> None:
         nominal = bench.nominal
@@ -132,8 +133,8 @@ class Loading(Branch):
         self.snaps: list[Snap] = []
 
     def outcome(self, step: float, smallest: float, marks: Sequence[float] = ()) -> DrawnOutcome:
-        """What becomes of it, loaded from nothing in steps of at most `step` of the load, where it falls known to the
-        `smallest` one, and beside factors in `marks` to MARKED."""
+        """What becomes of it, loaded from nothing in steps of at most `step` of the load, where it falls
+        known to the `smallest` one, and beside factors in `marks` to MARKED."""
         nominal = self.nominal
         here, factor = self.borne(1.0, step, smallest, marks=marks)
         snaps = tuple(self.snaps)
@@ -148,8 +149,9 @@ class Loading(Branch):
         return DrawnOutcome(self.number, factor, stands, far, here.state, self.spent, snaps)
 
     def rested(self, found: DrawnOutcome, share: float, step: float, smallest: float) -> DrawnOutcome:
-        """The structure's outcome with its state at rest under a `share` of the load: back along the branch, on
-        which it is elastic; where that leads nowhere, or something has snapped since, from nothing again."""
+        """The structure's outcome with its state at rest under a `share` of the load: back along the branch,
+        on which it is elastic; where that leads nowhere, or something has snapped since, from nothing
+        again."""
         if found.factor < share:
             return found
         there = None
@@ -173,7 +175,8 @@ class Loading(Branch):
         begin: tuple[float, State] | None = None,
         marks: Sequence[float] = (),
     ) -> tuple[Here | None, float]:
-        """As `followed`, but going on after local snaps, which are kept in `snaps`: where the structure falls."""
+        """As `followed`, but going on after local snaps, which are kept in `snaps`: where the structure
+        falls."""
         here, factor = self.followed(most, step, smallest, begin=begin, marks=marks)
         while here is not None and factor < most and len(self.snaps) < SNAPS:
             goal = min(factor + _BEYOND * smallest, most)
@@ -185,8 +188,8 @@ class Loading(Branch):
         return here, factor
 
     def _rested(self, here: Here, goal: float) -> Here | None:
-        """Where the structure comes to rest under the load factor `goal`, whose stable branch has ended `here` below
-        it; None where a node goes farther than STRAY of the span: it falls."""
+        """Where the structure comes to rest under the load factor `goal`, whose stable branch has ended
+        `here` below it; None where a node goes farther than STRAY of the span: it falls."""
         state, load = here.state, goal * self.load
         for _ in range(_LOOKS):
             try:
@@ -252,7 +255,8 @@ class Loading(Branch):
         )
         if found is not None and self._farthest(found.state, begin) <= STRAY * self.span:
             return found
-        # By small steps then, from where the errors took the perfect structure, or if that fails from the target.
+        # By small steps then, from where the errors took the perfect structure, or if that fails from the
+        # target.
         for near in (begin, moved(self.nominal.start, self.errors.supports)):
             try:
                 relaxed = find_equilibrium(self.assembly, near, none, limit=_RELAXATIONS)
@@ -264,10 +268,10 @@ class Loading(Branch):
         return None
 
     def beside(self) -> Here | None:
-        """The equilibrium under the whole load to which all errors at once take the perfect structure's, in some half of the
-        factorisations of a path from nothing; None where whole steps of Newton's, each tangent of them positive definite,
-        lead to none within STRAY of the span of where its own tangent leads. That the drawn structure would
-        come there from nothing isn't known."""
+        """The equilibrium under the whole load to which all errors at once take the perfect structure's, in
+        some half of the factorisations of a path from nothing; None where whole steps of Newton's, each
+        tangent of them positive definite, lead to none within STRAY of the span of where its own tangent
+        leads. That the drawn structure would come there from nothing isn't known."""
         if self.bench.loaded is None:
             return None
         begin, foreseen = self._taken_along(self.nominal.states[-1], self.load, self.bench.loaded)
@@ -277,8 +281,8 @@ class Loading(Branch):
         return found
 
     def _taken_along(self, start: State, load: Reals, factor: Factor | None) -> tuple[State, Foreseen]:
-        """Where the errors take the perfect structure at rest at `start` under a `load`, by its tangent's `factor`
-        (None: supports alone move), and the deformations that are foreseen there."""
+        """Where the errors take the perfect structure at rest at `start` under a `load`, by its tangent's
+        `factor` (None: supports alone move), and the deformations that are foreseen there."""
         offset = self.errors.supports
         balance = self.assembly.evaluate(start, tangent=False)
         pull = load - balance.force
@@ -293,8 +297,8 @@ class Loading(Branch):
         return begin, self._as_perfect(start, balance.turned, change)
 
     def _as_perfect(self, start: State, turned: float, change: Reals) -> Foreseen:
-        """The deformations that a step by the perfect structure's tangent leads to: elements take on the forces
-        that its own would."""
+        """The deformations that a step by the perfect structure's tangent leads to: elements take on the
+        forces that its own would."""
         still = self.foreseen(start, turned, np.zeros_like(change))
         moved_on = self.foreseen(start, turned, change)
         if still is None or moved_on is None:

@@ -34,8 +34,8 @@ class Perfect:
 
     - `network`; `members`; `present` (c,): which of the candidate cables it has; dead `load` (n, 6).
     - `start`: the state in which its unloaded one is sought.
-    - `factors` (k,) of the load along its path, 0 first, as far as that goes, with the `states` there; `bears`: whether
-      that is all of the load.
+    - `factors` (k,) of the load along its path, 0 first, as far as that goes, with the `states` there;
+      `bears`: whether that is all of the load.
     - `imperfections` of shape with which structures are drawn.
     """
 
@@ -71,9 +71,9 @@ def perfect(
     shapes: int = SHAPES,
     step: float = NOMINAL_STEP,
 ) -> Perfect:
-    """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it; 0:
-    it isn't followed, since drawn structures begin at its unloaded state. Raises NotConverged where there is
-    none."""
+    """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it;
+    0: it isn't followed, since drawn structures begin at its unloaded state. Raises NotConverged where there
+    is none."""
     network, present = shell.network(design), np.asarray(design.present)
     return _perfect(network, members_of(shell), present, load, shell.target, shapes, step)
 

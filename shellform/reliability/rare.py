@@ -55,10 +55,10 @@ def rare_failure(
 ) -> RareFailure:
     """The probability that a structure of the workshop's design doesn't bear its load.
 
-    `count` structures are followed on each level, none beyond the load factor `most`. `tell` hears the load factors less
-    1 of all structures so far, after every few; `known` are the first of those that an earlier call with the same
-    arguments told, so that it goes on from there. Raises InputError for a `count` that isn't a multiple of ten of at
-    least 20."""
+    `count` structures are followed on each level, none beyond the load factor `most`. `tell` hears the load
+    factors less 1 of all structures so far, after every few; `known` are the first of those that an earlier
+    call with the same arguments told, so that it goes on from there. Raises InputError for a `count` that
+    isn't a multiple of ten of at least 20."""
     members = workshop.nominal.members
     names = [name for name in CAUSES if getattr(tolerances, name) > 0.0]
     counts = sizes(members)
@@ -94,11 +94,12 @@ def _by_cause(members: Members, names: list[str], z: Reals) -> dict[str, Reals]:
 
 
 def _shares(found: Rare, names: list[str], counts: list[int]) -> dict[str, float]:
-    """Shares, 1 in all, of the causes `names`, each with so many variables as `counts` says; none where nothing failed.
+    """Shares, 1 in all, of the causes `names`, each with so many variables as `counts` says; none where
+    nothing failed.
 
-    They are those of the squares of the mean failed point. In this mean, variables that have nothing to do with failing
-    nearly cancel; what is left of them is noise, which is told from the median of the squares, since most
-    variables are such, and taken off."""
+    They are those of the squares of the mean failed point. In this mean, variables that have nothing to do
+    with failing nearly cancel; what is left of them is noise, which is told from the median of the squares,
+    since most variables are such, and taken off."""
     if not len(found.failed):
         return {}
     squared = found.failed.mean(axis=0) ** 2

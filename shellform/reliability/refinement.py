@@ -2,9 +2,9 @@
 each rod element halved, solved anew along the documented path; what the two meshes say of the error is
 Richardson's estimate (structure/answers/halved.py).
 
-New nodes lie on the cubic through both ends of an element with their directions (structure/answers/halved.py). A path that
-the finer mesh leaves much earlier has no error of order h²; the estimate then tells the size of it and
-nothing more.
+New nodes lie on the cubic through both ends of an element with their directions
+(structure/answers/halved.py). A path that the finer mesh leaves much earlier has no error of order h²; the
+estimate then tells the size of it and nothing more.
 """
 
 from __future__ import annotations
@@ -65,8 +65,8 @@ def critical_factor(shell: Gridshell, design: Design, load: Reals, *, sought: fl
 
 
 def critical_of(model: Model, *, sought: float = SOUGHT, resolution: float = _RESOLUTION) -> Limit:
-    """The same of a model with a start, under its load case "load", the factor to a `resolution`. Raises InputError
-    where it has no such load case or no start, NotConverged."""
+    """The same of a model with a start, under its load case "load", the factor to a `resolution`. Raises
+    InputError where it has no such load case or no start, NotConverged."""
     return _limit(model, sought, resolution)[1]
 
 

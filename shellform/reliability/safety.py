@@ -32,15 +32,16 @@ class Safety:
     """What is asked of a design with these `tolerances`.
 
     - `probability_design`: share of structures that stand under the design load.
-    - `probability_additional`: the same under every other load; None: no less than of the initial design, but never
-      more than under the design load.
-    - `critical_factor`: of the perfect structure under the design load, on the mesh with rod elements halved; None: any.
+    - `probability_additional`: the same under every other load; None: no less than of the initial design, but
+      never more than under the design load.
+    - `critical_factor`: of the perfect structure under the design load, on the mesh with rod elements halved;
+      None: any.
     - `stiffness`: share of the start's softest mode that a search keeps at first.
-    - `margin`: least tension that a search leaves to cables under the design load, in deviations of what the median cable
-      is off by.
+    - `margin`: least tension that a search leaves to cables under the design load, in deviations of what the
+      median cable is off by.
     - `drawn`, `seed`: structures with which a finished design is judged.
-    - `tried`, `enlarged`: structures with which a search judges, under a seed of their own, their errors larger by this
-      factor (trial_structures.py).
+    - `tried`, `enlarged`: structures with which a search judges, under a seed of their own, their errors
+      larger by this factor (trial_structures.py).
     """
 
     tolerances: Tolerances
@@ -179,9 +180,9 @@ def judge(
 
 
 def critical_on_halved(shell: Gridshell, design: Design, load: Reals, sought: float) -> Limit:
-    """The end of the perfect structure's path under the dead `load` (n, 6) on the mesh with rod elements halved,
-    followed up to the factor `sought`; the factor 0 where the unloaded state isn't stable on that mesh. Raises
-    NotConverged where there is none."""
+    """The end of the perfect structure's path under the dead `load` (n, 6) on the mesh with rod elements
+    halved, followed up to the factor `sought`; the factor 0 where the unloaded state isn't stable on that
+    mesh. Raises NotConverged where there is none."""
     model = rods_halved(model_under(shell, design, load))
     return critical_of(model, sought=sought, resolution=_RESOLUTION)
 

@@ -1,10 +1,10 @@
 """Drawn structures as scenarios of a design problem: how much of a load each bears, with exact derivatives.
 
 A scenario is a drawn structure that a search keeps in mind: its errors and the shapes of its imperfections
-stay while the design changes, it is loaded from nothing on its own path, and how much of a load it bears has a
-value and exact derivatives (borne.py), whether it falls or stands. So a design in which it falls can be led to
-one in which it stands. Once it was followed in a design (`remembered`), it is loaded in designs nearby from a
-state not far from its end, where Newton's steps lead there with every tangent definite.
+stay while the design changes, it is loaded from nothing on its own path, and how much of a load it bears has
+a value and exact derivatives (borne.py), whether it falls or stands. So a design in which it falls can be led
+to one in which it stands. Once it was followed in a design (`remembered`), it is loaded in designs nearby
+from a state not far from its end, where Newton's steps lead there with every tangent definite.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ _BEFORE_RESOLUTION = 1 / 16  # … or this much of the load before
 
 @dataclass(frozen=True)
 class Scenario:
-    """A drawn structure: its `number` under a seed, its `errors`, the factor of the load that it is to bear at
-    `least`, and where it is remembered, a factor that it bears with its state, `near`."""
+    """A drawn structure: its `number` under a seed, its `errors`, the factor of the load that it is to bear
+    at `least`, and where it is remembered, a factor that it bears with its state, `near`."""
 
     number: int
     errors: Errors
@@ -50,10 +50,10 @@ class Scenario:
 
 @dataclass(frozen=True)
 class FactorsAsBuilt(Term):
-    """The factors of the load `case` up to which the `scenarios`, whose shapes have these `imperfections`, keep
-    the stiffness `left`, N/m, over those that they are to bear: one value a scenario, none followed beyond
-    the factor `most`, the end of none sought closer than to a relative error `exact` of the stiffness left.
-    Each has an equilibrium of its own, so that the term needs none of the perfect structure's."""
+    """The factors of the load `case` up to which the `scenarios`, whose shapes have these `imperfections`,
+    keep the stiffness `left`, N/m, over those that they are to bear: one value a scenario, none followed
+    beyond the factor `most`, the end of none sought closer than to a relative error `exact` of the stiffness
+    left. Each has an equilibrium of its own, so that the term needs none of the perfect structure's."""
 
     name = "factor_as_built"
     stabilises = True
@@ -104,9 +104,9 @@ def scenarios(
     most: float = 1.5,
     exact: float = EXACT,
 ) -> FactorsAsBuilt:
-    """The drawn structures of the numbers in `least` under the `seed`, each with its number's `tolerances`, as
-    scenarios of the load `case`, with the factors of it that they are to bear; imperfections of shape follow the softest modes of this `design`.
-    Raises NotConverged where it has no unloaded equilibrium."""
+    """The drawn structures of the numbers in `least` under the `seed`, each with its number's `tolerances`,
+    as scenarios of the load `case`, with the factors of it that they are to bear; imperfections of shape
+    follow the softest modes of this `design`. Raises NotConverged where it has no unloaded equilibrium."""
     nominal = perfect(shell, design, case.force)
     left = _STIFFNESS_LEFT * float(modes(assemble(nominal.network), nominal.unloaded, 1).stiffness[0])
     own = tuple(

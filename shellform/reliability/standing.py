@@ -1,16 +1,18 @@
 """Structures as built, each loaded from nothing on its own path: does it stand?
 
-A structure is relaxed without load from where the perfect one rests, and then loaded (path_of_one.py), with the
-whole load at first. A step (branch.py) begins along the tangent of the path, whose factor is at hand, and goes
-on by whole steps of Newton's, in a mixed form: stresses are unknowns of their own, which halves the number of
-steps of slender rods. It counts only where every tangent that is made on the way is positive definite, the one at
-its end among them, and no node lands farther than `STRAY` of the span from where the path's tangent led; else it is
-halved, as on any path. So the large steps lead along the same branch as small ones do.
+A structure is relaxed without load from where the perfect one rests, and then loaded (path_of_one.py), with
+the whole load at first. A step (branch.py) begins along the tangent of the path, whose factor is at hand, and
+goes on by whole steps of Newton's, in a mixed form: stresses are unknowns of their own, which halves the
+number of steps of slender rods. It counts only where every tangent that is made on the way is positive
+definite, the one at its end among them, and no node lands farther than `STRAY` of the span from where the
+path's tangent led; else it is halved, as on any path. So the large steps lead along the same branch as small
+ones do.
 
 A structure stands if the equilibrium under the whole load is reached so, is stable, and no node is farther
-than `FAR` of the span from the perfect structure's. One that loses stability on the way is relaxed under a little more load. Where
-it comes to rest before any node has gone farther than `STRAY` of the span, one rod's end or one cell has snapped, it goes on from
-there, and the snap is told; else it has fallen, whatever it would come to, and how far it came is its load factor.
+than `FAR` of the span from the perfect structure's. One that loses stability on the way is relaxed under a
+little more load. Where it comes to rest before any node has gone farther than `STRAY` of the span, one rod's
+end or one cell has snapped, it goes on from there, and the snap is told; else it has fallen, whatever it
+would come to, and how far it came is its load factor.
 """
 
 from __future__ import annotations
@@ -152,8 +154,8 @@ class Workshop:
         return self.with_structure(errors, ended)
 
     def rests(self, errors: Errors, *, resolution: float, marks: Sequence[float] = ()) -> Limit:
-        """As `fall`, up to the whole load, but a structure that rests under it beside the perfect one (path_of_one.py)
-        isn't loaded from nothing."""
+        """As `fall`, up to the whole load, but a structure that rests under it beside the perfect one
+        (path_of_one.py) isn't loaded from nothing."""
 
         def ended(loading: Loading) -> Limit:
             here, factor = loading.beside(), 1.0

@@ -7,8 +7,8 @@ in sixteen does with half as much again. (Larger errors also lower the mean, whi
 dozen structures then refuse what else a hundred would be needed for. The same numbers are drawn for every
 design (common random numbers), those that fell before first, and no more than it takes to refuse.
 
-A structure counts as standing where it rests under the load beside the perfect one, be it on a path from nothing or
-not (path_of_one.py); a finished design's are loaded from nothing.
+A structure counts as standing where it rests under the load beside the perfect one, be it on a path from
+nothing or not (path_of_one.py); a finished design's are loaded from nothing.
 
 The perfect structure's critical factor is asked for beside them, with an allowance for the mesh.
 """
@@ -36,7 +36,8 @@ SEED = 2  # added to the safety's: a search doesn't see the structures that a fi
 FRESH = 100_000  # the number from which on structures are of fresh samples, whose errors are as they are
 MOST = 40  # structures by which a search tries designs without enlarged errors
 Judging = Callable[[int, int], None]
-"""Called while a design is judged, with how many structures were loaded and how many there are at the most."""
+"""Called while a design is judged, with how many structures were loaded and how many there are at the
+most."""
 
 _AT_ONCE = 4  # structures between two looks at how many have fallen
 _RESOLUTION = 1 / 32  # of the largest load, to which it is known where a structure falls
@@ -49,8 +50,8 @@ _SAME = 1e-9  # relative
 @dataclass(frozen=True)
 class Required:
     """What a search asks of designs: the `safety`, the dead `loads` (n, 6) under which structures are drawn,
-    the `design_load` among them, how many of the structures tried may have `fallen` under each, and the number
-    of the `first` of them."""
+    the `design_load` among them, how many of the structures tried may have `fallen` under each, and the
+    number of the `first` of them."""
 
     safety: Safety
     loads: Mapping[str, Reals]
@@ -72,11 +73,12 @@ class Required:
 class Demand:
     """What a search asks of structures as built.
 
-    - `trial`: of those on which it tries each design; `confirmed`: of a fresh sample at its end, None where that is left
-      to whoever judges what it finds.
-    - `trusted`: whether errors are enlarged in trials as was asked for, so that what they confirm seldom falls later.
-    - `spare`: whether fewer may fall in a fresh sample than of a finished design's, for what was chosen among many is at
-      the edge of falling.
+    - `trial`: of those on which it tries each design; `confirmed`: of a fresh sample at its end, None where
+      that is left to whoever judges what it finds.
+    - `trusted`: whether errors are enlarged in trials as was asked for, so that what they confirm seldom
+      falls later.
+    - `spare`: whether fewer may fall in a fresh sample than of a finished design's, for what was chosen among
+      many is at the edge of falling.
     """
 
     trial: Required
@@ -127,12 +129,13 @@ def demand(
 ) -> Demand:
     """What is asked of designs that come after `start`, in trials and of fresh samples.
 
-    Errors are enlarged in trials as far as is asked for, or half as much, or not at all: the first with which the start
-    bears the design load, for few structures at the edge of falling can't tell one design from another. Where they are
-    enlarged less, more structures make up for it: a search that tries hundreds of designs on a dozen finds one for that
-    dozen. The fresh sample is as large as the one that judges a finished design: of what forty confirmed, three of two
-    hundred fell. Where as many may fall as of the start, that judge's structures are counted: another sample has up to a
-    tenth more of them. Raises NotConverged where the start has no unloaded equilibrium."""
+    Errors are enlarged in trials as far as is asked for, or half as much, or not at all: the first with which
+    the start bears the design load, for few structures at the edge of falling can't tell one design from
+    another. Where they are enlarged less, more structures make up for it: a search that tries hundreds of
+    designs on a dozen finds one for that dozen. The fresh sample is as large as the one that judges a
+    finished design: of what forty confirmed, three of two hundred fell. Where as many may fall as of the
+    start, that judge's structures are counted: another sample has up to a tenth more of them. Raises
+    NotConverged where the start has no unloaded equilibrium."""
     trial, many = None, max(MOST, safety.tried)
     for factor, tries in ((safety.enlarged, safety.tried), (0.5 * (1.0 + safety.enlarged), many)):
         own = replace(safety, enlarged=factor, tried=tries)
@@ -157,8 +160,8 @@ def demand(
 
 
 def closer(asked: Demand) -> Demand:
-    """The same with as many structures in a trial as confirm a result: what is led by those that fall comes to
-    know the ones by which it is judged."""
+    """The same with as many structures in a trial as confirm a result: what is led by those that fall comes
+    to know the ones by which it is judged."""
     trial, own = asked.trial, replace(asked.trial.safety, tried=max(MOST, asked.trial.safety.tried))
     share = own.tried / trial.safety.tried
     fallen = {name: _known(own, name, trial.design_load) for name in trial.fallen}
@@ -207,9 +210,9 @@ def tried(
     judging: Judging | None = None,
 ) -> JudgedTrial:
     """The design judged by the search's structures, the numbers `first` before the others, and no more of
-    them than it takes to refuse it but where the `whole` sample is asked for. Those of `first` that are of other
-    samples, where they fell under the design load, have to stand under it and count under no other. Raises
-    NotConverged where it has no unloaded equilibrium."""
+    them than it takes to refuse it but where the `whole` sample is asked for. Those of `first` that are of
+    other samples, where they fell under the design load, have to stand under it and count under no other.
+    Raises NotConverged where it has no unloaded equilibrium."""
     safety, spent = asked.safety, 0
     fallen: dict[str, list[int]] = {name: [] for name in asked.loads}
     factors: dict[int, float] = {}
@@ -285,8 +288,8 @@ def to_bear(
     first: Sequence[int] = (),
     judging: Judging | None = None,
 ) -> dict[int, float]:
-    """The numbers of structures that fall under loads on the design load's path where more do than may, and the
-    factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its critical
+    """The numbers of structures that fall under loads on the design load's path where more do than may, and
+    the factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its critical
     factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
     found = tried(shell, design, asked, first=first, whole=True, judging=judging)
     _, shares = largest_on_path(asked)
@@ -296,24 +299,24 @@ def to_bear(
 
 
 def aims(asked: Required, found: JudgedTrial) -> dict[int, float]:
-    """As `to_bear`, from a whole sample that was judged already, at the end of a search: of the structures that fall
-    those that bear most, as many as have to stand and a few more, under the smaller load first. (Before thinning
-    `to_bear` names all of them: thinning spends the reserve that this gives.)"""
+    """As `to_bear`, from a whole sample that was judged already, at the end of a search: of the structures
+    that fall those that bear most, as many as have to stand and a few more, under the smaller load first.
+    (Before thinning `to_bear` names all of them: thinning spends the reserve that this gives.)"""
     _, shares = largest_on_path(asked)
     names = sorted(shares, key=lambda each: shares[each])
     return _aims(asked, found, {name: _nearest(found, name, asked.fallen[name]) for name in names})
 
 
 def _nearest(found: JudgedTrial, name: str, allowed: int) -> tuple[int, ...]:
-    """Of the structures that fall under the load `name` those that bear most of it, as many as have to stand and a
-    few more, from the one that bears least on."""
+    """Of the structures that fall under the load `name` those that bear most of it, as many as have to stand
+    and a few more, from the one that bears least on."""
     fell = sorted(found.fallen[name], key=lambda number: found.factors.get(number, 0.0))
     return tuple(fell[max(0, allowed - _BESIDE) :])
 
 
 def _aims(asked: Required, found: JudgedTrial, named: Mapping[str, Collection[int]]) -> dict[int, float]:
-    """The perfect structure's, and those of the numbers `named` under each load where more fall than may; one that is
-    under several keeps the first."""
+    """The perfect structure's, and those of the numbers `named` under each load where more fall than may; one
+    that is under several keeps the first."""
     _, shares = largest_on_path(asked)
     least: dict[int, float] = {}
     if not found.critical:
@@ -370,8 +373,8 @@ def confirm(
 
 
 def _sparing(asked: Required) -> Required:
-    """The same with one less that may fall than the probability allows. Where under a further load as many may fall as of
-    the start, fewer by a standard deviation of the difference of two such numbers."""
+    """The same with one less that may fall than the probability allows. Where under a further load as many
+    may fall as of the start, fewer by a standard deviation of the difference of two such numbers."""
     fallen = {}
     for name, count in asked.fallen.items():
         known = _known(asked.safety, name, asked.design_load)

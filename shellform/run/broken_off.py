@@ -1,5 +1,5 @@
-"""A run that ends early: what was found is judged and shown, and where there is no design yet, the page says why
-it ended."""
+"""A run that ends early: what was found is judged and shown, and where there is no design yet, the page says
+why it ended."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ _LINES = 25  # of the log
 
 
 def break_off(workspace: Workspace, stage: str, error: ShellformError) -> None:
-    """Writes summary and page of a run whose `stage` ended with an `error`: with the designs that were found and
-    their verdict, or, without any, with the cause alone."""
+    """Writes summary and page of a run whose `stage` ended with an `error`: with the designs that were found
+    and their verdict, or, without any, with the cause alone."""
     summary = read_summary(workspace.folder)
     summary = replace(summary, failed={**summary.failed, stage: str(error)})
     write_summary(workspace.folder, summary)

@@ -54,7 +54,8 @@ def keep(
     loads: Mapping[str, Reals],
     summary: Summary,
 ) -> Summary:
-    """Writes a design's model file, its states, and the summary with it, which is returned. Raises NotConverged."""
+    """Writes a design's model file, its states, and the summary with it, which is returned. Raises
+    NotConverged."""
     loaded = {each: _settled(shell, design, loaded[each], loads[each]) for each in loads}
     record = write_design(workspace.folder, shell, name, design, loaded, loads)
     states = {each: loaded[each].equilibrium.state for each in loads}
@@ -65,8 +66,9 @@ def keep(
 
 
 def _settled(shell: Gridshell, design: Design, loaded: Loaded, load: Reals) -> Loaded:
-    """The same; without load with twice the digits where double precision leaves more than 1e-6 of the stress, as
-    it does of bent rods beside stiff edge beams. On the way that is good enough, and a hundred times as fast."""
+    """The same; without load with twice the digits where double precision leaves more than 1e-6 of the
+    stress, as it does of bent rods beside stiff edge beams. On the way that is good enough, and a hundred
+    times as fast."""
     found = loaded.equilibrium
     if load.any() or not found.stable or found.residual <= OF_LOAD:
         return loaded

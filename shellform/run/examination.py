@@ -118,8 +118,8 @@ def examine(workspace: Workspace) -> Summary:
 
 
 def _bar(workspace: Workspace, initial: _Examined, summary: Summary, clock: Clock) -> Summary:
-    """With the initial design drawn in full where it falls under a further load: no fewer are to stand under that,
-    and a few structures tell their number by a fifth and more."""
+    """With the initial design drawn in full where it falls under a further load: no fewer are to stand under
+    that, and a few structures tell their number by a fifth and more."""
     entry = workspace.case.safety
     for name, row in summary.designs["initial"].loads.items():
         if name != "design" and row.stands is not None and row.stands.standing < row.stands.drawn:
@@ -253,8 +253,8 @@ def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: 
 
 
 def _guided(each: _Examined, largest: str, shares: Mapping[str, float], seed: int) -> dict[str, float]:
-    """The guide (reliability/guide.py) for the loads, whose `shares` of the largest are given; a load to which
-    the perfect path doesn't lead has none."""
+    """The guide (reliability/guide.py) for the loads, whose `shares` of the largest are given; a load to
+    which the perfect path doesn't lead has none."""
     nominal = perfect(each.shell, each.design, each.loads[largest], shapes=0, step=_GUIDED)
     found = guide(nominal, each.tolerances, seed=seed)
     return {

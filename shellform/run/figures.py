@@ -51,8 +51,8 @@ class Wish:
     """What of a run is to be drawn, and how.
 
     - `design`, `load`: None: all of them.
-    - `quantity`, one of QUANTITIES; `limit` of its colours, SI units; None: the case's for the deviation, 1 for the
-      utilisation, what the rods bear for their curvature, else the largest.
+    - `quantity`, one of QUANTITIES; `limit` of its colours, SI units; None: the case's for the deviation, 1
+      for the utilisation, what the rods bear for their curvature, else the largest.
     - `force_limit`, N, of the cables' colours; 0: the largest.
     - `paper` that it is for; None: a screen.
     - `endings` of the files; the rest as in panel.py.
@@ -170,8 +170,8 @@ def _pixels(text: str) -> tuple[int, int]:
 
 
 def draw_everything(run: Run, *, mapped: bool | None = None, report: Report = unheard) -> bool:
-    """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False. Where its maps are
-    there already, `mapped` says whether all of them are."""
+    """All pictures of a run. Without OpenGL the histories alone, a line that says why, and False. Where its
+    maps are there already, `mapped` says whether all of them are."""
     drawn = draw_maps(run, report=report) if mapped is None else mapped
     if drawn:
         draw_failure(run)
@@ -181,8 +181,8 @@ def draw_everything(run: Run, *, mapped: bool | None = None, report: Report = un
 
 
 def draw_maps(run: Run, *, report: Report = unheard) -> bool:
-    """The maps of a run's designs and of its net, none of which tells what the stage `safety` finds. Without OpenGL
-    none, a line that says why, and False."""
+    """The maps of a run's designs and of its net, none of which tells what the stage `safety` finds. Without
+    OpenGL none, a line that says why, and False."""
     from shellform.output.pictures.net_maps import draw_net  # loads no OpenGL
 
     if not pictures_possible(report):

@@ -1,8 +1,9 @@
-"""What edge beams `shellform new` tries: a bundle of the rods first, then what is about four times as stiff as the one before.
+"""What edge beams `shellform new` tries: a bundle of the rods first, then what is about four times as stiff
+as the one before.
 
-Solid rods are there anyway and bend into any curve, so that a light edge beam is a bundle of them; laths and tubes don't pack.
-What has to be stiffer is a steel tube, rolled to its curve: as stiff as 37 rods it has a third of their weight or less. Models
-are too small for tubes and keep to bundles.
+Solid rods are there anyway and bend into any curve, so that a light edge beam is a bundle of them; laths and
+tubes don't pack. What has to be stiffer is a steel tube, rolled to its curve: as stiff as 37 rods it has a
+third of their weight or less. Models are too small for tubes and keep to bundles.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ class EdgeChoice:
 
 
 def edge_choices(rods: RodChoice) -> tuple[EdgeChoice, ...]:
-    """By rising stiffness, one for each of the bundles: that, or the lightest tube that is so stiff, where it is lighter."""
+    """By rising stiffness, one for each of the bundles: that, or the lightest tube that is so stiff, where it
+    is lighter."""
     own = single(rods.section)
     radius = math.sqrt(own.constants[0] / math.pi)  # the round rod of the same area
     bundles = [Bundle(radius, count, COMPOSITE, own.material) for count in _BUNDLES]
@@ -51,7 +53,8 @@ def edge_choices(rods: RodChoice) -> tuple[EdgeChoice, ...]:
 
 
 def _lighter(bundle: Bundle, needed: float) -> Section:
-    """The lightest tube with so much EI, N·m², the stiffest where none has it, or the bundle, if that is lighter."""
+    """The lightest tube with so much EI, N·m², the stiffest where none has it, or the bundle, if that is
+    lighter."""
     tubes = _tubes().sections
     stiff = [each for each in tubes if _bending(each) >= needed] or [tubes[-1]]
     found = min(stiff, key=mass_per_length)

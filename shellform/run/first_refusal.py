@@ -1,9 +1,10 @@
 """What `shellform new` says of a shell that it can't design: the reason, and a way out that it went itself.
 
-Three are tried, each where the reason says that it may help, and offered only where a design then stood: walls all
-round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a rounded surface,
-where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as much concrete as these
-bear, where no rounded surface helps. None is begun once the work is done that a surface is worth.
+Three are tried, each where the reason says that it may help, and offered only where a design then stood:
+walls all round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a
+rounded surface, where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as
+much concrete as these bear, where no rounded surface helps. None is begun once the work is done that a
+surface is worth.
 """
 
 from __future__ import annotations
@@ -37,8 +38,8 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class WayOut:
-    """With what `new` goes on where it refuses a surface: the `wish`, on the surface in a `file` in metres (None: as given);
-    `told` is the sentence that offers it."""
+    """With what `new` goes on where it refuses a surface: the `wish`, on the surface in a `file` in metres
+    (None: as given); `told` is the sentence that offers it."""
 
     wish: DesignWish
     told: str
@@ -75,9 +76,9 @@ def with_ways_out(
     say: Say,
     allowance: Allowance | None = None,
 ) -> Refused:
-    """The refusal with the first way out that leads to a design; without one, saying that none was found or tried. What is
-    offered as a surface is written into a folder beside `output`. `say` hears what is tried; each kind of way out has its
-    share of the `allowance`, of which the search has taken its own."""
+    """The refusal with the first way out that leads to a design; without one, saying that none was found or
+    tried. What is offered as a surface is written into a folder beside `output`. `say` hears what is tried;
+    each kind of way out has its share of the `allowance`, of which the search has taken its own."""
     whole = allowance or Allowance()
     way_out: WayOut | None = None
     if _walls_may_help(refusal, surface, wish):
@@ -121,8 +122,8 @@ def _unused(folder: Path) -> Path:
 
 
 class _Rounded:
-    """All of the search on a rounded surface, within the work of all such trials; on walls too where a net covers it
-    that falls on edge beams."""
+    """All of the search on a rounded surface, within the work of all such trials; on walls too where a net
+    covers it that falls on edge beams."""
 
     def __init__(self, wish: DesignWish, whole: Allowance, say: Say) -> None:
         self.wish = wish  # with which the last surface went on
@@ -163,8 +164,8 @@ def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callab
 
 
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:
-    """Whether walls all round may: where something but its curvature is the reason, and its outer edge doesn't stand
-    on the ground."""
+    """Whether walls all round may: where something but its curvature is the reason, and its outer edge
+    doesn't stand on the ground."""
     if isinstance(refusal, Unbuildable) and refusal.why is not Why.STRENGTH:
         return False
     return isinstance(refusal, (Unbuildable, Tips, NotConverged)) and _on_edge_beams(surface, wish)

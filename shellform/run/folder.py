@@ -2,8 +2,8 @@
 
 Every file is written whole or not at all. `read_run` gives the nouns that pictures, drawings and the page are
 made from. Whoever makes a run is `alone` in its folder, and no symbolic link in a folder is followed: it may
-come from somebody else. Who only adds to it needs no lock (render, report, what is told on site): what they read and
-what they write are whole files, and pictures may be drawn while the run goes on.
+come from somebody else. Who only adds to it needs no lock (render, report, what is told on site): what they
+read and what they write are whole files, and pictures may be drawn while the run goes on.
 """
 
 from __future__ import annotations
@@ -102,7 +102,8 @@ class Run:
 
 
 def refuse_unknown(option: str, name: str, known: Collection[str]) -> None:
-    """Raises InputError for the `name`, given by an `option`, of a design or a load case that isn't among those `known`."""
+    """Raises InputError for the `name`, given by an `option`, of a design or a load case that isn't among
+    those `known`."""
     require_known(name, known, where=option, what="isn't there")
 
 
@@ -254,7 +255,8 @@ def refuse_overwriting(place: Path) -> None:
 
 
 def _strangers(place: Path) -> list[str]:
-    """What stands in a folder under the names that a run writes; a lock may stem from one that was refused."""
+    """What stands in a folder under the names that a run writes; a lock may stem from one that was
+    refused."""
     return [name for name in WRITTEN if name != LOCK and (place / name).exists()]
 
 

@@ -1,7 +1,7 @@
 """Whether what a stage left in the run folder is still there: what somebody has deleted is made again.
 
-Files that a stage leaves only now and then aren't asked for: models that some designs have none of, maps of what wasn't
-found.
+Files that a stage leaves only now and then aren't asked for: models that some designs have none of, maps of
+what wasn't found.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """What a run tells the site: calibration of connectors from scans, re-tensioning from surveys, and erection
 (`shellform calibrate`, `survey`, `erect`).
 
-Each reads CSV files (site/measurements.py, site/scans.py), calls its module of shellform/site, and leaves its tables in
-the run's folder `schedules`.
+Each reads CSV files (site/measurements.py, site/scans.py), calls its module of shellform/site, and leaves its
+tables in the run's folder `schedules`.
 """
 
 from __future__ import annotations
@@ -375,7 +375,8 @@ def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, g
 
 
 def _design(run: Run, name: str | None, usual: str) -> str:
-    """The `name` of a design of the run, or where none is given the `usual` one. Raises InputError for an unknown one."""
+    """The `name` of a design of the run, or where none is given the `usual` one. Raises InputError for an
+    unknown one."""
     chosen = name or usual
     refuse_unknown("--design", chosen, run.designs)
     return chosen

@@ -30,9 +30,9 @@ class Pace:
     """An estimate for `planned` evaluations in all and what comes `afterwards`, counted in evaluations of the
     first phase.
 
-    Each phase of a search has its own pace: one that draws structures is slower by factors than a descent. One
-    that has just begun is taken to go on as the one before. What came before the first note and the compiling
-    of loops tell nothing of what follows, and are left out.
+    Each phase of a search has its own pace: one that draws structures is slower by factors than a descent.
+    One that has just begun is taken to go on as the one before. What came before the first note and the
+    compiling of loops tell nothing of what follows, and are left out.
     """
 
     def __init__(self, planned: int, afterwards: int = 0) -> None:

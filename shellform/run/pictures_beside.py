@@ -1,9 +1,9 @@
 """A run's maps, drawn by a process of its own while the stage `safety` loads drawn structures.
 
-VTK doesn't let go of the interpreter while it draws, so that a thread would hold up the others. The child reads the
-run's folder and tells what it has to tell as lines of JSON. It stands in a session of its own: Ctrl-C goes to
-its parent alone, which ends it. Whatever becomes of it, nothing hangs on it: maps that it didn't draw, or of another
-design than the one that turns out to be built, are drawn in their own stage.
+VTK doesn't let go of the interpreter while it draws, so that a thread would hold up the others. The child
+reads the run's folder and tells what it has to tell as lines of JSON. It stands in a session of its own:
+Ctrl-C goes to its parent alone, which ends it. Whatever becomes of it, nothing hangs on it: maps that it
+didn't draw, or of another design than the one that turns out to be built, are drawn in their own stage.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from shellform.structure.elements.threads import cores
 
 @dataclass(frozen=True)
 class DrawnMaps:
-    """Maps that were drawn for a run whose design to build is `best`; whether all were (`complete`), which without
-    OpenGL they aren't, and the `notes` on them."""
+    """Maps that were drawn for a run whose design to build is `best`; whether all were (`complete`), which
+    without OpenGL they aren't, and the `notes` on them."""
 
     best: str
     complete: bool
@@ -53,7 +53,8 @@ class MapsBeside:
 
 @contextmanager
 def maps_beside(folder: Path) -> Iterator[MapsBeside]:
-    """Has the maps of the run in a folder drawn while the work within is done; what isn't by its end is given up."""
+    """Has the maps of the run in a folder drawn while the work within is done; what isn't by its end is given
+    up."""
     if cores() < 2:
         yield MapsBeside(None)
         return
@@ -74,8 +75,8 @@ def maps_beside(folder: Path) -> Iterator[MapsBeside]:
 
 
 def draw_all_but(maps: DrawnMaps | None, run: Run, *, report: Report = unheard) -> bool:
-    """All pictures of a run (figures.py) but the `maps` that are there already, if they are of the design that is to be
-    built; whether all could be drawn."""
+    """All pictures of a run (figures.py) but the `maps` that are there already, if they are of the design
+    that is to be built; whether all could be drawn."""
     if maps is None or maps.best != run.best:
         return draw_everything(run, report=report)
     for note in maps.notes:

@@ -1,8 +1,10 @@
-"""Plinths under a shell's feet: where a surface runs out flat on the ground, rods can't follow it down to there.
+"""Plinths under a shell's feet: where a surface runs out flat on the ground, rods can't follow it down to
+there.
 
-Shells that stand on few points often end in flat pads or flare into the ground, in a crease that is bent more sharply
-than anywhere else. What lies within two hundredths of the extent above the lowest point stands on the ground anyway
-(net/edges.py); cut off at that level the rest may be bent far less. Where it is, `new` leaves the feet to plinths.
+Shells that stand on few points often end in flat pads or flare into the ground, in a crease that is bent more
+sharply than anywhere else. What lies within two hundredths of the extent above the lowest point stands on the
+ground anyway (net/edges.py); cut off at that level the rest may be bent far less. Where it is, `new` leaves
+the feet to plinths.
 """
 
 from __future__ import annotations

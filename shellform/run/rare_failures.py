@@ -1,5 +1,5 @@
-"""How rarely structures of a design fall: subset simulation (reliability/rare.py), each few structures kept in
-the run folder, so that it goes on where it stopped."""
+"""How rarely structures of a design fall: subset simulation (reliability/rare.py), each few structures kept
+in the run folder, so that it goes on where it stopped."""
 
 from __future__ import annotations
 

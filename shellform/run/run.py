@@ -2,8 +2,8 @@
 
 surface -> net -> initial -> optimise -> safety -> figures -> documents -> report. Each stage leaves its
 result in the folder and a key in `stages.json`: a hash of the entries it depends on, the surface file's
-bytes, the package's version and the stage before. Run again, a stage whose key is unchanged and whose files are
-there is loaded instead of computed. Stages hand on what they made, and the summary with what they add to it.
+bytes, the package's version and the stage before. Run again, a stage whose key is unchanged and whose files
+are there is loaded instead of computed. Stages hand on what they made, and the summary with their part.
 """
 
 from __future__ import annotations
@@ -93,9 +93,10 @@ def run_case(
     """Runs the case's stages up to `until` in `folder` and returns the summary.
 
     Raises InputError for bad input, and where another process is at work in the folder unless it is to `wait`
-    for it; NotConverged where a stage finds no result; what was computed stays in the folder. Where pictures, documents or the page fail, the others are still made, `failed` in the summary
-    says what was wrong, and then the first error is raised. With `profile`, profile.json tells what the stages
-    took that were computed. A `sketch` is a first look (sketch.py).
+    for it; NotConverged where a stage finds no result; what was computed stays in the folder. Where pictures,
+    documents or the page fail, the others are still made, `failed` in the summary says what was wrong, and
+    then the first error is raised. With `profile`, profile.json tells what the stages took that were
+    computed. A `sketch` is a first look (sketch.py).
     """
     with listening() if profile else nullcontext() as clock:
         profiler = None if clock is None else Profiler(clock)

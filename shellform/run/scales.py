@@ -8,8 +8,8 @@ from shellform.run.folder import Run
 
 
 def colour_limit(run: Run) -> float:
-    """The end of the scale of deviations, m: the case's, or one that the design to build fills under the design
-    load (of a run that ended before that: under the first of its loads)."""
+    """The end of the scale of deviations, m: the case's, or one that the design to build fills under the
+    design load (of a run that ended before that: under the first of its loads)."""
     if run.case.figures.limit is not None:
         return run.case.figures.limit
     states = run.states[run.best]

@@ -1,4 +1,5 @@
-"""What is sized before anything is solved: the spacing, the cables, the concrete, and with which section to begin.
+"""What is sized before anything is solved: the spacing, the cables, the concrete, and with which section to
+begin.
 
 Spacing. A net is refused, or its rods break, where cells are large against the surface's radius of curvature;
 so it is at most a third of the radius that all but a twentieth of the surface keeps (a quantile of area: one
@@ -91,8 +92,8 @@ class RodChoice:
 
     @property
     def moment(self) -> float:
-        """About what bending moment across the surface it bears under loads, N·m: its strength times I / d, d the
-        distance of the outermost fibre."""
+        """About what bending moment across the surface it bears under loads, N·m: its strength times I / d, d
+        the distance of the outermost fibre."""
         material, fibre = self.section.material, self.section.fibres[1]
         outermost = 3.0 * fibre if layers_of(self.section) == 2 else fibre
         return material.strength * self.bending / (material.young * outermost)
@@ -101,8 +102,8 @@ class RodChoice:
 @dataclass(frozen=True)
 class DesignWish:
     """What the user wants: a `rod` like "gfrp_rods/8 mm", a `spacing` and a `thickness` of the concrete, m,
-    an `angle`, degrees, rods in so many `layers`; None: to be found, of a named rod one layer. `edges` says what the
-    outer edge stands on: "auto", what the geometry says, or "wall", walls all round up to it."""
+    an `angle`, degrees, rods in so many `layers`; None: to be found, of a named rod one layer. `edges` says
+    what the outer edge stands on: "auto", what the geometry says, or "wall", walls all round up to it."""
 
     rod: str | None = None
     spacing: float | None = None
@@ -199,8 +200,9 @@ def usual_thickness(surface: Surface) -> float:
 
 
 def may_come_off(surface: Surface, thickness: float) -> float:
-    """How far the shape may be off for the sake of cables, m: a 500th of the span, by which EN 1992-1-1, 7.4.1, lets concrete be
-    bent in use; but half its thickness in any case, since the thrust line of the shape as designed lies in it up to that."""
+    """How far the shape may be off for the sake of cables, m: a 500th of the span, by which EN 1992-1-1,
+    7.4.1, lets concrete be bent in use; but half its thickness in any case, since the thrust line of the
+    shape as designed lies in it up to that."""
     return max(0.5 * thickness, width(surface) / OF_SPAN)
 
 
@@ -216,7 +218,8 @@ def rope_for(spacing: float) -> Rope:
 
 
 def thicker(rope: Rope, times: float = 1.0) -> Rope | None:
-    """The first strand in stock whose area is so many `times` as large, the last where none is; None after that."""
+    """The first strand in stock whose area is so many `times` as large, the last where none is; None after
+    that."""
     larger = [each for each in _ROPES if each > rope.diameter]
     enough = (each for each in larger if each**2 >= times * rope.diameter**2)
     return Rope(next(enough, larger[-1])) if larger else None
@@ -259,11 +262,12 @@ def first_choice(
 def next_choice(
     net: Net, possible: Sequence[RodChoice], at: int, stress: float, times: float, most: float
 ) -> int:
-    """The section to try after that `at`, whose `stress` over its strength is told: the least stiff that is at
-    least so many `times` as stiff and whose stress is likely to be `most` at the most, else the stiffest such
-    one; with 0 `times` the one that is likely to be stressed least. `at` where there is none.
+    """The section to try after that `at`, whose `stress` over its strength is told: the least stiff that is
+    at least so many `times` as stiff and whose stress is likely to be `most` at the most, else the stiffest
+    such one; with 0 `times` the one that is likely to be stressed least. `at` where there is none.
 
-    Bending into the net stresses every section as it is; what the load adds goes with the moment that it bears.
+    Bending into the net stresses every section as it is; what the load adds goes with the moment that it
+    bears.
     """
     own, bent = possible[at], [_bent(net, each) for each in possible]
     added = max(stress - bent[at], 0.0)
@@ -275,16 +279,16 @@ def next_choice(
 
 
 def next_thinner(possible: Sequence[RodChoice], at: int, share: float) -> int:
-    """The stiffest of the sections less stiff than that `at` that is at most a `share` as deep, for where what is added
-    to the stress of bending into the net is more bending, at supports and ends of rods, and grows with the depth; `at`
-    where there is none."""
+    """The stiffest of the sections less stiff than that `at` that is at most a `share` as deep, for where
+    what is added to the stress of bending into the net is more bending, at supports and ends of rods, and
+    grows with the depth; `at` where there is none."""
     deep = share * max(possible[at].section.fibres)
     return next((k for k in range(at - 1, -1, -1) if max(possible[k].section.fibres) <= deep), at)
 
 
 def load_borne(net: Net, choice: RodChoice, stress: float, most: float) -> float:
-    """What share of the load a section bears with a stress of `most` over its strength, whose `stress` under all of
-    it is told."""
+    """What share of the load a section bears with a stress of `most` over its strength, whose `stress` under
+    all of it is told."""
     bent = _bent(net, choice)
     return max(most - bent, 0.0) / max(stress - bent, 1e-12)
 

@@ -1,8 +1,9 @@
 """Where the rods of the given size don't stand as built: which would.
 
-The initial design, which has all cables, is drawn with rods that become thicker step by step, or with the next
-stiffer sections of the catalogue that they are from, as far as the net's curvature allows (equation 1). It is the design that a search begins with, so that a search with such
-rods has where to begin; how few cables it comes to isn't known before.
+The initial design, which has all cables, is drawn with rods that become thicker step by step, or with the
+next stiffer sections of the catalogue that they are from, as far as the net's curvature allows (equation 1).
+It is the design that a search begins with, so that a search with such rods has where to begin; how few cables
+it comes to isn't known before.
 """
 
 from __future__ import annotations
@@ -38,8 +39,9 @@ def rods_that_stand(
     seed: int,
     catalogue: Catalogue | None = None,
 ) -> ThickerRodsRecord | None:
-    """The thinnest of the thicker rods, or the least stiff section of the `catalogue`, with which the `initial`
-    design stands as often as is `asked` under every load; None where none does that the net allows."""
+    """The thinnest of the thicker rods, or the least stiff section of the `catalogue`, with which the
+    `initial` design stands as often as is `asked` under every load; None where none does that the net
+    allows."""
     for name, other, design in _thicker(shell, initial, catalogue):
         standing = _standing(other, design, loads, tolerances, seed)
         if DRAWN - standing <= allowed(asked.design, DRAWN):

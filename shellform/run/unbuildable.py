@@ -38,8 +38,9 @@ _UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
 
 
 class Unbuildable(InputError):
-    """A surface that no net of the `spacing`, m, covers, or that no rod follows there, for the reason `why`; rounded
-    to the `radius`, m, it may be built, or with the thickness of concrete, m, that it `bears`, if one was found."""
+    """A surface that no net of the `spacing`, m, covers, or that no rod follows there, for the reason `why`;
+    rounded to the `radius`, m, it may be built, or with the thickness of concrete, m, that it `bears`, if one
+    was found."""
 
     def __init__(
         self,
@@ -126,16 +127,16 @@ class Obstacle:
         return min(self.factor, 0.9 * needed) if self.why is Why.SCATTER else self.factor
 
     def eases(self, before: Obstacle, needed: float) -> float:
-        """How many times as much of its load as with the failure `before` the shell bears; once it bears what is
-        `needed`, times how many times less it is stressed."""
+        """How many times as much of its load as with the failure `before` the shell bears; once it bears what
+        is `needed`, times how many times less it is stressed."""
         more = min(self.factor, needed) / max(min(before.factor, needed), 1e-12)
         if self.factor < needed or (self.stress > before.stress and before.factor < needed):
             return more
         return more * before.stress / self.stress
 
     def breaks_unloaded(self, before: Obstacle, most: float) -> bool:
-        """Whether this failure and the one `before`, of the same rods under more concrete, say that these would be
-        stressed to more than `most` of their strength without any."""
+        """Whether this failure and the one `before`, of the same rods under more concrete, say that these
+        would be stressed to more than `most` of their strength without any."""
         less = before.thickness - self.thickness
         if less <= 0.0 or before.choice != self.choice or not before.why == self.why == Why.STRENGTH:
             return False
@@ -268,8 +269,9 @@ def refused(
 
 
 def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
-    """The radius, m, to which creases are to be rounded so that rods follow them that bear the load, but no more
-    than nearly what three quarters of the surface keep; of flat pieces so far that they become a vault."""
+    """The radius, m, to which creases are to be rounded so that rods follow them that bear the load, but no
+    more than nearly what three quarters of the surface keep; of flat pieces so far that they become a
+    vault."""
     needed = NEEDED * pressure(failure.thickness, 2500.0)
     if flat_between_creases(surface):
         return _ARCHED * float(surface.size[:2].max())
@@ -278,14 +280,14 @@ def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
 
 
 def flat_between_creases(surface: Surface) -> bool:
-    """Whether three quarters of the surface are hardly curved, as roofs of flat pieces are: rounded creases alone leave
-    it flat, and a flat grid bears nothing."""
+    """Whether three quarters of the surface are hardly curved, as roofs of flat pieces are: rounded creases
+    alone leave it flat, and a flat grid bears nothing."""
     return float(surface.size[:2].max()) * curvature_usual(surface) < 1.0
 
 
 def _crease(surface: Surface, failure: Obstacle, wish: DesignWish, bears: float | None) -> Unbuildable | None:
-    """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the load,
-    while nearly all of it takes thicker ones; None where that isn't so."""
+    """The refusal of a surface on which the rods that can follow it at one spot are too thin to bear the
+    load, while nearly all of it takes thicker ones; None where that isn't so."""
     placed, choice = failure.placed, failure.choice
     if placed is None or choice is None or failure.why not in (Why.STABILITY, Why.STRENGTH):
         return None
@@ -316,7 +318,8 @@ def _said(error: NoNet | Stalled) -> str:
 
 
 def too_curved(placed: Placed, possible: Sequence[RodChoice], spacing: float, thickness: float) -> Obstacle:
-    """The failure of a net on which every one of the `possible` sections breaks, or is too deep for the spacing."""
+    """The failure of a net on which every one of the `possible` sections breaks, or is too deep for the
+    spacing."""
     net = placed.net
     least = min(possible, key=lambda each: erection_stress(net, each.section))
     stress = erection_stress(net, least.section) / least.section.material.strength

@@ -1,7 +1,7 @@
 """A way out for surfaces that can't be built: the nearest one that can, tried before it is offered.
 
-Creases are rounded and curvature is capped by the least change (surface/shape/fairing.py), to the radius that is
-asked for and, where that isn't enough, more; what is offered went through the very step that refused the
+Creases are rounded and curvature is capped by the least change (surface/shape/fairing.py), to the radius that
+is asked for and, where that isn't enough, more; what is offered went through the very step that refused the
 surface as given. Beside it stands a map of the change.
 """
 
@@ -30,7 +30,8 @@ _SLENDER = 1e-9  # m: less is no change
 
 @dataclass(frozen=True)
 class Nearest:
-    """The nearest buildable surface, in a `file` in metres, and the sentence in which it is offered (`told`)."""
+    """The nearest buildable surface, in a `file` in metres, and the sentence in which it is offered
+    (`told`)."""
 
     file: Path
     told: str
@@ -44,7 +45,8 @@ def with_way_out(
     again: Callable[[Surface], object],
     say: Callable[[str], None] = lambda text: None,
 ) -> InputError | NotConverged:
-    """The refusal of a surface with the nearest buildable one, as `nearest_buildable` finds it, for its remedy; as it was, where none is found."""
+    """The refusal of a surface with the nearest buildable one, as `nearest_buildable` finds it, for its
+    remedy; as it was, where none is found."""
     nearest = nearest_buildable(surface, radius, folder, again, say)
     return refusal if nearest is None else renewed(refusal, nearest.told)
 
@@ -58,12 +60,12 @@ def nearest_buildable(
     shares: Sequence[float] = MORE,
     options: Callable[[], str] = lambda: "",
 ) -> Nearest | None:
-    """The nearest buildable surface, written into `folder` as surface.obj, surface.step, change.vtu and change.png;
-    None where none is found.
+    """The nearest buildable surface, written into `folder` as surface.obj, surface.step, change.vtu and
+    change.png; None where none is found.
 
     `radius`, m, to which the surface must be rounded at least; `again` does with a surface what was refused
-    and raises InputError or NotConverged where it is refused again; `say` hears what is tried;
-    `shares` of the radius are, one after the other; `options` are those of the command with which `again` went on.
+    and raises InputError or NotConverged where it is refused again; `say` hears what is tried; `shares` of
+    the radius are, one after the other; `options` are those of the command with which `again` went on.
     """
     from shellform.surface.readers.meshes import write_mesh
 

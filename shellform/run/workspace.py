@@ -15,7 +15,8 @@ from shellform.run.profiling import Profiler
 @dataclass(frozen=True)
 class Workspace:
     """The `case` of a run that is being made, its `folder`, whom to `report` events to, the `keys` of its
-    stages, `until` which of them it is made, what measures them, if anything does, and whether it is a `sketch`."""
+    stages, `until` which of them it is made, what measures them, if anything does, and whether it is a
+    `sketch`."""
 
     case: Case
     folder: Path

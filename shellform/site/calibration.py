@@ -53,10 +53,11 @@ _SETTLED = 1e-5  # relative change of the residual norm or of the logarithms at 
 @dataclass(frozen=True)
 class Calibration:
     """The calibrated `joint`; which parameters were `fitted` and which `held` at the start.
-    `identifiability`: what the data tell, with the noise or the residuals, whichever are larger. `nodes` (m,): the markers';
-    `matches` of the scans (s). `before`, `after` (m, s), m: distances of markers from the model with the start's and the
-    calibrated joint, NaN where missing; `residual`, m: a coordinate's standard deviation. `states`: the calibrated model's.
-    `evaluations` of all load states that it took; `rejected`: trials off the branch."""
+    `identifiability`: what the data tell, with the noise or the residuals, whichever are larger. `nodes`
+    (m,): the markers'; `matches` of the scans (s). `before`, `after` (m, s), m: distances of markers from the
+    model with the start's and the calibrated joint, NaN where missing; `residual`, m: a coordinate's standard
+    deviation. `states`: the calibrated model's. `evaluations` of all load states that it took; `rejected`:
+    trials off the branch."""
 
     joint: Joint
     fitted: tuple[str, ...]

@@ -24,11 +24,11 @@ class Identifiability:
     """What data of a given noise tell about parameters.
 
     - `names` (p,).
-    - `deviation` (p,): relative standard deviations, infinite where nothing is told; parameters that aren't told count
-      as known to the others.
+    - `deviation` (p,): relative standard deviations, infinite where nothing is told; parameters that aren't
+      told count as known to the others.
     - `correlation` (p, p) of their errors.
-    - `singular` (p,): values of the Jacobian over the noise; `directions` (p, p): the logarithms' that belong to them, as
-      rows.
+    - `singular` (p,): values of the Jacobian over the noise; `directions` (p, p): the logarithms' that belong
+      to them, as rows.
     - `reach` (p,), m: how far the marker that moves most goes when the parameter grows by 1 %.
     """
 

@@ -31,8 +31,8 @@ _TABLE = "Give a table as CSV in UTF-8, with a head line."
 
 
 def check_noise(noise: float) -> None:
-    """Raises InputError for a standard deviation of measured coordinates, m, whose square is nothing or all beside
-    them."""
+    """Raises InputError for a standard deviation of measured coordinates, m, whose square is nothing or all
+    beside them."""
     give = "metres, one standard deviation of a measured coordinate, such as 0.0005"
     require_number(noise, least=1e-9, most=1e3, where="--noise", give=give)
 
@@ -47,8 +47,8 @@ def text_of(path: str | Path, remedy: str) -> str:
 
 
 def cells_of(file: Path, numbered: list[tuple[int, str]], delimiter: str) -> list[list[str]]:
-    """The cells of each of a file's lines, which come with their numbers. Raises InputError where a line is no row of
-    its own: a quotation mark that isn't closed runs on over the lines that follow."""
+    """The cells of each of a file's lines, which come with their numbers. Raises InputError where a line is
+    no row of its own: a quotation mark that isn't closed runs on over the lines that follow."""
     rows: list[list[str]] = []
     for number, line in numbered:
         try:
@@ -63,7 +63,8 @@ def cells_of(file: Path, numbered: list[tuple[int, str]], delimiter: str) -> lis
 
 
 def too_many_cells(file: Path, line: int, cells: int, columns: int) -> InputError:
-    """What a line with more cells than the file has columns is refused with: numbers with decimal commas have two."""
+    """What a line with more cells than the file has columns is refused with: numbers with decimal commas have
+    two."""
     return InputError(
         f"has {cells} cells for {columns} columns",
         where=f"{file}, line {line}",
@@ -189,8 +190,8 @@ def read_places(path: str | Path, shell: Gridshell) -> tuple[Indices, Reals]:
 
 
 def read_groups(path: str | Path, design: Design) -> list[Indices]:
-    """Groups of candidate cables by rising number from a CSV file: `cable`, its number among the design's own cables,
-    as in drawings and model files, and `group`."""
+    """Groups of candidate cables by rising number from a CSV file: `cable`, its number among the design's own
+    cables, as in drawings and model files, and `group`."""
     present = np.flatnonzero(design.present)
     teams: dict[float, list[int]] = {}
     for row in read_table(path, ("cable", "group")):

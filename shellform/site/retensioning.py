@@ -9,10 +9,10 @@ first the drawing and the usual error of a cable. A survey y of the nodes x(l), 
 
 x(l) being a re-solved equilibrium every time, and steps halved until they lead to a likelier estimate: the
 sum of squares of what the survey and the belief are missed by, each over its deviation, falls. Then the turns
-k, whole numbers of the turnbuckle's step h, are sought that minimise |x + J h k - goal|² + λ |h k|² (turns.py),
-x and J now those of the whole grid at the estimate. λ = (noise / largest change)²: a cable isn't turned for
-less than the survey can see. The first-order shape is checked by the true equilibrium on the stable branch;
-turns that leave the branch are halved.
+k, whole numbers of the turnbuckle's step h, are sought that minimise |x + J h k - goal|² + λ |h k|²
+(turns.py), x and J now those of the whole grid at the estimate. λ = (noise / largest change)²: a cable isn't
+turned for less than the survey can see. The first-order shape is checked by the true equilibrium on the
+stable branch; turns that leave the branch are halved.
 """
 
 from __future__ import annotations
@@ -56,10 +56,11 @@ class Belief:
 class Adjustment:
     """The next round of turning.
 
-    - `turns` (c,) of every candidate cable, in steps; `change` (c,), m, of rest length, negative where shorter.
+    - `turns` (c,) of every candidate cable, in steps; `change` (c,), m, of rest length, negative where
+      shorter.
     - `predicted` (n, 3), m: the shape to first order; `belief` afterwards, in the true equilibrium.
-    - `misfit_before`, `misfit_predicted` and `misfit_after`, m²: sums of squares before, to first order, and in the true
-      equilibrium.
+    - `misfit_before`, `misfit_predicted` and `misfit_after`, m²: sums of squares before, to first order, and
+      in the true equilibrium.
     - `halved`: how often the change was, to stay on the stable branch.
     """
 
@@ -167,7 +168,8 @@ def learn(shell: Gridshell, belief: Belief, nodes: Indices, survey: Reals, *, no
 
 @dataclass(frozen=True)
 class _Likelihood:
-    """How unlikely lengths are, after a survey that put the `marked` nodes at the `goal` (3 m,) with `noise`."""
+    """How unlikely lengths are, after a survey that put the `marked` nodes at the `goal` (3 m,) with
+    `noise`."""
 
     mean: Reals
     covariance: Reals

@@ -1,8 +1,9 @@
 """A survey of the erected grid: read from its file, and held against what it is believed to be.
 
 Nodes come by name in the model's axes, or as points in any axes and order, which are laid onto the crossings
-(scans.py). What cables' lengths can't explain of a survey is told, for the turns that follow from it are no better
-than the survey: a benchmark that is off looks like a grid that is, a point that is confused like a slack cable.
+(scans.py). What cables' lengths can't explain of a survey is told, for the turns that follow from it are no
+better than the survey: a benchmark that is off looks like a grid that is, a point that is confused like a
+slack cable.
 """
 
 from __future__ import annotations
@@ -30,8 +31,8 @@ _TOGETHER = 0.5  # of what is left: where a rigid motion leaves less, the axes a
 
 @dataclass(frozen=True)
 class Surveyed:
-    """The `nodes` (k,) that were seen, their `places` (k, 3), m, in the model's axes, what each is called, and what is
-    doubtful, a sentence each. `laid`: the points were laid onto the model by a rigid motion."""
+    """The `nodes` (k,) that were seen, their `places` (k, 3), m, in the model's axes, what each is called,
+    and what is doubtful, a sentence each. `laid`: the points were laid onto the model by a rigid motion."""
 
     nodes: Indices
     places: Reals
@@ -41,8 +42,8 @@ class Surveyed:
 
 
 def read_survey(path: Path, shell: Gridshell, expected: State, *, unit: str) -> Surveyed:
-    """The survey in a CSV file, near the `expected` state. Raises InputError where a named node lies more than half
-    a spacing from there, or points can't be laid onto the crossings."""
+    """The survey in a CSV file, near the `expected` state. Raises InputError where a named node lies more
+    than half a spacing from there, or points can't be laid onto the crossings."""
     crossings, reach = shell.net.grid.crossing_nodes[:, 1], 0.5 * shell.net.spacing
     if not any(measurements.has_column(path, name) for name in ("node", "crossing")):
         points = read_points(path, unit=unit)
@@ -79,8 +80,9 @@ def read_survey(path: Path, shell: Gridshell, expected: State, *, unit: str) -> 
 
 
 def doubtful(survey: Surveyed, before: Belief, after: Belief, *, noise: float) -> list[str]:
-    """What makes the survey doubtful, in words: what even the likeliest lengths, believed in `after` it, leave of it
-    unexplained beyond its `noise`, m a coordinate, and lengths unlikely by what was believed `before`."""
+    """What makes the survey doubtful, in words: what even the likeliest lengths, believed in `after` it,
+    leave of it unexplained beyond its `noise`, m a coordinate, and lengths unlikely by what was believed
+    `before`."""
     present = before.design.present
     change = (after.design.rest_length - before.design.rest_length)[present]
     times = np.abs(change) / np.sqrt(np.diag(before.covariance))

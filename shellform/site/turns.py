@@ -2,9 +2,10 @@
 
     |away + J h k|² + λ |h k|²
 
-with no more cables touched and none changed further than a crew can. Cables are chosen one by one, each the one that
-lowers the sum most with all chosen ones solved for again (orthogonal matching pursuit); rounding to whole turns goes from
-the surest to the least sure one with the rest solved for again, and single turns more or less are tried in the end.
+with no more cables touched and none changed further than a crew can. Cables are chosen one by one, each the
+one that lowers the sum most with all chosen ones solved for again (orthogonal matching pursuit); rounding to
+whole turns goes from the surest to the least sure one with the rest solved for again, and single turns more
+or less are tried in the end.
 """
 
 from __future__ import annotations

@@ -203,8 +203,8 @@ def _free_to_spin(network: Network) -> list[str]:
 
 
 def swinging(network: Network) -> Indices:
-    """A node (k,) of each of the parts of beams that their supports let turn as a whole and that no cable holds: the
-    tangent of one that nothing loads is singular, but for what holds rotations in the solution."""
+    """A node (k,) of each of the parts of beams that their supports let turn as a whole and that no cable
+    holds: the tangent of one that nothing loads is singular, but for what holds rotations in the solution."""
     touched, ends = np.unique(network.beams.ends), network.beams.ends
     if not len(touched):
         return touched

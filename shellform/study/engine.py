@@ -5,8 +5,8 @@ they don't fight for cores. Jobs are handed out within a window of twice the thr
 passed on as they come, so that memory doesn't grow with the study. A job on which others build is one task on
 which theirs depend: Dask runs it once, before them. When a worker dies, Dask starts another and gives its
 jobs out again; a job that has taken three workers with it is tried once more when all others are done, then
-given up. A cluster that has been without any worker for longer than the study waits ends the sweep, wherever it
-waits: for the next job to end, or for an outcome that was lost with its worker.
+given up. A cluster that has been without any worker for longer than the study waits ends the sweep, wherever
+it waits: for the next job to end, or for an outcome that was lost with its worker.
 """
 
 from __future__ import annotations
@@ -83,9 +83,10 @@ def engine(
     """`workers` processes on this machine (default: one a core), or the cluster at the address `scheduler`.
 
     Scheduler and workers of this machine listen on its loopback address alone and speak to nobody without the
-    certificate that is made for each cluster. Its `dashboard` answers everybody on the machine, so that it has
-    to be asked for. With `processes` False the workers are threads, to try out the engine. Raises InputError where a
-    cluster doesn't answer and for more than 8 workers a core, NoWorkers where processes can't be begun.
+    certificate that is made for each cluster. Its `dashboard` answers everybody on the machine, so that it
+    has to be asked for. With `processes` False the workers are threads, to try out the engine. Raises
+    InputError where a cluster doesn't answer and for more than 8 workers a core, NoWorkers where processes
+    can't be begun.
     """
     if workers is not None and workers > _MOST * _cores():
         what = f"at most {_MOST} for each of the {_cores()} cores"
@@ -163,9 +164,9 @@ def _settings(processes: bool, dashboard: bool) -> dict[str, Any]:
         "distributed.worker.memory.spill": False,
         "distributed.nanny.pre-spawn-environ": {**_ONE_THREAD, "MALLOC_TRIM_THRESHOLD_": "65536"},
         "distributed.comm.timeouts.connect": "30s",
-        # A worker that dies is begun anew by its nanny. Where that takes longer than this, the cluster ends the
-        # nanny, and nothing begins a worker any more: at six times the load that its cores can bear, a worker
-        # took 33 to 41 s, and Dask waits 15.
+        # A worker that dies is begun anew by its nanny. Where that takes longer than this, the cluster ends
+        # the nanny, and nothing begins a worker any more: at six times the load that its cores can bear, a
+        # worker took 33 to 41 s, and Dask waits 15.
         "distributed.deploy.lost-worker-timeout": "1h",
     } | ({} if dashboard else {"distributed.scheduler.http.routes": []})
 
@@ -225,8 +226,8 @@ def _close(part: Any) -> None:
 
 @dataclass(frozen=True)
 class Manned:
-    """How a cluster is manned: its `workers`, the `most` that it was seen to have, and for how many seconds it has
-    had `fewer` than those, and been `without` any."""
+    """How a cluster is manned: its `workers`, the `most` that it was seen to have, and for how many seconds
+    it has had `fewer` than those, and been `without` any."""
 
     workers: int = 0
     most: int = 0
@@ -236,8 +237,8 @@ class Manned:
 
 @dataclass
 class _Threads:
-    """How many threads a cluster has, `counted` anew each second, the `most` workers that it was seen to have, since
-    when it has been seen to have fewer (`lost`) and none (`gone`), by the monotonic clock; `tell` hears of it."""
+    """How many threads a cluster has, `counted` anew each second, the `most` workers that it was seen to
+    have, since when it has had fewer (`lost`) and none (`gone`), by the monotonic clock; `tell` hears of it."""
 
     engine: Engine
     tell: Callable[[Manned], None]

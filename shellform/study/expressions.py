@@ -2,8 +2,8 @@
 
 An expression is data: its syntax tree is walked here, node by node, and only numbers, names of entries, + - *
 / // % **, comparisons, `a if c else b` and the functions below mean anything. Nothing is compiled or run;
-every number on the way is a float, what a comparison gives too, so that no power grows without end; length and
-depth are bounded.
+every number on the way is a float, what a comparison gives too, so that no power grows without end; length
+and depth are bounded.
 """
 
 from __future__ import annotations

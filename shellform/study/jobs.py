@@ -2,8 +2,9 @@
 with others.
 
 Whatever happens ends as an outcome with a status. A full disk is no property of a design: its status stops
-the study. A design that takes too long is stopped at its next step; one that hangs within a step is ended with
-its process, and found out by the trace which that leaves in the folder when the design is handed out again.
+the study. A design that takes too long is stopped at its next step; one that hangs within a step is ended
+with its process, and found out by the trace which that leaves in the folder when the design is handed out
+again.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """What a study has found: an append-only log, and the table made from it (door to PyArrow).
 
-    DIR/results.jsonl   a line a finished design: checksum, then JSON with its key, status, reason, values and seconds
-    DIR/table.parquet   a row a design in the study's order, all numbers of its summary as columns
-    DIR/table.csv       the same with the columns that were asked for
-    DIR/seconds.csv     what each design took; apart, since it differs from run to run
+    DIR/results.jsonl   a line a finished design: checksum, then JSON with its key, status, reason, values and
+    seconds DIR/table.parquet   a row a design in the study's order, all numbers of its summary as columns
+    DIR/table.csv       the same with the columns that were asked for DIR/seconds.csv     what each design
+    took; apart, since it differs from run to run
 
 A line counts once its checksum and line end are on the disk; what a kill or a full disk leaves behind it is
 cut off at the next start. So a design is in the log entirely or not at all, and computed once. The table is

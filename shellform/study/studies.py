@@ -86,8 +86,8 @@ class Finding:
 
 @dataclass(frozen=True)
 class _Studying:
-    """A study at work in its `folder`: its `plan`, its `log` of outcomes, the `front` so far, and its `progress`, which is
-    told by `show`."""
+    """A study at work in its `folder`: its `plan`, its `log` of outcomes, the `front` so far, and its
+    `progress`, which is told by `show`."""
 
     plan: Plan
     folder: Path
@@ -100,8 +100,8 @@ class _Studying:
 
 @dataclass(frozen=True)
 class _Design:
-    """A design of a study: its `key`, its `own` entries, its `case` with the `keys` of its stages; no case where it is
-    refused, for the `reason`."""
+    """A design of a study: its `key`, its `own` entries, its `case` with the `keys` of its stages; no case
+    where it is refused, for the `reason`."""
 
     key: str
     own: Mapping[str, Value]
@@ -125,8 +125,8 @@ def run_study(
 
     `workers` processes on this machine, or those of a Dask `scheduler`, which have to see the folder by the
     same name. Dask's `dashboard` is open to everybody on this machine. `show` is called with the progress.
-    Raises InputError for a bad study, NotConverged where the disk is full, no worker is there for 5 minutes (of a
-    `scheduler`: an hour), or no design has a result.
+    Raises InputError for a bad study, NotConverged where the disk is full, no worker is there for 5 minutes
+    (of a `scheduler`: an hour), or no design has a result.
     """
     plan = read_study(file)
     arrow()  # before hours are spent on designs
@@ -235,9 +235,9 @@ def _identify(study: _Studying, own: Mapping[str, Value]) -> _Design:
 
 
 def _jobs(study: _Studying, batch: Batch, shared: Counter[str]) -> Iterator[Job]:
-    """The designs of a batch that have no result yet, with the stages that they share with others: as the first
-    of the batch has them, with a result or without, so that their folders are the same however often a study was
-    begun.
+    """The designs of a batch that have no result yet, with the stages that they share with others: as the
+    first of the batch has them, with a result or without, so that their folders are the same however often a
+    study was begun.
     """
     until, seen = study.plan.study.until, set()
     first: dict[str, Case] = {}
@@ -329,7 +329,8 @@ def _unwanted(study: _Studying, row: Row) -> list[str]:
 
 def _tidy(study: _Studying, keys: Sequence[str]) -> None:
     """Brings the front up to what the log has of these designs, and drops what an earlier call had no time to
-    drop. What the log has of others, from before the study or its case was changed, is on no front of this one.
+    drop. What the log has of others, from before the study or its case was changed, is on no front of this
+    one.
     """
     for found, outcome in zip(keys, study.log.outcomes(keys), strict=True):
         if outcome is not None:

@@ -108,8 +108,8 @@ def read_cad(
     if left out).
 
     The unit is the file's own; a BREP file's is `unit` ("m" if left out). `up` is the file's vertical axis,
-    and stays so; of a solid its "upper" or "lower" `face` is taken; `before_mesh` is told about how many triangles
-    there will be. Raises InputError for unreadable files, and for solids without a `face`.
+    and stays so; of a solid its "upper" or "lower" `face` is taken; `before_mesh` is told about how many
+    triangles there will be. Raises InputError for unreadable files, and for solids without a `face`.
     """
     if kind != "brep" and unit is not None:
         raise InputError(
@@ -151,7 +151,8 @@ def mesh_patches(
         gmsh.model.occ.synchronize()
         tolerance = _SEWN * float(extent().max())
         if to_sew(tolerance):
-            # Of all shapes at once, which an empty list means: named ones are sewn each by itself, to nothing.
+            # Of all shapes at once, which an empty list means: named ones are sewn each by itself, to
+            # nothing.
             gmsh.model.occ.healShapes([], tolerance, False, False, False, True, False)
             gmsh.model.occ.synchronize()
         return _draft(where, size, up, face, before_mesh)
@@ -162,8 +163,8 @@ def mesh_plan(outlines: Sequence[Reals], *, size: float | None = None) -> tuple[
     triangles (t, 3), counterclockwise.
 
     The triangles number the outlines' points first, one outline after the other, then these. Edges are about
-    `size`, m, long (left out: as those of the outline nearby). Raises InputError where outlines cross, and for a size with
-    which the triangles would be too many.
+    `size`, m, long (left out: as those of the outline nearby). Raises InputError where outlines cross, and
+    for a size with which the triangles would be too many.
     """
     if size is not None:
         sides = np.ptp(np.vstack(outlines), axis=0)
@@ -339,8 +340,8 @@ def _stretches(edge: Reals) -> list[range]:
 def _read_shapes(file: Path, kind: str) -> None:
     """The file's shapes into the current model, STEP in mm, IGES in m, faces that touch sewn together.
 
-    With metres for its unit OpenCASCADE loses the seam of what turns about a pole and is less than some 2 m wide in
-    STEP files of millimetres."""
+    With metres for its unit OpenCASCADE loses the seam of what turns about a pole and is less than some 2 m
+    wide in STEP files of millimetres."""
     if kind == "step":
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
     if kind == "iges":

@@ -210,8 +210,8 @@ def nearest_thrust_shell(surface: Surface, *, ground: float | None = None, least
 
     Vertices of its edge within a hundredth of its rise of the `ground`, m (left out: the lowest), are held.
     The force densities are those that leave the least unbalanced force on the surface as it is, none below
-    `least` of their mean, so that all stays in compression. Raises InputError where nothing is held, and where `least`
-    isn't above 0.
+    `least` of their mean, so that all stays in compression. Raises InputError where nothing is held, and
+    where `least` isn't above 0.
     """
     from shellform.surface.shape.target import make_surface, vertex_areas
 

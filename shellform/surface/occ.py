@@ -93,8 +93,8 @@ def errors(path: Path, what: str, remedy: str) -> Iterator[None]:
 
 def write_curves(path: Path, curves: Sequence[Reals], names: Sequence[str]) -> None:
     """Writes a STEP file, in m, of a B-spline curve through each of the rows of points (k, 3), closed where
-    the last is the first, a straight line where there are two, each under its name. The same curves give the same bytes: of the
-    time, and of how many files OpenCASCADE has written before, nothing is told.
+    the last is the first, a straight line where there are two, each under its name. The same curves give the
+    same bytes: of the time, and of how many files OpenCASCADE has written before, nothing is told.
     """
     with session(), errors(path, "gmsh can't write the curves", "Choose another folder."):
         occ = gmsh.model.occ
@@ -152,8 +152,8 @@ def silence() -> Iterator[None]:
 
 
 def extent() -> Reals:
-    """The extents (3,), in the model's unit, of its curves along x, y and z: gmsh's own boxes are those of the control
-    points.
+    """The extents (3,), in the model's unit, of its curves along x, y and z: gmsh's own boxes are those of
+    the control points.
     """
     ends = [np.reshape(gmsh.model.getValue(0, point, []), (-1, 3)) for _, point in gmsh.model.getEntities(0)]
     for _, curve in gmsh.model.getEntities(1):
@@ -165,8 +165,8 @@ def extent() -> Reals:
 
 
 def to_sew(tolerance: float) -> bool:
-    """Whether faces lie within the `tolerance`, in the model's unit, of others without hanging together with them by
-    curves that they share; sewing faces with a pole breaks them, so only such are sewn.
+    """Whether faces lie within the `tolerance`, in the model's unit, of others without hanging together with
+    them by curves that they share; sewing faces with a pole breaks them, so only such are sewn.
     """
     groups: list[tuple[set[int], Reals, Reals]] = []
     for _, face in gmsh.model.getEntities(2):
@@ -196,8 +196,8 @@ def mesh_faces(
     """Points (v, 3), triangles (t, 3) and, where the faces have them, CAD normals (v, 3) of the model's
     faces, zero at poles, where they mean nothing.
 
-    Of a solid, only the triangles of its upper or lower `side`. `before_mesh` is told about how many triangles the mesh
-    will have.
+    Of a solid, only the triangles of its upper or lower `side`. `before_mesh` is told about how many
+    triangles the mesh will have.
     """
     if not gmsh.model.getEntities(2):
         raise InputError(

@@ -26,8 +26,8 @@ def unit_factor(unit: str, *, where: str = "surface.unit") -> float:
 
 
 def turned_up(points: Reals, up: str) -> Reals:
-    """Points (k, 3) of a file whose vertical axis is `up`, "x", "y" or "z", or "-x", "-y" or "-z" where that points down, turned
-    so that it is z; nothing is mirrored."""
+    """Points (k, 3) of a file whose vertical axis is `up`, "x", "y" or "z", or "-x", "-y" or "-z" where that
+    points down, turned so that it is z; nothing is mirrored."""
     if up not in _AXES:
         raise InputError(
             f"must be one of {', '.join(_AXES)}",

@@ -79,7 +79,8 @@ def braced() -> Iterator[Comparison]:
 
 
 def braced_column(elements: int, rest_ratio: float) -> Network:
-    """The column of `braced` along x, an even number of elements; its nodes come before the cables' anchors."""
+    """The column of `braced` along x, an even number of elements; its nodes come before the cables'
+    anchors."""
     middle, end = elements // 2, elements
     points = np.vstack([line(elements), [[0.5, 0.0, 1.0], [0.5, 0.0, -1.0]]])
     fixed = np.zeros((elements + 3, 6), dtype=bool)

@@ -145,8 +145,8 @@ SIDE = 6
 
 
 def hypar(side: int = SIDE) -> tuple[Network, Reals]:
-    """A saddle net over a square of `side` × `side` meshes of 1 m, z = (x² - y²)/(2 side), cables of force density 50 N/m, EA
-    = 5e4 N.
+    """A saddle net over a square of `side` × `side` meshes of 1 m, z = (x² - y²)/(2 side), cables of force
+    density 50 N/m, EA = 5e4 N.
 
     z is discretely harmonic, so that equal force densities balance at every node: an exact form. Returns it
     and its shape.

@@ -179,7 +179,8 @@ def shallow_truss(half: float, rise: float, axial: float) -> tuple[float, float]
 
 
 def column(alpha: float) -> tuple[float, float, float]:
-    """A cantilever column of length 1 and EI 1 whose tip has the slope `alpha`, rad: thrust, tip along and across."""
+    """A cantilever column of length 1 and EI 1 whose tip has the slope `alpha`, rad: thrust, tip along and
+    across."""
     k = np.sin(0.5 * alpha)
     quarter = ellipk(k * k)
     return float(quarter**2), float(2.0 * ellipe(k * k) / quarter - 1.0), float(2.0 * k / quarter)
@@ -195,10 +196,12 @@ def helix(moment: Reals) -> Reals:
 
 
 def twist_under_thrust(thrust: float) -> float:
-    """ML/EI at which a rod between clamps, one free to slide, buckles under torsion and the `thrust` PL²/EI (tension
-    negative): the least M > 0 at which w = A + Bx + C exp(iax) + D exp(ibx) can vanish with its slope at both ends.
+    """ML/EI at which a rod between clamps, one free to slide, buckles under torsion and the `thrust` PL²/EI
+    (tension negative): the least M > 0 at which w = A + Bx + C exp(iax) + D exp(ibx) can vanish with its
+    slope at both ends.
 
-    With a, b = (M ± √(M² + 4P))/2 the determinant of these four conditions is i (a - b) exp(iM/2) times a real number.
+    With a, b = (M ± √(M² + 4P))/2 the determinant of these four conditions is i (a - b) exp(iM/2) times a
+    real number.
     """
     if thrust == 0.0:  # b = 0: the functions are no longer four
         return clamped_twist()

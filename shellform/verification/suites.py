@@ -1,5 +1,5 @@
-"""Cases of other programs' suites and of the literature on nets: slack and self-stressed nets, catenaries, the star
-dome of truss programs, and one of 100,000 elements.
+"""Cases of other programs' suites and of the literature on nets: slack and self-stressed nets, catenaries,
+the star dome of truss programs, and one of 100,000 elements.
 """
 
 from __future__ import annotations
@@ -57,8 +57,8 @@ def truss_dome() -> Network:
 def truss_domes() -> Iterator[Comparison]:
     """Hamel's star dome, a case of truss programs' suites: loads at three drops of the crown, and the limit.
 
-    Bars hinged by a bending stiffness that adds less than 1e-7; the reference is a sector of Hooke's bars, recomputed.
-    Feet are printed with four decimals, which leaves sectors unlike by 5e-6: 1e-5.
+    Bars hinged by a bending stiffness that adds less than 1e-7; the reference is a sector of Hooke's bars,
+    recomputed. Feet are printed with four decimals, which leaves sectors unlike by 5e-6: 1e-5.
     """
     network = truss_dome()
     source = "Hooke's bars, recomputed; Hamel's dome"
@@ -91,10 +91,12 @@ def heavy_cable(elements: int, force: float) -> Reals:
 
 
 def jayaraman() -> Iterator[Comparison]:
-    """Jayaraman and Knudsen, Computers and Structures 14 (1981) 165: 8000 lb on a heavy cable of 1000 ft, EA = 0.85 ·
-    19e6 lb, 3.16 lb/ft, unstressed 412.8837 and 613.0422 ft on both sides; what the loaded point moves by.
+    """Jayaraman and Knudsen, Computers and Structures 14 (1981) 165: 8000 lb on a heavy cable of 1000 ft, EA
+    = 0.85 · 19e6 lb, 3.16 lb/ft, unstressed 412.8837 and 613.0422 ft on both sides; what the loaded point
+    moves by.
 
-    40 straight cables a side, weight lumped: O(h²), 1e-4 of the elastic catenary; what is printed has four digits.
+    40 straight cables a side, weight lumped: O(h²), 1e-4 of the elastic catenary; what is printed has four
+    digits.
     """
     moved = heavy_cable(40, 8000.0) - heavy_cable(40, 0.0)
     length, at = 412.8837 + 613.0422, 412.8837
@@ -138,10 +140,11 @@ def inclined_catenaries() -> Iterator[Comparison]:
 
 
 def crossing_cables() -> Iterator[Comparison]:
-    """A sagging and a hogging cable that cross: the least of cable nets (Krishna, Cable-suspended roofs, 1978, ch. 3).
+    """A sagging and a hogging cable that cross: the least of cable nets (Krishna, Cable-suspended roofs,
+    1978, ch. 3).
 
-    Half spans 1, rises 0.2, EA = 1e4, 20 N of prestress in each, loads down before and after the hogging cable goes
-    slack. Closed form, solved here for the drop: to the solver's residual.
+    Half spans 1, rises 0.2, EA = 1e4, 20 N of prestress in each, loads down before and after the hogging
+    cable goes slack. Closed form, solved here for the drop: to the solver's residual.
     """
     length = np.hypot(1.0, 0.2)
     rest = length / (1.0 + 20.0 / 1e4)
@@ -166,10 +169,11 @@ def crossing_cables() -> Iterator[Comparison]:
 
 
 def spokes() -> Iterator[Comparison]:
-    """A flat net of seven prestressed spokes loaded across its plane at the hub: P = 7 EA (1/l0 - 1/l) w, and without
-    load its self-stress alone.
+    """A flat net of seven prestressed spokes loaded across its plane at the hub: P = 7 EA (1/l0 - 1/l) w, and
+    without load its self-stress alone.
 
-    EA = 1e4, prestress 2; the small load's sag is all from prestress, the large one's from stretching (Kwan 1998).
+    EA = 1e4, prestress 2; the small load's sag is all from prestress, the large one's from stretching (Kwan
+    1998).
     """
     angle = 2.0 * np.pi * np.arange(7) / 7.0
     points = np.vstack([np.column_stack([np.cos(angle), np.sin(angle), np.zeros(7)]), np.zeros((1, 3))])
@@ -188,11 +192,12 @@ def spokes() -> Iterator[Comparison]:
 
 
 def self_stressed_simplex() -> Iterator[Comparison]:
-    """The triangular prism of three struts and nine cables (Snelson's simplex): its twist of 30° beyond a prism's and
-    its one state of self-stress (Connelly and Back 1998; Pellegrino 1993).
+    """The triangular prism of three struts and nine cables (Snelson's simplex): its twist of 30° beyond a
+    prism's and its one state of self-stress (Connelly and Back 1998; Pellegrino 1993).
 
-    Started 6° off and 5 % off in height, without load or fixed place but what holds it in space, it comes back; forces
-    over lengths are 1 : √3 of triangles' to verticals' cables. Struts hinged, EI = 1e-7; to the residual: 1e-6.
+    Started 6° off and 5 % off in height, without load or fixed place but what holds it in space, it comes
+    back; forces over lengths are 1 : √3 of triangles' to verticals' cables. Struts hinged, EI = 1e-7; to the
+    residual: 1e-6.
     """
 
     def prism(twist: float, height: float) -> Reals:
@@ -240,8 +245,8 @@ LARGE = 225  # meshes a side: 100,800 cables
 
 
 def large_net() -> Iterator[Comparison]:
-    """A saddle net of 100,800 cables whose shape is exact (force densities, Schek 1974; see cables.py), found back
-    from a tenth deeper. To the residual over the net's stiffness: 1e-6 of its 225 m.
+    """A saddle net of 100,800 cables whose shape is exact (force densities, Schek 1974; see cables.py), found
+    back from a tenth deeper. To the residual over the net's stiffness: 1e-6 of its 225 m.
     """
     network, shape = hypar(LARGE)
     deep = np.where(network.fixed[:, :3], shape, shape * [1.0, 1.0, 1.1])

@@ -29,8 +29,8 @@ def end_moment(elements: int, moment: tuple[float, float, float]) -> Reals:
 
 
 def dead_moment() -> Iterator[Comparison]:
-    """A clamped rod under the dead end moment (2, 0, 5): a helix about the moment, since the moment is the same all
-    along it and the tangent turns about it at the rate |m|/EI (Kirchhoff; Love 1927, art. 270).
+    """A clamped rod under the dead end moment (2, 0, 5): a helix about the moment, since the moment is the
+    same all along it and the tangent turns about it at the rate |m|/EI (Kirchhoff; Love 1927, art. 270).
 
     40 elements leave O(h²), 2e-3 of the tip's place; and the order.
     """
@@ -49,8 +49,8 @@ def dead_moment() -> Iterator[Comparison]:
 def spirals() -> Iterator[Comparison]:
     """A cantilever rolled up ten times in space by the moment 20π EI/L: each tenth of it is a circle.
 
-    100 elements: the tip comes back to the clamp, exact by symmetry; the first half turn's end is 0.1 L/π off it, the
-    polygon's of ten sides by 1.6 %.
+    100 elements: the tip comes back to the clamp, exact by symmetry; the first half turn's end is 0.1 L/π off
+    it, the polygon's of ten sides by 1.6 %.
     """
     positions = end_moment(100, (0.0, 0.0, 20.0 * np.pi))
     source = "closed form"
@@ -62,11 +62,11 @@ def spirals() -> Iterator[Comparison]:
 
 
 def semi_tangential() -> Iterator[Comparison]:
-    """Torques on shafts whose ends may turn: semi-tangential, since a torque about a fixed axis has no potential
-    (Ziegler, Principles of structural stability, 1968, section 4).
+    """Torques on shafts whose ends may turn: semi-tangential, since a torque about a fixed axis has no
+    potential (Ziegler, Principles of structural stability, 1968, section 4).
 
-    Clamped and free at the other end ML/EI = π, hinged at both tan(x/2) = -x/6; 20 and 40 elements, extrapolated as
-    O(h²): 1e-3.
+    Clamped and free at the other end ML/EI = π, hinged at both tan(x/2) = -x/6; 20 and 40 elements,
+    extrapolated as O(h²): 1e-3.
     """
     hinge = [False, True, True, False, False, False]
     half = float(brentq(lambda x: np.tan(x) + x / 3.0, 2.0, 3.0, xtol=1e-14))
@@ -86,10 +86,12 @@ def semi_tangential() -> Iterator[Comparison]:
 
 
 def hockling() -> Iterator[Comparison]:
-    """The hockling shaft (Nour-Omid and Rankin, Comp. Meth. Appl. Mech. Eng. 93 (1991) 353): clamped, its other end
-    free to slide and spun by a torque, under tension, none and thrust; the torque at which it leaves its axis.
+    """The hockling shaft (Nour-Omid and Rankin, Comp. Meth. Appl. Mech. Eng. 93 (1991) 353): clamped, its
+    other end free to slide and spun by a torque, under tension, none and thrust; the torque at which it
+    leaves its axis.
 
-    Exact: EI w_xxxx - iM w_xxx + P w_xx = 0 between clamps (Greenhill 1883). 20 and 40 elements, extrapolated: 2e-3.
+    Exact: EI w_xxxx - iM w_xxx + P w_xx = 0 between clamps (Greenhill 1883). 20 and 40 elements,
+    extrapolated: 2e-3.
     """
     for thrust in (-10.0, 0.0, 10.0):
         found = []
@@ -117,15 +119,16 @@ THRUSTS = (
     (80.0, 1.293, 0.560, 0.719), (100.0, 1.518, 0.349, 0.792), (120.0, 1.884, 0.123, 0.803),
     (140.0, 2.541, -0.107, 0.750), (160.0, 4.029, -0.340, 0.625), (176.0, 9.116, -0.577, 0.421),
 )  # fmt: skip
-"""Tip's slope, degrees, thrust over Euler's, and the tip's place along and across, over L (Timoshenko and Gere)."""
+"""Tip's slope, degrees, thrust over Euler's, and the tip's place along and across, over L (Timoshenko and
+Gere)."""
 
 
 def elastica_at_nine_thrusts() -> Iterator[Comparison]:
-    """Timoshenko and Gere, Theory of elastic stability (1961), art. 2.7, table 2-4: a cantilever column at nine thrusts
-    beyond Euler's, its tip as the elliptic integrals and as the table have it.
+    """Timoshenko and Gere, Theory of elastic stability (1961), art. 2.7, table 2-4: a cantilever column at
+    nine thrusts beyond Euler's, its tip as the elliptic integrals and as the table have it.
 
-    80 elements: O(h²) leaves 2e-4 of the place, next to Euler's thrust, where the height answers to it, 1e-3; the
-    table prints three decimals.
+    80 elements: O(h²) leaves 2e-4 of the place, next to Euler's thrust, where the height answers to it, 1e-3;
+    the table prints three decimals.
     """
     count = 80
     network = in_plane(chain(line(count), (1e7, 1.0, 1.0, 1.0), {0: CLAMP}))

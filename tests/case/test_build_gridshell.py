@@ -94,7 +94,8 @@ def one(force):
 
 @pytest.fixture
 def parts(monkeypatch):
-    """What each kind of part weighs: its own amount, N, on the first node, twice that on the second, none on the third."""
+    """What each kind of part weighs: its own amount, N, on the first node, twice that on the second, none on
+    the third."""
     found = []
 
     def concrete(net, surface, *, thickness, density, region):

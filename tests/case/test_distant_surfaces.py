@@ -1,4 +1,5 @@
-"""Surfaces that lie far from the origin of their coordinates: when they are refused, and which origin is named."""
+"""Surfaces that lie far from the origin of their coordinates: when they are refused, and which origin is
+named."""
 
 import re
 

@@ -1,4 +1,5 @@
-"""`design --watch`: again at each change of case or surface; bad input is told and waited out; Ctrl-C ends it with 130."""
+"""`design --watch`: again at each change of case or surface; bad input is told and waited out; Ctrl-C ends it
+with 130."""
 
 import queue
 import shutil

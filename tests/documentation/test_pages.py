@@ -1,10 +1,10 @@
 """The documentation: what it shows runs, what it links to is there, and what is public is in it.
 
 A page is followed from top to bottom in a folder of its own: shell blocks by bash, Python blocks in one
-namespace, where the commands above have led. A comment before a block says where that differs: `status 3`, with which
-its last command ends; `with the names of start.md`; `with your files`, which stand_ins.py makes; `in the background`,
-until the page ends. Blocks of `console` are only read: ALONE says why. To take seconds instead of minutes,
-`design` gets small settings, and a study of 200 designs is cut to four.
+namespace, where the commands above have led. A comment before a block says where that differs: `status 3`,
+with which its last command ends; `with the names of start.md`; `with your files`, which stand_ins.py makes;
+`in the background`, until the page ends. Blocks of `console` are only read: ALONE says why. To take seconds
+instead of minutes, `design` gets small settings, and a study of 200 designs is cut to four.
 """
 
 import json
@@ -298,7 +298,8 @@ def follow(block, here):
     before = [f"{line} || [ $? = 3 ]" if line.startswith("shellform design") else line for line in before]
     script = "\n".join(["set -e", *before, "set +e", last, "status=$?", "echo; pwd", "exit $status"])
     done = subprocess.run(["bash", "-c", script], cwd=here, capture_output=True, text=True, check=False)
-    # few evaluations find no design that holds, which ends with 3, here and above; a page may also want exactly that
+    # few evaluations find no design that holds, which ends with 3, here and above; a page may also want
+    # exactly that
     usual = (0, 3) if last.startswith("shellform design") and not wanted else (wanted,)
     assert done.returncode in usual, f"{block.text}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
     return Path(done.stdout.splitlines()[-1])

@@ -82,8 +82,8 @@ def test_clamps_no_stiffer_than_short_rods_give_way_by_nothing_that_counts(arche
 
 
 def test_heavy_edge_beams_leave_less_to_rounding_than_rods_and_joints_do(arches, solved):
-    """Clamps and elements a twentieth of the spacing long, as stiff as 91 rods, left forty times what may be told as
-    equilibrium on a barrel of 30 m: every state was solved with twice the digits."""
+    """Clamps and elements a twentieth of the spacing long, as stiff as 91 rods, left forty times what may be
+    told as equilibrium on a barrel of 30 m: every state was solved with twice the digits."""
     shell, load = arches
     heavy = replace(shell, edge=EdgeBeam(Bundle(0.0012, 91, 0.5, GFRP)))
     beams = heavy.beams(heavy.rod.radius)
@@ -170,7 +170,8 @@ def test_the_schedule_of_edge_beams_is_in_equilibrium_and_names_the_rods_that_ar
                 apart = np.linalg.norm(place[ends[-1]] - place[ends[0]])
                 assert abs(places[-1] - places[0] - 1e3 * apart) < 1e3 * grid.gap + 1.0
         last = len(line.ends)
-        # the axial force, and the moments as they turn both ends: what one element begins with the one before ends with
+        # the axial force, and the moments as they turn both ends: what one element begins with the one before
+        # ends with
         for j in range(1, last):  # the moment, torsion with it, goes on where nothing is clamped
             if int(line.nodes[j]) not in clamped:
                 before, after = forces[element + j - 1], forces[element + j]
@@ -341,7 +342,8 @@ def test_rods_of_a_bundle_are_packed_about_their_middle_up_to_a_hexagon_of_twelv
 
 
 def test_a_clamp_is_as_stiff_as_the_edge_beam_but_no_stiffer_between_its_ends_than_a_rod_half_the_gap_long():
-    """EA and GJ go with the length, EI with its cube: of clamps as long, three times and ten times as long."""
+    """EA and GJ go with the length, EI with its cube: of clamps as long, three times and ten times as
+    long."""
     reach = np.array([[0.0, 0.0, 0.2], [0.0, 0.6, 0.0], [1.2, 1.6, 0.0]])
     found = module._no_stiffer((100.0, 200.0, 300.0, 400.0), (10.0, 5.0, 2.0, 1.0), reach, 0.2)
     wanted = [[10.0, 30.0, 100.0], [5.0, 15.0, 50.0], [2.0, 54.0, 300.0], [1.0, 27.0, 400.0]]

@@ -134,7 +134,8 @@ NET = SimpleNamespace(
 
 
 def test_rods_are_refused_beyond_the_radius_that_equation_1_leaves_them(monkeypatch):
-    """200 MPa over 40 GPa and 0.5 / m are 10 mm; of 12 mm they can be bent to 12 mm / 10 mm / (0.5 / m) = 2.4 m."""
+    """200 MPa over 40 GPa and 0.5 / m are 10 mm; of 12 mm they can be bent to 12 mm / 10 mm / (0.5 / m) = 2.4
+    m."""
 
     class Braced(Exception):
         pass

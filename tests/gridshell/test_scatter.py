@@ -1,5 +1,5 @@
-"""What is off, cause by cause: derivatives of the internal forces held against structures that are varied, for three
-cables and three short beams."""
+"""What is off, cause by cause: derivatives of the internal forces held against structures that are varied,
+for three cables and three short beams."""
 
 from types import SimpleNamespace
 

@@ -1,10 +1,10 @@
 """The Princeton beam: a lath of aluminium, clamped with its section turned, under a weight at its tip.
 
-Dowell and Traybar (1975), An experimental study of the nonlinear stiffness of a rotor blade undergoing flap, lag and twist
-deformations, AMS report 1257, Princeton; section, length and loads as in Bauchau, Han, Mikkola, Matikainen and Gruber,
-J. Computational Nonlinear Dynamics 11 (2016): 3.2024 × 12.377 mm, 0.508 m, E = 71.7 GPa, Poisson's ratio 0.31, 4.448, 8.896
-and 13.345 N. Bending about both axes is coupled with torsion, so that all four stiffnesses, the sense of the local
-axes and the torsion constant of a rectangle are in each number.
+Dowell and Traybar (1975), An experimental study of the nonlinear stiffness of a rotor blade undergoing flap,
+lag and twist deformations, AMS report 1257, Princeton; section, length and loads as in Bauchau, Han, Mikkola,
+Matikainen and Gruber, J. Computational Nonlinear Dynamics 11 (2016): 3.2024 × 12.377 mm, 0.508 m, E = 71.7
+GPa, Poisson's ratio 0.31, 4.448, 8.896 and 13.345 N. Bending about both axes is coupled with torsion, so that
+all four stiffnesses, the sense of the local axes and the torsion constant of a rectangle are in each number.
 """
 
 import numpy as np
@@ -53,7 +53,8 @@ def tip(count, load, angle):
 @pytest.mark.parametrize("load", [4.448, 8.896, 13.345])
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 45.0, 75.0])
 def test_the_tip_of_the_princeton_beam_is_that_of_the_exact_rod(load, degrees):
-    """16 and 32 straight elements leave an error of order h², at most 2e-4 and 5e-5 of the way; extrapolated 1.2e-7."""
+    """16 and 32 straight elements leave an error of order h², at most 2e-4 and 5e-5 of the way; extrapolated
+    1.2e-7."""
     wanted, angle = exact(load, np.radians(degrees)), np.radians(degrees)
     coarse, fine = tip(16, load, angle), tip(32, load, angle)
     way = np.abs(wanted - [LENGTH, 0.0, 0.0]).max()

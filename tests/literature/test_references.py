@@ -265,7 +265,8 @@ def test_the_second_kind_s_integral_holds_also_where_scipy_s_jumps():
 
 
 def hooke_dome(drop):
-    """Load and ring's place of Hamel's star dome at a drop of its crown, one sector of six with Hooke's bars."""
+    """Load and ring's place of Hamel's star dome at a drop of its crown, one sector of six with Hooke's
+    bars."""
     axial, radius, low, high = 0.0155 * 3e7, 9.8425, 2.4472, 3.2346
     crown, ring = np.array([0.0, 0.0, high]), np.array([radius, 0.0, low])
     feet = [np.array([17.0472, side * 9.8425, 0.0]) for side in (1.0, -1.0)]

@@ -46,7 +46,8 @@ def sail(size=0.9, rise=0.16):
 
 
 def undulating(radius=0.6, rise=0.22, wave=0.025):
-    """A paraboloid on a circle whose edge rises and falls by 0.025 m four times round, a little more than what counts as ground."""
+    """A paraboloid on a circle whose edge rises and falls by 0.025 m four times round, a little more than
+    what counts as ground."""
     r, angle = (
         each.ravel()
         for each in np.meshgrid(np.linspace(0.0, radius, 24)[1:], 2.0 * np.pi * np.arange(96) / 96, indexing="ij")
@@ -60,8 +61,8 @@ def undulating(radius=0.6, rise=0.22, wave=0.025):
 
 
 def waisted(length=8.0, half=4.0, rise=1.6, waist=0.03, flare=0.5):
-    """A low barrel on two straight lines along x, whose arched ends lie `waist` m beyond x = ±length/2 in the middle and
-    `flare` m farther out at their feet."""
+    """A low barrel on two straight lines along x, whose arched ends lie `waist` m beyond x = ±length/2 in the
+    middle and `flare` m farther out at their feet."""
     along, across = (each.ravel() for each in np.meshgrid(np.linspace(-1.0, 1.0, 41), np.linspace(-1.0, 1.0, 41), indexing="ij"))  # fmt: skip
     x = along * (0.5 * length + waist + flare * across**4)
     return _sheet(np.column_stack([x, half * across, rise * (1.0 - across**2)]), 41, 41)

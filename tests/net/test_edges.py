@@ -275,8 +275,8 @@ def test_no_rod_runs_beside_an_edge_with_hardly_a_joint():
 
 
 def test_rods_beside_an_opening_that_go_on_beyond_it_stay():
-    """One of 14 joints has 4 spacings without any beside the opening. Left out it took joints on either side along, of
-    which other rods then had too few, until no net was left."""
+    """One of 14 joints has 4 spacings without any beside the opening. Left out it took joints on either side
+    along, of which other rods then had too few, until no net was left."""
     net = sf.pull_net(opened(), spacing=0.7, gap=0.02, angle=0.0, offset=(0.5, 0.5), elements=1)
     free = [np.diff([0.0, *rod.marks, rod.length]).max() / 0.7 for rod in net.grid.rods]
     assert max(free) > 2.5

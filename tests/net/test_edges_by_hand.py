@@ -150,7 +150,8 @@ SQUARE = np.array([[0.0, 0, 0], [4.0, 0, 0], [4.0, 3.0, 2.0], [0.0, 3.0, 2.0]])
 
 
 def built(kinds, ends, run, points=SQUARE, scale=4.0):
-    """The nodes of an edge beam along a run of a loop, for rods' ends at arc lengths on it, nearest to a vertex."""
+    """The nodes of an edge beam along a run of a loop, for rods' ends at arc lengths on it, nearest to a
+    vertex."""
     made = rim_of(points, False)
     made.kinds, made.names = list(kinds), [f"edge {k}" for k in range(len(points))]
     net = SimpleNamespace(grid=SimpleNamespace(flat=np.zeros((100, 3)), scale=scale))
@@ -190,7 +191,8 @@ LOPSIDED = np.array([[0.0, 0, 0], [4.0, 0, 0], [4.0, 3.0, 0], [1.0, 3.0, 0]])
 def test_ends_within_a_fifth_of_the_spacing_share_a_node_at_their_mean_and_the_way_is_counted_from_the_first_foot(
     second, shared
 ):
-    """From vertex 1, at 4 m of 10 + 10 ** 0.5 m, by vertices 2 and 3 to vertex 0; ends at 6, 6.75 or 6.85 and 9 m."""
+    """From vertex 1, at 4 m of 10 + 10 ** 0.5 m, by vertices 2 and 3 to vertex 0; ends at 6, 6.75 or 6.85 and
+    9 m."""
     builder = built(["ground", "ground", "beam", "beam"], [(9.0, 3), (second, 2), (6.0, 2)], (2, 3), LOPSIDED)
     (line,) = builder.lines
     place = {100 + k: each for k, each in enumerate(builder.places)}
@@ -212,7 +214,8 @@ def square(low, high):
 
 
 def test_rods_ends_lie_on_the_nearest_edge_half_a_gap_below_or_above_it_unless_they_were_cut_off():
-    """On a square of 10 m with an opening from 4 to 6 m; the last three ends are farther than half a spacing from either."""
+    """On a square of 10 m with an opening from 4 to 6 m; the last three ends are farther than half a spacing
+    from either."""
     middles = np.array(
         [[3, 0, 0], [10, 7, 0], [6, 5.5, 0], [4, 4.5, 0], [9.55, 1, 0], [2, 2, 0], [2, 3, 0], [0.55, 4, 0]]
     )
@@ -304,8 +307,8 @@ def test_a_rim_s_arc_lengths_go_all_round():
 
 
 def test_ends_that_were_cut_off_are_chained_up_to_two_and_a_half_spacings_and_reach_edges_as_near():
-    """A spacing of 2 m: of five ends two lie 7 m from the other three, the outermost of which lie 2.8 and 3.4 m from a
-    corner."""
+    """A spacing of 2 m: of five ends two lie 7 m from the other three, the outermost of which lie 2.8 and 3.4
+    m from a corner."""
     middles = 2.0 * np.array([[0.8, 1.5, 0], [2, 3, 0], [3, 3, 0], [6.5, 2.5, 0], [6.5, 2, 0], [9.55, 1, 0]])
     surface = SimpleNamespace(
         vertices=2.0 * np.array([*square(0.0, 10.0), *square(4.0, 6.0)]),

@@ -188,8 +188,8 @@ def test_crossings_that_lie_nearer_or_farther_than_their_spacing_by_half_a_perce
 
 
 def test_what_is_bare_is_sampled_a_quarter_of_the_spacing_apart(monkeypatch):
-    """Of a triangle of 2 m² in 144 parts those whose middle lies beyond 0.75 m along x: 28 that stand and 28 that hang;
-    with half the spacing in 529 those beyond half as far."""
+    """Of a triangle of 2 m² in 144 parts those whose middle lies beyond 0.75 m along x: 28 that stand and 28
+    that hang; with half the spacing in 529 those beyond half as far."""
     corners = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
     surface = SimpleNamespace(vertices=corners, triangles=np.array([[0, 1, 2]]))
     monkeypatch.setattr(
@@ -233,7 +233,8 @@ def test_hazzidakis_formula_holds_over_every_rectangle_of_the_net(vault, net):
 
 
 def test_a_net_whose_crossings_come_nearer_than_their_spacing_is_refused_with_the_place_and_one_that_bends_less_is_not():
-    """A rod of length s on a cylinder of radius R has a chord of 2 R sin(s / 2R): 0.5 % less at s = 0.35 R."""
+    """A rod of length s on a cylinder of radius R has a chord of 2 R sin(s / 2R): 0.5 % less at s = 0.35
+    R."""
     for radius, refused in ((2.7, True), (3.3, False)):
         around, along = np.linspace(-1.2, 1.2, 31), np.linspace(-3.0, 3.0, 31)
         t, y = (each.ravel() for each in np.meshgrid(around, along, indexing="ij"))

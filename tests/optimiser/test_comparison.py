@@ -115,8 +115,8 @@ def test_a_trial_off_the_branch_is_infinite_and_has_the_derivatives_of_the_neare
 
 
 def test_the_nearest_design_is_the_one_whose_variables_are_nearest(coarse):
-    """Of two designs on the branch a trial off it takes the nearer one's derivatives, not those of the one with the
-    shorter cables."""
+    """Of two designs on the branch a trial off it takes the nearer one's derivatives, not those of the one
+    with the shorter cables."""
     plain = Plain(problem(coarse, 4.0), coarse.design())
     slope = plain.gradient(plain.start)
     shorter = plain.start - 1e-3

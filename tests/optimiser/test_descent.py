@@ -122,7 +122,8 @@ def descending(monkeypatch):
     [(-0.5, 0.36, 1.6), (-0.5, 0.34, 1.0), (-0.5, 0.16, 1.0), (-0.5, 0.14, 0.4), (0.0, 0.01, 1.6)],
 )
 def test_what_came_true_of_a_prediction_decides_on_the_next_window(descending, predicted, gained, factor):
-    """More than seven tenths of a half, or less than three; of nothing that was predicted any gain is more."""
+    """More than seven tenths of a half, or less than three; of nothing that was predicted any gain is
+    more."""
     descending.predicted, descending.trial = predicted, point(2.0 - gained)
     found = descent.descend(searching(1), iterate(point(2.0), window=0.5))
     assert found.window == pytest.approx(factor * 0.5)

@@ -1,5 +1,5 @@
-"""How a search judges trials and goes back: which it accepts, refuses, calls sound, and takes away. The equilibria
-are stood in for, so that each case is the one that is meant."""
+"""How a search judges trials and goes back: which it accepts, refuses, calls sound, and takes away. The
+equilibria are stood in for, so that each case is the one that is meant."""
 
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
@@ -68,7 +68,8 @@ def standing_at(point, **changes):
 
 @pytest.fixture
 def bare(monkeypatch):
-    """Phases whose steps are told: `predicted`, and the next of `trials`; those accepted are kept in `taken`."""
+    """Phases whose steps are told: `predicted`, and the next of `trials`; those accepted are kept in
+    `taken`."""
     told = SimpleNamespace(predicted=-1.0, trials=[], taken=[], merits={}, noted=[])
 
     def attempted(search, it, model, y):

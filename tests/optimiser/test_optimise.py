@@ -1,5 +1,5 @@
-"""The doors of a search: what is asked of it and of polishing, what polishing serves, when another round follows and what comes
-back; searches themselves are told.
+"""The doors of a search: what is asked of it and of polishing, what polishing serves, when another round
+follows and what comes back; searches themselves are told.
 """
 
 from dataclasses import replace

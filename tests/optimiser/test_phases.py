@@ -1,5 +1,5 @@
-"""In which order a search goes through its phases, how far it stiffens and thins, and what it says at the end: with trials and
-judgements that are told.
+"""In which order a search goes through its phases, how far it stiffens and thins, and what it says at the
+end: with trials and judgements that are told.
 """
 
 from dataclasses import replace
@@ -405,7 +405,8 @@ def test_a_trial_off_the_branch_is_no_trial_to_judge(thinning):
 
 @pytest.mark.parametrize(("idle", "left"), [(0.2, False), (0.3, True)])
 def test_cables_leave_the_search_that_pull_under_no_load_once_they_are_a_fifth(monkeypatch, idle, left):
-    """Of six candidates five are present; the fourth of these pulls nowhere, others under one of two loads."""
+    """Of six candidates five are present; the fourth of these pulls nowhere, others under one of two
+    loads."""
     pulls = {"wet": [1.0, 0.0, 2.0, 0.0, 0.0], "wetter": [1.0, 3.0, 0.0, -1.0, 0.5]}
     cables = SimpleNamespace(tension=lambda state: np.array(pulls[state]))
     search = searching(solver=sf.SequentialConvex(idle=idle))

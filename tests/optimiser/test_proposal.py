@@ -201,7 +201,8 @@ WIDTH = np.array([0.5, 0.5, 0.01])
 
 
 def test_a_guarded_cable_s_fall_is_told_in_what_a_whole_window_can_change_of_its_tension():
-    """Of the first 1.5 N and of the second 0.5 + 0 + 0.06: below its 0.3 N it regains 0.05 N, no more than a tenth."""
+    """Of the first 1.5 N and of the second 0.5 + 0 + 0.06: below its 0.3 N it regains 0.05 N, no more than a
+    tenth."""
     falls, scale, asked = proposal._falls(task_of(), GUARD, np.array([0, 1]), WIDTH)
     assert falls == pytest.approx(-np.array([[0.5, 1.0, 0.0], [0.5, 0.0, 0.06]]))
     assert scale == pytest.approx([1.5, 0.56])
@@ -210,7 +211,8 @@ def test_a_guarded_cable_s_fall_is_told_in_what_a_whole_window_can_change_of_its
 
 
 def test_the_nearest_cables_are_guarded_that_a_step_could_let_go_slack():
-    """The second could fall by 0.56 N to 0.34, not to 0.3; with 0.35 N it is guarded, too, and the third never."""
+    """The second could fall by 0.56 N to 0.34, not to 0.3; with 0.35 N it is guarded, too, and the third
+    never."""
     rows, values = proposal._guarding(task_of(guards=[GUARD]), WIDTH)
     assert rows == pytest.approx(-np.array([[0.5, 1.0, 0.0]]) / 1.5)
     assert values == pytest.approx([0.05 / 1.5])
@@ -297,8 +299,9 @@ def test_aims_that_are_missed_have_a_price_and_limits_that_are_broken_do_not():
 
 
 def test_a_step_is_bounded_by_its_window_in_tensions_and_by_its_share_of_other_steps(monkeypatch):
-    """Of half a newton where the start's mean is 2 N, so that the radius goes a quarter of its step; a cable below its
-    least goes there as far as the window lets it, and one whose tension is next to nothing has none."""
+    """Of half a newton where the start's mean is 2 N, so that the radius goes a quarter of its step; a cable
+    below its least goes there as far as the window lets it, and one whose tension is next to nothing has
+    none."""
     seen = []
 
     def quadratic(curvature, slope, rows, values, low, high):

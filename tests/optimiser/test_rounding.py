@@ -1,5 +1,5 @@
-"""Sections that can be bought instead of a free radius: which are tried, from where, by what they are compared and which one
-is chosen.
+"""Sections that can be bought instead of a free radius: which are tried, from where, by what they are
+compared and which one is chosen.
 """
 
 from types import SimpleNamespace
@@ -202,7 +202,8 @@ def test_stiffness_is_asked_for_as_a_share_of_the_start_s(monkeypatch, softest, 
 
 
 def test_sections_beside_the_free_radius_are_tried_each_from_its_own_design_and_from_all_cables(monkeypatch):
-    """Loads that no term is taken at aren't followed for the weights; the safety asked of the optimum is asked of each."""
+    """Loads that no term is taken at aren't followed for the weights; the safety asked of the optimum is
+    asked of each."""
     sections = {name: SimpleNamespace(rod=SimpleNamespace(section=name)) for name in ("thin", "up", "thick")}
     own = {
         name: Design(np.full(2, k + 1.0), np.array([True, False]), 0.01 * (k + 1))

@@ -70,7 +70,8 @@ def test_a_search_resumed_thinning_ends_with_the_same_design_and_history_to_the_
 
 
 def test_a_search_led_by_drawn_structures_and_resumed_ends_with_the_same_design_to_the_bit(shell):
-    # More is asked of the perfect structure than stiffness leads to; the search descends no further than it has to.
+    # More is asked of the perfect structure than stiffness leads to; the search descends no further than it
+    # has to.
     problem = misfit_and_force(shell, 4.5, most=9.0, rms=None)
     settings = {
         "solver": sf.SequentialConvex(settled=10.0),

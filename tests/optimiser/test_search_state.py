@@ -1,4 +1,5 @@
-"""What a search adds to its problem, tells of its trials and hands out at its end, without an equilibrium solved."""
+"""What a search adds to its problem, tells of its trials and hands out at its end, without an equilibrium
+solved."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,5 @@
-"""How a step's model reads a design off its tensions and other values, and what pulls on the shell where they change."""
+"""How a step's model reads a design off its tensions and other values, and what pulls on the shell where they
+change."""
 
 import itertools
 from dataclasses import replace
@@ -45,8 +46,8 @@ def model_of(variables, *, tensions=2):
 
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_design_is_read_off_tensions_and_other_values_in_whichever_order_their_blocks_stand(order):
-    """A tension of 5 N at the length 1.04 + 0.01 belongs to the rest length 100 / 105 times that; one of nothing to the
-    longest."""
+    """A tension of 5 N at the length 1.04 + 0.01 belongs to the rest length 100 / 105 times that; one of
+    nothing to the longest."""
     model = model_of([sf.RestLengths(), sf.FreeRadius()][::order])
     made = model.design(np.array([5.0, 10.0, 0.13]))
     assert made.rest_length == pytest.approx([1.05 / 1.05, 7.0, 2.18 / 1.1])
@@ -150,8 +151,8 @@ def test_sums_of_squares_under_the_design_load_are_told_apart_by_their_residuals
 
 
 def test_values_that_change_lengths_and_radius_pull_by_what_they_do_to_both(dome, begun):
-    """One makes the third cable and the sixth longer, the last cable that is present among them twice as much, and one the rods
-    thicker; a cable that is absent changes nothing."""
+    """One makes the third cable and the sixth longer, the last cable that is present among them twice as
+    much, and one the rods thicker; a cable that is absent changes nothing."""
     evaluator, design = begun
     last = int(np.flatnonzero(design.present)[-1])
     assert design.present[[3, 6]].all()

@@ -101,8 +101,8 @@ class Model:
 
 
 def test_a_trial_shows_by_how_much_constraints_near_their_limits_exceed_their_model():
-    """Of the square of a window of 0.2: 0.1 over the model are 2.5; a constraint farther than half of its limit off and
-    one below its model show nothing."""
+    """Of the square of a window of 0.2: 0.1 over the model are 2.5; a constraint farther than half of its
+    limit off and one below its model show nothing."""
     search = searching(evaluator=Tries(0.2, -0.6, -0.3))
     trial, it = trials.attempt(search, iterate(), Model(), NONE)
     assert trial.constraints.tolist() == [0.2, -0.6, -0.3]

@@ -54,7 +54,8 @@ def told_search(monkeypatch, *modules):
 
 
 def loaded(*names, falling=()):
-    """What loads come to from a start that falls under those `falling`, at two fifths of them; each state is told by its load."""
+    """What loads come to from a start that falls under those `falling`, at two fifths of them; each state is
+    told by its load."""
     return {
         name: SimpleNamespace(
             on_branch=name not in falling, equilibrium=SimpleNamespace(state=name), share=0.4

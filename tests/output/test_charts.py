@@ -1,4 +1,5 @@
-"""Where curves and limits lie on the page's charts, whose frame is 396 wide and 218 high, from 52 and 230 on."""
+"""Where curves and limits lie on the page's charts, whose frame is 396 wide and 218 high, from 52 and 230
+on."""
 
 import re
 

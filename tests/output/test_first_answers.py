@@ -1,5 +1,5 @@
-"""The verdicts on the page's first lines, on records that are made up: both sides of each rule, and the numbers with
-their units."""
+"""The verdicts on the page's first lines, on records that are made up: both sides of each rule, and the
+numbers with their units."""
 
 from dataclasses import replace
 from types import SimpleNamespace

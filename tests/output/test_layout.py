@@ -1,5 +1,5 @@
-"""What stands where on the drawings, on a grid of nine crossings whose places are known beforehand: 2 m apart along u
-and 1.5 m along v, rods going on past them by as much.
+"""What stands where on the drawings, on a grid of nine crossings whose places are known beforehand: 2 m apart
+along u and 1.5 m along v, rods going on past them by as much.
 """
 
 from dataclasses import replace

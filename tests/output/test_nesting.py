@@ -1,4 +1,5 @@
-"""Rods cut from stock, on rods whose lengths and crossings are made up so that every bar is known beforehand."""
+"""Rods cut from stock, on rods whose lengths and crossings are made up so that every bar is known
+beforehand."""
 
 from types import SimpleNamespace
 

@@ -74,7 +74,8 @@ def test_rods_are_told_to_stand_upright_on_the_flat_grid(shell):
         row for row in told["BEAMS"] if told["SECTIONS"][row[2]][0] == pytest.approx(shell.rod.stiffness[0])
     ]
     assert len(rods) == len(shell.net.grid.rod_ends)
-    # Curvature out of the surface is about the local y axis, which vecxz, the local z axis, leaves in the plane.
+    # Curvature out of the surface is about the local y axis, which vecxz, the local z axis, leaves in the
+    # plane.
     np.testing.assert_allclose(np.abs([row[3:] for row in rods]), [[0.0, 0.0, 1.0]] * len(rods), atol=1e-12)
 
 

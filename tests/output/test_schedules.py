@@ -476,8 +476,8 @@ def test_a_shoe_is_three_times_as_wide_as_the_rod_s_larger_side():
 
 
 def test_supports_of_rods_and_of_edge_beams_lead_from_their_feet_to_the_next_node(monkeypatch):
-    """A rod U0 of five nodes and an edge beam E0 of five others, of which three stand on the ground; the first of
-    the beam's feet is the rod's second end too, and is called after the rod."""
+    """A rod U0 of five nodes and an edge beam E0 of five others, of which three stand on the ground; the
+    first of the beam's feet is the rod's second end too, and is called after the rod."""
     place = np.array(
         [
             [1.0, 2.0, 0.5], [1.0, 5.0, 4.5], [3.0, 6.0, 6.0], [9.0, 6.0, 3.0], [12.0, 2.0, 3.0],

@@ -1,4 +1,5 @@
-"""How trial designs are evaluated: which equilibria count, in which order loads are tried, what is counted and weighted."""
+"""How trial designs are evaluated: which equilibria count, in which order loads are tried, what is counted
+and weighted."""
 
 from types import SimpleNamespace
 
@@ -110,7 +111,8 @@ def test_an_equilibrium_that_is_not_stable_or_not_found_is_none(evaluator, monke
 
 @pytest.fixture
 def trying(evaluator, monkeypatch):
-    """Which loads have equilibria next to the start, those that can be led to, and what was tried in which order."""
+    """Which loads have equilibria next to the start, those that can be led to, and what was tried in which
+    order."""
     told = SimpleNamespace(borne=set(LOADS), led=set(), tried=[], seeded=[])
 
     def settled(assembly, near, load):

@@ -66,7 +66,8 @@ def test_deviations_are_distances_from_the_target():
 
 
 def test_a_load_beyond_the_end_of_its_branch_is_not_on_it_though_a_quarter_of_it_leaps_over():
-    """A dish of 2 m that rises by 0.1 m buckles at 0.93 N a crossing; at 1.21 N each quarter came to rest on a stable state."""
+    """A dish of 2 m that rises by 0.1 m buckles at 0.93 N a crossing; at 1.21 N each quarter came to rest on
+    a stable state."""
     side = np.linspace(-1.0, 1.0, 13)
     x, y = (each.ravel() for each in np.meshgrid(side, side, indexing="ij"))
     number = np.arange(169).reshape(13, 13)

@@ -227,7 +227,8 @@ def test_limits_are_kept_in_the_values_unit_where_that_is_another_one():
 
 
 class Knob(Variable):
-    """Two variables of the user's own, the second of which lengthens cable 1 by half as much and the rods' radius."""
+    """Two variables of the user's own, the second of which lengthens cable 1 by half as much and the rods'
+    radius."""
 
     def __init__(self, unit=None, rates=None):
         self.own_unit, self.own_rates = unit, rates

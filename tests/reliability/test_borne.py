@@ -1,5 +1,6 @@
-"""The search for the factor at which a structure as built has only so much stiffness left, on branches of which the
-stiffness is known: a root that ends at 1, as at a limit point, and one with a leap, as where a cable goes slack.
+"""The search for the factor at which a structure as built has only so much stiffness left, on branches of
+which the stiffness is known: a root that ends at 1, as at a limit point, and one with a leap, as where a
+cable goes slack.
 """
 
 from types import SimpleNamespace
@@ -14,7 +15,8 @@ LEFT = 0.1
 
 
 class Branch:
-    """A branch whose stiffness is a root that comes to nothing at the factor 1, beyond which it isn't reached."""
+    """A branch whose stiffness is a root that comes to nothing at the factor 1, beyond which it isn't
+    reached."""
 
     number = 7
 

@@ -1,4 +1,5 @@
-"""The misfit of structures as built to first order: against structures that are built, and its derivatives."""
+"""The misfit of structures as built to first order: against structures that are built, and its
+derivatives."""
 
 from dataclasses import replace
 
@@ -53,8 +54,8 @@ def test_its_gradient_agrees_with_re_solved_equilibria(dome, loaded, cause):
 
 
 def test_its_value_is_the_mean_misfit_of_structures_that_are_built(dome, loaded):
-    """With a tenth of the errors: what is left is of third order, and the order of the first step is tested with
-    first_order.py."""
+    """With a tenth of the errors: what is left is of third order, and the order of the first step is tested
+    with first_order.py."""
     design, state, load = loaded
     small = sf.Tolerances(**{name: 0.1 * size for name, size in CAUSES.items()})
     term = term_of(dome, design, load, small, pairs=4)

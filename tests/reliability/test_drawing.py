@@ -123,8 +123,9 @@ def test_a_rod_s_elements_are_told_with_the_sense_in_which_each_runs_along_it():
 
 
 def two_rods():
-    """A rod of three elements that is marked at its ends and after two, whose last one runs against it, and one of one with a
-    lock; two connectors; three cables; a support held in two directions; four nodes in two zones."""
+    """A rod of three elements that is marked at its ends and after two, whose last one runs against it, and
+    one of one with a lock; two connectors; three cables; a support held in two directions; four nodes in two
+    zones."""
     rods = (
         Member(np.array([0, 2, 1]), np.array([1.0, 1.0, -1.0]), np.array([0, 2, 3])),
         Member(np.array([3]), np.array([1.0]), np.array([0, 1]), np.array([6])),

@@ -45,8 +45,8 @@ def test_edge_beams_are_drawn_without_error_and_the_structures_stand_or_fall_as_
 
 
 def test_edge_beams_whose_last_digits_are_near_what_is_to_be_told_are_loaded_in_double_precision(monkeypatch):
-    # as of a barrel of ten metres, whose design was refused: the bound of what rounding leaves is ten times what
-    # is left, and without load more than what may be left
+    # as of a barrel of ten metres, whose design was refused: the bound of what rounding leaves is ten times
+    # what is left, and without load more than what may be left
     steel = isotropic(young=210e9, density=7850.0, strength=355e6)
     shell = arches(EdgeBeam(Bundle(0.03, 7, 0.5, steel)))
     load = shell.point_load(0.5, every=2)

@@ -13,7 +13,8 @@ ROUGH = Tolerances(supports=1e-4, marks=2e-4, load_all=0.1)
 
 
 class Fallen:
-    """A structure that falls at the factor 0.6, and bears more of its load without the errors of some cause."""
+    """A structure that falls at the factor 0.6, and bears more of its load without the errors of some
+    cause."""
 
     def __init__(self, factor=0.6):
         self.factor, self.asked = factor, []

@@ -116,7 +116,8 @@ def test_up_to_a_share_of_the_load_the_guide_takes_the_least_on_the_way_and_at_i
 
 
 def test_a_stretch_is_off_by_its_ends_motion_less_the_cable_s_own_error_and_by_that_at_least(monkeypatch):
-    """One cable along x, 0.5 m; in two structures its ends part by 3 and -1 mm, and it is made longer by 1 and 3 mm."""
+    """One cable along x, 0.5 m; in two structures its ends part by 3 and -1 mm, and it is made longer by 1
+    and 3 mm."""
     cables = make_cables([[0, 1]], rest_length=np.array([0.5]), stiffness=187.0)
     state = at_rest(np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]]))
     network = SimpleNamespace(cables=cables)

@@ -10,7 +10,8 @@ from shellform.structure.elements.state import at_rest
 from shellform.structure.model import Model
 from shellform.structure.network import Network
 
-# A rod of four elements along x, bent by 30 degrees at its last node but one, and one across it that a connector joins.
+# A rod of four elements along x, bent by 30 degrees at its last node but one, and one across it that a
+# connector joins.
 PLACES = np.array(
     [
         [0.0, 0.0, 0.0],
@@ -53,8 +54,8 @@ def rods_of(model):
 
 
 def test_a_rod_goes_on_straight_through_elements_of_either_sense_and_ends_at_a_bend():
-    """It begins on the side on which its beam with the lowest number does, is marked where a connector, a cable or a support
-    touches it, and at its ends."""
+    """It begins on the side on which its beam with the lowest number does, is marked where a connector, a
+    cable or a support touches it, and at its ends."""
     assert rods_of(model_of()) == [
         ([2, 0, 1], [-1.0, 1.0, -1.0], [0, 1, 2, 3]),
         ([3], [1.0], [0, 1]),

@@ -1,4 +1,5 @@
-"""One structure's way under its load, with states that are told: snaps, marks, ends, and whether it stands."""
+"""One structure's way under its load, with states that are told: snaps, marks, ends, and whether it
+stands."""
 
 from types import SimpleNamespace
 
@@ -20,7 +21,8 @@ PLACES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [1.0, 0.5, 0.3]])
 
 
 def away(distance):
-    """A state of which one node is so far, m, from where the perfect structure's is, as 3 to 4 along two axes."""
+    """A state of which one node is so far, m, from where the perfect structure's is, as 3 to 4 along two
+    axes."""
     return at_rest(PLACES + np.array([[0.0] * 3, [0.0] * 3, [0.6 * distance, 0.0, -0.8 * distance]]))
 
 
@@ -113,7 +115,8 @@ def test_at_rest_under_a_share_a_structure_goes_back_along_its_branch_or_from_no
 
 
 def snapping(ends, rests, **own):
-    """A structure whose branches end at these factors, and where it rests beyond each, None where it falls."""
+    """A structure whose branches end at these factors, and where it rests beyond each, None where it
+    falls."""
     ends, rests, asked = list(ends), list(rests), []
 
     def followed(most, step, smallest, *, begin=None, marks=()):
@@ -200,7 +203,8 @@ def test_a_snap_is_local_where_no_node_goes_farther_than_a_hundredth_of_the_span
 @pytest.mark.parametrize(
     ("ends", "marks", "asked"),
     [
-        # next to a mark it counts on which side of it a structure falls: within two resolutions beyond the end
+        # next to a mark it counts on which side of it a structure falls: within two resolutions beyond the
+        # end
         ([0.79, 0.795], (0.8,), [(1.0, 0.5, 1 / 64), (0.8, pytest.approx(0.01), 1 / 512)]),
         ([0.768], (0.8,), [(1.0, 0.5, 1 / 64)]),
         ([0.8], (0.8,), [(1.0, 0.5, 1 / 64)]),

@@ -1,4 +1,5 @@
-"""The perfect structure's path: which states are kept, how far it is known, and what a model file must hold."""
+"""The perfect structure's path: which states are kept, how far it is known, and what a model file must
+hold."""
 
 from types import SimpleNamespace
 

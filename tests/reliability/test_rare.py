@@ -54,7 +54,8 @@ def test_the_cause_that_alone_matters_has_the_largest_share(dome, nominal):
 
 
 def test_causes_share_the_squared_distance_of_the_failures_mean_less_what_chance_leaves_of_each_variable():
-    """The median of the squares is that of one normal variable of deviation 1, so that each holds 1 by chance."""
+    """The median of the squares is that of one normal variable of deviation 1, so that each holds 1 by
+    chance."""
     chance = 0.4549**0.5
     mean = np.array([3.0, -chance, chance, -2.0, chance])
     aside = np.array([1.0, -2.0, 0.5, 0.3, 0.0])

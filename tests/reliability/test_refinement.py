@@ -101,8 +101,8 @@ def low_arch(rise, elements=24):
 @pytest.mark.parametrize(
     ("rise", "factor", "kind"),
     [
-        # Fung and Kaplan, NACA TN 2840 (1952): from a rise of 22^0.5 radii on the arch sways aside where a^2 =
-        # rise^2 - 16, before it would snap through at a^2 = (rise^2 - 4) / 3.
+        # Fung and Kaplan, NACA TN 2840 (1952): from a rise of 22^0.5 radii on the arch sways aside where a^2
+        # = rise^2 - 16, before it would snap through at a^2 = (rise^2 - 4) / 3.
         (8.0, 8.0 + 3.0 * 48.0**0.5, BIFURCATION),
         (4.4, 4.4 - 5.12**0.5 + 5.12**0.5 * (4.4**2 - 5.12) / 4.0, LIMIT_POINT),
     ],

@@ -157,8 +157,8 @@ BOTH = {"none": 0.0 * DOWN, "wet": DOWN, "wetter": 1.25 * DOWN}
 
 
 def test_each_structure_is_loaded_once_and_told_of_under_every_share_of_its_load(monkeypatch):
-    """One bears all, one comes to the larger load too far from its place, one to just the smaller one, and one not so
-    far; under the smaller load it counts how far a path goes alone."""
+    """One bears all, one comes to the larger load too far from its place, one to just the smaller one, and
+    one not so far; under the smaller load it counts how far a path goes alone."""
     made = Drawn([1.0, 1.0, 0.8, 0.7999, 0.3], [True, False, False, False, False])
     asked = Safety(HARD, probability_design=0.6, critical_factor=None, drawn=5, seed=7)
     found, followed = judged(monkeypatch, made, asked, loads=BOTH, design_load="wet")

@@ -54,8 +54,8 @@ def test_a_drawn_structure_ends_as_the_analysis_of_its_own_model_says(dome, shar
     ("share", "tolerances"), [(1.0, LARGE), (1.2, LARGE), (0.7, Tolerances(marks=1e-3, supports=5e-4))]
 )
 def test_what_rests_beside_the_perfect_structure_comes_there_from_nothing_too(dome, share, tolerances):
-    """In fewer factorisations; what doesn't is loaded from nothing, and falls where it falls. In the last one some
-    snap on the way."""
+    """In fewer factorisations; what doesn't is loaded from nothing, and falls where it falls. In the last one
+    some snap on the way."""
     nominal = perfect(dome, dome.design(), share * dome.point_load(4.5, every=2))
     workshop, stood = Workshop(nominal), 0
     for number in range(12):
@@ -258,7 +258,8 @@ def test_a_structure_whose_first_tangent_is_indefinite_is_relaxed_to_the_same_st
 
 
 def test_a_structure_of_which_one_spot_snaps_goes_on_and_ends_as_the_analysis_of_its_own_model_says(dome):
-    """Marks a millimetre off on cells of 110: two of sixteen snap by 5 and 7 mm at a rod's end, and bear the whole load."""
+    """Marks a millimetre off on cells of 110: two of sixteen snap by 5 and 7 mm at a rod's end, and bear the
+    whole load."""
     nominal = perfect(dome, dome.design(), dome.point_load(3.0, every=2))
     coarse, workshop = Tolerances(marks=1e-3, supports=5e-4), Workshop(nominal)
     made = workshop.drawn(coarse, seed=1, numbers=range(16))

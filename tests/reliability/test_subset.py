@@ -107,14 +107,15 @@ def test_chains_step_farther_where_most_trials_are_taken_and_less_far_where_few_
         ([[1, 1], [0, 0], [0, 0]], 1 / 3, 2 / 3),
         # one that turns round is told no better than six samples of their own
         ([[1, 1, 0], [0, 0, 1]], 1 / 2, 1 / 6),
-        # of neighbours 1/2 are both inside, of those two apart 1/3, by chance 25/81: 31/40 and 1/10 of the variance
+        # of neighbours 1/2 are both inside, of those two apart 1/3, by chance 25/81: 31/40 and 1/10 of the
+        # variance
         ([[1, 1, 0], [1, 1, 1], [0, 0, 0]], 5 / 9, 4 / 45 * (1 + 2 * (2 / 3 * 31 / 40 + 1 / 3 * 1 / 10))),
         ([[1, 1], [1, 1]], 1.0, 0.0),
     ],
 )
 def test_a_chain_s_samples_tell_less_than_as_many_of_their_own(inside, share, square):
-    """The square of the coefficient of variation, (1 - p) / (p N) (1 + gamma), gamma the sum of 2 (1 - lag / length)
-    times the correlation over each lag."""
+    """The square of the coefficient of variation, (1 - p) / (p N) (1 + gamma), gamma the sum of 2 (1 - lag /
+    length) times the correlation over each lag."""
     chains = np.arange(np.size(inside)).reshape(np.shape(inside))
     assert _square(np.array(inside, dtype=bool).ravel(), chains, share) == pytest.approx(square)
 

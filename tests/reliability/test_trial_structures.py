@@ -136,8 +136,8 @@ LOADS = {"wet": DOWN, "wetter": 1.25 * DOWN}
 
 
 class Tried:
-    """Structures that bear factors of the largest load on a path, by number; each takes ten factorisations and one
-    for each of its number."""
+    """Structures that bear factors of the largest load on a path, by number; each takes ten factorisations
+    and one for each of its number."""
 
     def __init__(self, factors, monkeypatch):
         self.factors, self.loaded, self.looked = factors, [], []
@@ -306,7 +306,8 @@ def test_a_fresh_sample_spares_nothing_below_none_and_no_further_than_the_probab
 
 
 class Bearing:
-    """A start that bears its loads with errors enlarged so many times and no more, of which so many fall else."""
+    """A start that bears its loads with errors enlarged so many times and no more, of which so many fall
+    else."""
 
     def __init__(self, monkeypatch, times, fallen=(0, 0)):
         self.times, self.fell, self.heard = times, dict(zip(LOADS, map(range, fallen), strict=True)), []

@@ -1,4 +1,5 @@
-"""A run that ends early has a page that tells the cause first; where it has designs, they are shown and judged."""
+"""A run that ends early has a page that tells the cause first; where it has designs, they are shown and
+judged."""
 
 import re
 from pathlib import Path

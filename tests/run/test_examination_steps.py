@@ -1,4 +1,5 @@
-"""What the examination as built draws, counts and tells of each load, with designs and structures that are stood in for."""
+"""What the examination as built draws, counts and tells of each load, with designs and structures that are
+stood in for."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,5 +1,5 @@
-"""The scripts that open a run in Blender and in Grasshopper, run in plain Python against a run folder, with stand-ins
-for what these programs bring."""
+"""The scripts that open a run in Blender and in Grasshopper, run in plain Python against a run folder, with
+stand-ins for what these programs bring."""
 
 import math
 import sys

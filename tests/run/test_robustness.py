@@ -1,4 +1,5 @@
-"""What scatter does to a design is told in the units of people, from a spread and a sample with known numbers."""
+"""What scatter does to a design is told in the units of people, from a spread and a sample with known
+numbers."""
 
 from types import SimpleNamespace
 

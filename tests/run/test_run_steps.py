@@ -1,4 +1,5 @@
-"""Single steps of a run, without running it: what is outdated, when a design deforms too much, and what keys depend on."""
+"""Single steps of a run, without running it: what is outdated, when a design deforms too much, and what keys
+depend on."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -16,7 +16,8 @@ LOADS = {"design": DESIGN, "additional": 1.25 * DESIGN}
 
 
 class Bench:
-    """Draws structures whose numbers tell all of them: every fifth falls and snaps, every third doesn't rest."""
+    """Draws structures whose numbers tell all of them: every fifth falls and snaps, every third doesn't
+    rest."""
 
     asked: ClassVar[list] = []
 

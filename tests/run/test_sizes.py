@@ -1,4 +1,5 @@
-"""Sizes by hand: spacings, strands, concrete and sections, on surfaces and nets of which only numbers are known."""
+"""Sizes by hand: spacings, strands, concrete and sections, on surfaces and nets of which only numbers are
+known."""
 
 import math
 from types import SimpleNamespace
@@ -205,7 +206,8 @@ def test_sections_begin_with_the_least_stiff_that_bears_twice_the_load_and_has_s
 
 
 def test_after_a_section_comes_the_least_stiff_that_is_stiff_enough_and_likely_to_be_stressed_no_more(known):
-    """Bending takes 0.5, the load 0.4 more of the first: 0.2, 0.1 and 0.05 more of those of 2, 4 and 8 times its moment."""
+    """Bending takes 0.5, the load 0.4 more of the first: 0.2, 0.1 and 0.05 more of those of 2, 4 and 8 times
+    its moment."""
     some = [
         section(0.01, 2.0, 3.0, share=0.5), section(0.01, 4.0, 6.0, share=0.6), section(0.01, 6.0, 12.0, share=0.5),
         section(0.01, 10.0, 24.0, share=0.89),
@@ -252,8 +254,8 @@ def test_the_moment_that_rods_bear_is_their_strength_over_the_distance_of_the_ou
 def test_the_radius_is_that_of_the_thinnest_rods_that_are_likely_to_bear_the_load(
     monkeypatch, needed, radius
 ):
-    """100 and 200 N/m² are borne by rods that equation (1) lets bend to 1.3 and 2.6 m, with 0.65 of their strength to
-    twice that radius over 1.3: first twice what is needed is asked for, then that, then half."""
+    """100 and 200 N/m² are borne by rods that equation (1) lets bend to 1.3 and 2.6 m, with 0.65 of their
+    strength to twice that radius over 1.3: first twice what is needed is asked for, then that, then half."""
     thin, thick, too_deep = section(0.26), section(0.52), section(0.9)
     borne, asked = {thin: 100.0, thick: 200.0, too_deep: 1e9}, []
 

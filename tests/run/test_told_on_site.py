@@ -1,4 +1,5 @@
-"""What the site is told after a survey, a replay and an erection: numbers by hand, from results that are stood in for."""
+"""What the site is told after a survey, a replay and an erection: numbers by hand, from results that are
+stood in for."""
 
 import csv
 from types import SimpleNamespace

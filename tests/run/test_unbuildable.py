@@ -1,4 +1,5 @@
-"""What can't be built is refused with the amounts by which it is too much, on surfaces and nets that are stood in for."""
+"""What can't be built is refused with the amounts by which it is too much, on surfaces and nets that are
+stood in for."""
 
 import math
 from dataclasses import replace

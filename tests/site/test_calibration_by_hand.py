@@ -69,8 +69,8 @@ def test_stiffnesses_are_found_by_their_logarithms_and_others_stay(bending):
 
 
 def test_the_deviation_of_a_coordinate_is_that_of_the_residuals_over_what_is_left_to_them():
-    """Each of 8 markers is 2 mm off along x: 8 · 4 mm² over 24 coordinates less two stiffnesses; one scanner's place
-    takes them all away, and six coordinates."""
+    """Each of 8 markers is 2 mm off along x: 8 · 4 mm² over 24 coordinates less two stiffnesses; one
+    scanner's place takes them all away, and six coordinates."""
     off = np.array([0.002, 0.0, 0.0])
     assert fit(JOINT, off).dof == 24
     assert fit(JOINT, off).deviation(2) == pytest.approx(np.sqrt(32e-6 / 22.0))

@@ -91,8 +91,8 @@ class Step(NamedTuple):
 
 
 def drives(monkeypatch, *, way=(), lift=None, borne=1.0):
-    """What the supports and the load are driven by on the way down, with the steps that are told; a state is how many
-    drives came before."""
+    """What the supports and the load are driven by on the way down, with the steps that are told; a state is
+    how many drives came before."""
     asked = []
 
     def advance(_assembly, state, drive, *, step, smallest, stay, report):

@@ -1,4 +1,5 @@
-"""What measurements tell about parameters: by hand, for two that act nearly alike and one that hardly acts."""
+"""What measurements tell about parameters: by hand, for two that act nearly alike and one that hardly
+acts."""
 
 from types import SimpleNamespace
 

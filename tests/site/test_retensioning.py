@@ -73,8 +73,8 @@ def test_one_survey_of_every_crossing_teaches_the_shape_beyond_the_noise_and_nev
 
 
 def test_a_survey_teaches_in_as_many_rounds_as_its_estimate_moves(shell, belief, errors, upper, monkeypatch):
-    """What is learnt is the likeliest estimate: the sum of squares of what the survey and the drawing are missed by, each
-    over its deviation, is least. After one linearisation it isn't."""
+    """What is learnt is the likeliest estimate: the sum of squares of what the survey and the drawing are
+    missed by, each over its deviation, is least. After one linearisation it isn't."""
     design = replace(belief.design, rest_length=belief.design.rest_length + 2.0 * errors)
     true = find_equilibrium(assemble(shell.network(design)), belief.state, belief.load, on_branch=True).state
     survey = true.positions[upper]
@@ -93,7 +93,8 @@ def test_a_survey_teaches_in_as_many_rounds_as_its_estimate_moves(shell, belief,
 def test_changes_that_leave_the_branch_are_halved_until_they_do_not_to_whole_steps_where_there_are_some(
     shell, belief, monkeypatch, step, kept
 ):
-    """The branch is taken to end a little above a half of a millimetre; of two steps of 0.3 mm one is a half."""
+    """The branch is taken to end a little above a half of a millimetre; of two steps of 0.3 mm one is a
+    half."""
     design, assembly = belief.design, assemble(shell.network(belief.design))
     change = np.full(design.present.sum(), -1e-3)
     solved = find_equilibrium

@@ -83,7 +83,8 @@ def test_a_survey_teaches_what_the_formula_of_the_filter_says(linear):
 
 
 def test_a_step_that_leads_to_no_likelier_estimate_is_halved_and_given_up_after_five(linear, monkeypatch):
-    """With rates that are told a fifth as large as they are a step leads five times too far: a quarter of it helps."""
+    """With rates that are told a fifth as large as they are a step leads five times too far: a quarter of it
+    helps."""
     monkeypatch.setattr(retensioning, "_LEARNING", 1)
     survey, wide = at([1.01, 2.0, 3.0]).positions, belief((1.0, 1.0, 1.0))
     monkeypatch.setattr(retensioning, "_rates", lambda *_: 0.2 * RATES)
@@ -98,7 +99,8 @@ def test_a_step_that_leads_to_no_likelier_estimate_is_halved_and_given_up_after_
 
 
 def test_learning_ends_where_no_length_changes_by_a_fiftieth_of_the_largest_usual_error(linear, monkeypatch):
-    """With rates that are told twice as large as they are every step goes half of the way that is left of 0.12 m."""
+    """With rates that are told twice as large as they are every step goes half of the way that is left of
+    0.12 m."""
     monkeypatch.setattr(retensioning, "_rates", lambda *_: 2.0 * RATES)
     survey = at([1.12, 2.0, 3.0]).positions
     learn(SHELL, belief((1.0, 0.5, 0.3)), np.arange(3), survey, noise=1e-6)
@@ -118,7 +120,8 @@ def test_what_a_survey_and_a_belief_are_missed_by_counts_over_their_deviations()
 
 
 def test_turns_bring_nodes_to_the_goal_and_slack_cables_are_left_alone(linear):
-    """The first cable is wanted 4 steps of 0.5 mm longer, the third one 3 shorter, and the goal is a tenth of a step off."""
+    """The first cable is wanted 4 steps of 0.5 mm longer, the third one 3 shorter, and the goal is a tenth of
+    a step off."""
     goal = at([1.0 + 4.1 * 0.5e-3, 2.0 - 3.1 * 0.5e-3, 3.0]).positions
     found = adjust(SHELL, belief(), goal, Crew(0.5e-3, 5e-3, 3), noise=1e-9)
     assert found.turns.tolist() == [4, 0, -3, 0]
@@ -148,7 +151,8 @@ def test_turning_weighs_by_the_noise_over_the_largest_change(linear, monkeypatch
 
 
 def test_a_replay_plays_errors_surveys_and_turns_on_and_tells_what_is_left(linear, monkeypatch):
-    """Errors of 2 and -1 mm; in the first round all but half a millimetre is taken back, then nothing is worth it."""
+    """Errors of 2 and -1 mm; in the first round all but half a millimetre is taken back, then nothing is
+    worth it."""
     beliefs, steps = [], [np.array([-0.0015, 0.0, 0.001, 0.0]), np.zeros(4)]
 
     def teach(_shell, belief, nodes, survey, *, noise):
@@ -224,7 +228,8 @@ def test_surveys_of_a_replay_have_their_noise(linear, monkeypatch):
 def test_changes_are_halved_to_whole_steps_if_there_are_any_until_a_stable_state_follows(
     monkeypatch, change, step, bears, kept, halved
 ):
-    """Those that leave no length of a cable aren't tried: the second is 2 m long, and absent ones don't count."""
+    """Those that leave no length of a cable aren't tried: the second is 2 m long, and absent ones don't
+    count."""
 
     def solve(parts, start, _load, *, limit, on_branch):
         assert start is STATE or start == "foreseen"

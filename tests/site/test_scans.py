@@ -58,7 +58,8 @@ def test_closest_points_are_iterated_until_the_pairs_stay_and_what_is_lost_costs
 
 
 def test_the_cost_of_a_pairing_is_what_its_points_are_off_in_square():
-    """Two points are pulled apart by 0.2 each, which no motion takes back; a stray point costs nothing of its own."""
+    """Two points are pulled apart by 0.2 each, which no motion takes back; a stray point costs nothing of its
+    own."""
     markers = np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0]])
     cloud = np.vstack([markers * [1.2, 1.0, 1.0], [[9.0, 9.0, 0.0]]])
     cost, pairs, _ = scans._closest(cKDTree(markers), cloud, markers, Motion(np.eye(3), np.zeros(3)), 0.5)
@@ -163,8 +164,8 @@ def test_markers_whose_breadth_is_less_than_a_fiftieth_of_their_length_lie_on_a_
 def test_a_second_pairing_is_doubted_where_it_costs_less_than_half_as_much_again(
     monkeypatch, rival, swing, doubted
 ):
-    """The best is the third start's; the second pairs the same points, so that it is no rival; the first is turned
-    against it, by a matrix that rounding has lengthened."""
+    """The best is the third start's; the second pairs the same points, so that it is no rival; the first is
+    turned against it, by a matrix that rounding has lengthened."""
     best, pairs = Motion(turned(17.0), np.zeros(3)), np.array([0, 1, 2, 3])
     found = [
         (rival, pairs[[1, 2, 0, 3]], Motion((1.0 + 1e-9) * turned(17.0 + swing), np.zeros(3))),
@@ -186,8 +187,8 @@ def state(places):
 
 
 def test_scans_of_one_frame_share_a_motion_and_one_in_the_model_s_axes_keeps_its_own():
-    """The second scan is shifted by 2 mm against the first, with as many points: half of it is left to each; the third,
-    placed already, is 3 mm off."""
+    """The second scan is shifted by 2 mm against the first, with as many points: half of it is left to each;
+    the third, placed already, is 3 mm off."""
     nodes, apart_by = np.arange(2, 10), np.array([0.002, 0.0, 0.0])
     scanned = [
         Scan(MARKERS[:7] @ TURN.T + SHIFT, NONE, 3),

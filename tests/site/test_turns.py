@@ -30,8 +30,9 @@ def test_a_largest_change_of_so_many_steps_allows_that_many_whatever_rounding_ma
 
 
 def test_a_crew_of_few_turns_the_cables_that_bring_most_within_their_bounds():
-    """Alone, and at most 3 steps: 3 · 4 - 0.5 · 3² / 2 = 9.75 of the first and 7² / 6 = 8.2 of the second; without
-    bounds the third would bring most, 5² / (2 · 0.25) = 50, which are 3 · 5 - 0.25 · 3² / 2 = 13.9 with them."""
+    """Alone, and at most 3 steps: 3 · 4 - 0.5 · 3² / 2 = 9.75 of the first and 7² / 6 = 8.2 of the second;
+    without bounds the third would bring most, 5² / (2 · 0.25) = 50, which are 3 · 5 - 0.25 · 3² / 2 = 13.9
+    with them."""
     jacobian, away = apart([0.5, 3.0, 0.25 + 1e-9], [-4.0, -7.0, 5.0], weight=0.0)
     wanted = {1: [0, 0, -3], 2: [3, 0, -3], 3: [3, 2, -3]}
     for cables, steps in wanted.items():
@@ -39,7 +40,8 @@ def test_a_crew_of_few_turns_the_cables_that_bring_most_within_their_bounds():
 
 
 def test_cables_are_chosen_one_by_one_by_what_each_brings_beside_those_chosen_before():
-    """The second alone would bring nearly as much as the first, 15.0 of 18.0, and nothing beside it; the third 1.0."""
+    """The second alone would bring nearly as much as the first, 15.0 of 18.0, and nothing beside it; the
+    third 1.0."""
     jacobian = np.array([[3.0, 1.0, 0.0], [0.0, 0.45, 0.0], [0.0, 0.0, 1.0]])
     away = np.array([-6.0, 0.0, 1.4])
     for cables, steps in ((1, [2, 0, 0]), (2, [2, 0, -1])):
@@ -67,8 +69,8 @@ def test_no_cable_is_turned_where_none_brings_anything():
 
 
 def test_what_would_go_too_far_is_held_at_its_bound_and_the_rest_is_solved_for_again():
-    """Without bounds 19/3 and -8/3; with the first at 3 the second is (1 - 3) / 2. Beside a third, fixed at 0.4, that
-    acts on the second, it is (1 - 3 - 0.4) / 2."""
+    """Without bounds 19/3 and -8/3; with the first at 3 the second is (1 - 3) / 2. Beside a third, fixed at
+    0.4, that acts on the second, it is (1 - 3 - 0.4) / 2."""
     gram = np.array([[2.0, 1.0, 0.0], [1.0, 2.0, 1.0], [0.0, 1.0, 2.0]])
     slope = np.array([-10.0, -1.0, 0.0])
     for third, second in ((0.0, -1.0), (0.4, -1.2)):
@@ -80,8 +82,8 @@ def test_what_would_go_too_far_is_held_at_its_bound_and_the_rest_is_solved_for_a
 
 @pytest.mark.parametrize(("second", "whole"), [(0.55, [2.0, 0.0]), (0.65, [2.0, 1.0])])
 def test_the_surest_turn_is_rounded_first_and_the_other_solved_for_again(monkeypatch, second, whole):
-    """1.9 is nearer to a whole number than 0.55, of which 0.55 - 0.9 (2 - 1.9) is left; the other way round they would
-    be 1 and 1.9 - 0.9 · 0.45, which is 1 too."""
+    """1.9 is nearer to a whole number than 0.55, of which 0.55 - 0.9 (2 - 1.9) is left; the other way round
+    they would be 1 and 1.9 - 0.9 · 0.45, which is 1 too."""
     monkeypatch.setattr(turns, "_polished", lambda _gram, _slope, whole, _chosen, _most: whole)
     jacobian = np.linalg.cholesky([[1.0, 0.9], [0.9, 1.0]]).T
     away = -jacobian @ [1.9, second]
@@ -94,7 +96,8 @@ def test_single_turns_are_tried_on_the_chosen_cables_one_after_the_other_within_
     slope = np.array([-9.2, -7.2, -5.0])
     assert turns._polished(gram, slope, np.zeros(3), [0, 1], 4).tolist() == [4, 2, 0]
     assert turns._polished(gram, -slope, np.zeros(3), [0, 1], 4).tolist() == [-4, -2, 0]
-    # from too many turns of the second: (9.2 - 4) / 2 = 2.6, then (7.2 - 3) / 2 = 2.1, then (9.2 - 2) / 2 = 3.6
+    # from too many turns of the second: (9.2 - 4) / 2 = 2.6, then (7.2 - 3) / 2 = 2.1, then (9.2 - 2) / 2 =
+    # 3.6
     assert turns._polished(gram, slope, np.array([0.0, 4.0, 1.0]), [0, 1], 4).tolist() == [4, 2, 1]
 
 

@@ -1,7 +1,8 @@
-"""A slow oracle for equilibria: the energy of equations (12) to (18) with fifty digits, and its gradient by central
-differences, which at that many digits are exact.
+"""A slow oracle for equilibria: the energy of equations (12) to (18) with fifty digits, and its gradient by
+central differences, which at that many digits are exact.
 
-Written from the equations alone; it shares no line with the package. Networks are small: energies are Python loops.
+Written from the equations alone; it shares no line with the package. Networks are small: energies are Python
+loops.
 """
 
 import numpy as np
@@ -16,8 +17,8 @@ _STEP = mpf(10) ** -18  # of the differences: errors of its square
 
 
 def random_network(seed):
-    """A bent chain of 3 to 7 rods with a branch, clamped at its first node: size 1e-6 to 1e3 m, rods 1 to 1e-4 of
-    it long, stiffnesses apart by up to 1e12; and a load that bends it well.
+    """A bent chain of 3 to 7 rods with a branch, clamped at its first node: size 1e-6 to 1e3 m, rods 1 to
+    1e-4 of it long, stiffnesses apart by up to 1e12; and a load that bends it well.
     """
     chance = np.random.default_rng(seed)
     count = int(chance.integers(3, 8))
@@ -51,8 +52,8 @@ def random_network(seed):
 
 
 def unbalanced(network, load, state):
-    """The largest unbalanced force at a state, digits beyond double precision included, moments over the longest
-    rod that meets the node, over the largest applied force.
+    """The largest unbalanced force at a state, digits beyond double precision included, moments over the
+    longest rod that meets the node, over the largest applied force.
     """
     with_digits = mp.workdps(DIGITS)
     with with_digits:

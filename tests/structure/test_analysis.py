@@ -47,7 +47,8 @@ def shallow_truss(elements=1):
 @pytest.mark.parametrize("times", [1.01, 1.3, 2.6, 5.0, 25.0, 80.0, 250.0])
 @pytest.mark.parametrize(("increments", "way"), [(1, 1.0), (3, 1.0), (10, -1.0)])
 def test_a_truss_under_more_than_its_limit_load_has_snapped_whatever_the_increments(times, increments, way):
-    """Increments leapt over the unstable stretch: at 2.6 times the limit load it was told to be on its branch."""
+    """Increments leapt over the unstable stretch: at 2.6 times the limit load it was told to be on its
+    branch."""
     model, limit = shallow_truss()
     turned = Model(model.network, {"down": way * model.loads["down"]}, None, model.supported)
     beyond = analyse(turned, factor=way * times * limit, increments=increments)
@@ -58,7 +59,8 @@ def test_a_truss_under_more_than_its_limit_load_has_snapped_whatever_the_increme
 
 
 def test_what_stiffens_without_end_stays_on_its_branch_at_any_load():
-    """The elastica under PL²/EI = 1000 and a rope pulled from its middle, whose stiffness grows by thousands."""
+    """The elastica under PL²/EI = 1000 and a rope pulled from its middle, whose stiffness grows by
+    thousands."""
     bent = in_plane(chain(line(4), (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))
     down = load_at(bent, 4, [0.0, 0.0, -1000.0])
     for increments in (1, 4):
@@ -71,7 +73,8 @@ def test_what_stiffens_without_end_stays_on_its_branch_at_any_load():
 
 
 def guyed_mast(tight, stiff, start=True):
-    """A mast of 1 m and EI = 1 N·m² with a guy beside its top that is `tight`, m, too short and goes slack under the load."""
+    """A mast of 1 m and EI = 1 N·m² with a guy beside its top that is `tight`, m, too short and goes slack
+    under the load."""
     points = np.vstack([np.column_stack([np.zeros((5, 2)), np.linspace(0.0, 1.0, 5)]), [[1.0, 0.0, 1.0]]])
     bare = in_plane(chain(points[:5], (1e6, 1.0, 1.0, 1.0), {0: CLAMP}))
     guy = make_cables(np.array([[4, 5]]), rest_length=[1.0 - tight], stiffness=[stiff])
@@ -94,8 +97,8 @@ def test_a_guy_that_goes_slack_is_no_snap_however_much_softer_the_mast_is_then(t
 
 
 def stayed_mast(seed):
-    """A mast of 1 m and EI = 1 N·m² with up to three guys, each somewhat too short or too long, of stiffnesses between 1e2 and
-    1e6 N; in its plane where the seed is even."""
+    """A mast of 1 m and EI = 1 N·m² with up to three guys, each somewhat too short or too long, of
+    stiffnesses between 1e2 and 1e6 N; in its plane where the seed is even."""
     rng, plane = np.random.default_rng(seed), seed % 2 == 0
     count = int(rng.integers(1, 4))
     points = np.column_stack([np.zeros((5, 2)), np.linspace(0.0, 1.0, 5)])
@@ -118,7 +121,8 @@ def stayed_mast(seed):
 
 @pytest.mark.parametrize("seed", [4, 87, 89, 91, 96, 145, 173, 224, 248, 257])
 def test_a_path_gets_over_the_kinks_that_cables_make(seed):
-    """Of 260 such masts fifteen ended early or ran off to factors of 1e100, for a path may bend by more than a right angle."""
+    """Of 260 such masts fifteen ended early or ran off to factors of 1e100, for a path may bend by more than
+    a right angle."""
     model = stayed_mast(seed)
     found, expected = analyse(model, method="path"), analyse(model)
     assert found.converged, found.message
@@ -306,7 +310,8 @@ def test_no_load_and_increments_that_would_take_for_ever_are_refused(increments)
 
 
 def buckled_strip(off=0.0, count=16):
-    """A strip pushed together by a twentieth and pressed at its crown; its supports' places in the start are `off`, m."""
+    """A strip pushed together by a twentieth and pressed at its crown; its supports' places in the start are
+    `off`, m."""
     points = line(count)
     network = in_plane(chain(points, (1e5, 1.0, 1.0, 1.0), {0: CLAMP, count: CLAMP}))
     imposed = np.zeros((count + 1, 6))
@@ -383,7 +388,8 @@ HINGE = [True, True, True, False, False, False]
 
 
 def twisted_rod(elements, angle):
-    """A clamped rod, GJ = 0.7 N·m² and 1 m long, whose other clamp turns by the angle, rad, about its axis."""
+    """A clamped rod, GJ = 0.7 N·m² and 1 m long, whose other clamp turns by the angle, rad, about its
+    axis."""
     network = in_plane(chain(line(elements), (1e6, 0.7, 1.0, 1.0), {0: CLAMP, elements: CLAMP}))
     imposed = np.zeros((elements + 1, 6))
     imposed[elements, 3] = angle
@@ -398,8 +404,8 @@ def twisted_rod(elements, angle):
     [(2, 16.0 * np.pi), (2, 50.0), (4, 32.0 * np.pi), (8, 64.0 * np.pi), (16, 7.0), (8, 4.0)],
 )
 def test_a_clamp_that_goes_round_twists_the_rod_as_often_or_nothing_is_told(method, elements, angle):
-    """Rotations are told by quaternions, which forget whole turns: of two elements 50 rad left -0.0027 of 0.5 N·m
-    by relaxation in quarters, and Newton's method took 4 rad for -2.28."""
+    """Rotations are told by quaternions, which forget whole turns: of two elements 50 rad left -0.0027 of 0.5
+    N·m by relaxation in quarters, and Newton's method took 4 rad for -2.28."""
     found = analyse(twisted_rod(elements, angle), method=method)
     told = elements > 4 and angle < 10.0 and method in ("relaxation", "path")
     assert found.converged is told
@@ -414,7 +420,8 @@ def test_increments_of_less_than_half_a_turn_twist_a_rod_by_newton_s_method_as_w
 
 
 def test_a_beam_whose_ends_are_both_held_has_the_end_forces_of_the_slope_deflection_equations():
-    """12 EI d / L³, 6 EI d / L² and EA d² / 2 L² for a small sinking d, where no freedom is free: PARDISO broke off with a traceback."""
+    """12 EI d / L³, 6 EI d / L² and EA d² / 2 L² for a small sinking d, where no freedom is free: PARDISO
+    broke off with a traceback."""
     network = chain(line(1), (1e6, 0.7, 3.0, 3.0), {0: CLAMP, 1: CLAMP})
     imposed = np.zeros((2, 6))
     imposed[1, 2] = 1e-6

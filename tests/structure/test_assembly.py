@@ -173,7 +173,8 @@ def test_a_rod_that_nothing_holds_keeps_its_middle_and_its_length(axial):
 
 
 def test_between_two_beams_the_stiffer_one_decides_and_what_is_held_stays():
-    """A node between ends that are held moves across by 0.2: each chord would have it back by its own turn."""
+    """A node between ends that are held moves across by 0.2: each chord would have it back by its own
+    turn."""
     nodes, ends = [[0, 0, 0], [2, 0, 0], [3, 0, 0]], [[0, 1], [1, 2]]
     held = [*range(6), *range(12, 18)]
     chords, state = keeper(nodes, ends, axial=[600.0, 100.0], held=held)

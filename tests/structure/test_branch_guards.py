@@ -115,7 +115,8 @@ def told(state, *, stable=True):
 
 
 def stood_in(monkeypatch, ends, *, by="unstable"):
-    """Load steps whose equilibria are stable up to a factor, beyond it unstable or not found; the factors tried."""
+    """Load steps whose equilibria are stable up to a factor, beyond it unstable or not found; the factors
+    tried."""
     tried = []
 
     def find(assembly, start, load, *, tolerance, limit=0, on_branch=False, **_):

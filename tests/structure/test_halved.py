@@ -1,4 +1,5 @@
-"""Models with their beams cut in two: what stands for a curve is cut on it, what is straight stays straight."""
+"""Models with their beams cut in two: what stands for a curve is cut on it, what is straight stays
+straight."""
 
 from dataclasses import replace
 
@@ -143,7 +144,8 @@ def test_the_middle_of_a_bent_beam_is_turned_halfway_whichever_sign_its_quaterni
 
 
 def test_the_middle_of_a_beam_bent_to_an_s_lies_on_its_chord_and_turns_back_against_its_ends():
-    """The cubic's tangent there is 3/2 of the chord less a quarter of both ends' directions times its length."""
+    """The cubic's tangent there is 3/2 of the chord less a quarter of both ends' directions times its
+    length."""
     points, turn = np.add(line(1, 2.5), [3.0, 1.0, 2.0]), 0.3
     state = from_vectors(points, [[0.0, turn, 0.0]] * 2)
     middle = halved(replace(model(points, {0: PIN, 1: PIN}), start=state)).start

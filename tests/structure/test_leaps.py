@@ -18,8 +18,9 @@ STILL = SimpleNamespace(at=lambda factor: factor, moves_supports=False)
 
 @pytest.fixture
 def heeded(monkeypatch):
-    """Increments that all come to rest, each with so many factorisations (`cost`), `far` or not, and may leap or not (`leaps`); what
-    was asked is kept: `looked` at and taken back (`back`), which leads back where `returns`."""
+    """Increments that all come to rest, each with so many factorisations (`cost`), `far` or not, and may leap
+    or not (`leaps`); what was asked is kept: `looked` at and taken back (`back`), which leads back where
+    `returns`."""
     asked = SimpleNamespace(cost=7, far=False, leaps=True, returns=True, looked=[], back=[])
 
     def find(assembly, start, load, *, tolerance, limit=None, on_branch=False):
@@ -85,7 +86,8 @@ def along(x):
 
 @pytest.fixture
 def rests(monkeypatch):
-    """Stands in for equilibria of the load `load(x)` at a place x: states at rest know their own, and no other."""
+    """Stands in for equilibria of the load `load(x)` at a place x: states at rest know their own, and no
+    other."""
     found = SimpleNamespace(load=None, slope=None)
 
     def at_rest_under(assembly, state, load):
@@ -159,7 +161,8 @@ def test_a_state_that_nothing_is_found_behind_does_not_come_back(monkeypatch, lo
 
 
 def test_nodes_move_with_their_supports_and_by_the_load():
-    """A bar of 1 m and EA = 100 N, clamped at one end: pulled by 5 N its tip goes 0.05 m, and 0.2 m with the clamp."""
+    """A bar of 1 m and EA = 100 N, clamped at one end: pulled by 5 N its tip goes 0.05 m, and 0.2 m with the
+    clamp."""
     network = chain(line(1), (100.0, 1.0, 1.0, 1.0), {0: CLAMP})
     assembly, none = assemble(network), np.zeros((2, 6))
     pull, imposed = load_at(network, 1, [5.0, 0.0, 0.0]), np.zeros((2, 6))

@@ -1,4 +1,5 @@
-"""Increments of a load on stand-ins of the equilibria: how wide they are, what they cost, and how supports move."""
+"""Increments of a load on stand-ins of the equilibria: how wide they are, what they cost, and how supports
+move."""
 
 from types import SimpleNamespace
 
@@ -15,7 +16,8 @@ from shellform.structure.solve.loading import Drive, advance, apply_load, forces
 
 @pytest.fixture
 def tried(monkeypatch):
-    """The factors tried with what was asked; a factor is stable unless `tried.refuse(factor, times)` says otherwise."""
+    """The factors tried with what was asked; a factor is stable unless `tried.refuse(factor, times)` says
+    otherwise."""
 
     class Tried(list):
         def refuse(self, factor):

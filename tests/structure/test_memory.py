@@ -38,7 +38,8 @@ def test_work_areas_are_taken_only_where_there_is_room_for_them(monkeypatch):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux refuses memory under a limit")
 def test_the_limit_to_what_is_free_ends_with_what_it_was_set_for():
-    """A limit that was left to the process kept the next one from being set, and pictures from their memory."""
+    """A limit that was left to the process kept the next one from being set, and pictures from their
+    memory."""
     before = resource.getrlimit(resource.RLIMIT_DATA)
     with limited_to_free_memory():
         within = resource.getrlimit(resource.RLIMIT_DATA)[0]

@@ -273,7 +273,8 @@ def test_without_free_memory_a_small_model_is_solved_and_a_large_one_ends_with_a
 
 
 def test_what_the_elements_of_a_model_are_given_is_what_they_have():
-    """Ends of a cable in one place ask for its rest length; where left out it is the distance of its nodes."""
+    """Ends of a cable in one place ask for its rest length; where left out it is the distance of its
+    nodes."""
     model = bow()
     model["nodes"] += [[3, 4, 1], [3, 4, 1]]
     tie = {"EA": 187.0}

@@ -1,4 +1,5 @@
-"""What a network is refused or doubted for: drifting parts, and stiffnesses, lengths and spins that are rarely meant."""
+"""What a network is refused or doubted for: drifting parts, and stiffnesses, lengths and spins that are
+rarely meant."""
 
 import re
 from dataclasses import replace

@@ -168,7 +168,8 @@ def test_modes_of_an_unstable_state_have_a_negative_stiffness():
 
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_modes_of_an_unstable_state_are_the_lowest_of_the_dense_tangent(count):
-    """A column of 20 elements under thirty times its critical load: its lowest mode lies far below the ones near nothing."""
+    """A column of 20 elements under thirty times its critical load: its lowest mode lies far below the ones
+    near nothing."""
     assembly, start, load = column(20)
     beyond = newton(assembly, start, 300.0 * load).state
     tangent = assembly.matrix.full(assembly.evaluate(beyond).tangent).toarray()
@@ -229,7 +230,8 @@ def test_moving_supports_take_the_free_nodes_along():
 
 
 def pushed_strip(elements):
-    """A pinned strip and what pushes its end in to 0.6 of its length, with a force that says to which side."""
+    """A pinned strip and what pushes its end in to 0.6 of its length, with a force that says to which
+    side."""
     network = plane(chain(line(elements), (1e4, 1.0, 1.0, 1.0), {0: PIN, elements: PIN}))
     imposed, aside = np.zeros((2, elements + 1, 6))
     imposed[elements, 0] = -0.4
@@ -263,7 +265,8 @@ def test_an_element_that_the_supports_reverse_is_named_and_not_accepted():
 
 
 def shallow_truss():
-    """Von Mises' truss of two bars, half span 1 m, rise 0.1 m and EA = 1 kN, its limit load, N, and its load."""
+    """Von Mises' truss of two bars, half span 1 m, rise 0.1 m and EA = 1 kN, its limit load, N, and its
+    load."""
     points = polyline([[-1.0, 0.0, 0.0], [0.0, 0.0, 0.1], [1.0, 0.0, 0.0]], 1)
     network = plane(chain(points, (1e3, 1e-7, 1e-7, 1e-7), {0: PIN, 2: PIN}))
     return network, exact.shallow_truss(1.0, 0.1, 1e3)[0], load_at(network, 1, [0.0, 0.0, -1.0])
@@ -272,8 +275,8 @@ def shallow_truss():
 @pytest.mark.parametrize("sought", [1.3, 3.0, 10.0, 30.0, 100.0, 1e3, 1e4])
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_a_limit_load_is_found_however_far_and_in_whichever_direction_it_is_sought(sought, way):
-    """The closed form of von Mises (1923), 1e-6 for the bending stiffness of the hinges. A first step of a tenth of a
-    hundred times that load leapt over both limit points, and there was no critical factor."""
+    """The closed form of von Mises (1923), 1e-6 for the bending stiffness of the hinges. A first step of a
+    tenth of a hundred times that load leapt over both limit points, and there was no critical factor."""
     network, limit, load = shallow_truss()
     start = at_rest(network.nodes)
     found = critical_load(assemble(network), start, forces(way * load), goal=way * sought * limit)
@@ -283,7 +286,8 @@ def test_a_limit_load_is_found_however_far_and_in_whichever_direction_it_is_soug
 
 @pytest.mark.parametrize("sought", [2.0, 100.0, 1e3, 1e4])
 def test_a_toggle_whose_load_falls_by_a_twelfth_only_is_not_leapt_over(sought):
-    """Williams' toggle, whose valley is at 31.3 below its limit of 33.87; 12 straight elements a member leave 0.6 %."""
+    """Williams' toggle, whose valley is at 31.3 below its limit of 33.87; 12 straight elements a member leave
+    0.6 %."""
     points = polyline([[-12.943, 0.0, 0.0], [0.0, 0.0, 0.386], [12.943, 0.0, 0.0]], 12)
     network = plane(chain(points, (1.885e6, 9.274e3, 9.274e3, 9.274e3), {0: CLAMP, 24: CLAMP}))
     load = forces(load_at(network, 12, [0.0, 0.0, -1.0]))

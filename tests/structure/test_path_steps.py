@@ -16,7 +16,8 @@ from shellform.structure.solve.walk import Missed, OnPath, Walk
 
 
 class Curve:
-    """Stands in for `Walk`: one coordinate x, at which the load factor is f(x) and so many pivots are negative."""
+    """Stands in for `Walk`: one coordinate x, at which the load factor is f(x) and so many pivots are
+    negative."""
 
     def __init__(self, load, negative=lambda x: 0, *, most=np.inf, iterations=4):
         self.load, self.negatives, self.most, self.iterations = load, negative, most, iterations
@@ -191,7 +192,8 @@ def test_a_path_that_the_load_leads_nowhere_either_is_given_up_where_it_is(monke
 
 
 def doubtful(monkeypatch, way):
-    """A path whose steps turn out as `way` says by their size, beside a kink: "leaps", "back", "missed" or nothing."""
+    """A path whose steps turn out as `way` says by their size, beside a kink: "leaps", "back", "missed" or
+    nothing."""
     curve = Curve(lambda x: 2.0 * x)
     ahead = curve.step
 
@@ -210,7 +212,8 @@ def doubtful(monkeypatch, way):
 
 
 def test_of_the_doubted_steps_over_a_kink_the_shortest_is_taken_once_a_shorter_one_is_missed(monkeypatch):
-    """Steps of 0.05 and 0.0125 are doubted, one of a sixteenth of that leads back, and none shorter leads on."""
+    """Steps of 0.05 and 0.0125 are doubted, one of a sixteenth of that leads back, and none shorter leads
+    on."""
     ways = {0.05: "leaps", 0.0125: "leaps", 0.003125: "back"}
 
     def way(size):
@@ -234,7 +237,8 @@ def test_a_doubted_step_is_taken_where_a_shorter_one_would_be_the_last(monkeypat
 
 
 def test_a_step_back_over_a_kink_is_missed(monkeypatch):
-    """With as many negative eigenvalues the load goes on as before; found beyond a kink, a point of less load lies behind."""
+    """With as many negative eigenvalues the load goes on as before; found beyond a kink, a point of less load
+    lies behind."""
     curve = Curve(lambda x: 2.0 * x if x > -0.01 else 9.0 * x)
     ahead = curve.step
     back = []

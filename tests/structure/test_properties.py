@@ -54,7 +54,8 @@ def assembly(network):
 
 
 def derivative(value, h=1e-5):
-    """Of `value(t)` at 0 to the fourth order: where chords are turned half round, forces bend within any step."""
+    """Of `value(t)` at 0 to the fourth order: where chords are turned half round, forces bend within any
+    step."""
     return (8.0 * (value(h) - value(-h)) - (value(2 * h) - value(-2 * h))) / (12.0 * h)
 
 

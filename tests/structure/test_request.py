@@ -1,4 +1,5 @@
-"""What an analysis is asked for: bounds of each number, the case that is meant, and where moved supports are."""
+"""What an analysis is asked for: bounds of each number, the case that is meant, and where moved supports
+are."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,5 @@
-"""What counts as equilibrium and what is refused for rounding or for turning too far, by hand-computed numbers."""
+"""What counts as equilibrium and what is refused for rounding or for turning too far, by hand-computed
+numbers."""
 
 from types import SimpleNamespace
 

@@ -127,7 +127,8 @@ def overtaken(monkeypatch, first, second):
 @pytest.mark.parametrize("backend", factorisation.installed())
 @pytest.mark.parametrize("rods", [8, 16, 22])  # 3,456, 13,056 and 24,288 degrees of freedom
 def test_one_entry_that_spoils_definiteness_is_seen_at_every_size(backend, rods, monkeypatch):
-    """PARDISO's ways with blocks depend on the size, and one of them, faster than the others, tells nothing."""
+    """PARDISO's ways with blocks depend on the size, and one of them, faster than the others, tells
+    nothing."""
     monkeypatch.setenv("SHELLFORM_SOLVER", backend)
     model = gridshell(rods)
     assembly = assemble(model.network)

@@ -78,7 +78,8 @@ def test_designs_share_the_last_stages_that_not_all_who_share_them_have_in_commo
 
 
 def test_a_stage_that_all_share_together_with_the_next_has_no_folder_of_its_own(tmp_path, designs):
-    """Three with the same net, of which all have the surface and two the first equilibria; one beside them."""
+    """Three with the same net, of which all have the surface and two the first equilibria; one beside
+    them."""
     with Log(tmp_path / "log") as log:
         study = studying(tmp_path, log)
         batch = designs("ABCa", "ABCb", "ABDa", "EFGa")

@@ -457,8 +457,8 @@ def test_coordinates_that_32_bits_have_rounded_are_told(tmp_path):
 
 
 def test_which_axis_is_vertical_is_found_before_openings_are_filled(tmp_path):
-    """A barrel between two open arches, y up: with z up it lies on its side, where its ends can't be filled down to
-    a ground, or come out flat."""
+    """A barrel between two open arches, y up: with z up it lies on its side, where its ends can't be filled
+    down to a ground, or come out flat."""
     turn, along = np.meshgrid(np.linspace(0.1 * np.pi, 0.9 * np.pi, 13), np.linspace(-1.5, 1.5, 9))
     corners = np.column_stack([2.0 * np.cos(turn.ravel()), 2.0 * np.sin(turn.ravel()), along.ravel()])
     grid = np.arange(corners.shape[0]).reshape(9, 13)

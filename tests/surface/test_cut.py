@@ -61,8 +61,8 @@ def area_of(points, faces):
 
 
 def test_each_triangle_keeps_what_lies_above_the_level_once():
-    """At 1 m: one above, one with a corner on it, one with an edge on it, two across, one below, one under an edge
-    on the level; crossings are shared, and each triangle keeps its turning."""
+    """At 1 m: one above, one with a corner on it, one with an edge on it, two across, one below, one under an
+    edge on the level; crossings are shared, and each triangle keeps its turning."""
     points = np.array(
         [[0.0, 0.0, 3.0], [2.0, 0.0, 3.0], [0.0, 2.0, 2.0], [2.0, 2.0, 1.0], [4.0, 0.0, 1.0], [0.0, 4.0, 0.0], [4.0, 4.0, -2.0]]
     )  # fmt: skip
@@ -97,7 +97,8 @@ def test_a_triangle_with_a_corner_on_the_level_is_cut_from_there(begin, mirrored
 
 
 def test_a_vertex_inside_moves_along_its_edges_and_one_of_the_rim_along_the_rim_alone():
-    """The middle of a square, 0.1 m above the level, of whose corners one is 0.9 m below and the others are above."""
+    """The middle of a square, 0.1 m above the level, of whose corners one is 0.9 m below and the others are
+    above."""
     points = np.array(
         [[0.0, 0.0, 0.1], [2.0, 0.0, -0.9], [0.0, 2.0, 0.3], [-2.0, 0.0, 0.5], [0.0, -2.0, 0.4]]
     )
@@ -111,7 +112,8 @@ def test_a_vertex_inside_moves_along_its_edges_and_one_of_the_rim_along_the_rim_
 @pytest.mark.parametrize("level", [1.0, 1.5])
 @pytest.mark.parametrize("turned", [False, True])
 def test_a_slope_is_cut_to_its_length_whether_or_not_vertices_lie_on_the_level(level, turned):
-    """Of a slope of 1 : 2 over 8 × 8 m, which rises from -2 to 2 m and has vertices at each sixth of a metre."""
+    """Of a slope of 1 : 2 over 8 × 8 m, which rises from -2 to 2 m and has vertices at each sixth of a
+    metre."""
     surface = sheet(lambda x, y: 0.5 * (y if turned else x))
     for above in (level - 1.0, level - 1.0 + 0.02, level - 1.0 + 0.08, level - 1.0 - 0.02):
         cut = cut_off(surface, above)

@@ -110,8 +110,8 @@ KITE = np.array([[0.0, -2.0, 0.0], [0.6, 0.0, 0.0], [0.0, 2.0, 0.0], [-1.4, 0.0,
 @pytest.mark.parametrize("lifted", range(4))
 @pytest.mark.parametrize("height", [0.4, -0.4])
 def test_a_quadrilateral_is_cut_along_the_diagonal_that_folds_less(lifted, height):
-    """Of a kite across: the sine of a fold is as its length over the areas of both triangles, 2 m / (2 m² 2 m²) across
-    and 4 m / (1.2 m² 2.8 m²) along."""
+    """Of a kite across: the sine of a fold is as its length over the areas of both triangles, 2 m / (2 m² 2
+    m²) across and 4 m / (1.2 m² 2.8 m²) along."""
     points = KITE + [3.0, 5.0, 2.0] * np.ones((4, 1))
     points[lifted, 2] += height
     assert triangulated(points, np.array([[0, 1, 2, 3]])).tolist() == [[0, 1, 3], [1, 2, 3]]
@@ -155,7 +155,8 @@ def test_a_concave_polygon_is_cut_into_triangles_that_lie_in_it_and_do_not_turn_
 
 
 def test_the_ear_whose_smallest_angle_is_widest_is_cut_first():
-    """Of a house with a flat roof on one side: its angles at corner 3, a right one with equal sides, are 45° and more."""
+    """Of a house with a flat roof on one side: its angles at corner 3, a right one with equal sides, are 45°
+    and more."""
     house = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.2, 1.0, 0.0], [3.0, 3.0, 0.0], [0.0, 1.5, 0.0]])
 
     def smallest(k):

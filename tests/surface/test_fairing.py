@@ -58,8 +58,9 @@ def test_a_crease_that_runs_out_at_the_edge_is_rounded_there_too():
 
 
 def test_a_crease_changes_less_than_an_arc_that_touches_both_sides_would():
-    """Of a fold by 30° on each side the arc of radius R leaves it by R (1 / cos 30° - sqrt(1 - s²) - s tan 30°)
-    at R s from the ridge, upright; one of all surfaces that keep the cap, so that the least change is less."""
+    """Of a fold by 30° on each side the arc of radius R leaves it by R (1 / cos 30° - sqrt(1 - s²) - s tan
+    30°) at R s from the ridge, upright; one of all surfaces that keep the cap, so that the least change is
+    less."""
     radius = 1.5
     found = faired(sheet(gable), radius)
     x = found.before.vertices[:, 0]

@@ -1,4 +1,5 @@
-"""The parts of a fill that are told beforehand: which stretches are open, how far out they go, and their slopes."""
+"""The parts of a fill that are told beforehand: which stretches are open, how far out they go, and their
+slopes."""
 
 import numpy as np
 import pytest
@@ -9,7 +10,8 @@ from shellform.surface.readers import fills
 
 @pytest.mark.parametrize("turned", range(8))
 def test_arches_go_from_foot_to_foot_and_know_the_ground_beyond_them(turned):
-    """Of a ring of vertices 10 to 17 the 10th, 11th and 14th stand on the ground, of which the first two are a line."""
+    """Of a ring of vertices 10 to 17 the 10th, 11th and 14th stand on the ground, of which the first two are
+    a line."""
     low = np.isin(np.arange(18), [3, 10, 11, 14])
     found = fills._arches(np.roll(np.arange(10, 18), turned), low, "shell")
     told = {tuple(arch.vertices.tolist()): (arch.before, arch.after) for arch in found}
@@ -36,7 +38,8 @@ def test_a_footprint_leaves_its_foot_in_line_with_the_ground_up_to_45_degrees_ou
 
 
 def arch(height):
-    """An arch of 4 m along x from (1, 2), its vertices' heights over a ground at 5 m, and how far out they go at 45°."""
+    """An arch of 4 m along x from (1, 2), its vertices' heights over a ground at 5 m, and how far out they go
+    at 45°."""
     x = np.array([0.0, 1.0, 2.0, 3.0, 4.0])
     z = height * np.array([0.0, 0.75, 1.0, 0.5, 0.0])
     return np.column_stack([1.0 + x, np.full(5, 2.0), 5.0 + z]), z

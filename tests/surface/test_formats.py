@@ -141,7 +141,8 @@ def test_what_has_vertices_and_no_faces_in_a_compas_file_is_no_mesh(tmp_path):
 
 
 def compas_network(points, faces):
-    """The lines of a mesh as force density programs write them, each once, with a line that ends in nothing."""
+    """The lines of a mesh as force density programs write them, each once, with a line that ends in
+    nothing."""
     lines = sorted(
         {tuple(sorted(pair)) for face in faces for pair in zip(face, np.roll(face, 1), strict=True)}
     )

@@ -322,7 +322,8 @@ def test_more_than_five_pieces_are_told_in_part():
 
 
 def test_vertices_at_which_the_edge_meets_itself_are_parted_by_a_millionth_into_the_smaller_fan():
-    """Two triangles with a common edge, and two others in a row behind them, each on the last one's corner."""
+    """Two triangles with a common edge, and two others in a row behind them, each on the last one's
+    corner."""
     points = np.array(
         [[0.0, -1.0, 1.0], [4.0, 0.0, 1.0], [0.0, 1.0, 1.0], [0.0, 3.0, 1.0], [8.0, 2.0, 1.0], [8.0, 0.0, 1.0], [12.0, 2.0, 1.0], [12.0, 0.0, 1.0]]
     )  # fmt: skip

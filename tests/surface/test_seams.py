@@ -12,7 +12,8 @@ TWO = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def beside(gap):
-    """Two squares of 2 × 2 m, the second one to the right of the first and that much off and half that much higher."""
+    """Two squares of 2 × 2 m, the second one to the right of the first and that much off and half that much
+    higher."""
     second = SQUARE + np.array([2.0 + gap * np.sqrt(0.8), 0.0, gap * np.sqrt(0.2)])
     return Draft(np.vstack([SQUARE, second]), np.vstack([TWO, TWO + 4]))
 
@@ -76,7 +77,8 @@ def test_ends_of_a_short_edge_are_not_joined_with_each_other():
 )  # fmt: skip
 @pytest.mark.parametrize("begin", range(3))
 def test_an_edge_is_cut_at_a_vertex_that_lies_on_it_and_not_at_its_ends(share, away, cut, begin):
-    """An edge of 4 m, and the tip of another triangle that far along it and off it; reached is what is 20 mm off."""
+    """An edge of 4 m, and the tip of another triangle that far along it and off it; reached is what is 20 mm
+    off."""
     points = np.array(
         [[1.0, 1.0, 0.0], [5.0, 1.0, 0.0], [3.0, 4.0, 0.0], [1.0 + 4.0 * share, 1.0 + away, 0.0], [2.0, -3.0, 0.0], [4.0, -3.5, 0.0]]
     )  # fmt: skip
@@ -118,8 +120,8 @@ def test_a_triangle_with_vertices_on_two_of_its_edges_is_cut_twice():
 
 
 def sliver(x, height, *, right=False):
-    """A triangle 10 m long with its tip that far from its left end, and that high, between others; and, to the right of
-    it, the same mirrored, which has a corner in common with it."""
+    """A triangle 10 m long with its tip that far from its left end, and that high, between others; and, to
+    the right of it, the same mirrored, which has a corner in common with it."""
     points = np.array([[0.0, 0.0], [10.0, 0.0], [x, height], [5.0, -5.0], [5.0, 5.0]])
     faces = np.array([[0, 1, 2], [1, 0, 3], [0, 2, 4], [2, 1, 4]])
     if right:

@@ -1,4 +1,5 @@
-"""Which faces of closed skins are the upper and the lower ones: prisms along y, of which the outline is given."""
+"""Which faces of closed skins are the upper and the lower ones: prisms along y, of which the outline is
+given."""
 
 import numpy as np
 import pytest
@@ -10,8 +11,8 @@ LONG = 3.0  # m, along y
 
 
 def prism(outline):
-    """Points and triangles of the skin round a convex outline (n, 2) of x and z, counterclockwise seen against y;
-    triangles 2k and 2k + 1 belong to side k, those that follow to the ends."""
+    """Points and triangles of the skin round a convex outline (n, 2) of x and z, counterclockwise seen
+    against y; triangles 2k and 2k + 1 belong to side k, those that follow to the ends."""
     xz = np.asarray(outline, dtype=float)
     count = len(xz)
     points = np.vstack([np.insert(xz, 1, y, axis=1) for y in (0.0, LONG)]) + np.array([40.0, -7.0, 12.0])
@@ -61,8 +62,9 @@ def test_the_upper_face_is_what_points_up_between_edges_of_35_degrees(ridge, ris
 
 
 def bulb(upright, undercut):
-    """An outline of sides whose normals turn by 30° at the most, from 118° on the right over the vertical to 118° on
-    the left: 8 m of them point up, so many stand upright on both sides, and so many below hang over."""
+    """An outline of sides whose normals turn by 30° at the most, from 118° on the right over the vertical to
+    118° on the left: 8 m of them point up, so many stand upright on both sides, and so many below hang
+    over."""
     right = [(118.0, undercut), (90.0, upright), (60.0, 1.0), (30.0, 1.0)]
     stretches = [*right, (0.0, 4.0), *((-angle, length) for angle, length in reversed(right))]
     at, outline = np.zeros(2), []

@@ -68,7 +68,8 @@ def test_iges_global_section_says_the_unit(tmp_path, flag, unit):
     ],
 )
 def test_a_line_that_has_nan_for_a_number_is_found_and_refused(tmp_path, ending, old, new, line):
-    """OpenCASCADE didn't come to an end on such STEP and BREP files, and gave 0.65 m² instead of 0.62 of an IGES one."""
+    """OpenCASCADE didn't come to an end on such STEP and BREP files, and gave 0.65 m² instead of 0.62 of an
+    IGES one."""
     text = (DATA / f"dome_mm.{ending}").read_text(encoding="latin-1")
     bad = tmp_path / f"dome.{ending}"
     bad.write_text(text.replace(old, new, 1), encoding="latin-1")

@@ -103,8 +103,8 @@ def write_vtu(path: str | Path, built: Built) -> None:
 
 
 def write_3dm(path: str | Path, built: Built, target: Surface, *, load: str = "design") -> None:
-    """Rhino: rods u, rods v, cables, supports, crossings and the target's mesh on layers of their own; rods as
-    NURBS curves. Section, lengths, marks, and forces and places at each load are user strings.
+    """Rhino: rods u, rods v, cables, supports, crossings and the target's mesh on layers of their own; rods
+    as NURBS curves. Section, lengths, marks, and forces and places at each load are user strings.
     """
     from shellform.surface.readers.rhino import Item, write_rhino
 

@@ -1,8 +1,8 @@
 """Scripts that open a run in other programs: Blender's Python, and a Python component of Grasshopper.
 
-They stand alone: the standard library reads what the run folder promises (summary.json, net.json, the arrays of
-states/NAME-LOAD.vtp), the program's own library draws it. So they go on working where shellform isn't installed.
-The texts stand in `readers_of_runs/`: what both share, and the beginning and the end of each.
+They stand alone: the standard library reads what the run folder promises (summary.json, net.json, the arrays
+of states/NAME-LOAD.vtp), the program's own library draws it. So they go on working where shellform isn't
+installed. The texts stand in `readers_of_runs/`: what both share, and the beginning and the end of each.
 """
 
 from __future__ import annotations

@@ -1,5 +1,5 @@
-"""Gridshells as lines for ParaView, as VTK's XML of polygonal data (VTP; VTK File Formats, "XML File Formats":
-arrays in line, in base 64, compressed by zlib in one block each).
+"""Gridshells as lines for ParaView, as VTK's XML of polygonal data (VTP; VTK File Formats, "XML File
+Formats": arrays in line, in base 64, compressed by zlib in one block each).
 """
 
 from __future__ import annotations

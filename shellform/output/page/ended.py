@@ -1,5 +1,5 @@
-"""The page of a run that ended before it had a design: the cause first, then what to do, how far it came, and what
-was found until then."""
+"""The page of a run that ended before it had a design: the cause first, then what to do, how far it came, and
+what was found until then."""
 
 from __future__ import annotations
 

@@ -53,8 +53,8 @@ def answers(
     next_size: str = "",
 ) -> list[Answer]:
     """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the
-    design to build, whose check `as_built` says how many drawn structures stand under the additional load; `next_size` is the size
-    of the catalogue that its rods would be rounded to."""
+    design to build, whose check `as_built` says how many drawn structures stand under the additional load;
+    `next_size` is the size of the catalogue that its rods would be rounded to."""
     row = summary.designs.get(name)
     main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
     found = [] if main is None else [_how_far(main, shape_notes(summary, name))]
@@ -156,8 +156,8 @@ def _stands_on(net: Net, more: LoadRecord | None, loads: Mapping[str, LoadRecord
 
 
 def _how_far(main: LoadRecord, notes: Sequence[str]) -> Answer:
-    """Of the perfect structure, and of drawn ones beside it, which may be ten times as far off; what is to be noted of
-    that."""
+    """Of the perfect structure, and of drawn ones beside it, which may be ten times as far off; what is to be
+    noted of that."""
     question, good = "How far off is the shell?", None if main.stable and main.on_branch else False
     planned, mean, built = _mm(main.deviation_max), _mm(main.deviation_mean), main.built_shape
     if built is None:

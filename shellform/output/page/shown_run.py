@@ -21,18 +21,19 @@ class ShownRun:
     """One run on the page.
 
     What was found:
-    - `surface`; `loads` (n, 6), N, by name; `designs` by name, each with its `shells` (rods may differ) and its
-      `states` by load case, of which `best` is to be built.
+    - `surface`; `loads` (n, 6), N, by name; `designs` by name, each with its `shells` (rods may differ) and
+      its `states` by load case, of which `best` is to be built.
     - `summary` of the run, and `checks` and `verdict` made from it; `history` of the optimiser.
-    - `next_size`: of the catalogue, that the rods to build would be rounded to ("": no catalogue, or none is stiff
-      enough).
+    - `next_size`: of the catalogue, that the rods to build would be rounded to ("": no catalogue, or none is
+      stiff enough).
     - `profile`, empty where none was made.
 
     What is shown of it:
     - `title`, and `place`: the folder's name; `notes`: what is missing or to be known.
     - `settings`: the case file's text; `pictures`.
     - `limit`, m: the end of the colour scale; `force_max`, N: the cables' limit.
-    - `files` of the run folder, which is reached from the page by the relative address `home` ("": it stands in it).
+    - `files` of the run folder, which is reached from the page by the relative address `home` ("": it stands
+      in it).
     """
 
     title: str

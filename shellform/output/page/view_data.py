@@ -1,5 +1,5 @@
-"""What the three-dimensional view draws, as JSON: positions in m from the middle of the target, lengths in mm,
-forces in N; arrays of floats as base64 of little-endian float32.
+"""What the three-dimensional view draws, as JSON: positions in m from the middle of the target, lengths in
+mm, forces in N; arrays of floats as base64 of little-endian float32.
 
 Beside the computed states the view shows the way to them: from the flat grid, laid out where the shell lies
 nearest to it, to the erected, the braced and the poured shell. Between two computed states it draws straight
@@ -30,9 +30,9 @@ _MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 
 @dataclass(frozen=True)
 class ViewedShell:
-    """What is seen: `designs`, each with its `shells` (rods may differ) and its `states` by load case, of which
-    `best` is to be built; `loads` (n, 6), N, with their `load_titles`; the `surface`, if it is known; `limit`,
-    m, which ends the case's colour scale; the load that is `shown_first`."""
+    """What is seen: `designs`, each with its `shells` (rods may differ) and its `states` by load case, of
+    which `best` is to be built; `loads` (n, 6), N, with their `load_titles`; the `surface`, if it is known;
+    `limit`, m, which ends the case's colour scale; the load that is `shown_first`."""
 
     title: str
     shells: Mapping[str, Gridshell]
@@ -143,8 +143,8 @@ def _design(viewed: ViewedShell, name: str) -> dict[str, Any]:
 
 
 def net_data(net: Net, title: str, told: str, cable_ends: Indices) -> dict[str, Any]:
-    """The same of a net that bears nothing yet, or of a gridshell's target: coloured by its rods' curvature, 1/m,
-    with all candidate cables slack; `told` is said of it."""
+    """The same of a net that bears nothing yet, or of a gridshell's target: coloured by its rods' curvature,
+    1/m, with all candidate cables slack; `told` is said of it."""
     grid, place = net.grid, net.target.positions
     middle = 0.5 * (place.min(axis=0) + place.max(axis=0))
     bent = np.zeros(net.node_count)
@@ -209,8 +209,8 @@ def _geometry(net: Net, middle: Reals, place: Reals) -> dict[str, Any]:
 
 
 def laid_out(flat: Reals, place: Reals) -> Reals:
-    """The flat grid (n, 3), m, turned and moved in plan to where it lies nearest to `place` (n, 3) (Kabsch 1976,
-    in two dimensions), on the level of its lowest point."""
+    """The flat grid (n, 3), m, turned and moved in plan to where it lies nearest to `place` (n, 3) (Kabsch
+    1976, in two dimensions), on the level of its lowest point."""
     first, second = (each[:, :2] - each[:, :2].mean(axis=0) for each in (flat, place))
     left, _, right = np.linalg.svd(first.T @ second)
     turn = left @ np.diag([1.0, np.linalg.det(left @ right)]) @ right

@@ -119,8 +119,8 @@ def heading(text: str, size: tuple[int, int], letters: int) -> tuple[Word, ...]:
 
 
 def key(scale: Scale, width: int, height: int) -> tuple[tuple[Word, ...], tuple[Ramp, ...]]:
-    """The colour scales below the panels: the quantity's, and beside it the cables' where one is taut; in letters that
-    fit into so many pixels.
+    """The colour scales below the panels: the quantity's, and beside it the cables' where one is taut; in
+    letters that fit into so many pixels.
     """
     ends = [(0.1, 0.52), (0.66, 0.92)] if scale.force > 0.0 else [(0.22, 0.78)]
     line = min(round(0.9 * scale.letters), round(width / 38), int(height / (_CAPTION + 1.0)))

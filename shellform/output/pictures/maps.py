@@ -121,8 +121,8 @@ def _mode(shell: Gridshell, design: Design, state: State) -> Map:
 
 
 def sunk(positions: Reals, shift: Reals) -> Reals:
-    """The nodes' `positions` (n, 3), m, moved along the translations `shift` (n, 3) of a mode, the largest of which is 1,
-    so far that it is seen. A mode has no sign: where it moves most up or down it sinks."""
+    """The nodes' `positions` (n, 3), m, moved along the translations `shift` (n, 3) of a mode, the largest of
+    which is 1, so far that it is seen. A mode has no sign: where it moves most up or down it sinks."""
     size = float(np.ptp(positions, axis=0).max())
     upright = 1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0
     return positions + _AMPLITUDE * size * upright * shift

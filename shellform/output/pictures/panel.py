@@ -38,8 +38,9 @@ class Panel:
 
     `positions` (n, 3), m; rod elements `beams` (m, 2); `deviation` (n,), m, of each node from its target;
     `cables` (c, 2) with their `cable_forces` (c,), N, slack at or below zero; nodes of `supports` (s,) and of
-    loads, `load_points` (k,); `rod_radius`, m; elements `edges` (e, 2) of edge beams. `quantity` says what `deviation` measures where it is
-    something else, in a `unit` of a name and so much in SI. Raises InputError for wrong shapes and indices.
+    loads, `load_points` (k,); `rod_radius`, m; elements `edges` (e, 2) of edge beams. `quantity` says what
+    `deviation` measures where it is something else, in a `unit` of a name and so much in SI. Raises
+    InputError for wrong shapes and indices.
     """
 
     title: str

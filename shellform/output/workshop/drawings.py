@@ -40,8 +40,8 @@ _SIDES = {"left": "LEFT", "middle": "CENTER", "right": "RIGHT"}
 
 
 def write_drawings(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
-    """Writes grid, cables, supports, elevations and rods, each as .dxf and .pdf; returns the files. Raises InputError
-    where they can't be written.
+    """Writes grid, cables, supports, elevations and rods, each as .dxf and .pdf; returns the files. Raises
+    InputError where they can't be written.
     """
     place = Path(folder)
     sheets = {

@@ -23,8 +23,8 @@ def edge_names(net: Net) -> list[str]:
 
 def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], rods: Sequence[str]) -> Table:
     """The edge beams, a line a node of their axes in the target: where it is, how far along the beam, and
-    which rods' ends are clamped to it, with how far before or behind it where there are more of them; the section forces
-    there in each of the `states`. `rods` are the rods' names."""
+    which rods' ends are clamped to it, with how far before or behind it where there are more of them; the
+    section forces there in each of the `states`. `rods` are the rods' names."""
     net, beams = shell.net, shell.beams(design.radius)
     place = shell.target.positions
     ends = {
@@ -65,8 +65,8 @@ def edge_table(shell: Gridshell, design: Design, states: Mapping[str, State], ro
 
 
 def _clamped(line: EdgeLine, place: Reals, ends: Mapping[int, str]) -> dict[int, str]:
-    """For nodes of the line what is clamped to them: the names of `ends`, of several each with its place, mm, along the
-    beam from the node."""
+    """For nodes of the line what is clamped to them: the names of `ends`, of several each with its place, mm,
+    along the beam from the node."""
     onward = np.gradient(place[line.nodes], axis=0)
     onward /= np.linalg.norm(onward, axis=1, keepdims=True)
     way = dict(zip(line.nodes.tolist(), onward, strict=True))

@@ -302,8 +302,8 @@ def rod_strips(built: Built, cutting: Cutting, first: int = 0, last: int | None 
 
 
 def _splices(places: Sequence[float], y: float, s: float, height: float) -> list[Mark]:
-    """A stroke through the rod at each of the places, and below it where it is; of two near each other one a line
-    lower."""
+    """A stroke through the rod at each of the places, and below it where it is; of two near each other one a
+    line lower."""
     marks: list[Mark] = []
     taken: list[Box] = []
     for place in places:

@@ -1,5 +1,5 @@
-"""What is cut, tensioned and set out: the tables that go to the workshop and to the site; here in SI units, in
-their files in mm and degrees.
+"""What is cut, tensioned and set out: the tables that go to the workshop and to the site; here in SI units,
+in their files in mm and degrees.
 
 Names are those of the drawings: rod U5 or V16 has the number 5 or 16 in net.json, crossing 37 and support S3
 too; cable C12 is number 12 in the model file of the design. All places are those of the rods' axes; a
@@ -64,12 +64,12 @@ class TitleBlock:
 
 @dataclass(frozen=True)
 class Built:
-    """A `design` to build of a `shell`, with its `states` by load case, "none" among them; for the heads its `name` and
-    the job's `title`; `block`: what the title block says of who drew it and when.
-    `hung`: the state in which cables are hung in, the erected grid before bracing (None: the target). `adjustment`, m:
-    the turnbuckles' range, by which cables are let out from the lengths that they are cut to (None: each is cut for
-    itself). `origin` (3,), m: where coordinates count from in those of a survey (None: the file's). `loads` (n, 6), N,
-    of the states: what stands on a support goes straight into it (left out: nothing does)."""
+    """A `design` to build of a `shell`, with its `states` by load case, "none" among them; for the heads its
+    `name` and the job's `title`; `block`: what the title block says of who drew it and when. `hung`: the
+    state in which cables are hung in, the erected grid before bracing (None: the target). `adjustment`, m:
+    the turnbuckles' range, by which cables are let out from the lengths that they are cut to (None: each is
+    cut for itself). `origin` (3,), m: where coordinates count from in those of a survey (None: the file's).
+    `loads` (n, 6), N, of the states: what stands on a support goes straight into it (left out: nothing)."""
 
     shell: Gridshell
     design: Design
@@ -261,7 +261,8 @@ def cut_counts(built: Built) -> dict[str, int]:
 
 
 def cutting_of_cables(built: Built) -> tuple[str, ...]:
-    """To how many lengths cables are cut, and what their turnbuckles can't reach; nothing where each is cut for itself."""
+    """To how many lengths cables are cut, and what their turnbuckles can't reach; nothing where each is cut
+    for itself."""
     if built.adjustment is None or not built.design.present.any():
         return ()
     ties = built.shell.cables(built.design)
@@ -284,8 +285,8 @@ def clashing_supports(built: Built) -> list[tuple[int, int, float]]:
 
 
 def support_forces(built: Built) -> dict[str, Reals]:
-    """With which force (n, 3), N, the shell and what stands on its supports act on the ground at each node and load,
-    in order: the reactions' opposite, nothing away from supports."""
+    """With which force (n, 3), N, the shell and what stands on its supports act on the ground at each node
+    and load, in order: the reactions' opposite, nothing away from supports."""
     assembly = assemble(built.shell.network(built.design))
     none = np.zeros((built.shell.node_count, 6))
     return {
@@ -337,7 +338,8 @@ def supports(built: Built) -> Table:
 
 
 def survey(built: Built) -> Table:
-    """Where the axis of each crossing's upper rod is wanted, and expected at each load, "none" before the pour."""
+    """Where the axis of each crossing's upper rod is wanted, and expected at each load, "none" before the
+    pour."""
     grid, shell, upper = built.grid, built.shell, built.grid.crossing_nodes[:, 1]
     places = {"target": shell.target.positions[upper]}
     places |= {_stage(name): built.states[name].positions[upper] for name in _in_order(built)}
@@ -374,8 +376,8 @@ def all_tables(built: Built, cutting: Cutting) -> list[Table]:
 
 
 def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
-    """Writes every schedule as NAME.csv and all of them as schedules.xlsx, lengths in mm and angles in degrees
-    as workshops read them; returns the files. Raises InputError where they can't be written.
+    """Writes every schedule as NAME.csv and all of them as schedules.xlsx, lengths in mm and angles in
+    degrees as workshops read them; returns the files. Raises InputError where they can't be written.
     """
     return write_tables(folder, [for_the_workshop(table) for table in all_tables(built, cutting)])
 

@@ -1,5 +1,5 @@
-"""What is set out on site: the supports in plan, and the shell in elevation with its levels; marks (marks.py) in
-mm at real scale.
+"""What is set out on site: the supports in plan, and the shell in elevation with its levels; marks (marks.py)
+in mm at real scale.
 
 **Clashing supports.** The ends of two rods may come to stand so near to each other that their shoes don't fit
 side by side. A shoe is taken to be three rod diameters wide, the rod between two walls of its own thickness:
@@ -97,7 +97,8 @@ def support_plan(built: Built) -> Sheet:
 def _clear(
     text: str, here: Reals, away: Reals, height: float, taken: Sequence[Box], layer: str = "SUPPORT_NUMBERS"
 ) -> Words:
-    """A support's number beside it, outwards, as far off as it takes to lie on no other; or an edge beam's name."""
+    """A support's number beside it, outwards, as far off as it takes to lie on no other; or an edge beam's
+    name."""
     out = away / (np.linalg.norm(away) or 1.0)
     side = "left" if out[0] > 0.3 else "right" if out[0] < -0.3 else "middle"
     foot = "bottom" if out[1] > 0.3 else "top" if out[1] < -0.3 else "middle"
@@ -127,8 +128,8 @@ def clash_notes(built: Built) -> tuple[str, ...]:
 
 
 def elevations(built: Built) -> Sheet:
-    """The shell on its target from the front (along y) and, above it, from the side (along -x), with the levels
-    of the ground, the lowest and the highest support, and the crown."""
+    """The shell on its target from the front (along y) and, above it, from the side (along -x), with the
+    levels of the ground, the lowest and the highest support, and the crown."""
     grid, place = built.grid, MM * built.shell.target.positions
     low, high = place.min(axis=0), place.max(axis=0)
     tall, wide = float(high[2] - low[2]), max(float(high[0] - low[0]), float(high[1] - low[1]))
@@ -174,8 +175,8 @@ def elevations(built: Built) -> Sheet:
 
 
 def _levels(levels: dict[str, float], right: float, up: float, height: float, wide: float) -> list[Mark]:
-    """A short line at each level on the right, with its words; where levels lie near each other, words give way
-    upwards."""
+    """A short line at each level on the right, with its words; where levels lie near each other, words give
+    way upwards."""
     marks: list[Mark] = []
     start, end = right + 0.06 * wide, right + 0.10 * wide
     least = -np.inf

@@ -1,8 +1,9 @@
-"""What turnbuckles of a given range can do: to how many lengths cables are cut for them, and what they can't reach.
+"""What turnbuckles of a given range can do: to how many lengths cables are cut for them, and what they can't
+reach.
 
-With the turnbuckle closed a cable has its cut length, at most the range shorter than its rest length (grouping.py). To be
-hung in without force it has to reach the length between its pins in the grid before bracing, and to be tightened
-after a survey it must not be closed yet.
+With the turnbuckle closed a cable has its cut length, at most the range shorter than its rest length
+(grouping.py). To be hung in without force it has to reach the length between its pins in the grid before
+bracing, and to be tightened after a survey it must not be closed yet.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from shellform.gridshell.grouping import cut_lengths
 
 
 def turnbuckle_notes(rest: Reals, hung: Reals, adjustment: float, *, lengths: int) -> tuple[str, ...]:
-    """Of cables of the `rest` lengths (c,), of which so many `lengths` are different, that are `hung` in at (c,), m, and
-    turnbuckles with the range `adjustment`, m: a sentence each."""
+    """Of cables of the `rest` lengths (c,), of which so many `lengths` are different, that are `hung` in at
+    (c,), m, and turnbuckles with the range `adjustment`, m: a sentence each."""
     cut = cut_lengths(rest, adjustment)
     told = [
         f"Cut to {len(np.unique(cut))} different lengths, the fewest for {lengths} different rest lengths and turnbuckles that "

@@ -1,11 +1,12 @@
 """The analysis of a model: how it comes to its load, and what there is to tell of it then
 (documentation/reference/model.md).
 
-Four ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the stable branch
-and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole increments without help,
-dynamic relaxation lets the network move until it comes to rest (dynamic.py). A path goes through limit points, loads
-falling and rising, to where the factor first comes to its goal or a led displacement to its own (path.py). Where relaxation
-doesn't come to rest under moments that have no potential, the path is followed instead, and a warning says so.
+Four ways lead to the equilibrium under a load. Relaxation, the default, goes in adaptive increments on the
+stable branch and, past its end, follows the snap-through to a stable state (loading.py). Newton takes whole
+increments without help, dynamic relaxation lets the network move until it comes to rest (dynamic.py). A path
+goes through limit points, loads falling and rising, to where the factor first comes to its goal or a led
+displacement to its own (path.py). Where relaxation doesn't come to rest under moments that have no potential,
+the path is followed, and a warning says so.
 """
 
 from __future__ import annotations
@@ -53,9 +54,9 @@ class Analysis:
 
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
     `converged`; `increments` as result.json has them, each with the `steps` it took; `modes` and `critical`
-    where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable branch
-    from the start; None where the method (Newton's) doesn't tell. `critical_sought`: the factor up to which there is
-    no other critical one, 0 where that wasn't found out; `critical_mesh`: the critical factor on this mesh and with beams halved.
+    where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable
+    branch from the start; None where Newton's method doesn't tell. `critical_sought`: the factor up to which
+    no other is critical, 0 where that wasn't found out; `critical_mesh`: on this mesh and with beams halved.
     """
 
     model: Model
@@ -230,8 +231,8 @@ class _Analysis:
             self.documented.append(self._increment(after, spent) | {"steps": steps})
 
     def _relaxed(self, before: float, after: float, steps: list[dict[str, Any]]) -> tuple[Equilibrium, int]:
-        """The equilibrium at the factor `after` from the one at `before`, and factorisations spent; along the path
-        where moments without potential don't let the relaxation come to rest.
+        """The equilibrium at the factor `after` from the one at `before`, and factorisations spent; along the
+        path where moments without potential don't let the relaxation come to rest.
         """
         try:
             arrived = advance(
@@ -256,9 +257,8 @@ class _Analysis:
         return arrived.equilibrium, arrived.factorisations
 
     def _followed(self, before: float, after: float, steps: list[dict[str, Any]], wasted: int) -> Equilibrium:
-        """The equilibrium at the factor `after` along the path from the one at `before`, `wasted` factorisations
-        having led nowhere.
-        """
+        """The equilibrium at the factor `after` along the path from the one at `before`, after `wasted`
+        factorisations."""
         change = after - before
         rest = Drive(change * self.drive.load, change * self.drive.imposed, self.drive.at(before))
         if self.followed_from is None:

@@ -1,14 +1,15 @@
 """A model with each beam cut in two, and what numbers are off because beams are straight.
 
-With q4 and q8 found on the two meshes and an error of order h² (elements/beam.py), Richardson's estimate of the value
-at h = 0 and of the error of each is
+With q4 and q8 found on the two meshes and an error of order h² (elements/beam.py), Richardson's estimate of
+the value at h = 0 and of the error of each is
 
     q0 = q8 + (q8 - q4) / 3,   q4 - q0 = 4 (q4 - q8) / 3,   q8 - q0 = (q4 - q8) / 3.
 
-Where beams stand for a curve, halves of the chords would keep the polygon. The curvature at a node where two beams
-of one kind meet, k = (t' - t) / l with their directions and mean length, belongs to a beam as far as both its ends have
-it (the smaller of the two where they point to one side, else none; at a chain's end its neighbour's), so that a
-corner among straight beams stays one. The new node lies off the chord by -k l²/8, where the circle has its middle.
+Where beams stand for a curve, halves of the chords would keep the polygon. The curvature at a node where two
+beams of one kind meet, k = (t' - t) / l with their directions and mean length, belongs to a beam as far as
+both its ends have it (the smaller of the two where they point to one side, else none; at a chain's end its
+neighbour's), so that a corner among straight beams stays one. The new node lies off the chord by -k l²/8,
+where the circle has its middle.
 """
 
 from __future__ import annotations
@@ -53,8 +54,8 @@ class Refined:
 def critical_error(
     model: Model, drive: Drive, factor: float, *, goal: float, tolerance: float
 ) -> Refined | None:
-    """The critical `factor` of the model under the drive, found up to `goal`, beside that of the finer one; None where
-    no beam can be halved or the finer model has no critical factor up to 1.5 times the goal.
+    """The critical `factor` of the model under the drive, found up to `goal`, beside that of the finer one;
+    None where no beam can be halved or the finer model has no critical factor up to 1.5 times the goal.
     """
     finer = halved(model)
     more = len(finer.network.nodes) - len(model.network.nodes)
@@ -114,8 +115,8 @@ def halved(model: Model) -> Model:
 
 
 def with_middles(state: State, beams: Beams, cut: Indices) -> State:
-    """The state with the middles of the beams `cut` on the cubic through their ends: along it, and turned about it
-    halfway."""
+    """The state with the middles of the beams `cut` on the cubic through their ends: along it, and turned
+    about it halfway."""
     a, b = beams.ends[cut].T
     one, other = state.positions[a], state.positions[b]
     length = np.linalg.norm(other - one, axis=1)[:, None]
@@ -142,7 +143,8 @@ def _turned_along(quaternions: Reals, axis: Reals, direction: Reals) -> Reals:
 
 
 def _least_turn(now: Reals, wanted: Reals) -> Reals:
-    """Quaternions (k, 4) of the least rotations that bring the unit vectors `now` (k, 3) onto those `wanted`."""
+    """Quaternions (k, 4) of the least rotations that bring the unit vectors `now` (k, 3) onto those
+    `wanted`."""
     cosine = (now * wanted).sum(axis=1, keepdims=True)
     least = np.hstack([1.0 + cosine, np.cross(now, wanted)])
     return np.asarray(least / np.linalg.norm(least, axis=1, keepdims=True))
@@ -171,8 +173,8 @@ def _bulge(nodes: Reals, beams: Beams) -> Reals:
 
 
 def _curvature(nodes: Reals, beams: Beams, direction: Reals, length: Reals) -> tuple[Reals, Flags]:
-    """The curvature (n, 3), 1/m, at each node, towards the curve's centre, and whether two beams of a kind go on
-    through it (n,).
+    """The curvature (n, 3), 1/m, at each node, towards the curve's centre, and whether two beams of a kind go
+    on through it (n,).
     """
     count, m = len(nodes), len(beams.ends)
     meeting = np.bincount(beams.ends.ravel(), minlength=count)

@@ -74,8 +74,8 @@ def check_imposed_turns(network: Network) -> None:
 
 
 def chosen_load(model: Model, name: str | None) -> Reals:
-    """The load (n, 6) of the case `name`; where there is none, that of the only case, or none. "none" is the structure
-    without load unless a case has that name. Raises InputError.
+    """The load (n, 6) of the case `name`; where there is none, that of the only case, or none. "none" is the
+    structure without load unless a case has that name. Raises InputError.
     """
     if name is None:
         if len(model.loads) > 1:

@@ -4,9 +4,9 @@ Three looks at the same question, from the tangent K of the equilibrium and its 
 
 Modes. The softest shapes solve K v = w M v with the mass of the implicit dynamic relaxation (1 for a
 translation, the square of an element length for a rotation), by Lanczos iteration with shift-invert about 0:
-each step is one solve with the factor of K. That gives the eigenvalues nearest to 0, which are the lowest where K is
-positive definite. Elsewhere its factor tells how many are negative; where some of them lie farther off, the iteration is
-made again about a shift below all, from where K - shift M is positive definite.
+each step is one solve with the factor of K. That gives the eigenvalues nearest to 0, which are the lowest
+where K is positive definite. Elsewhere its factor tells how many are negative; where some of them lie farther
+off, the iteration is made again about a shift below all, from where K - shift M is positive definite.
 
 Linearised critical factor. Between two equilibria at factors f0 < f1 of one load the tangent changes from K0
 to K1; carried on at the same rate it becomes singular where
@@ -73,8 +73,8 @@ class Critical:
 
 
 def modes(assembly: Assembly, state: State, count: int) -> Modes:
-    """The `count` modes of the tangent at the state with the lowest stiffness, unstable ones first. Raises InputError for a
-    bad count, NotConverged.
+    """The `count` modes of the tangent at the state with the lowest stiffness, unstable ones first. Raises
+    InputError for a bad count, NotConverged.
     """
     size = len(assembly.free)
     if size < 2:
@@ -109,8 +109,8 @@ def modes(assembly: Assembly, state: State, count: int) -> Modes:
 
 @told(Work.EIGENVECTORS)
 def linearised_factor(assembly: Assembly, before: State, after: State, factors: tuple[float, float]) -> float:
-    """The critical factor estimated from the equilibria `before` and `after` at two load `factors`, beyond the second
-    as seen from the first; infinite where there is none.
+    """The critical factor estimated from the equilibria `before` and `after` at two load `factors`, beyond
+    the second as seen from the first; infinite where there is none.
 
     Raises NotPositiveDefinite where `after` isn't stable.
     """
@@ -178,8 +178,8 @@ def critical_load(
 def _from_below(
     assembly: Assembly, values: Reals, mass: Reals, size: float
 ) -> tuple[Callable[[Reals], Reals], float]:
-    """The solve with K - shift M and a shift below all eigenvalues, by the factor that is positive definite first; `size`
-    is that of the known ones. Raises NotConverged."""
+    """The solve with K - shift M and a shift below all eigenvalues, by the factor that is positive definite
+    first; `size` is that of the known ones. Raises NotConverged."""
     matrix, shift = assembly.matrix, -2.0 * (size or 1.0)
     for _ in range(_SHIFTS):
         try:

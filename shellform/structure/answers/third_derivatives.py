@@ -3,8 +3,8 @@ of the elements' energies, exact.
 
 For motions l_k, r_k of the nodes at fixed l, r the tangent K gives B = sum of l_k'K r_k; l = r = a mode is
 that mode's stiffness, l the multipliers of linear answers r what a robust design derives. B is linear in the
-sum of l_k r_k', so that any number of motions costs what one does. Of beams it is derived in one compiled pass
-(beam_thirds.py). A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q, has
+sum of l_k r_k', so that any number of motions costs what one does. Of beams it is derived in one compiled
+pass (beam_thirds.py). A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q, has
 
     B = EA/l0 (p·q - (l0/l) (p·q - a b)),
     dB/d(x_b - x_a) = EA/l² ((p·q - a b) e + a (q - b e) + b (p - a e)).

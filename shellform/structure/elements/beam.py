@@ -26,8 +26,8 @@ into a bent structure, an edge beam or a lath locked to another, has its stress-
 the node turned by R in that state, and the element's triad E in it, the axes at that end are R' E
 (`built_in`).
 
-Equation (12) turns back at 90 degrees; ends that are turned farther than 45 degrees against the chord go over to
-the rotation vector (local_rotation.py), which holds up to 180.
+Equation (12) turns back at 90 degrees; ends that are turned farther than 45 degrees against the chord go over
+to the rotation vector (local_rotation.py), which holds up to 180.
 
 Sign: theta_y and M_y follow the paper's (12), which counts turns about the local y axis negative
 (left-handed); theta_x and theta_z are right-handed.
@@ -126,8 +126,9 @@ class Beams:
         return Evaluation(energy, force, blocks if tangent else None, float(turn.max(initial=0.0)))
 
     def foreseen(self, state: State, motion: Reals) -> Reals:
-        """Deformations (m, 7) to which a `motion` (n, 6) leads to first order: stretch, m, and the sines of the six
-        local rotations. No end may be turned farther than 45 degrees at the state (`Evaluation.turned` is 0).
+        """Deformations (m, 7) to which a `motion` (n, 6) leads to first order: stretch, m, and the sines of
+        the six local rotations. No end may be turned farther than 45 degrees at the state
+        (`Evaluation.turned` is 0).
         """
         result = np.empty((len(self.ends), 7))
         inputs = self._kernel_input(state)[:5]

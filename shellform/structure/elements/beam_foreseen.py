@@ -1,9 +1,9 @@
 """Deformations of co-rotational beams that a motion leads to, to first order: the independent ones of a mixed
 formulation (Assembly.tangent_of).
 
-With a motion y = (dd, w_a, w_b) in element axes the element triad turns by phi = G y (beam_kernels.py), the stretch
-grows by d_0 and the sine of a local rotation of equation (12), s_k / 2, by h_k·(w - phi) / 2, h_k the gradient of s_k
-by the rotation increment of its end.
+With a motion y = (dd, w_a, w_b) in element axes the element triad turns by phi = G y (beam_kernels.py), the
+stretch grows by d_0 and the sine of a local rotation of equation (12), s_k / 2, by h_k·(w - phi) / 2, h_k the
+gradient of s_k by the rotation increment of its end.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ _MOST = 0.9  # of a sine: the tangent is that of a local rotation of less than 9
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def foreseen(start, stop, positions, quaternions, ends, frames, rest_length, motion, result):  # type: ignore[no-untyped-def]
-    """Fills stretch, m, and the sines of the six local rotations (m, 7) to which the `motion` (n, 6) leads from a
-    state in which no end is turned farther than equation (12) measures."""
+    """Fills stretch, m, and the sines of the six local rotations (m, 7) to which the `motion` (n, 6) leads
+    from a state in which no end is turned farther than equation (12) measures."""
     E, A, B, Q = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     d, w, v, phi, h = np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for e in range(start, stop):

@@ -21,8 +21,8 @@ from shellform.compiled import njit
 from shellform.structure.elements.local_rotation import NEAR, turned_far
 from shellform.structure.elements.rotation import matrix
 
-# The least (a_y + b_y)·e_y, 2 at rest, from which the roll of the element triad is taken; below, where the chord
-# has turned about z until it lies nearly along them, it is taken from the z axes in the same way.
+# The least (a_y + b_y)·e_y, 2 at rest, from which the roll of the element triad is taken; below, where the
+# chord has turned about z until it lies nearly along them, it is taken from the z axes in the same way.
 _UPRIGHT = 0.25
 
 
@@ -46,12 +46,13 @@ def evaluate(  # type: ignore[no-untyped-def]
     turn,
 ):
     """One pass over the beams from `start` to `stop`; `blocks`, `local_force`, `local_deformation` are filled
-    where they have rows, `turn` (m,) with the largest of the ends' local rotations and the twist from one to the
-    other, rad, where an end is turned farther than equation (12) measures (local_rotation.py), else 0.
+    where they have rows, `turn` (m,) with the largest of the ends' local rotations and the twist from one to
+    the other, rad, where an end is turned farther than equation (12) measures (local_rotation.py), else 0.
 
     `given` (m, 7): stretch and sines of the local rotations where they are known better than from double
-    precision, else no rows (double_double.py); `material`: 1, or 0 to leave the material part out of the tangent.
-    Positions and quaternions may be complex, for derivatives by complex steps (third_derivatives.py).
+    precision, else no rows (double_double.py); `material`: 1, or 0 to leave the material part out of the
+    tangent. Positions and quaternions may be complex, for derivatives by complex steps
+    (third_derivatives.py).
     """
     dtype = positions.dtype
     E = np.empty((3, 3), dtype)
@@ -361,8 +362,8 @@ def _turn(E, K, row, column, X):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, inline="always")
 def _rolled_by_z(A, B):  # type: ignore[no-untyped-def]
-    """Whether the roll of the element has to be taken from the ends' z axes instead of their y axes: the chord
-    has turned about z so far that it lies along the y axes, or beyond them.
+    """Whether the roll of the element has to be taken from the ends' z axes instead of their y axes: the
+    chord has turned about z so far that it lies along the y axes, or beyond them.
     """
     upright, along = (A[1, 1] + B[1, 1]).real, (A[2, 2] + B[2, 2]).real
     if upright < _UPRIGHT:

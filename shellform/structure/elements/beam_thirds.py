@@ -2,9 +2,10 @@
 derivatives of the energy.
 
 The derivative of the compiled tangent (beam_kernels.py) by a degree of freedom is the imaginary part of that
-tangent at a place, or a turn, that is off by i h, over h: exact to the last digit, since nothing is subtracted
-(Squire and Trapp 1998). Moved as a whole an element keeps its stiffness: what the first end's place changes is
-what the second's does, with the other sign, so that nine evaluations an element serve for twelve.
+tangent at a place, or a turn, that is off by i h, over h: exact to the last digit, since nothing is
+subtracted (Squire and Trapp 1998). Moved as a whole an element keeps its stiffness: what the first end's
+place changes is what the second's does, with the other sign, so that nine evaluations an element serve for
+twelve.
 """
 
 from __future__ import annotations

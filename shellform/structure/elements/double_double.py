@@ -1,16 +1,16 @@
 """Numbers of twice the digits, and what elements need of them where stiffnesses lie far apart.
 
-A number is held as the sum of two doubles, hi + lo, which don't overlap: 32 digits (Dekker 1971; Knuth, The Art
-of Computer Programming 2, section 4.2.2). An element's stretch and local rotations are differences of coordinates
-of order 1; where the element is 1e12 times as stiff as its neighbours they matter to the 28th digit, and rounding
-the coordinates to the 16th is a force. Here the coordinates have a tail (`State.tail`), the differences are taken
-with all digits, and what is left of them, rounded only then, goes into the ordinary kernels: a force computed from
-a stretch that is right to 16 digits is so too.
+A number is held as the sum of two doubles, hi + lo, which don't overlap: 32 digits (Dekker 1971; Knuth, The
+Art of Computer Programming 2, section 4.2.2). An element's stretch and local rotations are differences of
+coordinates of order 1; where the element is 1e12 times as stiff as its neighbours they matter to the 28th
+digit, and rounding the coordinates to the 16th is a force. Here the coordinates have a tail (`State.tail`),
+the differences are taken with all digits, and what is left of them, rounded only then, goes into the ordinary
+kernels: a force computed from a stretch that is right to 16 digits is so too.
 
-The tangent has to keep digits as well: turned as a rigid body a stiff element must resist by nothing, not by what
-rounding leaves of its stiffness, which would be more than all the rest of the structure. So its material part,
-the sum of w u u' over the six ways in which an element deforms, is formed with all digits; the part due to the
-forces that it carries isn't large and is added in double precision.
+The tangent has to keep digits as well: turned as a rigid body a stiff element must resist by nothing, not by
+what rounding leaves of its stiffness, which would be more than all the rest of the structure. So its material
+part, the sum of w u u' over the six ways in which an element deforms, is formed with all digits; the part due
+to the forces that it carries isn't large and is added in double precision.
 """
 
 from __future__ import annotations
@@ -120,8 +120,8 @@ def _scaled(a, size):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def moved_on(positions, quaternions, tail, step, vectors):  # type: ignore[no-untyped-def]
-    """Coordinates (n, 7) and their tails (n, 7) after translations `step` (n, 3) and turns by the unit quaternions
-    `vectors` (n, 4) with tails (n, 4): (n, 4, 2).
+    """Coordinates (n, 7) and their tails (n, 7) after translations `step` (n, 3) and turns by the unit
+    quaternions `vectors` (n, 4) with tails (n, 4): (n, 4, 2).
     """
     place, rest = np.empty((len(positions), 7)), np.empty((len(positions), 7))
     for n in range(len(positions)):
@@ -153,8 +153,8 @@ def moved_on(positions, quaternions, tail, step, vectors):  # type: ignore[no-un
 
 @njit(cache=True, error_model="numpy")
 def quaternions_of(vectors):  # type: ignore[no-untyped-def]
-    """Unit quaternions (n, 4, 2) of rotation vectors (n, 3) of less than a turn, by the series of sine and cosine
-    of half their angle.
+    """Unit quaternions (n, 4, 2) of rotation vectors (n, 3) of less than a turn, by the series of sine and
+    cosine of half their angle.
     """
     result = np.empty((len(vectors), 4, 2))
     for n in range(len(vectors)):
@@ -177,7 +177,8 @@ def quaternions_of(vectors):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy")
 def _triad(quaternion, tail, frame, T):  # type: ignore[no-untyped-def]
-    """Writes a node's rotation times the axes `frame` (3, 3) into T (3, 3, 2), columns first: T[j] is axis j."""
+    """Writes a node's rotation times the axes `frame` (3, 3) into T (3, 3, 2), columns first: T[j] is axis
+    j."""
     w, x, y, z = (
         (quaternion[0], tail[3]),
         (quaternion[1], tail[4]),
@@ -203,10 +204,10 @@ def _triad(quaternion, tail, frame, T):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def beam_deformations(start, stop, positions, quaternions, tail, ends, frames, rest_length, given, modes):  # type: ignore[no-untyped-def]
-    """Of the beams from `start` to `stop`: into `given` (m, 7) stretch and sines of the local rotations (12), right
-    to the last digit, and where it has rows, into `modes` (m, 6, 9, 2) the gradients, by chord and both ends'
-    rotation increments in global axes, of stretch, twist, and sum and difference of the bending angles about y and
-    about z.
+    """Of the beams from `start` to `stop`: into `given` (m, 7) stretch and sines of the local rotations (12),
+    right to the last digit, and where it has rows, into `modes` (m, 6, 9, 2) the gradients, by chord and both
+    ends' rotation increments in global axes, of stretch, twist, and sum and difference of the bending angles
+    about y and about z.
     """
     d, v = np.empty((3, 2)), np.empty((3, 2))
     E, A, B = np.empty((3, 3, 2)), np.empty((3, 3, 2)), np.empty((3, 3, 2))
@@ -288,7 +289,8 @@ def _end(T, V, v0, v1, l, end, given, rate, wanted):  # type: ignore[no-untyped-
 
 @njit(cache=True)
 def _modes(E, rate, modes):  # type: ignore[no-untyped-def]
-    """The six ways of deforming in global axes: stretch; twist; sums and differences of the bending angles."""
+    """The six ways of deforming in global axes: stretch; twist; sums and differences of the bending
+    angles."""
     for r in range(6):
         for block in range(3):
             for i in range(3):
@@ -307,8 +309,9 @@ def _modes(E, rate, modes):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def beam_tangents(start, stop, modes, rest_length, stiffness, turn, blocks, result):  # type: ignore[no-untyped-def]
-    """Packed lower tangents (m, 78, 2) of the beams from `start` to `stop` into `result`: the material part from
-    the `modes` (18), and `blocks` (m, 78), what the forces add to it or, where an end is turned far, the whole.
+    """Packed lower tangents (m, 78, 2) of the beams from `start` to `stop` into `result`: the material part
+    from the `modes` (18), and `blocks` (m, 78), what the forces add to it or, where an end is turned far, the
+    whole.
     """
     weight = np.empty((6, 2))
     for e in range(start, stop):
@@ -343,8 +346,8 @@ def beam_tangents(start, stop, modes, rest_length, stiffness, turn, blocks, resu
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def cable_evaluation(start, stop, positions, tail, ends, rest_length, stiffness, energy, force, blocks):  # type: ignore[no-untyped-def]
-    """The cables from `start` to `stop` as `cable._evaluate` has them; `blocks` (c, 21, 2) filled where it has
-    rows.
+    """The cables from `start` to `stop` as `cable._evaluate` has them; `blocks` (c, 21, 2) filled where it
+    has rows.
     """
     d = np.empty((3, 2))
     for c in range(start, stop):

@@ -1,9 +1,10 @@
 """Local rotations of a beam's ends that are too large for the arcsines of equation (12).
 
-With R a triad in element axes, s its axial part sin(t) n, and v = t n its rotation vector, t up to 180 degrees,
-equation (12) reads a_k = arcsin(s_k). That is exact about one axis up to 90 degrees, where it turns back: a
-reversed element would cost nothing. The rotation vector is exact about any axis up to 180 degrees. The two
-agree about one axis, and to the third order about several; from 45 to 75 degrees one goes over into the other,
+With R a triad in element axes, s its axial part sin(t) n, and v = t n its rotation vector, t up to 180
+degrees, equation (12) reads a_k = arcsin(s_k). That is exact about one axis up to 90 degrees, where it turns
+back: a reversed element would cost nothing. The rotation vector is exact about any axis up to 180 degrees.
+The two agree about one axis, and to the third order about several; from 45 to 75 degrees one goes over into
+the other,
 
     theta = v + q (a - v),   q(cos t) from 1 to 0 with three continuous derivatives,
 
@@ -30,9 +31,9 @@ _FAR = 1.0 + 2.0 * np.cos(np.radians(75.0))  # and below which the rotation vect
 
 @njit(cache=True, error_model="numpy")
 def turned_far(T, moment, theta, h, curvature):  # type: ignore[no-untyped-def]
-    """For an end whose triad T (3, 3), element axes, has a trace below NEAR: fills its local rotations `theta`
-    (3,), their gradients `h` (3, 3) by the end's rotation increment, and `curvature` (3, 3), the symmetric
-    second derivatives times the `moment` (3,). Signs as in (12). Returns the angle, rad.
+    """For an end whose triad T (3, 3), element axes, has a trace below NEAR: fills its local rotations
+    `theta` (3,), their gradients `h` (3, 3) by the end's rotation increment, and `curvature` (3, 3), the
+    symmetric second derivatives times the `moment` (3,). Signs as in (12). Returns the angle, rad.
     """
     sign = np.array([1.0, -1.0, 1.0])
     v, angle = _vector(T)

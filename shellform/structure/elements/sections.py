@@ -135,8 +135,8 @@ def mass_per_length(section: Section) -> float:
 
 
 class Circular(ABC):
-    """A section whose bending stress doesn't ask in which direction it is bent; `radius`, m, is the outer one, unless
-    its `fibres` say otherwise."""
+    """A section whose bending stress doesn't ask in which direction it is bent; `radius`, m, is the outer
+    one, unless its `fibres` say otherwise."""
 
     radius: float
 

@@ -16,8 +16,8 @@ from shellform.structure.elements.double_double import moved_on, quaternions_of
 class State:
     """Positions (n, 3), m, and total rotations from the stress-free state, unit quaternions (n, 4).
 
-    `tail` (n, 7): what positions and quaternions have beyond double precision where stiffnesses lie so far apart
-    that it takes part (double_double.py), else None.
+    `tail` (n, 7): what positions and quaternions have beyond double precision where stiffnesses lie so far
+    apart that it takes part (double_double.py), else None.
     """
 
     positions: Reals

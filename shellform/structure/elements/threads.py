@@ -70,8 +70,8 @@ def side_by_side(work: Callable[[Item], Result], items: Sequence[Item]) -> list[
 
 
 def in_turn(work: Callable[[Item], Result], items: Sequence[Item]) -> Generator[Result, None, None]:
-    """The results of `side_by_side` one after the other, while those that come next are worked on. Who closes it
-    leaves out what hasn't begun by then.
+    """The results of `side_by_side` one after the other, while those that come next are worked on. Who closes
+    it leaves out what hasn't begun by then.
     """
     return _results(work, items, _AHEAD * cores())
 

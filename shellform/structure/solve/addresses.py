@@ -10,7 +10,8 @@ _WORK_AREA = 40_000_000  # bytes; OpenBLAS takes 33.6e6
 
 
 def has_room(size: int) -> bool:
-    """Whether so many bytes of addresses are free; none are taken. True where the system has no such limit."""
+    """Whether so many bytes of addresses are free; none are taken. True where the system has no such
+    limit."""
     if not hasattr(mmap, "MAP_PRIVATE"):  # Windows
         return True
     try:
@@ -21,8 +22,9 @@ def has_room(size: int) -> bool:
 
 
 def take_work_areas() -> None:
-    """Has NumPy's and SciPy's OpenBLAS take their work areas, which they keep. Each takes its own at its first
-    call, and where it is refused it tries again for ever. Raises MemoryError where there is no room for them.
+    """Has NumPy's and SciPy's OpenBLAS take their work areas, which they keep. Each takes its own at its
+    first call, and where it is refused it tries again for ever. Raises MemoryError where there is no room for
+    them.
     """
     import numpy as np
     from scipy.linalg.blas import dgemm

@@ -33,7 +33,8 @@ class Balance:
     None).
 
     `largest` is the largest component of any element's end force, moments over the node's arm, N: the scale
-    for residuals. `turned`, rad: the largest local rotation or twist of a beam, 0 where all are below 45 degrees.
+    for residuals. `turned`, rad: the largest local rotation or twist of a beam, 0 where all are below 45
+    degrees.
     """
 
     energy: float
@@ -46,8 +47,8 @@ class Balance:
 class Assembly:
     """Parts on `count` nodes, put together.
 
-    - `parts`, in order; `free` (f,): the degrees of freedom that aren't held, in order; `number` (6 count,): the place of
-      each degree of freedom among them, -1 where it is held or has no stiffness.
+    - `parts`, in order; `free` (f,): the degrees of freedom that aren't held, in order; `number` (6 count,):
+      the place of each degree of freedom among them, -1 where it is held or has no stiffness.
     - `arms` (count,), m: the mean rest length of each node's beams.
     - `matrix`: the pattern and the factor of the tangent.
     - `clock`, s: what was spent on assembly, factorisation and solve.
@@ -88,7 +89,8 @@ class Assembly:
         return other
 
     def beside(self) -> Assembly:
-        """The same assembly, its pattern shared, with a factor of its own, for work that goes on side by side."""
+        """The same assembly, its pattern shared, with a factor of its own, for work that goes on side by
+        side."""
         other = self.with_parts(self.parts)
         other.matrix = Symmetric(self.matrix.indptr, self.matrix.indices)
         other.clock = dict.fromkeys(self.clock, 0.0)
@@ -139,8 +141,8 @@ class Assembly:
         return Balance(energy, force.reshape(-1, 6), values, largest, turned)
 
     def unbalanced(self, state: State, load: Reals) -> Reals:
-        """Internal forces less the `load` (n, 6), N and N·m: what the ground bears (the reactions) where degrees of
-        freedom are held, and what is out of balance elsewhere."""
+        """Internal forces less the `load` (n, 6), N and N·m: what the ground bears (the reactions) where
+        degrees of freedom are held, and what is out of balance elsewhere."""
         return self.evaluate(state, tangent=False).force - load
 
     def foreseen(self, state: State, motion: Reals) -> tuple[Reals, ...]:
@@ -149,11 +151,11 @@ class Assembly:
 
     @told(Work.LOOPS)
     def tangent_of(self, state: State, deformations: Sequence[Reals]) -> Reals:
-        """The tangent's lower values (nnz,) at the state, of beams that have other `deformations` than follow from
-        it, part after part. Those of the last step's linear system make Newton's iteration a mixed one, in which
-        stresses are unknowns of their own (Magisano, Leonetti and Garcea 2017): a slender rod that a finite step
-        has stretched by second-order terms isn't told to be stiffer, or softer, by a force that the next step
-        takes away again."""
+        """The tangent's lower values (nnz,) at the state, of beams that have other `deformations` than follow
+        from it, part after part. Those of the last step's linear system make Newton's iteration a mixed one,
+        in which stresses are unknowns of their own (Magisano, Leonetti and Garcea 2017): a slender rod that a
+        finite step has stretched by second-order terms isn't told to be stiffer, or softer, by a force that
+        the next step takes away again."""
         began = time.perf_counter()
         given = iter(deformations)
         for part, dofs, (first, last) in zip(self.parts, self._dofs, self._shares, strict=True):

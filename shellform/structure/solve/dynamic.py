@@ -1,18 +1,18 @@
 """Implicit dynamic relaxation with velocity, damping and time step (Rombouts et al. 2018, 2019; section 3).
 
-The network moves in fictitious time by M a + C v = r(x), r = p - f (equation 8). With backward differences and r
-linearised at the end of a step dt,
+The network moves in fictitious time by M a + C v = r(x), r = p - f (equation 8). With backward differences
+and r linearised at the end of a step dt,
 
     (M/dt² + C/dt + K) dx = r + M v/dt,   v <- dx/dt,
 
 from rest. M is diagonal, 1 for translations and the square of an element length for rotations, times the mean
-stiffness of a translation, so that the natural time of the stiffest motions is about 1; C = c M. Kinetic damping:
-where the kinetic energy v'Mv/2 has passed a peak the velocity is set to zero. The time step grows while steps
-succeed, which takes the method over into Newton-Raphson, and is cut where the matrix isn't positive definite or a
-node or an element would turn too far.
+stiffness of a translation, so that the natural time of the stiffest motions is about 1; C = c M. Kinetic
+damping: where the kinetic energy v'Mv/2 has passed a peak the velocity is set to zero. The time step grows
+while steps succeed, which takes the method over into Newton-Raphson, and is cut where the matrix isn't
+positive definite or a node or an element would turn too far.
 
-`equilibrium.py` has the form that is the default: no velocity, and the mass only as large as definiteness and a
-falling potential ask for.
+`equilibrium.py` has the form that is the default: no velocity, and the mass only as large as definiteness and
+a falling potential ask for.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def dynamic(
 ) -> Equilibrium:
     """The equilibrium in which the fictitious motion from `start` under the dead `load` (n, 6) comes to rest.
 
-    `time_step` to begin with and viscous `damping`, in natural times of the stiffest motions; `limit` bounds the
-    factorisations. Raises NotConverged with the last state.
+    `time_step` to begin with and viscous `damping`, in natural times of the stiffest motions; `limit` bounds
+    the factorisations. Raises NotConverged with the last state.
     """
     measure, turning = ResidualNorm(assembly), Turning(assembly, load)
     state, now = start, assembly.evaluate(start)

@@ -374,8 +374,8 @@ class _Relaxation:
         return known
 
     def drowns(self) -> bool:
-        """Whether rounding surely hides what there is to find from the start; where it only may, steps show it,
-        for those that stagnate too high are given up (`balanced`)."""
+        """Whether rounding surely hides what there is to find from the start; where it only may, steps show
+        it, for those that stagnate too high are given up (`balanced`)."""
         return self.measure.drowns(self.now, self.state, self.load, self.tolerance, surely=True)
 
     def _noise(self) -> float:

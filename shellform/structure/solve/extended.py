@@ -1,13 +1,15 @@
-"""Assembly and factorisation with twice the digits, for stiffnesses that lie too far apart for double precision.
+"""Assembly and factorisation with twice the digits, for stiffnesses that lie too far apart for double
+precision.
 
-Where one part of a structure is 1e8 times as stiff as another, or a member a millionth as long, the last bit of a
-coordinate is a force that the load can't be told from, and the soft part's stiffness is lost beside the rounding of
-the stiff one's. `ExtendedAssembly` stands in for an assembly then: states have tails, the tangent (nnz, 2) is a sum
-of two doubles an entry (elements/double_double.py). What calls for it is told by `ResidualNorm.rounding`.
+Where one part of a structure is 1e8 times as stiff as another, or a member a millionth as long, the last bit
+of a coordinate is a force that the load can't be told from, and the soft part's stiffness is lost beside the
+rounding of the stiff one's. `ExtendedAssembly` stands in for an assembly then: states have tails, the tangent
+(nnz, 2) is a sum of two doubles an entry (elements/double_double.py). What calls for it is told by
+`ResidualNorm.rounding`.
 
-L D L' of it is made column by column with all its digits (up-looking, Davis 2005), so that its pivots tell definiteness
-and the number of negative eigenvalues; that takes some hundred times as long as PARDISO, and is left for where the
-leading digits' factor can't be refined (refined.py).
+L D L' of it is made column by column with all its digits (up-looking, Davis 2005), so that its pivots tell
+definiteness and the number of negative eigenvalues; that takes some hundred times as long as PARDISO, and is
+left for where the leading digits' factor can't be refined (refined.py).
 """
 
 from __future__ import annotations
@@ -49,8 +51,8 @@ class ExtendedAssembly(Assembly):
 
     @cached_property
     def chords(self) -> ChordKeeper:
-        """As `Assembly.chords`, all beams with one axial stiffness: stiff ones would leave the soft ones none of
-        the digits.
+        """As `Assembly.chords`, all beams with one axial stiffness: stiff ones would leave the soft ones none
+        of the digits.
         """
         alike = [replace(part, axial=np.ones(len(part.ends))) for part in self.beams]
         return _ExactChords(self.count, alike, self.free)
@@ -110,8 +112,8 @@ class ExtendedSymmetric(Symmetric):
 
     @cached_property
     def _order(self) -> tuple[Indices, Indices, Indices, Indices, Indices, Indices]:
-        """The order of elimination, the permuted pattern's columns (upper triangle), where each of its entries
-        comes from, and the elimination tree with the columns of L.
+        """The order of elimination, the permuted pattern's columns (upper triangle), where each of its
+        entries comes from, and the elimination tree with the columns of L.
         """
         size = self.size
         weight = np.ones(len(self.indices))
@@ -224,8 +226,8 @@ class ExtendedFactor:
 
 
 class _ExactChords(ChordKeeper):
-    """The correction to the last digit: its differences are written out, so that it vanishes with the step, and its
-    solution is refined, since stiff elements answer to what the anchor leaves of it.
+    """The correction to the last digit: its differences are written out, so that it vanishes with the step,
+    and its solution is refined, since stiff elements answer to what the anchor leaves of it.
     """
 
     def corrected(self, state: State, step: Reals) -> Reals:

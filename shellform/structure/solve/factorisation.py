@@ -351,7 +351,8 @@ def _solve(order, starts, rows, entries, right):  # type: ignore[no-untyped-def]
 
 
 class _SuperLU:
-    """A factor by SciPy's SuperLU, its own for good. Raises NotPositiveDefinite where it isn't, if it is to be `definite`."""
+    """A factor by SciPy's SuperLU, its own for good. Raises NotPositiveDefinite where it isn't, if it is to
+    be `definite`."""
 
     def __init__(self, full: sp.csc_array, *, definite: bool = True) -> None:
         options = {"SymmetricMode": True}

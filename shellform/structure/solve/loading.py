@@ -6,15 +6,16 @@ unless said otherwise); each is solved from the one before by steps that may not
 (`on_branch`). Where they do, or where many steps are needed, the increment is halved, down to `SMALLEST` of
 the whole; after two that succeed it is doubled again. Where even the smallest fails the stable branch has
 ended; the rest is then applied at once, supports being moved no farther at a time than no element folds, and
-implicit dynamic relaxation follows the snap-through to wherever it ends. So the same start and load always lead to the same state. Supports that move take the free nodes
-along by the tangent, K dx = -K_held d, before the steps begin.
+implicit dynamic relaxation follows the snap-through to wherever it ends. So the same start and load always
+lead to the same state. Supports that move take the free nodes along by the tangent, K dx = -K_held d, before
+the steps begin.
 
-An increment may be so wide that its steps leap over an unstable stretch and meet nothing on their way that isn't
-definite: a truss of von Mises that bears 0.38 is at rest under 1.0 beyond its snap, with positive definite tangents only.
-The cubic of the load factor over the way between both states, from the factors and from the rates K gives at both, then
-turns round twice in between (`turns_between`); `heeding` that takes one factorisation more an increment. What stiffens
-a great deal, and a cable that goes slack, look alike, even in the smallest increment: only where the structure comes back
-when it is taken back has nothing snapped.
+An increment may be so wide that its steps leap over an unstable stretch and meet nothing on their way that
+isn't definite: a truss of von Mises that bears 0.38 is at rest under 1.0 beyond its snap, with positive
+definite tangents only. The cubic of the load factor over the way between both states, from the factors and
+from the rates K gives at both, then turns round twice in between (`turns_between`); `heeding` that takes one
+factorisation more an increment. What stiffens a great deal, and a cable that goes slack, look alike, even in
+the smallest increment: only where the structure comes back when it is taken back has nothing snapped.
 """
 
 from __future__ import annotations
@@ -140,9 +141,9 @@ def advance(
 
     Increments are at most `step` and at least `smallest`, shares of the whole. With `stay` the end of the
     stable branch is returned instead of what lies beyond the snap-through: the last stable equilibrium and
-    the share of the change that it bears; `heeding`: increments that leap over an unstable stretch are halved too.
-    `report(share, equilibrium)` is called at each accepted increment;
-    `limit` bounds the factorisations of what follows a snap-through. Raises NotConverged.
+    the share of the change that it bears; `heeding`: increments that leap over an unstable stretch are halved
+    too. `report(share, equilibrium)` is called at each accepted increment; `limit` bounds the factorisations
+    of what follows a snap-through. Raises NotConverged.
     """
     share, spent, good = 0.0, 0, 0
     state, found = start, None
@@ -199,8 +200,8 @@ def advance(
 
 
 def turns_between(before: float, after: float, mean: float) -> bool:
-    """Whether a cubic with the slopes `before` and `after`, of one sign, at its ends, and the `mean` slope from one to the
-    other, has slopes of the other sign on its way."""
+    """Whether a cubic with the slopes `before` and `after`, of one sign, at its ends, and the `mean` slope
+    from one to the other, has slopes of the other sign on its way."""
     # At the share t of the way its slope is before - 2 half t + square t².
     half, square = 2.0 * before + after - 3.0 * mean, 3.0 * (before + after - 2.0 * mean)
     if not (before * after > 0.0 and before * square > 0.0):
@@ -233,7 +234,8 @@ def _at_rest(assembly: Assembly, state: State, load: Reals) -> bool:
 
 
 def _motion(assembly: Assembly, state: State, drive: Drive) -> Reals | None:
-    """How all nodes move (n, 3) with the load factor, m, by the tangent; None where that isn't positive definite."""
+    """How all nodes move (n, 3) with the load factor, m, by the tangent; None where that isn't positive
+    definite."""
     own = fit_for(assembly, state)
     grows = drive.load - assembly.force_along(state, drive.imposed) if drive.moves_supports else drive.load
     motion = drive.imposed.ravel().copy()
@@ -248,9 +250,9 @@ def _motion(assembly: Assembly, state: State, drive: Drive) -> Reals | None:
 def _may_leap(
     assembly: Assembly, before: State, after: State, drive: Drive, factor: float, change: float
 ) -> bool:
-    """Whether an increment from one state to the other, by a `change` of the load factor up to this one, may have leapt over
-    an unstable stretch: whether the cubic through both, with the rates at which the nodes move there, turns back. A state
-    that isn't in equilibrium before, or has other digits, tells nothing."""
+    """Whether an increment from one state to the other, by a `change` of the load factor up to this one, may
+    have leapt over an unstable stretch: whether the cubic through both, with the rates at which the nodes
+    move there, turns back. A state that isn't in equilibrium before, or has other digits, tells nothing."""
     if not _alike(before, after) or not _at_rest(assembly, before, drive.at(factor - change)):
         return False
     way = after.positions - before.positions
@@ -267,8 +269,9 @@ def _may_leap(
 def _returns(
     assembly: Assembly, before: State, after: State, drive: Drive, factor: float, change: float, limit: int
 ) -> bool:
-    """Whether the state `after` an increment to the load factor comes back to the one `before` it where the `change` of
-    the factor is taken back: on one branch it does, with all kinks that cables make, and from another one it doesn't."""
+    """Whether the state `after` an increment to the load factor comes back to the one `before` it where the
+    `change` of the factor is taken back: on one branch it does, with all kinks that cables make, and from
+    another one it doesn't."""
     try:
         back, _ = _carried(assembly, after, drive, -change)
         there = find_equilibrium(assembly, back, drive.at(factor - change), limit=limit)
@@ -281,8 +284,9 @@ def _returns(
 def _moved_on(
     assembly: Assembly, state: State, drive: Drive, share: float, begin: float, end: float
 ) -> tuple[State, float]:
-    """The state with the supports moved on from a share of the whole, to its end or as far as they turn no element
-    too far and halve the length of none, and the share reached. Raises NotConverged where they can't move.
+    """The state with the supports moved on from a share of the whole, to its end or as far as they turn no
+    element too far and halve the length of none, and the share reached. Raises NotConverged where they can't
+    move.
     """
     goal = 1.0
     while True:
@@ -301,8 +305,8 @@ def _moved_on(
 
 
 def turns_half(motion: Reals) -> bool:
-    """Whether a motion (n, 6), m and rad, turns a node by half a turn or more: the state after it doesn't tell which way,
-    or how often, it went round."""
+    """Whether a motion (n, 6), m and rad, turns a node by half a turn or more: the state after it doesn't
+    tell which way, or how often, it went round."""
     return bool(np.linalg.norm(motion[:, 3:], axis=1).max(initial=0.0) >= np.pi)
 
 

@@ -20,8 +20,8 @@ _LOADING = 400_000_000
 
 @contextmanager
 def limited_to_free_memory() -> Iterator[None]:
-    """Limits the data of this process, within, to what is free now, or to what loading takes if that is more, where
-    the system can (Linux) and nobody has set a limit already.
+    """Limits the data of this process, within, to what is free now, or to what loading takes if that is more,
+    where the system can (Linux) and nobody has set a limit already.
     """
     free = free_memory()
     if sys.platform != "linux" or free is None:

@@ -9,13 +9,14 @@ threads, told to add up in the same order however many there are (conditional nu
 34), so that the same case gives the same bytes. Minimum degree beats nested dissection up to some 300,000
 degrees of freedom.
 
-Two levels of blocks (iparm 24) are meant for many threads and serve one as well where many solutions follow each
-factorisation: of gridshells with 7,488, 11,520, 31,200 and 127,296 degrees of freedom a factorisation takes 1.07,
-1.08, 1.16 and 1.08 times as long as in one level, a solve 0.58, 0.68, 0.75 and 1.1 times, the analysis 1.8, 2.0, 1.9 and
-1.5 times. The later kind of them (10) is faster than both, but told of 38 in a hundred matrices that were not definite, and
-of the others nothing. Orders of elimination made outside (iparm 5) do without two levels: AMD of the graph of nodes
-halves the analysis of small ones, and solves take 1.6 times as long. Reference: Intel oneAPI Math Kernel Library, Developer Reference, "oneMKL
-PARDISO", parameters as numbered there (from 1).
+Two levels of blocks (iparm 24) are meant for many threads and serve one as well where many solutions follow
+each factorisation: of gridshells with 7,488, 11,520, 31,200 and 127,296 degrees of freedom a factorisation
+takes 1.07, 1.08, 1.16 and 1.08 times as long as in one level, a solve 0.58, 0.68, 0.75 and 1.1 times, the
+analysis 1.8, 2.0, 1.9 and 1.5 times. The later kind of them (10) is faster than both, but told of 38 in a
+hundred matrices that were not definite, and of the others nothing. Orders of elimination made outside (iparm
+5) do without two levels: AMD of the graph of nodes halves the analysis of small ones, and solves take 1.6
+times as long. Reference: Intel oneAPI Math Kernel Library, Developer Reference, "oneMKL PARDISO", parameters
+as numbered there (from 1).
 """
 
 from __future__ import annotations
@@ -44,8 +45,8 @@ _ANALYSIS = 96  # bytes an entry: 51 to 62 were measured for cubes of rods of 50
 # bytes of addresses: 260e6 of files that it loads for the newest processors, and its buffers
 _PARTS = 320_000_000
 _BESIDE = 64_000_000  # bytes that a phase takes beside what it tells of; 31e6 were measured
-# right-hand sides, which two threads solve side by side without waiting, on one core too: each comes out otherwise
-# as one of so many on a thread than as one of half as many
+# right-hand sides, which two threads solve side by side without waiting, on one core too: each comes out
+# otherwise as one of so many on a thread than as one of half as many
 _MANY = 16
 
 

@@ -19,9 +19,9 @@ Near a limit point K is nearly singular, but dx is not. K needn't be positive de
 whose negative pivots count the negative eigenvalues at each point. Where the count changes between two
 points, a limit point lies between them if f turns round there, else a bifurcation; it is located by bisecting
 the step on that count. Steps follow the curvature of the path: longer where Newton needs few iterations, cut
-where it doesn't get there, or where the cubic through both its ends with their rates turns round twice in between:
-so long a step leaps from one stable branch to the next, over two limit points. Where no step gets on from a stable point, as
-before the kink that a cable makes, the load alone leads on (walk.py).
+where it doesn't get there, or where the cubic through both its ends with their rates turns round twice in
+between: so long a step leaps from one stable branch to the next, over two limit points. Where no step gets on
+from a stable point, as before the kink that a cable makes, the load alone leads on (walk.py).
 """
 
 from __future__ import annotations
@@ -62,10 +62,11 @@ def follow(
 ) -> Iterator[PathPoint]:
     """The points of the path from the equilibrium `start` at factor 0, one by one.
 
-    It ends when the factor comes to `goal` for the first time. With a `lead` that degree of freedom is led instead, up
-    to its displacement. `first`: the first step, as a share of the goal or of the led displacement; `most` points. With
-    `events` limit points and bifurcations are located and given as points of their own. Raises NotConverged with the last state where no step succeeds
-    or the points run out, InputError for a held degree of freedom as lead.
+    It ends when the factor comes to `goal` for the first time. With a `lead` that degree of freedom is led
+    instead, up to its displacement. `first`: the first step, as a share of the goal or of the led
+    displacement; `most` points. With `events` limit points and bifurcations are located and given as points
+    of their own. Raises NotConverged with the last state where no step succeeds or the points run out,
+    InputError for a held degree of freedom as lead.
     """
     precise = with_twice_the_digits(assembly)
     load, measure = drive.at(goal), ResidualNorm(assembly)
@@ -130,8 +131,8 @@ def follow(
 def _onward(
     walk: Walk, here: OnPath, size: float, smallest: float, doubted: Doubted, *, began: bool
 ) -> tuple[float, OnPath]:
-    """The step taken and its point; the `doubted` one where a cable's kink lies on the way that no shorter one gets over.
-    Raises Missed."""
+    """The step taken and its point; the `doubted` one where a cable's kink lies on the way that no shorter
+    one gets over. Raises Missed."""
     try:
         there = walk.step(here, size)
     except Missed:
@@ -150,8 +151,8 @@ def _onward(
 
 
 def _by_load(walk: Walk, here: OnPath, size: float, goal: float) -> OnPath | None:
-    """The point that the load alone leads to, by as much as a step of this `size`, m, takes by the rate at `here`, and no
-    farther than to the `goal`; None where it leads to none."""
+    """The point that the load alone leads to, by as much as a step of this `size`, m, takes by the rate at
+    `here`, and no farther than to the `goal`; None where it leads to none."""
     end = here.factor + size * here.rate
     if (end - goal) * (here.factor - goal) < 0.0:
         end = goal

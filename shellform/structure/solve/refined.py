@@ -1,9 +1,9 @@
 """Solutions with twice the digits by a factor of the leading ones.
 
-Where the load is merely small, as that of one crossing of ten thousand, the tangent's leading digits do for its
-factor: solutions are refined against all digits (Wilkinson; Higham 2002, chapter 12). They do where I - M^-1 K, with
-K the tangent and M what was factorised, shrinks a random vector a hundredfold at its third turn, for then the
-eigenvalues of M^-1 K lie about 1 and K is as positive definite as M.
+Where the load is merely small, as that of one crossing of ten thousand, the tangent's leading digits do for
+its factor: solutions are refined against all digits (Wilkinson; Higham 2002, chapter 12). They do where I -
+M^-1 K, with K the tangent and M what was factorised, shrinks a random vector a hundredfold at its third turn,
+for then the eigenvalues of M^-1 K lie about 1 and K is as positive definite as M.
 """
 
 from __future__ import annotations
@@ -20,7 +20,8 @@ _NEAR = 1e-2  # of a vector that a third turn may leave of it
 
 
 class RefinedFactor:
-    """The factor of a positive definite matrix's leading digits; solutions are refined against `values` (nnz, 2)."""
+    """The factor of a positive definite matrix's leading digits; solutions are refined against `values` (nnz,
+    2)."""
 
     negative = 0
 

@@ -1,5 +1,5 @@
-"""How far a state is from equilibrium, how far its elements may turn, what holds a rod that is free to spin, and
-Newton's step under dead moments.
+"""How far a state is from equilibrium, how far its elements may turn, what holds a rod that is free to spin,
+and Newton's step under dead moments.
 """
 
 from __future__ import annotations
@@ -69,9 +69,10 @@ class ResidualNorm:
         return stiffest * last_bit / scale if scale > 0.0 else 0.0
 
     def most(self, balance: Balance, load: Reals, tolerance: float) -> float:
-        """The largest residual of what is told to be an equilibrium: 1e-6 of the `load` (n, 6), or the `tolerance` where
-        it is looser. A structure without load is measured by its own stress: 1e-5 of the largest internal force
-        (what double precision leaves of edge beams beside bent laths; a tenth of it takes twice the digits).
+        """The largest residual of what is told to be an equilibrium: 1e-6 of the `load` (n, 6), or the
+        `tolerance` where it is looser. A structure without load is measured by its own stress: 1e-5 of the
+        largest internal force (what double precision leaves of edge beams beside bent laths; a tenth of it
+        takes twice the digits).
         """
         applied, scale = float(_largest(load.ravel(), self._reach)), self.scale(balance, load)
         share = max(OF_LOAD, tolerance)
@@ -88,10 +89,10 @@ class ResidualNorm:
         *,
         whole: Reals | None = None,
     ) -> bool:
-        """Whether the residual of a state counts as none: within the tolerance or, where steps have stopped to
-        bring anything (`stagnant`), within what rounding leaves, and never above `most`, of the load or, on the way
-        to it, of the `whole` (n, 6), less what rounding may hide of the residual itself. A structure without load
-        whose forces are all rounding is without stress.
+        """Whether the residual of a state counts as none: within the tolerance or, where steps have stopped
+        to bring anything (`stagnant`), within what rounding leaves, and never above `most`, of the load or,
+        on the way to it, of the `whole` (n, 6), less what rounding may hide of the residual itself. A
+        structure without load whose forces are all rounding is without stress.
         """
         measured = load if whole is None else whole
         most, noise = self.most(balance, measured, tolerance), self.rounding(balance, state, load)
@@ -106,15 +107,15 @@ class ResidualNorm:
     def drowns(
         self, balance: Balance, state: State, load: Reals, tolerance: float, *, surely: bool = False
     ) -> bool:
-        """Whether rounding may leave more than the largest residual that may be told to be none; whether it does
-        so `surely`, for its bound is sixteen times what it leaves or more."""
+        """Whether rounding may leave more than the largest residual that may be told to be none; whether it
+        does so `surely`, for its bound is sixteen times what it leaves or more."""
         noise = self.rounding(balance, state, load) / (_BOUND if surely else 1.0)
         return bool(noise > self.most(balance, load, tolerance) and (load.any() or noise <= _NO_STRESS))
 
 
 def overturned(assembly: Assembly, before: State, was: float, after: State, turned: float) -> bool:
-    """Whether an element has turned, or may have on the way, beyond what its local rotation is measured for: from
-    one state to the other, at which `Balance.turned` was `was` and is `turned`.
+    """Whether an element has turned, or may have on the way, beyond what its local rotation is measured for:
+    from one state to the other, at which `Balance.turned` was `was` and is `turned`.
     """
     if turned == 0.0:  # more in one step than a chord and nodes together can turn
         return False

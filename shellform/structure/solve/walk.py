@@ -1,8 +1,10 @@
-"""One step of a path after the other (path.py): Newton's steps of a given length, to a given factor, or by the load alone.
+"""One step of a path after the other (path.py): Newton's steps of a given length, to a given factor, or by
+the load alone.
 
-Where a cable goes slack or taut a path has a kink, and may bend there by more than a right angle. Newton's steps of a fixed
-length then go to and fro between both sides, however short they are. On a stable branch the load alone gets over it (loading.py):
-it grows on either side. Which way the path goes on tells the factor: with as many negative eigenvalues it grows, or falls, as before.
+Where a cable goes slack or taut a path has a kink, and may bend there by more than a right angle. Newton's
+steps of a fixed length then go to and fro between both sides, however short they are. On a stable branch the
+load alone gets over it (loading.py): it grows on either side. Which way the path goes on tells the factor:
+with as many negative eigenvalues it grows, or falls, as before.
 """
 
 from __future__ import annotations
@@ -76,9 +78,10 @@ class Missed(Exception):
 
 
 class Walk:
-    """The path of the `assembly` under a `drive` from the state `start`, and what was found of it on the way: `spent`
-    factorisations, the `largest` factor come to, and whether only rotations move (`by_turns`). The number of the degree of
-    freedom that is `led` among the free ones, None where none is; the `direction` of the first step, 1 or -1."""
+    """The path of the `assembly` under a `drive` from the state `start`, and what was found of it on the way:
+    `spent` factorisations, the `largest` factor come to, and whether only rotations move (`by_turns`). The
+    number of the degree of freedom that is `led` among the free ones, None where none is; the `direction` of
+    the first step, 1 or -1."""
 
     def __init__(
         self, assembly: Assembly, start: State, drive: Drive, tolerance: float, goal: float, lead: Lead | None
@@ -110,8 +113,8 @@ class Walk:
         return float(state.positions[lead[0], lead[1]] - self.start.positions[lead[0], lead[1]])
 
     def between(self, before: State, after: State) -> Reals:
-        """Translations (t,) of the free degrees of freedom from one state to the other; rotation vectors where
-        nothing else moves.
+        """Translations (t,) of the free degrees of freedom from one state to the other; rotation vectors
+        where nothing else moves.
         """
         if self.by_turns:
             back = before.quaternions * [1.0, -1.0, -1.0, -1.0]
@@ -120,8 +123,8 @@ class Walk:
         return (after.positions - before.positions).ravel()[self._flat()]
 
     def point(self, state: State, factor: float, iterations: int) -> OnPath:
-        """The equilibrium `state` at a load factor, with the tangent of the path there. Raises InputError where nothing
-        moves under the load."""
+        """The equilibrium `state` at a load factor, with the tangent of the path there. Raises InputError
+        where nothing moves under the load."""
         balance = self.assembly.evaluate(state)
         matrix = self._factor(balance)
         tangent = self.turning.solve(matrix, balance, self._drive(state))
@@ -232,8 +235,8 @@ class Walk:
         )
 
     def _settled(self, here: OnPath, state: State, factor: float, iterations: int) -> OnPath:
-        """The converged point, its rate signed by which way along the path the factor grows. Raises Missed where
-        an element has turned too far on the way.
+        """The converged point, its rate signed by which way along the path the factor grows. Raises Missed
+        where an element has turned too far on the way.
         """
         found = self.point(state, factor, iterations)
         if overturned(self.assembly, here.state, here.turned, state, found.turned):
@@ -245,8 +248,8 @@ class Walk:
         return replace(found, rate=onward * abs(found.rate))
 
     def by_load(self, here: OnPath, end: float) -> OnPath | None:
-        """The point to which the load alone leads on the stable branch from `here`, at the factor `end` or where that branch
-        ends before; None where `here` isn't stable, or nothing is reached."""
+        """The point to which the load alone leads on the stable branch from `here`, at the factor `end` or
+        where that branch ends before; None where `here` isn't stable, or nothing is reached."""
         if not here.equilibrium.stable:
             return None
         found = advance(
@@ -268,8 +271,8 @@ class Walk:
     def _balanced(
         self, residual: float, before: float, balance: Balance, state: State, factor: float
     ) -> bool:
-        """Whether a state of the path is in equilibrium after a step from the residual `before`. The load that counts
-        is the largest on the way, for it falls to nothing on it.
+        """Whether a state of the path is in equilibrium after a step from the residual `before`. The load
+        that counts is the largest on the way, for it falls to nothing on it.
         """
         whole = self.drive.at(max(self.largest, abs(factor)))
         stagnant = residual > STAGNANT * before

@@ -1,7 +1,8 @@
-"""What memory and processor time a reader's process may take: as much as files of its size do, and then as the mesh
-does that is made of its surfaces. A damaged file may ask for all there is, and never come to an end.
+"""What memory and processor time a reader's process may take: as much as files of its size do, and then as
+the mesh does that is made of its surfaces. A damaged file may ask for all there is, and never come to an end.
 
-Measured: OpenCASCADE takes 0.5 s of a processor and 0.1 GB for a dome of 10 kB, and its mesh 45 µs and 0.9 kB a triangle.
+Measured: OpenCASCADE takes 0.5 s of a processor and 0.1 GB for a dome of 10 kB, and its mesh 45 µs and 0.9 kB
+a triangle.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ _SECONDS_A_TRIANGLE = 5e-4
 
 
 def allow_file(file: Path) -> None:
-    """Limits this process to what reading a file of its size takes. More memory is refused to it, and beyond the time
-    the system ends it by SIGXCPU."""
+    """Limits this process to what reading a file of its size takes. More memory is refused to it, and beyond
+    the time the system ends it by SIGXCPU."""
     if resource is None:
         return
     size = file.stat().st_size

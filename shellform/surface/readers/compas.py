@@ -2,9 +2,9 @@
 
 A file is one mesh, or a session with a scene of several; each is found by its `vertex` and `face` tables, in
 the layouts of COMPAS 1 (`dva`, faces as lists) and 2 (`default_vertex_attributes`, `facedata`). Of a
-RHINOVault session the `ThrustDiagram` is the shell; its faces marked as without load are openings. A file without a mesh
-may hold a network (`node` and `edge` tables, as force density programs write): the faces between its lines are
-the shell.
+RHINOVault session the `ThrustDiagram` is the shell; its faces marked as without load are openings. A file
+without a mesh may hold a network (`node` and `edge` tables, as force density programs write): the faces
+between its lines are the shell.
 """
 
 from __future__ import annotations
@@ -80,7 +80,8 @@ def read_compas(file: Path, choice: Choice) -> Draft:
 
 
 def _tables(data: Any, name: str, points: str, joins: str) -> Iterator[tuple[str, dict[str, Any]]]:
-    """The tables that hold one of `points` and one of what `joins` them, with the name or the kind of the object around each."""
+    """The tables that hold one of `points` and one of what `joins` them, with the name or the kind of the
+    object around each."""
     if isinstance(data, list):
         for each in data:
             yield from _tables(each, name, points, joins)

@@ -24,8 +24,8 @@ _ENTRIES = ("surface.layer", "surface.object")
 @dataclass(frozen=True)
 class Draft:
     """`points` (v, 3) in units of `metres` m (None: the file doesn't say) with the vertical axis `up`;
-    `triangles` (t, 3); unit `normals` (v, 3) where the source knows them, zero where it knows others; `notes`, a sentence for each thing
-    left out or chosen."""
+    `triangles` (t, 3); unit `normals` (v, 3) where the source knows them, zero where it knows others;
+    `notes`, a sentence for each thing left out or chosen."""
 
     points: Reals
     triangles: Indices
@@ -129,8 +129,9 @@ def joined(parts: Sequence[MeshObject], choice: Choice, where: str) -> Draft:
 
 
 def require_mesh_size(size: float, length: float, width: float, *, where: str, give: str) -> float:
-    """About how many triangles of that size, m, a surface of `length` × `width`, m, gets. Raises InputError where these are
-    too many, with the size that is possible, and for what is no size; `give` is what to give instead."""
+    """About how many triangles of that size, m, a surface of `length` × `width`, m, gets. Raises InputError
+    where these are too many, with the size that is possible, and for what is no size; `give` is what to give
+    instead."""
     require_number(size, above=0.0, where=where, give=give)
     length, width = float(length), float(width)  # NumPy's warn where they overflow
     expected = _TRIANGLES * (length / size) * (width / size)

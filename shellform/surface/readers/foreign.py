@@ -1,5 +1,5 @@
-"""Readers of foreign libraries and of nested formats, and builder scripts, in a process of their own, so that a
-crash, a hang or a flood of memory in them becomes a message.
+"""Readers of foreign libraries and of nested formats, and builder scripts, in a process of their own, so that
+a crash, a hang or a flood of memory in them becomes a message.
 
 The child imports one reader (gmsh, rhino3dm, meshio, plyfile or VTK; 0.3 to 0.7 s), reads, and hands its
 arrays back through a pipe: no file is needed for that.

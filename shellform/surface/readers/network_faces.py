@@ -1,8 +1,9 @@
-"""The faces between the lines of a network, as form-finding programs write shells that they hold as nodes and edges.
+"""The faces between the lines of a network, as form-finding programs write shells that they hold as nodes and
+edges.
 
-Seen from above, the lines cut the plane into faces: from each line's end the next one is followed clockwise, until the
-walk closes. Walks round faces turn counter-clockwise; the one round the whole turns the other way. Lines that end in
-nothing bound no face.
+Seen from above, the lines cut the plane into faces: from each line's end the next one is followed clockwise,
+until the walk closes. Walks round faces turn counter-clockwise; the one round the whole turns the other way.
+Lines that end in nothing bound no face.
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from shellform.errors import InputError
 
 
 def faces_in_plan(points: Reals, lines: Indices, where: str) -> list[list[int]]:
-    """The faces, each with its corners counter-clockwise from above, of a network of `points` (n, 3) and `lines` (m, 2) between
-    them; `where` names it in errors. Raises InputError where lines cross, touch or lie on each other in plan, so that there
-    are none to tell."""
+    """The faces, each with its corners counter-clockwise from above, of a network of `points` (n, 3) and
+    `lines` (m, 2) between them; `where` names it in errors. Raises InputError where lines cross, touch or lie
+    on each other in plan, so that there are none to tell."""
     lines = _bounding(np.unique(np.sort(lines[lines[:, 0] != lines[:, 1]], axis=1), axis=0), len(points))
     if not len(lines):
         return []

@@ -79,14 +79,14 @@ def read_surface(
     """The surface in a file, in metres, z up.
 
     - `unit`: of files that state none; left out: "m".
-    - `up`: the file's vertical axis, "x", "y" or "z", "-z" where it points down; left out: the format's, and where that has
-      none z, but y, or else x, for a shell that lies on its side with z up and not with that.
+    - `up`: the file's vertical axis, "x", "y" or "z", "-z" where it points down; left out: the format's, and
+      where that has none z, but y, or else x, for a shell that lies on its side with z up and not with that.
     - `size`, m: of the mesh on CAD surfaces.
     - `layer`, `name`: the objects that are meant.
     - `face`: of a closed solid, "upper" or "lower".
     - `piece`: of several separate ones, 1 being the largest.
-    - `fill`: "holes", "edges" or "all" closes openings (fills.py), edges down to the `ground`, m; left out: the edge's
-      lowest point.
+    - `fill`: "holes", "edges" or "all" closes openings (fills.py), edges down to the `ground`, m; left out:
+      the edge's lowest point.
 
     `mended` of the result tells what was done. Raises InputError.
     """
@@ -164,8 +164,8 @@ def _closed(whole: Draft, source: str, fill: str | None, ground: float | None) -
 
 
 def _step_of_32_bits(draft: Draft) -> float:
-    """How far apart coordinates lie that are numbers of 32 bits, in the file's unit, where that is too far for a shell;
-    else 0."""
+    """How far apart coordinates lie that are numbers of 32 bits, in the file's unit, where that is too far
+    for a shell; else 0."""
     points = draft.points
     with np.errstate(over="ignore"):
         rounded = points.astype(np.float32)
@@ -176,8 +176,8 @@ def _step_of_32_bits(draft: Draft) -> float:
 
 
 def _hangs(surface: Surface) -> bool:
-    """Whether a surface looks like a form that hangs from its edge: its highest point lies on that, and its lowest
-    doesn't."""
+    """Whether a surface looks like a form that hangs from its edge: its highest point lies on that, and its
+    lowest doesn't."""
     level = surface.vertices[:, 2]
     edge = level[np.concatenate(surface.boundary)] if surface.boundary else level
     slack = _LEVEL * float(np.ptp(level))

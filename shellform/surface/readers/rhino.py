@@ -43,7 +43,8 @@ _SAMPLES = 161  # along each side, whose chords are then nearer to it than that
 @dataclass(frozen=True)
 class Item:
     """What is written: on `layer`, under a `name`, a NURBS curve through `points` (n, 3), m, a straight line
-    where there are two, a point where there is one, or where `triangles` are given their mesh; `strings` are its user strings."""
+    where there are two, a point where there is one, or where `triangles` are given their mesh; `strings` are
+    its user strings."""
 
     layer: str
     name: str
@@ -53,8 +54,8 @@ class Item:
 
 
 def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -> None:
-    """Writes the items in metres, each layer in its colour (#rrggbb), the same bytes each time, dated 1970. Raises
-    OSError where the file can't be written.
+    """Writes the items in metres, each layer in its colour (#rrggbb), the same bytes each time, dated 1970.
+    Raises OSError where the file can't be written.
     """
     model = rhino3dm.File3dm()
     model.Settings.ModelUnitSystem = rhino3dm.UnitSystem.Meters
@@ -89,8 +90,8 @@ def write_rhino(path: Path, items: Sequence[Item], colours: Mapping[str, str]) -
 
 
 def _through(points: Reals) -> Any:
-    """The cubic spline through the points over the chords' length, without a kink at its second and its last but
-    one point (de Boor 1978), as a NURBS curve; of less degree where there are fewer than four."""
+    """The cubic spline through the points over the chords' length, without a kink at its second and its last
+    but one point (de Boor 1978), as a NURBS curve; of less degree where there are fewer than four."""
     if len(points) == 2:
         return rhino3dm.LineCurve(*(rhino3dm.Point3d(*point) for point in points.tolist()))
     degree = min(3, len(points) - 1)

@@ -1,9 +1,10 @@
-"""What a Rhino file tells of when and where it was written, taken out of its bytes (openNURBS archive, version 7).
+"""What a Rhino file tells of when and where it was written, taken out of its bytes (openNURBS archive,
+version 7).
 
-After 32 bytes of heading a file is a row of chunks: a code (4 bytes), the length of what follows (8), that. The table of
-properties holds such chunks too: the path that was written to, and a history with who made and last edited the file,
-and the two dates (each eight whole numbers: second, minute, hour, day, month, year since 1900, weekday, day of the
-year), closed by a check sum. The file's last chunk states its length.
+After 32 bytes of heading a file is a row of chunks: a code (4 bytes), the length of what follows (8), that.
+The table of properties holds such chunks too: the path that was written to, and a history with who made and
+last edited the file, and the two dates (each eight whole numbers: second, minute, hour, day, month, year
+since 1900, weekday, day of the year), closed by a check sum. The file's last chunk states its length.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ _EPOCH = _DATE.pack(0, 0, 0, 1, 0, 70, 4, 0)
 
 
 def without_date_and_path(content: bytes) -> bytes:
-    """The same file, dated 1970 and without the path that it was written to. Raises ValueError for another layout."""
+    """The same file, dated 1970 and without the path that it was written to. Raises ValueError for another
+    layout."""
     parts = [content[:_HEADING]]
     for code, number, inside in _chunks(content, _HEADING):
         if code == _PROPERTIES:

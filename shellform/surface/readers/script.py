@@ -45,8 +45,8 @@ def function_of(module: ModuleType, name: str, path: Path) -> Callable[..., Any]
 
 
 def named_dimensions(build: Callable[..., Any], given: dict[str, float], path: Path) -> dict[str, float]:
-    """The dimensions, m, that `build` takes by keyword, those `given` in place of its defaults. Raises InputError for a
-    name that it doesn't take, and for a value or a default that is no positive number."""
+    """The dimensions, m, that `build` takes by keyword, those `given` in place of its defaults. Raises
+    InputError for a name that it doesn't take, and for a value or a default that is no positive number."""
     parameters = inspect.signature(build).parameters.values()
     known = {p.name: p.default for p in parameters if p.kind is inspect.Parameter.KEYWORD_ONLY}
     for name, value in known.items():

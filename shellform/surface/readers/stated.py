@@ -1,5 +1,6 @@
-"""What the text of a CAD file states by itself: its unit (STEP's length unit, IGES' global section), and whether it has
-"nan" for a number, on which OpenCASCADE doesn't come to an end (STEP, BREP) or makes another surface (IGES)."""
+"""What the text of a CAD file states by itself: its unit (STEP's length unit, IGES' global section), and
+whether it has "nan" for a number, on which OpenCASCADE doesn't come to an end (STEP, BREP) or makes another
+surface (IGES)."""
 
 from __future__ import annotations
 
@@ -32,8 +33,8 @@ def stated_unit(file: Path, kind: str) -> str | None:
 
 
 def line_without_number(file: Path, kind: str) -> int | None:
-    """The number of the first line of a "step", "iges" or "brep" file that has "nan" for a number; None where none
-    has."""
+    """The number of the first line of a "step", "iges" or "brep" file that has "nan" for a number; None where
+    none has."""
     text = file.read_text(encoding="latin-1")
     if "nan" not in text.lower():
         return None

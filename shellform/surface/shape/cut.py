@@ -1,8 +1,8 @@
 """A surface cut off at a level: what lies lower is left to plinths, walls or footings that reach up to there.
 
 Triangles across the level are divided where their edges cross it. A vertex nearer to such a crossing than a
-fraction of the edge is moved there, along the edge, so that no slivers are left on which normals can't be told.
-Normals are told anew: beside a crease that is cut off they aren't what they were.
+fraction of the edge is moved there, along the edge, so that no slivers are left on which normals can't be
+told. Normals are told anew: beside a crease that is cut off they aren't what they were.
 """
 
 from __future__ import annotations
@@ -62,8 +62,8 @@ def cut_off(surface: Surface, above: float) -> Surface:
 
 
 def _snapped(surface: Surface, above: float) -> tuple[Reals, Reals]:
-    """The vertices (v, 3), those near a crossing moved onto it, and on which side (v,) they are: 1 above, 0 on the
-    level, -1 below."""
+    """The vertices (v, 3), those near a crossing moved onto it, and on which side (v,) they are: 1 above, 0
+    on the level, -1 below."""
     points, faces = surface.vertices.copy(), surface.triangles
     height = points[:, 2] - above
     size = float(np.ptp(points[:, 2]))

@@ -11,22 +11,23 @@ since no rod on it, whichever way it runs, is then bent across the surface to le
     II_i = Σ_j C_ij n_i · (x_j - x_i) = II_i(v) + (L d)_i,   L_ij = C_ij n_i · D_j,
 
 of one side at the edge (a crease that runs out there bends rods as well), linear in d while the frames stay.
-With Z = II(v) + L d, whose eigenvalues are to be capped, this is a projection, solved by the alternating direction
-method of multipliers (Boyd et al. 2011, section 5.2):
+With Z = II(v) + L d, whose eigenvalues are to be capped, this is a projection, solved by the alternating
+direction method of multipliers (Boyd et al. 2011, section 5.2):
 
     (M + ρ Lᵀ W L) d = ρ Lᵀ W (Z - U - II(v)),   Z = capped(II + U),   U += II - Z
 
-with the areas M and the areas W of the forms' components, II_uv twice. The matrix is sparse and factored once for
-fixed frames; frames follow in a few rounds. ρ = R⁴ makes both terms of one size at the length R, where the change
-happens.
+with the areas M and the areas W of the forms' components, II_uv twice. The matrix is sparse and factored once
+for fixed frames; frames follow in a few rounds. ρ = R⁴ makes both terms of one size at the length R, where
+the change happens.
 
 D are normals smoothed over R, so that neighbours on both sides of a crease don't cross. Vertices on the
-ground stay on their level, and move in plan only where a crease runs into it; where that leaves none that keeps
-the cap, the ground is left uncapped: rods end there.
+ground stay on their level, and move in plan only where a crease runs into it; where that leaves none that
+keeps the cap, the ground is left uncapped: rods end there.
 
-Where much has to change, quadratics fitted across a sharp crease say little of the rounded one. Then the radius grows
-in stages from what the surface keeps to R, each from the places p that the one before has come to, with D, frames and multipliers
-made anew: ½ ∫ |p - v + d D|² dA is what is least there, so that it stays the change from the surface as given.
+Where much has to change, quadratics fitted across a sharp crease say little of the rounded one. Then the
+radius grows in stages from what the surface keeps to R, each from the places p that the one before has come
+to, with D, frames and multipliers made anew: ½ ∫ |p - v + d D|² dA is what is least there, so that it stays
+the change from the surface as given.
 """
 
 from __future__ import annotations
@@ -110,8 +111,8 @@ def _stages(start: Surface, fit: _Fit, radius: float) -> list[float]:
 
 
 def _rounded(start: Surface, fit: _Fit, radii: Sequence[float]) -> Faired:
-    """The nearest surface that keeps the cap of the last of the `radii`, m, where it is fitted, rounded to each of them in turn. Raises
-    NotConverged."""
+    """The nearest surface that keeps the cap of the last of the `radii`, m, where it is fitted, rounded to
+    each of them in turn. Raises NotConverged."""
     at, weight, faces = start.vertices, _weights(start), start.triangles
     if fit.most(at, rough_normals(at, faces)) <= 1.0 / radii[-1]:
         return Faired(start, start, np.zeros(len(at)))
@@ -137,8 +138,9 @@ def _rounded(start: Surface, fit: _Fit, radii: Sequence[float]) -> Faired:
 def _at_stage(
     fit: _Fit, start: Surface, here: Surface, weight: Reals, radius: float, rounds: int
 ) -> tuple[Reals, float]:
-    """Places (v, 3) on the way from `here` to those nearest to the `start` that keep the radius, m, after as many rounds as
-    help; and the largest curvature, 1/m, there, or the least that was met, where they don't."""
+    """Places (v, 3) on the way from `here` to those nearest to the `start` that keep the radius, m, after as
+    many rounds as help; and the largest curvature, 1/m, there, or the least that was met, where they
+    don't."""
     toward = _directions(here, radius)
     before = np.sum((here.vertices - start.vertices) * toward, axis=1)
     place, multiplier = np.zeros(len(toward)), np.zeros((len(fit.fitted), 3))
@@ -164,8 +166,8 @@ def _round(
     multiplier: Reals,
     radius: float,
 ) -> tuple[Reals, Reals]:
-    """The displacements (v,) and multipliers (i, 3) after a number of steps in the frames at `place`; `before` (v,), m: how far
-    the vertices had moved along the directions before."""
+    """The displacements (v,) and multipliers (i, 3) after a number of steps in the frames at `place`;
+    `before` (v,), m: how far the vertices had moved along the directions before."""
     at = here.vertices + place[:, None] * toward
     frames = fit.frames(rough_normals(at, here.triangles))
     own, rate = fit.forms(at, frames), fit.by_distance(at, frames, toward)
@@ -185,8 +187,8 @@ def _round(
 
 
 class _Fit:
-    """Quadratics through the neighbours of the vertices `fitted` (i,), those `chosen` (v,) that have enough of them: how
-    their second derivatives follow from places."""
+    """Quadratics through the neighbours of the vertices `fitted` (i,), those `chosen` (v,) that have enough
+    of them: how their second derivatives follow from places."""
 
     def __init__(self, surface: Surface, chosen: Flags) -> None:
         count, faces = len(surface.vertices), surface.triangles
@@ -224,7 +226,8 @@ class _Fit:
         return result
 
     def by_distance(self, at: Reals, frames: Reals, toward: Reals) -> sp.csr_array:
-        """Their derivatives (3 i, v) by distances that vertices move along `toward` (v, 3), at fixed frames."""
+        """Their derivatives (3 i, v) by distances that vertices move along `toward` (v, 3), at fixed
+        frames."""
         rows, columns, values = [], [], []
         for which, near in self._groups:
             here = self.fitted[which]

@@ -81,9 +81,9 @@ def make_surface(
     upwards.
 
     Vertices at one place are merged, unused ones and triangles without area or given twice are dropped
-    (`mended` says so). `normals` (v, 3) where the source knows them; else, and where they are zero, they are estimated. Raises
-    InputError for an empty mesh, edges with more than two triangles, several separate pieces, a closed
-    surface, and one with a single side.
+    (`mended` says so). `normals` (v, 3) where the source knows them; else, and where they are zero, they are
+    estimated. Raises InputError for an empty mesh, edges with more than two triangles, several separate
+    pieces, a closed surface, and one with a single side.
     """
     points = reals("vertices", vertices, (None, 3))
     faces = indices("triangles", triangles, (None, 3), below=max(len(points), 1))
@@ -129,7 +129,8 @@ def largest_curvature(surface: Surface) -> float:
 
 
 def sharpest_bend(surface: Surface) -> tuple[int, float]:
-    """The vertex inside its edge at which the surface is bent most, mesh noise included, and to what radius, m."""
+    """The vertex inside its edge at which the surface is bent most, mesh noise included, and to what radius,
+    m."""
     bent = np.abs(curvature(surface)).max(axis=1)
     bent[np.concatenate(surface.boundary)] = 0.0
     most = int(np.argmax(bent))
@@ -137,7 +138,8 @@ def sharpest_bend(surface: Surface) -> tuple[int, float]:
 
 
 def width(surface: Surface) -> float:
-    """The least extent, m, of its plan in any direction, to within a hundredth of the largest: what a shell spans."""
+    """The least extent, m, of its plan in any direction, to within a hundredth of the largest: what a shell
+    spans."""
     turns = np.linspace(0.0, np.pi, 180, endpoint=False)
     along = surface.vertices[:, :2] @ np.vstack([np.cos(turns), np.sin(turns)])
     return float(np.ptp(along, axis=0).min())
