@@ -7,7 +7,7 @@ concrete last.
 What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
 forty structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or stiffer steel tubes where
 these are stressed too much or the shell nearly stands (first_edges.py).
-What stands gets heavier edge beams and thicker strands at last, where they help (first_finish.py).
+What stands gets heavier edge beams, stiffer rods and thicker strands at last, where they help (first_finish.py).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -25,7 +25,7 @@ from shellform.gridshell.loads import pressure
 from shellform.net.edges import Edges, stand
 from shellform.net.refusal import NoNet, Stalled
 from shellform.run.first_edges import HEAVY, EdgeChoice, edge_choices
-from shellform.run.first_finish import came_to, straighter, with_room
+from shellform.run.first_finish import came_to, nearer, straighter, too_far, with_room
 from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net, with_gap
 from shellform.run.first_trial import (
     DRAWN,
@@ -44,6 +44,7 @@ from shellform.run.next_trial import (
     bears_most,
     edges_may_help,
     fails_by,
+    stiffer_rods,
     thinned,
 )
 from shellform.run.sizes import (
@@ -119,9 +120,23 @@ class _Search:
         self._say(text)
 
     def found(self) -> FirstDesign:
-        """What stands, on edge beams that don't sag too far, with strands that leave a search room."""
+        """What stands, on edge beams that don't sag too far, near enough to its shape, with strands that leave a search room."""
         found = straighter(self._first_that_holds(), self.surface, self._with_edges, self.allowance)
+        if self.allowance.thorough and too_far(found, self.surface):
+            found = nearer(found, self.surface, self._stiffer, self._other, self.allowance, self.say)
+            found = replace(found, told=tuple(self.told))
         return with_room(found, self.surface, self.say)
+
+    def _stiffer(self, design: FirstDesign, times: float) -> RodChoice | None:
+        """Rods so many `times` as stiff as those of a design, or the stiffest, in as many layers or more."""
+        own = layers_of(design.parts.choice.section)
+        possible = [
+            each
+            for layers in self.layers
+            if layers >= own
+            for each in choices(design.placed.net, design.spacing, self.wish.rod, layers)
+        ]
+        return stiffer_rods(design.placed.net, possible, design.parts.choice, design.tried.stress, times)
 
     def _first_that_holds(self) -> FirstDesign:
         spacing, reason = self._first_spacing()
@@ -289,17 +304,29 @@ class _Search:
     def _with_edges(
         self, placed: Placed, choice: RodChoice, edge: EdgeChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
-        """The design, where it stands with the gap that follows its rods too."""
+        """The design with the strands and the prestrain that are usual."""
         swivels = turning_stress(placed.net, choice.section.material) > _TURNED
         parts = FirstParts(choice, edge, rest_ratio_for(self.surface, spacing), rope_for(spacing), swivels)
+        return self._with_parts(placed, parts, spacing, thickness)
+
+    def _other(self, design: FirstDesign, parts: FirstParts) -> FirstDesign | Obstacle:
+        """The design of other parts; where its net can't be pulled with the gap that follows their rods, no other is looked for."""
+        return self._with_parts(design.placed, parts, design.spacing, design.thickness, climbs=False)
+
+    def _with_parts(
+        self, placed: Placed, parts: FirstParts, spacing: float, thickness: float, *, climbs: bool = True
+    ) -> FirstDesign | Obstacle:
+        """The design, where it stands with the gap that follows its rods too; a net that can't be pulled with that `climbs` the
+        ladder, or doesn't."""
         parts, tried, failure = self._solved(placed, parts, spacing, thickness)
+        choice = parts.choice
         what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
         if placed.net.edges:
-            what += f", edge beams of {edge.label}"
+            what += f", edge beams of {parts.edge.label}"
         gap = parts.joint.gap
         if failure is None and not math.isclose(placed.net.grid.gap, gap, rel_tol=1e-9):
             try:
-                placed = with_gap(self.surface, placed, spacing, gap, self.edges, self._say)
+                placed = with_gap(self.surface, placed, spacing, gap, self.edges, self._say, climbs=climbs)
             except (NoNet, Stalled) as error:
                 return self._keep(Obstacle(Why.NET, spacing, thickness, error=error))
             parts, tried, failure = self._solved(placed, parts, spacing, thickness)

@@ -147,14 +147,24 @@ def least_bent_net(
     return Placed(net, math.degrees(given.angle), given.offset), []
 
 
-def with_gap(surface: Surface, placed: Placed, spacing: float, gap: float, edges: Edges, tell: Say) -> Placed:
-    """The net pulled anew with another gap, its edges standing on what `edges` say. Raises NoNet or Stalled."""
+def with_gap(
+    surface: Surface,
+    placed: Placed,
+    spacing: float,
+    gap: float,
+    edges: Edges,
+    tell: Say,
+    *,
+    climbs: bool = True,
+) -> Placed:
+    """The net pulled anew with another gap, its edges standing on what `edges` say; where that fails it `climbs` the ladder,
+    or doesn't. Raises NoNet or Stalled."""
     net, given = climbed_net(
         surface,
         {"spacing": spacing, "gap": gap, "elements": ELEMENTS},
         angle=math.radians(placed.angle),
         offset=placed.offset,
-        most=_worth(surface, spacing),
+        most=_worth(surface, spacing) if climbs else 0,
         near=False,
         progress=tell,
     )

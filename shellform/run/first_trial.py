@@ -101,13 +101,14 @@ class FirstParts:
 class Followed:
     """What a design came to: the `factor` of its load up to which it stands; under the additional load the
     stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge beams
-    (`edge`), how far these are off at most (`sag`, m), and the cables' largest force over its limit (`pull`); `where` (3,), m,
-    the last state is farthest off."""
+    (`edge`), how far these are off at most (`sag`, m), how far the whole shell is (`off`, m), and the cables' largest force
+    over its limit (`pull`); `where` (3,), m, the last state is farthest off."""
 
     factor: float
     stress: float
     edge: float
     sag: float
+    off: float
     pull: float
     where: Reals
     most_stressed: Reals
@@ -115,7 +116,17 @@ class Followed:
     @property
     def sag_told(self) -> str:
         """In two digits: "87 mm"."""
-        return f"{float(f'{1e3 * self.sag:.2g}'):g} mm"
+        return millimetres(self.sag)
+
+    @property
+    def off_told(self) -> str:
+        """In two digits."""
+        return millimetres(self.off)
+
+
+def millimetres(length: float) -> str:
+    """A `length`, m, in two digits: "87 mm"."""
+    return f"{float(f'{1e3 * length:.2g}'):g} mm"
 
 
 @dataclass(frozen=True)
@@ -159,13 +170,15 @@ def followed(net: Net, surface: Surface, parts: FirstParts, thickness: float) ->
     except NotConverged as error:
         state = error.state if isinstance(error.state, State) else state
     away, beams = deviations(shell, state), shell.beams(design.radius)
+    off = deviations(shell, stressed)
     stress = shell.utilisation(design, stressed)
     breaks = net.grid.rod_ends[int(np.argmax(stress))]
     return Followed(
         factor,
         float(stress.max()),
         edge_utilisation(shell, beams, beams.local_forces(stressed)),
-        float(deviations(shell, stressed)[net.edge_lines].max(initial=0.0)),
+        float(off[net.edge_lines].max(initial=0.0)),
+        float(off.max()),
         float(shell.cables(design).tension(stressed).max(initial=0.0)) / parts.rope.force_max,
         shell.target.positions[int(np.argmax(away))],
         shell.target.positions[breaks].mean(axis=0),

@@ -60,6 +60,20 @@ def thinner_rods(possible: Sequence[RodChoice], choice: RodChoice, failure: Obst
     return possible[next_thinner(possible, possible.index(choice), share)]
 
 
+def stiffer_rods(
+    net: Net, possible: Sequence[RodChoice], choice: RodChoice, stress: float, times: float
+) -> RodChoice | None:
+    """Of the `possible` sections the least stiff that is at least so many `times` as stiff as the `choice` and is likely to be
+    stressed no more than it may be, else the stiffest such one; None where that is no stiffer. `stress` is that of the choice
+    over its strength."""
+    rising = sorted(possible, key=lambda each: each.bending)
+    if choice not in rising:  # its net was pulled anew, and bends rods a little more
+        return None
+    at = rising.index(choice)
+    found = next_choice(net, rising, at, stress, times, STRESSED)
+    return rising[found] if found > at else None
+
+
 def bears_most(failures: Sequence[Obstacle], nearest: Obstacle) -> Obstacle:
     """Of the failures with the spacing and the thickness of the `nearest` the one whose rods are likely to bear most
     concrete: of those that fall the share of the load up to which they stand, of those that break what their strength

@@ -24,6 +24,7 @@ from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.remedies import rounded_up
 from shellform.run.first_design import first_design
 from shellform.run.first_edges import TUBES
+from shellform.run.first_finish import far_told
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance, larger
 from shellform.run.first_refusal import Refused, with_ways_out
@@ -152,6 +153,7 @@ def _proposed(
     entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}
     design = replace(design, told=(*before, *told, *design.told))
     title = asked.file.stem + ("" if file == asked.file else ", nearest buildable surface")
+    far = far_told(design, surface)
     write_text(asked.output, _text(asked.file, title, entries, surface, design, wish, edges))
     return {
         "size": size_text(surface.size),
@@ -163,6 +165,7 @@ def _proposed(
         "cables": f"⌀ {1e3 * design.parts.rope.diameter:g} mm",
         "concrete": f"{1e3 * design.thickness:g} mm",
         "stands": f"up to {design.tried.factor:.2f} × its load or more; {design.standing} of {design.drawn} structures under 1.2 × its load with {_BUILT}",
+        **({"shape": far} if far else {}),
         "edges": edges,
         "case": str(asked.output),
     }
@@ -247,13 +250,14 @@ def _optimise(surface: Surface, design: FirstDesign) -> str:
     """The table of the search."""
     off = may_come_off(surface, design.thickness)
     why = f"a {OF_SPAN:g}th of the span" if off > 0.5 * design.thickness else "half the concrete's thickness"
+    far = far_told(design, surface)
     return f"""\
 [optimise]
 misfit = 0.7         # w1
 cable_force = 0.3    # w2
 # built_misfit = 0.3 # of the shape as built, with 0.35 for the others: keeps cables that hold structures as built in shape
 misfit_rms_additional = {_short(0.005 * design.spacing / _SPACING)!r}     # m, constraint (6): the paper's 5 mm × {design.spacing / _SPACING:.3g}
-deviation = {rounded_up(off)!r}    # m, {why}: beyond it no cable is taken away for shape; limits.deviation requires it
+deviation = {rounded_up(off)!r}    # m, {why}: beyond it no cable is taken away for shape; limits.deviation requires it{far and f"; {far}"}
 evaluations = {_EVALUATIONS}     # a first answer in minutes; 100 leave fewer cables
 polish = {_POLISHED}
 unloaded = false     # true: make the design without regard to the loads too, to compare with

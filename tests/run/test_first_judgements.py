@@ -11,9 +11,10 @@ import pytest
 import shellform as sf
 from shellform.run import first_design, first_trial, next_trial, unbuildable
 from shellform.run.first_design import _Search
+from shellform.run.first_net import Allowance
 from shellform.run.first_trial import Followed
 from shellform.run.next_trial import bears_most
-from shellform.run.sizes import Placed
+from shellform.run.sizes import DesignWish, Placed
 from shellform.run.unbuildable import Obstacle, Why
 
 Choice = namedtuple("Choice", "section")
@@ -21,7 +22,9 @@ PARTS = SimpleNamespace(easier=lambda tried, most: None, stronger=lambda tried: 
 
 
 def came_to(factor, stress, edge, pull):
-    return Followed(factor, stress, edge, 0.0, pull, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0]))
+    return Followed(
+        factor, stress, edge, 0.0, 0.0, pull, np.array([1.0, 0.0, 0.0]), np.array([2.0, 0.0, 0.0])
+    )
 
 
 STANDS = "stands"
@@ -242,6 +245,7 @@ def test_rods_edge_beams_and_cables_are_judged_under_the_additional_load(monkeyp
     assert found.stress == pytest.approx(0.4 * 1.2)
     assert found.edge == pytest.approx(0.5 * 1.2)
     assert found.sag == pytest.approx(1.2), "of the edge alone, though node 0 is farther off"
+    assert found.off == pytest.approx(1.3), "of all nodes"
     assert found.pull == pytest.approx(1.2 / 2.0)
     np.testing.assert_array_equal(found.where, [0.0, 1.0, 0.0])
     np.testing.assert_array_equal(found.most_stressed, [0.0, 0.5, 0.5])
@@ -298,6 +302,27 @@ def test_edge_beams_are_tried_from_the_lightest_of_their_stage_on(
         is found[-1]
     )
     assert asked == tried
+
+
+@pytest.mark.parametrize(
+    ("far", "thorough", "finished"),
+    [(True, True, ["nearer", "with room"]), (False, True, ["with room"]), (True, False, ["with room"])],
+)
+def test_what_lies_far_off_is_stiffened_before_its_strands_and_not_on_the_way_to_a_way_out(
+    monkeypatch, far, thorough, finished
+):
+    done = []
+    found = first_trial.FirstDesign(0.5, "why", None, None, 0.05, None, 40, 40, 0.03, ("before",))
+    monkeypatch.setattr(first_design, "straighter", lambda design, *_: design)
+    monkeypatch.setattr(first_design, "too_far", lambda *_: far)
+    monkeypatch.setattr(first_design, "nearer", lambda design, *_: done.append("nearer") or design)
+    monkeypatch.setattr(first_design, "with_room", lambda design, *_: done.append("with room") or design)
+    search = _Search(None, DesignWish(), lambda text: None, Allowance(thorough=thorough))
+    search._first_that_holds = lambda: found
+    search.told = ["before", "and what was tried since"]
+    told = search.found().told
+    assert done == finished
+    assert told == (tuple(search.told) if len(finished) == 2 else ("before",))
 
 
 @pytest.mark.parametrize(

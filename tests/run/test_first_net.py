@@ -112,7 +112,9 @@ def test_where_no_angle_gives_a_net_the_ladder_is_climbed_from_the_first_with_th
     assert allowance.left == 50_000 - 3 * 1600
 
 
-def test_a_net_is_pulled_anew_with_another_gap_and_stands_on_its_edges(monkeypatch):
+@pytest.mark.parametrize(("climbs", "worth"), [(True, 338), (False, 0)])
+def test_a_net_is_pulled_anew_with_another_gap_and_stands_on_its_edges(monkeypatch, climbs, worth):
+    """Where no factorisation that fails is worth anything, the ladder ends with its first rung."""
     asked = []
 
     def climb(surface, settings, *, angle, offset, most, near, progress):
@@ -121,8 +123,10 @@ def test_a_net_is_pulled_anew_with_another_gap_and_stands_on_its_edges(monkeypat
 
     monkeypatch.setattr(first_net, "climbed_net", climb)
     monkeypatch.setattr(first_net, "stand", lambda own, surface, edges: (own, edges))
-    placed = first_net.with_gap(SURFACE, Placed(None, 30.0, (0.5, 0.5)), 0.5, 0.07, "edges", print)
-    assert asked == [(0.07, 30.0, (0.5, 0.5), 338, False)]
+    placed = first_net.with_gap(
+        SURFACE, Placed(None, 30.0, (0.5, 0.5)), 0.5, 0.07, "edges", print, climbs=climbs
+    )
+    assert asked == [(0.07, 30.0, (0.5, 0.5), worth, False)]
     assert (placed.net, placed.angle, placed.offset) == (("net", "edges"), pytest.approx(22.5), (0.5, 0.0))
 
 

@@ -54,6 +54,16 @@ def test_where_only_deeper_sections_are_left_rods_give_way_to_less_deep_ones_for
     assert next_trial.thinner_rods(SOME, other, failed(Why.STRENGTH, stress=1.4)) is other
 
 
+@pytest.mark.parametrize(("found", "then"), [(2, THICK), (1, None)])
+def test_for_the_shape_s_sake_come_rods_so_many_times_as_stiff_or_none(monkeypatch, found, then):
+    asked = []
+    monkeypatch.setattr(next_trial, "next_choice", lambda *how: asked.append(how) or found)
+    assert next_trial.stiffer_rods("net", [THICK, THIN, MIDDLE], MIDDLE, 0.7, 4.2) is then
+    assert asked == [("net", SOME, 1, 0.7, 4.2, 0.95)], "by rising stiffness"
+    other = RodChoice("another", MIDDLE.section)
+    assert next_trial.stiffer_rods("net", SOME, other, 0.7, 4.2) is None
+
+
 @pytest.mark.parametrize(
     ("last", "found", "then"),
     [
@@ -128,7 +138,7 @@ def parts(ratio=0.996, swivels=False, diameter=0.006):
 
 
 def came_to(factor=1.5, stress=0.5, edge=0.5, pull=0.5):
-    return Followed(factor, stress, edge, 0.0874, pull, np.zeros(3), np.zeros(3))
+    return Followed(factor, stress, edge, 0.0874, 0.0874, pull, np.zeros(3), np.zeros(3))
 
 
 @pytest.mark.parametrize(
