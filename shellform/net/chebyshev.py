@@ -91,8 +91,7 @@ def pull_net(
       plan; joints nearer to the end than `merge` spacings are left out.
     - The `method` "pull" relaxes the grid, of so many `elements` a segment, on sliding springs of
       `spring_density`, EI/s³, rising, and `shear_stiffness`, EI/s a radian (pull.py), from the compass net or
-      the flat grid (`start`); "compass" leaves the compass net as it is. `tuning` of the numbers behind it:
-      left out, as most nets need it.
+      the flat grid (`start`); "compass" leaves the compass net as it is. `tuning`: of the numbers behind it.
 
     Raises InputError for settings that can't work on this surface, NoNet for surfaces too curved for one net,
     Stalled where the pull fails.

@@ -120,7 +120,7 @@ class Iterate:
     - `stage`: share of the further loads that is borne; `margin`: what is kept from the end of their branch.
     - `window`, N.
     - `guarded`: whether cables are under further loads; `tensioned` (c,): cables that stay in tension.
-    - `excess` (k,), 1/N²: of the constraints over their linear models at the last trial, by the window's square.
+    - `excess` (k,), 1/N²: of constraints over their linear models at the last trial, by the window squared.
     - `climbing`: whether stability stands in for the objective.
 
     Descending:

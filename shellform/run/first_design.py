@@ -3,11 +3,10 @@
 Nets are pulled at several angles, and the one that bends its rods least is taken. Then the initial design is
 solved under its growing load, for the rods with which the estimate says to begin (sizes.py), stiffer ones
 where it falls, two layers where the stiffest that equation (1) allows falls, finer spacings, and thinner
-concrete last.
-What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods, solved again, and
-forty structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or stiffer steel tubes where
-these are stressed too much or the shell nearly stands (first_edges.py).
-What stands gets heavier edge beams, stiffer rods and thicker strands at last, where they help (first_finish.py).
+concrete last. What stands up to `NEEDED` times its load is pulled anew with the gap that follows its rods,
+solved again, and forty structures are drawn and loaded (first_trial.py). Edge beams are bundles of rods, or
+stiffer steel tubes where these are stressed too much or the shell nearly stands (first_edges.py). What stands
+gets heavier edge beams, stiffer rods and thicker strands at last, where they help (first_finish.py).
 
 Nothing is random but what is drawn under a fixed seed: the same surface gives the same case.
 """
@@ -93,8 +92,9 @@ def first_design(
     say: Say = lambda text: None,
     allowance: Allowance | None = None,
 ) -> FirstDesign:
-    """The design to propose, found within an `allowance` of work. Raises InputError for a surface of absurd size, a flat one, or one that no net
-    covers or no rod follows, NotConverged where nothing stands; both with the reason and a way out."""
+    """The design to propose, found within an `allowance` of work. Raises InputError for a surface of absurd
+    size, a flat one, or one that no net covers or no rod follows, NotConverged where nothing stands; both
+    with the reason and a way out."""
     refuse_size(surface)
     refuse_flat(surface)
     return _Search(surface, wish, say, allowance or Allowance()).found()
@@ -120,7 +120,8 @@ class _Search:
         self._say(text)
 
     def found(self) -> FirstDesign:
-        """What stands, on edge beams that don't sag too far, near enough to its shape, with strands that leave a search room."""
+        """What stands, on edge beams that don't sag too far, near enough to its shape, with strands that
+        leave a search room."""
         found = straighter(self._first_that_holds(), self.surface, self._with_edges, self.allowance)
         if self.allowance.thorough and too_far(found, self.surface):
             found = nearer(found, self.surface, self._stiffer, self._other, self.allowance, self.say)
@@ -193,8 +194,8 @@ class _Search:
         return self._on_heavier_edges(placed, spacing, thickness) if placed.net.edges else None
 
     def _on_heavier_edges(self, placed: Placed, spacing: float, thickness: float) -> FirstDesign | None:
-        """The design on far heavier edge beams, without which no rods help where edges give way; None where these let the
-        shell bear hardly more."""
+        """The design on far heavier edge beams, without which no rods help where edges give way; None where
+        these let the shell bear hardly more."""
         nearest = self.best
         assert nearest is not None
         falls = nearest.factor > 0.0 and nearest.spacing == spacing and nearest.why is not Why.SCATTER
@@ -220,8 +221,8 @@ class _Search:
         thickness: float,
         tried: dict[int, Obstacle] | None = None,
     ) -> FirstDesign | None:
-        """The design with the first of the `possible` sections, by rising stiffness, that stands, none of those that
-        were `tried`; None where none does that is likely to."""
+        """The design with the first of the `possible` sections, by rising stiffness, that stands, none of
+        those that were `tried`; None where none does that is likely to."""
         needed = NEEDED * pressure(thickness, 2500.0)
         if hopeless(self.surface, spacing, possible[-1], needed):
             place = sharpest(placed.net)
@@ -290,8 +291,9 @@ class _Search:
     def _stands(
         self, placed: Placed, choice: RodChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
-        """The design with these rods and this load, and the lightest edge beams with which it stands. Single rods of
-        which drawn structures fall give way to two layers, which cost no more and spare more than heavier edge beams."""
+        """The design with these rods and this load, and the lightest edge beams with which it stands. Single
+        rods of which drawn structures fall give way to two layers, which cost no more and spare more than
+        heavier edge beams."""
         spare = layers_of(choice.section) < self.layers[-1]
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
             result = self._with_edges(placed, choice, edge, spacing, thickness)
@@ -310,14 +312,15 @@ class _Search:
         return self._with_parts(placed, parts, spacing, thickness)
 
     def _other(self, design: FirstDesign, parts: FirstParts) -> FirstDesign | Obstacle:
-        """The design of other parts; where its net can't be pulled with the gap that follows their rods, no other is looked for."""
+        """The design of other parts; where its net can't be pulled with the gap that follows their rods, no
+        other is looked for."""
         return self._with_parts(design.placed, parts, design.spacing, design.thickness, climbs=False)
 
     def _with_parts(
         self, placed: Placed, parts: FirstParts, spacing: float, thickness: float, *, climbs: bool = True
     ) -> FirstDesign | Obstacle:
-        """The design, where it stands with the gap that follows its rods too; a net that can't be pulled with that `climbs` the
-        ladder, or doesn't."""
+        """The design, where it stands with the gap that follows its rods too; a net that can't be pulled with
+        that `climbs` the ladder, or doesn't."""
         parts, tried, failure = self._solved(placed, parts, spacing, thickness)
         choice = parts.choice
         what = f"{choice.label} ({choice.catalogue}), {1e3 * thickness:.3g} mm of concrete"
@@ -352,7 +355,8 @@ class _Search:
     def _solved(
         self, placed: Placed, parts: FirstParts, spacing: float, thickness: float
     ) -> tuple[FirstParts, Followed, Obstacle | None]:
-        """The parts with cables below their limit, what the design came to, and what it fails by, if it does."""
+        """The parts with cables below their limit, what the design came to, and what it fails by, if it
+        does."""
         tried = self._followed(placed, parts, thickness)
         for turn in range(_EASED):
             easier = parts.easier(tried, PULLED if turn == 0 else STRESSED)

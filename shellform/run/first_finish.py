@@ -1,13 +1,15 @@
 """What the first design that stands gets at last, where it helps the search for the design to build.
 
-Edge beams. No cable lifts an edge, and what it sags by pulls the shell beside it along: heavier ones, until edges sag less.
+Edge beams. No cable lifts an edge, and what it sags by pulls the shell beside it along: heavier ones, until
+edges sag less.
 
-Shape. Of what the initial design lies off under 1.2 × the load a search leaves about a quarter, so that from much farther off
-it doesn't come to what is wished for. Such a design gets heavier edge beams, and stiffer rods where these don't do.
+Shape. Of what the initial design lies off under 1.2 × the load a search leaves about a quarter, so that from
+much farther off it doesn't come to what is wished for. Such a design gets heavier edge beams, and stiffer
+rods where these don't do.
 
-Strands. Rods are chosen with strands as they are usual, but a search that begins near what these bear can lengthen and leave
-out few: its steps end at their limit. With about twice the section a half round barrel keeps 167 of 442 cables instead of
-400, and is 8 instead of 15 mm off.
+Strands. Rods are chosen with strands as they are usual, but a search that begins near what these bear can
+lengthen and leave out few: its steps end at their limit. With about twice the section a half round barrel
+keeps 167 of 442 cables instead of 400, and is 8 instead of 15 mm off.
 """
 
 from __future__ import annotations
@@ -39,19 +41,21 @@ _FAR = 4.0  # times what the shape may be off, of the shell under the additional
 _NEARER = 0.85  # of the deviation before, at the most, for which it is
 _ROOM = 1.9  # times the section of the strands with which a design stands
 WithEdges = Callable[[Placed, RodChoice, EdgeChoice, float, float], FirstDesign | Obstacle]
-"""The design on a net with rods, edge beams, a spacing, m, and a thickness of the concrete, m, or what it fails by."""
+"""The design on a net with rods, edge beams, a spacing, m, and a thickness of the concrete, m, or what it
+fails by."""
 WithParts = Callable[[FirstDesign, FirstParts], FirstDesign | Obstacle]
 """A design of other parts on its net, or what it fails by then."""
 Stiffer = Callable[[FirstDesign, float], RodChoice | None]
-"""Rods so many times as stiff as those of a design, or the stiffest that may bear its load; None where there are none stiffer."""
+"""Rods so many times as stiff as those of a design, or the stiffest that may bear its load; None where there
+are none stiffer."""
 Say = Callable[[str], None]
 
 
 def straighter(
     design: FirstDesign, surface: Surface, with_edges: WithEdges, allowance: Allowance
 ) -> FirstDesign:
-    """The design on the first heavier edge beams that don't sag too far; where all do, on the last that help and with which
-    it stands."""
+    """The design on the first heavier edge beams that don't sag too far; where all do, on the last that help
+    and with which it stands."""
     choice, thickness = design.parts.choice, design.thickness
     edges, far = edge_choices(choice), _SAGS * may_come_off(surface, thickness)
     for edge in edges[edges.index(design.parts.edge) + 1 :]:
@@ -65,7 +69,8 @@ def straighter(
 
 
 def too_far(design: FirstDesign, surface: Surface) -> bool:
-    """Whether the initial design lies farther off its shape than a search usually brings to what that may be off."""
+    """Whether the initial design lies farther off its shape than a search usually brings to what that may be
+    off."""
     return design.tried.off > _FAR * may_come_off(surface, design.thickness)
 
 
@@ -92,8 +97,9 @@ def nearer(
     allowance: Allowance,
     say: Say,
 ) -> FirstDesign:
-    """The design on heavier edge beams, and on stiffer rods where these don't do, with which it is no longer `too_far` off; where
-    none bring it so near, on what comes nearest. Only what a look at the perfect structure promises is drawn too."""
+    """The design on heavier edge beams, and on stiffer rods where these don't do, with which it is no longer
+    `too_far` off; where none bring it so near, on what comes nearest. Only what a look at the perfect
+    structure promises is drawn too."""
 
     def off(parts: FirstParts) -> float:
         """How far the design of these parts lies off on the same net, m; infinite where it fails."""
@@ -119,9 +125,9 @@ def nearer(
 def _stiffened(
     design: FirstDesign, stiffer: Stiffer, far: float, off: Callable[[FirstParts], float]
 ) -> Iterator[FirstParts]:
-    """What promises a shape that lies no more than `far`, m, off, or nearer: heavier edge beams, with which the net stays as it
-    is; then stiffer rods, on edge beams as much stiffer than these as before; then rods half the way there. `off` tells how
-    far a design of other parts lies off."""
+    """What promises a shape that lies no more than `far`, m, off, or nearer: heavier edge beams, with which
+    the net stays as it is; then stiffer rods, on edge beams as much stiffer than these as before; then rods
+    half the way there. `off` tells how far a design of other parts lies off."""
     parts, least = design.parts, design.tried.off
     edges = edge_choices(parts.choice)
     stage = edges.index(parts.edge)
@@ -147,8 +153,8 @@ def _stiffened(
 
 
 def with_room(design: FirstDesign, surface: Surface, say: Say) -> FirstDesign:
-    """The design with thicker strands, as it is where it doesn't stand with them or there are none; what came of it is
-    told to `say`, and with the design."""
+    """The design with thicker strands, as it is where it doesn't stand with them or there are none; what came
+    of it is told to `say`, and with the design."""
     rope = thicker(design.parts.rope, _ROOM)
     if rope is None:
         return design

@@ -1,9 +1,9 @@
 """The net that a first design begins with: of several angles and offsets the one that bends its rods least.
 
-Pulls that fail end earlier here than in a design: nets that are found take up to a hundred factorisations. Where
-no angle gives a net, the ladder (net/ladder.py) is climbed from the one whose failure costs least to mend, with
-fewer factorisations for larger nets; not on surfaces that are tried as a way out, of which the next rounder one is
-more likely to take a net than another attempt on this one.
+Pulls that fail end earlier here than in a design: nets that are found take up to a hundred factorisations.
+Where no angle gives a net, the ladder (net/ladder.py) is climbed from the one whose failure costs least to
+mend, with fewer factorisations for larger nets; not on surfaces that are tried as a way out, of which the
+next rounder one is more likely to take a net than another attempt on this one.
 """
 
 from __future__ import annotations
@@ -36,11 +36,11 @@ Say = Callable[[str], None]
 
 @dataclass
 class Allowance:
-    """How much `work` a search may do, in crossings of the nets that are pulled and of the designs that are solved; and how much
-    is `left` of it. Seconds aren't asked, so that a surface ends at the same place on any machine, however busy. What a
-    part spends the `whole` spends too, and where that is over so is the part.
-    Whether it is `thorough`: climbs the ladder where no angle gives a net, and tries finer spacings where no section
-    stands; whether it `thins` concrete then. The `angle`, degrees, of the net found last."""
+    """How much `work` a search may do, in crossings of the nets that are pulled and of the designs that are
+    solved; and how much is `left` of it. Seconds aren't asked, so that a surface ends at the same place on
+    any machine, however busy. What a part spends the `whole` spends too, and where that is over so is the
+    part. Whether it is `thorough`: climbs the ladder where no angle gives a net, and tries finer spacings
+    where no section stands; whether it `thins` concrete then. The `angle`, degrees, of the net found last."""
 
     work: int = WORK
     thorough: bool = True
@@ -59,8 +59,8 @@ class Allowance:
 
     @classmethod
     def for_size(cls, surface: Surface, spacing: float | None) -> Allowance:
-        """The usual one; so many times more work as the `spacing`, m, that was asked for makes more crossings than a first
-        design has by itself, which each trial then takes."""
+        """The usual one; so many times more work as the `spacing`, m, that was asked for makes more crossings
+        than a first design has by itself, which each trial then takes."""
         return cls(round(larger(surface, spacing) * WORK))
 
     def part(self, share: float, *, thorough: bool = True, thins: bool = True) -> Allowance:
@@ -75,8 +75,8 @@ class Allowance:
 
 
 def larger(surface: Surface, spacing: float | None) -> float:
-    """How many times more crossings than a first design has by itself the `spacing`, m, asked for makes: at least 1, and no
-    more than is worth waiting for."""
+    """How many times more crossings than a first design has by itself the `spacing`, m, asked for makes: at
+    least 1, and no more than is worth waiting for."""
     if spacing is None:
         return 1.0
     across = math.sqrt(surface.area / MOST_CROSSINGS) / spacing
@@ -94,9 +94,10 @@ def least_bent_net(
     shifted: bool,
     tell: Say,
 ) -> tuple[Placed, list[float]]:
-    """The net that bends its rods least among those at the `angles`, degrees, and, if it is to be `shifted`, the
-    best of these half a spacing off; and up to two angles that bend them nearly as little, none where only the
-    ladder gave a net. `say` hears what fails, `tell` what doesn't; the `allowance` is spent. Raises NoNet or Stalled."""
+    """The net that bends its rods least among those at the `angles`, degrees, and, if it is to be `shifted`,
+    the best of these half a spacing off; and up to two angles that bend them nearly as little, none where
+    only the ladder gave a net. `say` hears what fails, `tell` what doesn't; the `allowance` is spent. Raises
+    NoNet or Stalled."""
     settings: dict[str, Any] = {"spacing": spacing, "gap": gap, "elements": ELEMENTS}
 
     def at(angle: float, offset: tuple[float, float]) -> Placed | NoNet | Stalled:
@@ -157,8 +158,8 @@ def with_gap(
     *,
     climbs: bool = True,
 ) -> Placed:
-    """The net pulled anew with another gap, its edges standing on what `edges` say; where that fails it `climbs` the ladder,
-    or doesn't. Raises NoNet or Stalled."""
+    """The net pulled anew with another gap, its edges standing on what `edges` say; where that fails it
+    `climbs` the ladder, or doesn't. Raises NoNet or Stalled."""
     net, given = climbed_net(
         surface,
         {"spacing": spacing, "gap": gap, "elements": ELEMENTS},

@@ -63,10 +63,12 @@ class FirstParts:
         return swivelling(fitting) if self.swivels else fitting
 
     def easier(self, tried: Followed, most: float) -> FirstParts | None:
-        """What to try after a design that bears its load, `tried`, with rods that are stressed too much or cables that are
-        pulled to more than `most` of their limit: the same with slacker cables and joints that turn, or thicker cables; else None.
+        """What to try after a design that bears its load, `tried`, with rods that are stressed too much or
+        cables that are pulled to more than `most` of their limit: the same with slacker cables and joints
+        that turn, or thicker cables; else None.
 
-        Where the last cells end short of the edge, prestressed cables bend the rods' ends in the surface, load or none.
+        Where the last cells end short of the edge, prestressed cables bend the rods' ends in the surface,
+        load or none.
         """
         if tried.factor < NEEDED:
             return None
@@ -77,9 +79,9 @@ class FirstParts:
         return self.eased(tried.pull) if tried.edge <= STRESSED and tried.pull > most else None
 
     def stronger(self, tried: Followed) -> FirstParts | None:
-        """What to try after a design that bears its load, `tried`, with rods that are stressed too much and cables beyond their
-        limit: the same with strands that bear what pulls these. Where soft ones let the shell move, that is what breaks
-        both. Else None."""
+        """What to try after a design that bears its load, `tried`, with rods that are stressed too much and
+        cables beyond their limit: the same with strands that bear what pulls these. Where soft ones let the
+        shell move, that is what breaks both. Else None."""
         if tried.factor < NEEDED or tried.stress <= STRESSED or tried.pull <= 1.0:
             return None
         rope = thicker(self.rope, (tried.pull / PULLED) ** _RELIEVED)
@@ -87,8 +89,8 @@ class FirstParts:
 
     def eased(self, pull: float) -> FirstParts | None:
         """The same with so much less prestrain that cables whose largest force is `pull` times their limit
-        come down to `PULLED`; with the next thicker strand where they have the least already; None where there
-        is none."""
+        come down to `PULLED`; with the next thicker strand where they have the least already; None where
+        there is none."""
         prestrain = 1.0 - self.rest_ratio - (pull - PULLED) * STRAINED
         least = round(1.0 - max(prestrain, LEAST_PRESTRAIN), 4)
         if least > self.rest_ratio:
@@ -100,9 +102,9 @@ class FirstParts:
 @dataclass(frozen=True)
 class Followed:
     """What a design came to: the `factor` of its load up to which it stands; under the additional load the
-    stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge beams
-    (`edge`), how far these are off at most (`sag`, m), how far the whole shell is (`off`, m), and the cables' largest force
-    over its limit (`pull`); `where` (3,), m, the last state is farthest off."""
+    stress over the strength of its rods (`stress`), where that is (`most_stressed` (3,), m), and of its edge
+    beams (`edge`), how far these are off at most (`sag`, m), how far the whole shell is (`off`, m), and the
+    cables' largest force over its limit (`pull`); `where` (3,), m, the last state is farthest off."""
 
     factor: float
     stress: float
@@ -131,9 +133,10 @@ def millimetres(length: float) -> str:
 
 @dataclass(frozen=True)
 class FirstDesign:
-    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of the concrete;
-    what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest fibre distance, m,
-    that equation (1) allows rods of that material (`allowed`); what was `told` on the way."""
+    """What is proposed: `spacing`, m, and its `reason`; `placed`, the net; the `parts`; `thickness`, m, of
+    the concrete; what the perfect structure came to (`tried`); of `drawn` structures `standing`; the largest
+    fibre distance, m, that equation (1) allows rods of that material (`allowed`); what was `told` on the
+    way."""
 
     spacing: float
     reason: str

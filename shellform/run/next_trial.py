@@ -1,4 +1,5 @@
-"""What a trial of `shellform new` fails by, and what it tries next: which section, which edge beams, how much concrete."""
+"""What a trial of `shellform new` fails by, and what it tries next: which section, which edge beams, how much
+concrete."""
 
 from __future__ import annotations
 
@@ -52,8 +53,8 @@ def after(net: Net, possible: Sequence[RodChoice], tried: Mapping[int, Obstacle]
 
 
 def thinner_rods(possible: Sequence[RodChoice], choice: RodChoice, failure: Obstacle) -> RodChoice:
-    """Of the `possible` sections the stiffest that is so much less deep than the `choice` that bending stresses it no more
-    than it may be; the `choice` itself where there is none."""
+    """Of the `possible` sections the stiffest that is so much less deep than the `choice` that bending
+    stresses it no more than it may be; the `choice` itself where there is none."""
     if choice not in possible:
         return choice
     share = AIMED * STRESSED / failure.stress
@@ -63,9 +64,9 @@ def thinner_rods(possible: Sequence[RodChoice], choice: RodChoice, failure: Obst
 def stiffer_rods(
     net: Net, possible: Sequence[RodChoice], choice: RodChoice, stress: float, times: float
 ) -> RodChoice | None:
-    """Of the `possible` sections the least stiff that is at least so many `times` as stiff as the `choice` and is likely to be
-    stressed no more than it may be, else the stiffest such one; None where that is no stiffer. `stress` is that of the choice
-    over its strength."""
+    """Of the `possible` sections the least stiff that is at least so many `times` as stiff as the `choice`
+    and is likely to be stressed no more than it may be, else the stiffest such one; None where that is no
+    stiffer. `stress` is that of the choice over its strength."""
     rising = sorted(possible, key=lambda each: each.bending)
     if choice not in rising:  # its net was pulled anew, and bends rods a little more
         return None
@@ -75,9 +76,9 @@ def stiffer_rods(
 
 
 def bears_most(failures: Sequence[Obstacle], nearest: Obstacle) -> Obstacle:
-    """Of the failures with the spacing and the thickness of the `nearest` the one whose rods are likely to bear most
-    concrete: of those that fall the share of the load up to which they stand, of those that break what their strength
-    leaves, or that of their edge beams and cables. `nearest` where none bears any.
+    """Of the failures with the spacing and the thickness of the `nearest` the one whose rods are likely to
+    bear most concrete: of those that fall the share of the load up to which they stand, of those that break
+    what their strength leaves, or that of their edge beams and cables. `nearest` where none bears any.
 
     Rods that break least aren't always these: deep ones have spent their strength when they are bent."""
 
@@ -105,13 +106,15 @@ def thinned(
     stands: Callable[[Placed, RodChoice, float, float], Stands | Obstacle],
     over: Callable[[], bool],
 ) -> tuple[Obstacle, Stands | None]:
-    """What stands with the most concrete where the `failure` has shown that its rods don't bear theirs, if anything does, and
-    what came nearest to the thickness asked for: the `nearest` until now, or rods that bending breaks less.
+    """What stands with the most concrete where the `failure` has shown that its rods don't bear theirs, if
+    anything does, and what came nearest to the thickness asked for: the `nearest` until now, or rods that
+    bending breaks less.
 
-    Rods that break give way to others of the `possible` that break less; once these are known the concrete is thinned for those
-    that bear most, to about what the last trial says that they bear. Rods that would break without any
-    concrete give way to less deep ones under as much as before. `stands` tries a net, rods, a spacing and a thickness, m; `least`,
-    m, is the thinnest layer that is poured; nothing is tried once it is `over`.
+    Rods that break give way to others of the `possible` that break less; once these are known the concrete is
+    thinned for those that bear most, to about what the last trial says that they bear. Rods that would break
+    without any concrete give way to less deep ones under as much as before. `stands` tries a net, rods, a
+    spacing and a thickness, m; `least`, m, is the thinnest layer that is poured; nothing is tried once it is
+    `over`.
     """
     assert failure.choice is not None
     rods, thickness = failure.choice, failure.thickness

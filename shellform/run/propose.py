@@ -1,7 +1,7 @@
 """`shellform new`: a commented case file for a surface, with a design that stands (first_design.py).
 
-Every number comes with its reason. Forces and lengths that only limit the search are the paper's scale model's (section
-4.1: 55 mm spacing), times k = spacing / 55 mm and its square.
+Every number comes with its reason. Forces and lengths that only limit the search are the paper's scale
+model's (section 4.1: 55 mm spacing), times k = spacing / 55 mm and its square.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
 
 @dataclass(frozen=True)
 class _Asked:
-    """What was asked for: a case for the surface of a `file`, written to `output`; whether its scripts may run, and who
-    hears what is tried."""
+    """What was asked for: a case for the surface of a `file`, written to `output`; whether its scripts may
+    run, and who hears what is tried."""
 
     file: Path
     output: Path
@@ -75,10 +75,10 @@ def propose_case(
 ) -> dict[str, str]:
     """Writes a case for a surface file to `output`; returns what was proposed as labelled lines.
 
-    `options` are the entries of [surface] in a case; `wish` is what the user wants of the design; with `way_out` the case
-    of a shell that gets no design as it is becomes that of the first way out (first_refusal.py), and says so. Raises
-    InputError where `output` exists or isn't named .toml, and InputError or NotConverged where no design stands
-    (unbuildable.py).
+    `options` are the entries of [surface] in a case; `wish` is what the user wants of the design; with
+    `way_out` the case of a shell that gets no design as it is becomes that of the first way out
+    (first_refusal.py), and says so. Raises InputError where `output` exists or isn't named .toml, and
+    InputError or NotConverged where no design stands (unbuildable.py).
     """
     _check(output)
     asked = _Asked(file, output, allow_scripts, report)
@@ -104,7 +104,8 @@ def propose_case(
 
 @dataclass(frozen=True)
 class _Without:
-    """That a surface got no design: how it is `refused`, for what `cause`; and what was `told` of it before."""
+    """That a surface got no design: how it is `refused`, for what `cause`; and what was `told` of it
+    before."""
 
     refused: Refused
     cause: InputError | NotConverged
@@ -120,8 +121,8 @@ def _proposed(
     *,
     ways_out: bool = True,
 ) -> dict[str, str] | _Without:
-    """The case for the surface in `file`, written, and what it proposes; its head says what came `before`. Where there is no
-    design, `ways_out` are looked for or not."""
+    """The case for the surface in `file`, written, and what it proposes; its head says what came `before`.
+    Where there is no design, `ways_out` are looked for or not."""
     told: tuple[str, ...] = ()
     surface = surface_of(surface_entry(file, options), allow_scripts=asked.allow_scripts)
     origin = distant_origin(surface, FAR)
@@ -293,7 +294,8 @@ section = "{_named(label(section))}"    # {told}rolled to the edge's curve; or r
 
 
 def _edges_came_to(design: FirstDesign) -> str:
-    """What the initial design's edge beams came to: no cable lifts an edge, so that what it sags by stays in the shape."""
+    """What the initial design's edge beams came to: no cable lifts an edge, so that what it sags by stays in
+    the shape."""
     if not design.placed.net.edges:
         return ""
     tried = design.tried

@@ -238,7 +238,7 @@ class Manned:
 @dataclass
 class _Threads:
     """How many threads a cluster has, `counted` anew each second, the `most` workers that it was seen to
-    have, since when it has had fewer (`lost`) and none (`gone`), by the monotonic clock; `tell` hears of it."""
+    have, since when it has had fewer (`lost`) and none (`gone`), by the monotonic clock; whom to `tell`."""
 
     engine: Engine
     tell: Callable[[Manned], None]

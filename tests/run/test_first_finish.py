@@ -71,8 +71,9 @@ def test_heavier_edge_beams_are_those_after_the_ones_with_which_a_design_stands(
 
 
 class Trials:
-    """Stands in for what is solved: how far a design of some edge beams and rods lies off on the same net (`looks`), and as it
-    is then solved and drawn (`drawn`, else as it looked); None where it falls. Keeps what was asked."""
+    """Stands in for what is solved: how far a design of some edge beams and rods lies off on the same net
+    (`looks`), and as it is then solved and drawn (`drawn`, else as it looked); None where it falls. Keeps
+    what was asked."""
 
     def __init__(self, monkeypatch, looks, drawn=(), rods=(None, None)):
         self.looks, self.drawn, self.rods = looks, {**looks, **dict(drawn)}, list(rods)

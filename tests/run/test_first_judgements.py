@@ -1,5 +1,5 @@
-"""What the search for a first design calls a failure, and how much less concrete it tries next. What a design came to
-is stood in for, so that each case is the one that is meant."""
+"""What the search for a first design calls a failure, and how much less concrete it tries next. What a design
+came to is stood in for, so that each case is the one that is meant."""
 
 import itertools
 from collections import namedtuple

@@ -93,7 +93,8 @@ def test_a_pull_that_stalls_costs_four_that_end_and_none_is_begun_once_the_work_
 def test_where_no_angle_gives_a_net_the_ladder_is_climbed_from_the_first_with_the_work_that_is_left(
     monkeypatch, pulled, allowance, climbs
 ):
-    """Of 450 · 300 / 400 = 338 factorisations two pulls of 60 are spent, of which the first counts for the ladder."""
+    """Of 450 · 300 / 400 = 338 factorisations two pulls of 60 are spent, of which the first counts for the
+    ladder."""
     climbed, asked = net(1.0), []
 
     def climb(surface, settings, *, angle, most, failed, near, progress):

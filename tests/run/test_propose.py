@@ -344,7 +344,8 @@ def test_what_heavier_edge_beams_gain_is_load_until_all_is_borne_and_stress_from
 
 
 def test_a_shell_on_four_feet_that_no_rods_hold_up_stands_on_heavier_edge_beams():
-    """Its edges are arches of 20 m between the feet. On bundles of 19 and 37 rods it bore 16 mm of concrete, on such of 61 25 mm."""
+    """Its edges are arches of 20 m between the feet. On bundles of 19 and 37 rods it bore 16 mm of concrete,
+    on such of 61 25 mm."""
     said: list[str] = []
     dome = dish(size=20.0, rise=3.0, count=25)
     found = first_design(dome, DesignWish(spacing=1.4, angle=0.0), said.append)
