@@ -52,7 +52,7 @@ def compared(folder: Path, seed: int) -> Iterator[Row]:
         if before is None:
             continue
         workshop = Workshop(perfect(shell, design, run.loads[largest], step=TO_ITS_END))
-        outcomes = workshop.drawn(
+        outcomes = workshop.load_numbers(
             case_tolerances(run.case, shell),
             seed=seed,
             numbers=range(before.drawn),

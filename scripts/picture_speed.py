@@ -45,7 +45,7 @@ def main(run: str) -> None:
         with _timed("a page of lines, PDF", NEXT):
             render.picture(Path(folder) / "a.pdf", panel, look)
         with _timed("a film's frame, 960 × 600", NEXT, 8):
-            list(scene.drawn(single([panel] * 8, Look(size=(960, 600)))))
+            list(scene.paint(single([panel] * 8, Look(size=(960, 600)))))
 
 
 @contextmanager

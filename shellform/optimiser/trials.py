@@ -25,7 +25,7 @@ from shellform.optimiser.search_state import (
 from shellform.optimiser.step_model import StepModel
 from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.problem.paths import follow
-from shellform.reliability.trial_structures import FRESH, JudgedTrial, Required, confirm, stands
+from shellform.reliability.trial_structures import FRESH, JudgedTrial, Required, confirm, judge_trial
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 
@@ -106,7 +106,9 @@ def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]
     """Whether the design stands as built, and the iterate that knows which structures fell."""
     if search.asked is None:
         return True, it
-    found = stands(search.problem.shell, built, search.asked.trial, first=it.fallen, judging=search.judging)
+    found = judge_trial(
+        search.problem.shell, built, search.asked.trial, first=it.fallen, judging=search.judging
+    )
     search.evaluator.factorisations += found.factorisations
     fallen = [number for own in found.fallen.values() for number in own]
     fallen = list(dict.fromkeys([*fallen, *it.fallen]))

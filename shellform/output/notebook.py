@@ -69,7 +69,7 @@ def _png(rows: Sequence[Sequence[Panel]], look: Look, heading: str = "") -> byte
     many = len(rows[0]) > 1
     laid = sheets.table(rows, look, heading) if many else sheets.single(rows[0], look)[0]
     try:
-        (picture,) = painter.drawn([laid])
+        (picture,) = painter.paint([laid])
     except InputError:  # no OpenGL
         from shellform.output.pictures import vectors
 

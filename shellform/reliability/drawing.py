@@ -144,7 +144,7 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
     )
 
 
-def drawn(members: Members, tolerances: Tolerances, seed: int, number: int) -> Errors:
+def draw_errors(members: Members, tolerances: Tolerances, seed: int, number: int) -> Errors:
     """The errors of a structure under the seed; of number PERFECT none."""
     if number == PERFECT:
         return errors_of(members, Tolerances(), variables(members, seed, 0))

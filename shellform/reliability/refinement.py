@@ -17,7 +17,7 @@ from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import LOCK, locks_along, rod_bending_stress
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import PERFECT, drawn
+from shellform.reliability.drawing import PERFECT, draw_errors
 from shellform.reliability.members import members_of_model
 from shellform.reliability.path_of_one import SOUGHT, Limit
 from shellform.reliability.perfect import perfect_of
@@ -135,7 +135,7 @@ def _limit(model: Model, sought: float, resolution: float) -> tuple[Workshop, Li
     nominal = perfect_of(model, _LOAD, shapes=0, step=_STEP)
     workshop = Workshop(nominal)
     members = members_of_model(model)
-    none = drawn(members, Tolerances(), 0, PERFECT)
+    none = draw_errors(members, Tolerances(), 0, PERFECT)
     return workshop, workshop.limit(
         none, most=sought, step=_STEP, resolution=resolution, begin=nominal.known_to(sought)
     )

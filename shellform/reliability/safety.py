@@ -67,7 +67,6 @@ class Safety:
         for name, usual in (("drawn", 60), ("tried", 12)):
             give = f"a number of structures, such as {usual}"
             require_count(getattr(self, name), where=f"safety.{name}", give=give)
-        require_count(self.seed, least=0, where="safety.seed", give="a whole number, such as 1")
         give = "a share of the start's stiffness, such as 0.5"
         require_number(self.stiffness, above=0.0, where="safety.stiffness", give=give)
         give = "a factor of the errors, such as 1.5"
@@ -142,7 +141,7 @@ def judge(
     failed = []
     for largest, shares in paths(loads).items():
         workshop = Workshop(perfect(shell, design, loads[largest], step=TO_ITS_END))
-        outcomes = workshop.drawn(
+        outcomes = workshop.load_numbers(
             safety.tolerances,
             seed=safety.seed,
             numbers=range(safety.drawn),

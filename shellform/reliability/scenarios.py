@@ -22,7 +22,7 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.problem import LoadCase
 from shellform.problem.terms import LoadedDesign, Measurement, Term
 from shellform.reliability.borne import CAREFUL, EXACT, BorneFactor, borne
-from shellform.reliability.drawing import Errors, Imperfections, built_beams, drawn
+from shellform.reliability.drawing import Errors, Imperfections, built_beams, draw_errors
 from shellform.reliability.path_of_one import Loading
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
@@ -110,7 +110,7 @@ def scenarios(
     nominal = perfect(shell, design, case.force)
     left = _STIFFNESS_LEFT * float(modes(assemble(nominal.network), nominal.unloaded, 1).stiffness[0])
     own = tuple(
-        Scenario(number, drawn(nominal.members, tolerances(number), seed, number), factor)
+        Scenario(number, draw_errors(nominal.members, tolerances(number), seed, number), factor)
         for number, factor in least.items()
     )
     return FactorsAsBuilt(case, own, nominal.imperfections, left, most, exact)

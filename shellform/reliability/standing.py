@@ -78,7 +78,7 @@ def sample(
     NotConverged where the perfect structure has no unloaded equilibrium.
     """
     require_count(count, where="count", give="a number of structures to draw, such as 200")
-    made = Workshop(perfect(shell, design, load)).drawn(tolerances, seed=seed, numbers=range(count))
+    made = Workshop(perfect(shell, design, load)).load_numbers(tolerances, seed=seed, numbers=range(count))
     stand = sum(each.stands for each in made)
     return DrawnSample(tuple(made), counted(count, stand, seed=seed, confidence=confidence))
 
@@ -179,7 +179,7 @@ class Workshop:
         finally:
             self._idle.put(own)
 
-    def drawn(
+    def load_numbers(
         self,
         tolerances: Tolerances,
         *,

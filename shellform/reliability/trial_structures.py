@@ -26,7 +26,7 @@ from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import LARGEST_SHARE, Tolerances
-from shellform.reliability.drawing import PERFECT, drawn
+from shellform.reliability.drawing import PERFECT, draw_errors
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import Safety, allowed, critical_on_halved, paths
 from shellform.reliability.standing import Workshop
@@ -142,7 +142,7 @@ def demand(
         most = {name: own.tried for name, load in loads.items() if load.any()}
         most[design_load] = _known(own, design_load, design_load)
         asked = Required(own, {name: loads[name] for name in most}, design_load, most)
-        bears = tried(shell, start, asked, critical=False, judging=judging)
+        bears = try_structures(shell, start, asked, critical=False, judging=judging)
         if bears.stands:
             trial = _shown(asked, bears)
             break
@@ -186,7 +186,7 @@ def required(
     equilibrium."""
     own = {name: load for name, load in loads.items() if load.any()}
     every = Required(safety, own, design_load, {name: safety.tried for name in own})
-    return _shown(every, tried(shell, start, every, critical=False, judging=judging))
+    return _shown(every, try_structures(shell, start, every, critical=False, judging=judging))
 
 
 def _shown(asked: Required, shown: JudgedTrial) -> Required:
@@ -199,7 +199,7 @@ def _shown(asked: Required, shown: JudgedTrial) -> Required:
     return replace(asked, fallen=fallen)
 
 
-def tried(
+def try_structures(
     shell: Gridshell,
     design: Design,
     asked: Required,
@@ -231,7 +231,7 @@ def tried(
             shares: Mapping[str, float] = shares,
         ) -> tuple[float, int]:
             """The share of the largest load that a structure bears."""
-            errors = drawn(nominal.members, asked.tolerances(number), safety.seed + SEED, number)
+            errors = draw_errors(nominal.members, asked.tolerances(number), safety.seed + SEED, number)
             marks = tuple(shares.values())
             if number == PERFECT:  # whose path is known so far
                 begin = nominal.known_to(wanted)
@@ -291,7 +291,7 @@ def to_bear(
     """The numbers of structures that fall under loads on the design load's path where more do than may, and
     the factors of the largest one that they were to bear; of the perfect one, if it doesn't keep its critical
     factor, under PERFECT. Raises NotConverged where the design has no unloaded equilibrium."""
-    found = tried(shell, design, asked, first=first, whole=True, judging=judging)
+    found = try_structures(shell, design, asked, first=first, whole=True, judging=judging)
     _, shares = largest_on_path(asked)
     return _aims(
         asked, found, {name: found.fallen[name] for name in sorted(shares, key=lambda each: -shares[each])}
@@ -335,7 +335,7 @@ def _critical(asked: Required, shares: Mapping[str, float]) -> float:
     return _MESH * asked.safety.critical_factor * shares[asked.design_load]
 
 
-def stands(
+def judge_trial(
     shell: Gridshell,
     design: Design,
     asked: Required,
@@ -344,9 +344,9 @@ def stands(
     whole: bool = False,
     judging: Judging | None = None,
 ) -> JudgedTrial:
-    """As `tried`; a design without unloaded equilibrium doesn't stand."""
+    """As `try_structures`; a design without unloaded equilibrium doesn't stand."""
     try:
-        return tried(shell, design, asked, first=first, whole=whole, judging=judging)
+        return try_structures(shell, design, asked, first=first, whole=whole, judging=judging)
     except NotConverged as error:
         return JudgedTrial({name: () for name in asked.loads}, False, False, error.iterations)
 
@@ -360,8 +360,8 @@ def confirm(
     whole: bool = False,
     judging: Judging | None = None,
 ) -> JudgedTrial:
-    """As `stands`, and with the critical factor kept on the mesh with rod elements halved."""
-    found = stands(shell, design, asked, first=first, whole=whole, judging=judging)
+    """As `judge_trial`, and with the critical factor kept on the mesh with rod elements halved."""
+    found = judge_trial(shell, design, asked, first=first, whole=whole, judging=judging)
     factor = asked.safety.critical_factor
     if not found.stands or factor is None:
         return found

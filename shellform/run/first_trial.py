@@ -196,7 +196,9 @@ def drawn_standing(net: Net, surface: Surface, parts: FirstParts, thickness: flo
     workshop, tolerances = Workshop(nominal), enlarged(default_tolerances(shell), ENLARGED)
     standing = 0
     for first in range(0, DRAWN, _TOGETHER):
-        made = workshop.drawn(tolerances, seed=SEED, numbers=range(first, min(first + _TOGETHER, DRAWN)))
+        made = workshop.load_numbers(
+            tolerances, seed=SEED, numbers=range(first, min(first + _TOGETHER, DRAWN))
+        )
         standing += sum(each.stands for each in made)
         if not all(each.stands for each in made):
             break

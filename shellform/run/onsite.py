@@ -315,7 +315,11 @@ def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.B
     shell, load = run.shell_of(name), run.loads[options.load]
     design, state = run.designs[name], run.states[name][options.load]
     if options.after is None:
-        return name, shell, retensioning.drawn(shell, design, state, load, length_error=options.length_error)
+        return (
+            name,
+            shell,
+            retensioning.first_belief(shell, design, state, load, length_error=options.length_error),
+        )
     remedy = "Name the schedules/belief.npz of the round before."
     require_file(options.after)
     try:

@@ -40,8 +40,8 @@ class MapsBeside:
     def __init__(self, child: subprocess.Popen[bytes] | None) -> None:
         self._child = child
 
-    def drawn(self) -> DrawnMaps | None:
-        """What it has drawn, once it has ended; None where it came to no end of its own."""
+    def wait(self) -> DrawnMaps | None:
+        """What it has drawn, after its end; None where it came to no end of its own."""
         if self._child is None:
             return None
         told, _ = self._child.communicate()

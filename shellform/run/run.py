@@ -370,7 +370,7 @@ def _safety(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) ->
         return _Ended(parts, examine(workspace))
     with maps_beside(workspace.folder) as maps:
         summary = examine(workspace)
-        return _Ended(replace(parts, maps=maps.drawn()), summary)
+        return _Ended(replace(parts, maps=maps.wait()), summary)
 
 
 def _figures(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:

@@ -76,7 +76,7 @@ def drawn_of(
         if workshop is None:
             workshop = Workshop(perfect(shell, design, loads[load], step=TO_ITS_END))
         first = len(path.factors)
-        some = workshop.drawn(
+        some = workshop.load_numbers(
             tolerances,
             seed=seed,
             numbers=range(first, min(first + _AT_ONCE, count)),

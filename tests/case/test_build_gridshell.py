@@ -21,6 +21,7 @@ from shellform.case.entries import (
 )
 from shellform.errors import InputError
 from shellform.gridshell.gridshell import Rod
+from shellform.structure.elements.sections import Rectangle
 
 ROD = {"young": 40e9, "strength": 240e6}
 
@@ -81,7 +82,7 @@ def test_edge_beams_are_of_the_rods_material_or_their_own():
     material = module.edge_beam(other, rod).section.material
     assert (material.young, material.strength, material.density) == (70e9, 160e6, 2700.0)
     assert material.shear == pytest.approx(28e9)
-    lath = Rod(module.Rectangle(0.04, 0.01, rod.section.material))
+    lath = Rod(Rectangle(0.04, 0.01, rod.section.material))
     bundle = module.edge_beam(EdgeBeamEntry(rods=7), lath).section
     assert (bundle.count, bundle.radius) == (7, pytest.approx(math.sqrt(4e-4 / math.pi)))
 

@@ -7,7 +7,8 @@ import pytest
 
 from shellform.net import edges as module
 from shellform.net.edges import Edges, Place
-from shellform.net.rims import End, Rim, _along, _chains, _reached, ends_of, rim_of
+from shellform.net.polylines import closed, nearest
+from shellform.net.rims import End, Rim, _chains, _reached, ends_of, rim_of
 from shellform.structure.elements.rotation import matrices
 
 
@@ -35,7 +36,7 @@ def test_a_place_holds_where_all_that_is_given_does_its_bounds_included():
 def test_distances_from_an_open_plan_curve_are_those_from_its_nearest_piece():
     curve = np.array([[10.0, 20.0], [13.0, 24.0], [13.0, 24.0], [13.0, 30.0]])
     points = np.array([[10.7, 22.6], [15.0, 27.0], [7.0, 16.0], [13.0, 31.5], [16.0, 20.0]])
-    assert module._distance(points, curve) == pytest.approx([1.0, 2.0, 5.0, 1.5, 4.8])
+    assert nearest(points, curve)[0] == pytest.approx([1.0, 2.0, 5.0, 1.5, 4.8])
 
 
 def test_an_edge_stands_on_the_ground_up_to_a_fiftieth_of_the_larger_extent_above_its_lowest_point_or_the_level_given():
@@ -279,7 +280,7 @@ def test_feet_in_one_place_are_one():
 def test_arc_lengths_on_a_polygon_are_those_of_the_nearest_places():
     polygon = np.array([[10.0, 5.0], [14.0, 5.0], [14.0, 8.0], [10.0, 8.0]])
     points = np.array([[11.0, 4.0], [15.0, 6.5], [13.0, 9.0], [9.0, 6.0], [15.0, 9.0], [13.9, 5.0]])
-    assert _along(points, polygon) == pytest.approx([1.0, 5.5, 8.0, 13.0, 7.0, 3.9])
+    assert nearest(points, closed(polygon))[1] == pytest.approx([1.0, 5.5, 8.0, 13.0, 7.0, 3.9])
 
 
 def test_a_chain_of_ends_is_parted_at_each_gap_that_is_wider_than_told():

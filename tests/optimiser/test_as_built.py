@@ -24,9 +24,9 @@ from shellform.reliability.trial_structures import (
     confirm,
     demand,
     enlarged,
+    judge_trial,
     required,
-    stands,
-    tried,
+    try_structures,
 )
 from tests.problems import misfit_and_force
 
@@ -64,10 +64,10 @@ def test_a_search_with_safety_resumed_in_thinning_ends_with_the_same_design_to_t
 
 def test_where_no_accepted_design_stands_the_search_says_so(stout, problem, monkeypatch):
     def falls(shell, design, asked, *, first=(), judging=None):
-        found = stands(shell, design, asked, first=first, judging=judging)
+        found = judge_trial(shell, design, asked, first=first, judging=judging)
         return replace(found, stands=False)
 
-    monkeypatch.setattr(trials, "stands", falls)
+    monkeypatch.setattr(trials, "judge_trial", falls)
     best = sf.optimise(
         problem, stout.design(), evaluations=4, safety=ASKED, solver=sf.SequentialConvex(thin=False)
     )
@@ -79,10 +79,10 @@ def test_polishing_that_spends_what_stands_comes_back_with_the_design_before_it(
     before = best.design
 
     def only_before(shell, design, asked, *, first=(), judging=None):
-        own = stands(shell, design, asked, first=first, judging=judging)
+        own = judge_trial(shell, design, asked, first=first, judging=judging)
         return replace(own, stands=bool(np.array_equal(design.rest_length, before.rest_length)))
 
-    monkeypatch.setattr(trials, "stands", only_before)
+    monkeypatch.setattr(trials, "judge_trial", only_before)
     monkeypatch.setattr(trials, "confirm", only_before)
     polished = sf.polish(best, evaluations=4)
     np.testing.assert_array_equal(polished.design.rest_length, before.rest_length)
@@ -93,9 +93,9 @@ def test_where_no_polished_design_stands_the_design_before_it_comes_back(found, 
     best, _ = found
 
     def falls(shell, design, asked, **how):
-        return replace(stands(shell, design, asked, **how), stands=False)
+        return replace(judge_trial(shell, design, asked, **how), stands=False)
 
-    monkeypatch.setattr(trials, "stands", falls)
+    monkeypatch.setattr(trials, "judge_trial", falls)
     monkeypatch.setattr(trials, "confirm", falls)
     for one in (best, replace(best, mind={0: 1.0})):
         polished = sf.polish(one, evaluations=3)
@@ -246,10 +246,10 @@ def test_cables_keep_a_tension_that_errors_of_their_lengths_leave_them(stout, pr
 def test_structures_that_fell_before_come_first_and_refuse_early(stout, problem):
     heavy = {"wet": 2.2 * problem.loads["wet"]}
     asked = Required(ASKED, heavy, "wet", {"wet": 6})
-    every = tried(stout, stout.design(), asked)
+    every = try_structures(stout, stout.design(), asked)
     assert every.fallen["wet"]
     strict = Required(ASKED, heavy, "wet", {"wet": 0})
-    early = tried(stout, stout.design(), strict, first=every.fallen["wet"][-1:])
+    early = try_structures(stout, stout.design(), strict, first=every.fallen["wet"][-1:])
     assert not early.stands
     assert early.factorisations < every.factorisations
 
@@ -269,7 +269,7 @@ def test_numbers_make_up_for_errors_that_the_start_doesnt_bear_as_large_as_asked
     def bears_half(shell, start, asked, **_):
         return JudgedTrial(dict.fromkeys(asked.loads, ()), True, asked.safety.enlarged <= 1.25, 0)
 
-    monkeypatch.setattr(trial_structures, "tried", bears_half)
+    monkeypatch.setattr(trial_structures, "try_structures", bears_half)
     asked = replace(ASKED, enlarged=1.5)
     found = demand(stout, stout.design(), {"wet": problem.loads["wet"]}, asked, design_load="wet")
     assert (found.trial.safety.enlarged, found.trial.safety.tried) == (1.25, MOST)
@@ -298,12 +298,12 @@ def test_structures_of_fresh_samples_are_drawn_with_errors_as_they_are_and_count
     assert asked.tolerances(FRESH) == ROUGH
     numbers = range(FRESH, FRESH + 8)
     of_one = replace(asked, safety=replace(ASKED, tried=8), first=FRESH)
-    fell = tried(stout, stout.design(), of_one, whole=True).fallen
+    fell = try_structures(stout, stout.design(), of_one, whole=True).fallen
     assert fell["wet"]
     assert fell["wetter"]
     few = replace(asked, safety=replace(ASKED, tried=1))
-    own = tried(stout, stout.design(), few, whole=True).fallen
-    found = tried(stout, stout.design(), few, first=numbers, whole=True).fallen
+    own = try_structures(stout, stout.design(), few, whole=True).fallen
+    found = try_structures(stout, stout.design(), few, first=numbers, whole=True).fallen
     assert found == {"wet": (*fell["wet"], *own["wet"]), "wetter": own["wetter"]}
 
 
@@ -311,7 +311,7 @@ def test_no_more_is_asked_of_designs_than_the_start_shows(stout, problem):
     heavy = {"wet": 1.4 * problem.loads["wet"], "wetter": 2.2 * problem.loads["wet"]}
     asked = required(stout, stout.design(), heavy, ASKED, design_load="wet")
     assert asked.fallen["wetter"] > 0
-    assert stands(stout, stout.design(), asked).stands
+    assert judge_trial(stout, stout.design(), asked).stands
     named = required(
         stout, stout.design(), heavy, replace(ASKED, probability_additional=0.99), design_load="wet"
     )

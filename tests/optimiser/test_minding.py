@@ -144,7 +144,7 @@ def test_where_structures_lead_to_no_design_that_stands_the_search_goes_back_to_
     search, it, _ = searching
     monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 1.0})
     led = ready_to_lead(search, it, it.point.design)
-    monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": (0,)}, True, False, 0))
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: JudgedTrial({"wet": (0,)}, True, False, 0))
     after = phases._led(search, led)
     assert after.phase == "thin"
     assert after.mind is None
@@ -159,7 +159,7 @@ def test_where_another_turn_leads_to_a_worse_design_the_search_goes_back_to_the_
     search, it, _ = searching
     monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 1.0})
     led = ready_to_lead(search, it, it.point.design)
-    monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": ()}, True, True, 0))
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: JudgedTrial({"wet": ()}, True, True, 0))
     start, found = it.point, []
 
     def descend(search, it):
@@ -183,7 +183,7 @@ def test_where_structures_lead_to_a_better_design_that_stands_thinning_begins_th
     search, it, _ = searching
     monkeypatch.setattr(minding, "to_bear", lambda *_, **__: {0: 1.0})
     led = ready_to_lead(search, it, it.point.design)
-    monkeypatch.setattr(trials, "stands", lambda *_, **__: JudgedTrial({"wet": ()}, True, True, 0))
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: JudgedTrial({"wet": ()}, True, True, 0))
     after = phases._led(search, led)
     assert after.phase == "thin"
     assert [each.number for each in after.mind.scenarios] == [0]

@@ -79,7 +79,7 @@ def test_a_design_that_falls_is_made_stiffer_until_it_stands(stout, monkeypatch)
     search, it = searched(stout, 0.005, asked=demanded({"wet": wet}))
     before = stiffness_of(search, it.point)
     answers = iter([False, True])
-    monkeypatch.setattr(trials, "stands", lambda *_, **__: told(next(answers)))
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: told(next(answers)))
     found, after = _made_to_stand(search, it, it.point, Budget())
     assert found is not None
     assert stiffness_of(search, found) > 1.01 * before
@@ -115,7 +115,7 @@ def test_a_design_that_stands_only_at_a_cost_beyond_the_budget_is_not_taken(stou
     search, it = descended(stout, 0.5)
     for budget, taken in ((it.point.objective, False), (np.inf, True)):
         answers = iter([False, True])
-        monkeypatch.setattr(trials, "stands", lambda *_, own=answers, **__: told(next(own)))
+        monkeypatch.setattr(trials, "judge_trial", lambda *_, own=answers, **__: told(next(own)))
         assert (_made_to_stand(search, it, it.point, Budget(budget))[0] is not None) == taken
 
 
@@ -150,7 +150,7 @@ def test_thinning_ends_after_as_many_single_cables_in_a_row_as_it_may_fail_with(
 def test_where_nothing_stands_the_stiffness_asked_for_is_as_before(stout, monkeypatch):
     wet = stout.point_load(4.5, every=2)
     search, it = searched(stout, 0.005, asked=demanded({"wet": wet}))
-    monkeypatch.setattr(trials, "stands", lambda *_, **__: told(False))
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: told(False))
     found, after = _made_to_stand(search, it, it.point, Budget())
     assert found is None
     assert after.stiffness == it.stiffness
@@ -161,7 +161,7 @@ def test_a_design_that_stands_may_have_less_stiffness_than_was_aimed_for(stout, 
     wet = stout.point_load(4.5, every=2)
     search, it = searched(stout, 0.005, stiffness=5.0, asked=demanded({"wet": wet}))
     assert violation(search, it.point) > 0.0
-    monkeypatch.setattr(trials, "stands", lambda *_, **__: told(True))
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: told(True))
     found, after = _made_to_stand(search, it, it.point, Budget())
     assert found is not None
     assert violation(search, found) <= 0.0

@@ -148,14 +148,14 @@ def test_structures_that_have_fallen_last_are_tried_first(monkeypatch):
         asked.append((shell, built, trial, how))
         return judged({"wet": (3, 1), "wetter": (1, 5)})
 
-    monkeypatch.setattr(trials, "stands", stands)
+    monkeypatch.setattr(trials, "judge_trial", stands)
     search = searching(asked=SimpleNamespace(trial="trial"))
     holds, it = trials.standing(search, iterate(fallen=(5, 8, 3)), "built")
     assert not holds
     assert (it.fallen, it.fell) == ((3, 1, 5, 8), True)
     assert asked == [("shell", "built", "trial", {"first": (5, 8, 3), "judging": "judging"})]
     assert search.evaluator.factorisations == 111
-    monkeypatch.setattr(trials, "stands", lambda *_, **__: judged({"wet": ()}, stands=True))
+    monkeypatch.setattr(trials, "judge_trial", lambda *_, **__: judged({"wet": ()}, stands=True))
     holds, after = trials.standing(search, it, "built")
     assert holds
     assert (after.fallen, after.fell) == (it.fallen, False)

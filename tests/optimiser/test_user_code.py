@@ -190,7 +190,6 @@ def test_a_term_or_variable_whose_shapes_are_not_those_that_it_says_is_refused(c
         (lambda: sf.SequentialConvex(batch=2.5), r"solver\.batch: must be a whole number"),
         (lambda: sf.SequentialConvex(most_cables=40.0), r"solver\.most_cables: must be a whole number"),
         (lambda: sf.MovingAsymptotes(stage=8.0), r"solver\.stage: must be a whole number"),
-        (lambda: sf.Safety(sf.Tolerances(), seed=-1), r"safety\.seed: must be at least 0"),
     ],
 )
 def test_limits_bounds_and_settings_that_make_no_sense_are_refused(make, said):

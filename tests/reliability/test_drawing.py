@@ -13,7 +13,7 @@ from shellform.reliability.drawing import (
     built_beams,
     built_cables,
     built_load,
-    drawn,
+    draw_errors,
     errors_of,
     sizes,
     variables,
@@ -228,11 +228,11 @@ def test_a_cable_keeps_a_twentieth_of_its_length_and_goes_along_with_the_shape()
 
 def test_the_perfect_structure_has_no_errors_and_numbers_are_no_less_than_nothing():
     members = two_rods()
-    found = drawn(members, Tolerances(marks=0.1, load_all=0.1, supports=0.1), 5, PERFECT)
+    found = draw_errors(members, Tolerances(marks=0.1, load_all=0.1, supports=0.1), 5, PERFECT)
     assert not found.beam_length.any()
     assert not found.supports.any()
     assert (found.load == 1.0).all()
-    assert drawn(members, Tolerances(supports=0.1), 5, 0).supports.any()
+    assert draw_errors(members, Tolerances(supports=0.1), 5, 0).supports.any()
     for wrong in ({"seed": -1, "number": 0}, {"seed": 0, "number": -1}):
         with pytest.raises(InputError, match="must"):
             variables(members, **wrong)

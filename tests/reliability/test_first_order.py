@@ -41,7 +41,7 @@ def test_causes_are_told_apart_and_each_moves_the_shell_as_drawn_structures_do(n
     workshop, place = Workshop(nominal), nominal.states[-1].positions
     for cause, expected in told.items():
         alone = replace(Tolerances(), **{cause: getattr(small, cause)})
-        made = workshop.drawn(alone, seed=2, numbers=range(12))
+        made = workshop.load_numbers(alone, seed=2, numbers=range(12))
         squares = [((each.state.positions - place) ** 2).sum(axis=1).mean() for each in made]
         assert np.sqrt(np.mean(squares)) == pytest.approx(expected, rel=0.02)
 

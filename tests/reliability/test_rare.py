@@ -15,7 +15,7 @@ ERRORS = Tolerances(supports=3e-4, load_each=0.1, load_all=0.05)
 
 def test_subset_simulation_agrees_with_counting_fallen_structures(dome, nominal):
     workshop = Workshop(perfect(dome, dome.design(), 1.13 * nominal.load))
-    drawn = workshop.drawn(ERRORS, seed=1, numbers=range(150))
+    drawn = workshop.load_numbers(ERRORS, seed=1, numbers=range(150))
     share = 1.0 - np.mean([each.stands for each in drawn])
     found = rare_failure(workshop, ERRORS, seed=1, count=100, most=1.5).found
     doubt = np.hypot(found.variation * found.probability, np.sqrt(share * (1.0 - share) / 150))

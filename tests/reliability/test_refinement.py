@@ -145,7 +145,7 @@ def test_mesh_errors_are_told_of_all_four_numbers(dome, nominal):
 
 def test_a_fallen_structure_is_explained_by_what_it_would_bear_without_each_cause(dome, nominal):
     workshop = Workshop(perfect(dome, dome.design(), 1.2 * nominal.load))
-    outcomes = workshop.drawn(LARGE, seed=7, numbers=range(12))
+    outcomes = workshop.load_numbers(LARGE, seed=7, numbers=range(12))
     lost = sorted((each for each in outcomes if not each.stands), key=lambda each: each.factor)
     fallen = lost[len(lost) // 2]
     found = explained(workshop, LARGE, seed=7, number=fallen.number)

@@ -8,7 +8,7 @@ import pytest
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability import safety as safety_module
-from shellform.reliability.drawing import PERFECT, drawn
+from shellform.reliability.drawing import PERFECT, draw_errors
 from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.refinement import critical_factor, mesh_error
 from shellform.reliability.safety import Safety, allowed, critical_on_halved, judge, paths
@@ -103,7 +103,7 @@ def test_judging_asks_for_a_design_load(dome, loads):
 @pytest.mark.parametrize("step", [0.5, 0.125])
 def test_a_path_gone_on_with_ends_where_one_from_nothing_does(dome, loads, step):
     nominal = perfect(dome, dome.design(), loads["additional"], step=step)
-    none = drawn(nominal.members, Tolerances(), 0, PERFECT)
+    none = draw_errors(nominal.members, Tolerances(), 0, PERFECT)
     workshop = Workshop(nominal)
     begin = float(nominal.factors[-1]), nominal.states[-1]
     going_on = workshop.limit(none, most=3.0, resolution=1e-4, begin=begin)
@@ -129,7 +129,7 @@ class Drawn:
     def __call__(self, _nominal):
         return self
 
-    def drawn(self, tolerances, **how):
+    def load_numbers(self, tolerances, **how):
         self.asked.append((tolerances, how))
         every = zip(how["numbers"], self.factors, self.stand, strict=True)
         return [SimpleNamespace(number=k, factor=factor, stands=stands) for k, factor, stands in every]

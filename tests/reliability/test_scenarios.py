@@ -15,7 +15,7 @@ from shellform.problem.problem import LoadCase
 from shellform.problem.terms import LoadedDesign
 from shellform.reliability import borne
 from shellform.reliability import scenarios as scenarios_module
-from shellform.reliability.drawing import PERFECT, drawn
+from shellform.reliability.drawing import PERFECT, draw_errors
 from shellform.reliability.perfect import perfect
 from shellform.reliability.scenarios import FactorsAsBuilt, Scenario, borne_factors, remembered, scenarios
 from shellform.reliability.standing import Workshop
@@ -124,7 +124,7 @@ def test_the_structure_without_errors_is_a_scenario_too(dome, case):
     design = dome.design()
     alone = scenarios(dome, design, case, lambda _: AS_BUILT, seed=7, least={PERFECT: 1.25}, most=3.0)
     nominal = perfect(dome, design, case.force)
-    none = drawn(nominal.members, Tolerances(), 7, 0)
+    none = draw_errors(nominal.members, Tolerances(), 7, 0)
     end = Workshop(nominal).limit(none, most=3.0, step=0.25, resolution=1e-4)
     assert factors(dome, design, alone)[0] == pytest.approx(end.factor, rel=0.02)
     value = alone.measure(LoadedDesign(dome, design, nominal.unloaded, case.force)).value
@@ -215,7 +215,7 @@ def test_scenarios_keep_a_tenth_of_the_unloaded_structure_s_softest_stiffness(mo
         "modes",
         lambda assembly, state, count: SimpleNamespace(stiffness=[6.0] if state == "unloaded" else None),
     )
-    monkeypatch.setattr(scenarios_module, "drawn", lambda *given: given)
+    monkeypatch.setattr(scenarios_module, "draw_errors", lambda *given: given)
     case = LoadCase("wet", np.ones((2, 6)))
     found = scenarios(
         None,

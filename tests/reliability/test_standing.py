@@ -107,9 +107,9 @@ def test_small_steps_lead_to_the_same_states(nominal):
 def test_a_structure_has_the_same_bits_whatever_the_count_the_order_and_the_threads(nominal, monkeypatch):
     tolerances = replace(LARGE, rod_bow=1e-3, shape=5e-4)
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
-    alone = Workshop(nominal).drawn(tolerances, seed=3, numbers=[4, 2])
+    alone = Workshop(nominal).load_numbers(tolerances, seed=3, numbers=[4, 2])
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
-    among = Workshop(nominal).drawn(tolerances, seed=3, numbers=range(6))
+    among = Workshop(nominal).load_numbers(tolerances, seed=3, numbers=range(6))
     for one, other in zip(alone, (among[4], among[2]), strict=True):
         assert (one.number, one.factor, one.far) == (other.number, other.factor, other.far)
         assert one.state.positions.tobytes() == other.state.positions.tobytes()
@@ -170,7 +170,7 @@ def test_a_model_file_is_drawn_and_loaded_like_the_shell_it_came_from(dome, nomi
         assert one.elements.tolist() == other.elements.tolist()
         assert one.marks.tolist() == other.marks.tolist()
     assert model.states[-1].positions == pytest.approx(nominal.states[-1].positions, abs=1e-8)
-    assert Workshop(model).drawn(LARGE, seed=0, numbers=[0])[0].stands
+    assert Workshop(model).load_numbers(LARGE, seed=0, numbers=[0])[0].stands
 
 
 def test_an_unknown_load_case_of_a_model_is_refused(dome, nominal):
@@ -262,7 +262,7 @@ def test_a_structure_of_which_one_spot_snaps_goes_on_and_ends_as_the_analysis_of
     whole load."""
     nominal = perfect(dome, dome.design(), dome.point_load(3.0, every=2))
     coarse, workshop = Tolerances(marks=1e-3, supports=5e-4), Workshop(nominal)
-    made = workshop.drawn(coarse, seed=1, numbers=range(16))
+    made = workshop.load_numbers(coarse, seed=1, numbers=range(16))
     snapped = [each for each in made if each.stands and each.snaps]
     assert len(snapped) >= 2
     assert any(not each.stands for each in made)
@@ -288,7 +288,7 @@ def test_no_more_than_so_many_spots_may_snap_before_a_structure_counts_as_fallen
     nominal = perfect(dome, dome.design(), dome.point_load(3.0, every=2))
     coarse = Tolerances(marks=1e-3, supports=5e-4)
     monkeypatch.setattr(path_of_one, "SNAPS", 0)
-    made = Workshop(nominal).drawn(coarse, seed=1, numbers=range(12))
+    made = Workshop(nominal).load_numbers(coarse, seed=1, numbers=range(12))
     assert not any(each.snaps for each in made)
     assert not made[9].stands
 
@@ -296,7 +296,7 @@ def test_no_more_than_so_many_spots_may_snap_before_a_structure_counts_as_fallen
 def test_a_structure_rests_under_a_share_of_the_load_where_one_loaded_with_that_alone_does(dome):
     share, load = 1.0 / 1.2, dome.point_load(4.5, every=2)
     more, less = perfect(dome, dome.design(), 1.2 * load), perfect(dome, dome.design(), load)
-    made = Workshop(more).drawn(LARGE, seed=7, numbers=range(12), resting=share)
+    made = Workshop(more).load_numbers(LARGE, seed=7, numbers=range(12), resting=share)
     alone = Workshop(less)
     looked_at = [each for each in made if each.resting is not None]
     assert any(not each.stands for each in looked_at), "one that falls later rested there before"
@@ -306,7 +306,7 @@ def test_a_structure_rests_under_a_share_of_the_load_where_one_loaded_with_that_
         assert np.abs(each.resting.positions - each.state.positions).max() > 1e-5
     for each in made:
         assert (each.resting is None) == (each.factor < share)
-    for each, same in zip(made, Workshop(more).drawn(LARGE, seed=7, numbers=range(12)), strict=True):
+    for each, same in zip(made, Workshop(more).load_numbers(LARGE, seed=7, numbers=range(12)), strict=True):
         assert same.resting is None, "where nobody asks"
         assert (same.factor, same.stands) == (each.factor, each.stands)
 
@@ -314,7 +314,7 @@ def test_a_structure_rests_under_a_share_of_the_load_where_one_loaded_with_that_
 def test_a_structure_that_has_snapped_beyond_a_load_tells_where_it_rested_before(dome):
     share, coarse = 0.2, Tolerances(marks=1e-3, supports=5e-4)
     nominal = perfect(dome, dome.design(), dome.point_load(3.0, every=2))
-    made = Workshop(nominal).drawn(coarse, seed=1, numbers=range(16), resting=share)
+    made = Workshop(nominal).load_numbers(coarse, seed=1, numbers=range(16), resting=share)
     beyond = [each for each in made if each.snaps and each.snaps[0].factor > share]
     assert len(beyond) >= 2
     workshop = Workshop(perfect(dome, dome.design(), share * dome.point_load(3.0, every=2)))
@@ -396,7 +396,7 @@ def test_drawn_structures_are_loaded_number_by_number_and_counted(monkeypatch, w
     monkeypatch.setattr(made, "load", load)
     monkeypatch.setattr(standing, "variables", lambda members, seed, number: (members, seed, number))
     monkeypatch.setattr(standing, "errors_of", lambda members, tolerances, z: (tolerances, z))
-    made.drawn("rough", seed=4, numbers=[5, 2], step=0.5, marks=(0.8,), resting=0.3)
+    made.load_numbers("rough", seed=4, numbers=[5, 2], step=0.5, marks=(0.8,), resting=0.3)
     assert heard == [
         (("rough", ("members", 4, k)), {"number": k, "step": 0.5, "marks": (0.8,), "resting": 0.3})
         for k in (5, 2)

@@ -20,7 +20,7 @@ from shellform.reliability.trial_structures import (
     aims,
     enlarged,
     to_bear,
-    tried,
+    try_structures,
 )
 
 ROUGH = Tolerances(supports=1e-4, load_each=0.1, load_all=0.4)
@@ -29,16 +29,16 @@ ROUGH = Tolerances(supports=1e-4, load_each=0.1, load_all=0.4)
 def test_a_search_draws_other_structures_than_those_by_which_its_result_is_judged_and_with_larger_errors(
     dome, nominal, monkeypatch
 ):
-    asked_for, own = [], trial_structures.drawn
+    asked_for, own = [], trial_structures.draw_errors
 
     def perfect(members, tolerances, seed, number):
         asked_for.append((tolerances, seed, number))
         return own(members, Tolerances(), seed, number)
 
-    monkeypatch.setattr(trial_structures, "drawn", perfect)
+    monkeypatch.setattr(trial_structures, "draw_errors", perfect)
     safety = Safety(ROUGH, critical_factor=None, drawn=10, tried=3, seed=5, enlarged=1.5)
     asked = Required(safety, {"design": nominal.load}, "design", {"design": 0})
-    found = tried(dome, dome.design(), asked, first=(2,))
+    found = try_structures(dome, dome.design(), asked, first=(2,))
     assert found.stands
     assert [number for *_, number in asked_for] == [2, 0, 1], "those that fell before come first"
     assert {seed for _, seed, _ in asked_for} == {5 + SEED} != {safety.seed}
@@ -51,7 +51,7 @@ def test_a_judgement_tells_how_many_structures_were_loaded_and_how_many_there_ar
     safety = Safety(ROUGH, critical_factor=None, drawn=10, tried=6)
     heard = []
     asked = Required(safety, {"design": nominal.load}, "design", {"design": 6})
-    tried(dome, dome.design(), asked, judging=lambda done, most: heard.append((done, most)))
+    try_structures(dome, dome.design(), asked, judging=lambda done, most: heard.append((done, most)))
     assert heard == [(4, 6), (6, 6)]
 
 
@@ -82,10 +82,10 @@ def test_before_thinning_all_that_fall_are_aimed_for_where_more_do_than_may(dome
     )
     factors = {number: 0.1 + 0.1 * number for number in range(10)}
     found = JudgedTrial({"design": (), "additional": tuple(range(9))}, True, False, 0, factors)
-    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: found)
+    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: found)
     assert to_bear(dome, dome.design(), asked) == dict.fromkeys(range(9), 1.0)
     may = JudgedTrial({"design": (), "additional": (1, 2, 3, 4)}, True, True, 0, factors)
-    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: may)
+    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: may)
     assert to_bear(dome, dome.design(), asked) == {}
 
 
@@ -108,11 +108,11 @@ def test_a_judgement_knows_what_each_structure_bears(dome, nominal):
     asked = Required(
         Safety(ROUGH, critical_factor=None, drawn=10, tried=3), loads, "design", dict.fromkeys(loads, 3)
     )
-    found = tried(dome, dome.design(), asked)
+    found = try_structures(dome, dome.design(), asked)
     assert set(found.factors) == {0, 1, 2}
     assert max(found.factors.values()) <= 1.0, "none is followed beyond the largest load"
     light = replace(asked, loads={"design": 0.2 * nominal.load}, fallen={"design": 3})
-    assert set(tried(dome, dome.design(), light).factors.values()) == {1.0}
+    assert set(try_structures(dome, dome.design(), light).factors.values()) == {1.0}
     for name, share in (("design", 0.8), ("additional", 1.0)):
         assert set(found.fallen[name]) == {
             number for number, factor in found.factors.items() if factor < share - 1e-9
@@ -147,7 +147,7 @@ class Tried:
                 lambda *given, step: SimpleNamespace(members=given[2].sum(), known_to=lambda f: ("to", f)),
             ),
             ("Workshop", self),
-            ("drawn", lambda members, tolerances, seed, number: (number, members)),
+            ("draw_errors", lambda members, tolerances, seed, number: (number, members)),
         ]:
             monkeypatch.setattr(trial_structures, name, fake)
 
@@ -164,7 +164,7 @@ class Tried:
         return SimpleNamespace(factor=self.factors[PERFECT], factorisations=100)
 
     def judged(self, asked, **how):
-        return tried(None, None, asked, **how)
+        return try_structures(None, None, asked, **how)
 
 
 def test_structures_fall_under_the_loads_that_they_do_not_bear_and_refuse_where_more_do_than_may(monkeypatch):
@@ -254,7 +254,7 @@ def test_where_the_start_shows_more_falls_than_the_probability_allows_as_many_ma
         heard = []
         monkeypatch.setattr(
             trial_structures,
-            "tried",
+            "try_structures",
             lambda _shell, _start, asked, heard=heard, fell=fell, **how: (
                 heard.append((asked, how)) or JudgedTrial(fell, True, True, 0)
             ),
@@ -311,7 +311,7 @@ class Bearing:
 
     def __init__(self, monkeypatch, times, fallen=(0, 0)):
         self.times, self.fell, self.heard = times, dict(zip(LOADS, map(range, fallen), strict=True)), []
-        monkeypatch.setattr(trial_structures, "tried", self)
+        monkeypatch.setattr(trial_structures, "try_structures", self)
 
     def __call__(self, _shell, _start, asked, **_how):
         self.heard.append((asked.safety.enlarged, asked.safety.tried, asked.safety.seed, dict(asked.fallen)))
@@ -365,8 +365,8 @@ def test_a_design_without_unloaded_equilibrium_does_not_stand_and_tells_what_was
     def none(*_, **__):
         raise NotConverged("no equilibrium", iterations=17)
 
-    monkeypatch.setattr(trial_structures, "tried", none)
-    found = trial_structures.stands(None, None, asked_of({"wet": 1, "wetter": 1}))
+    monkeypatch.setattr(trial_structures, "try_structures", none)
+    found = trial_structures.judge_trial(None, None, asked_of({"wet": 1, "wetter": 1}))
     assert found == JudgedTrial({"wet": (), "wetter": ()}, False, False, 17)
 
 
@@ -382,12 +382,12 @@ def test_a_design_is_confirmed_where_its_critical_factor_is_kept_on_the_halved_m
 
     monkeypatch.setattr(trial_structures, "critical_on_halved", halved)
     trial = JudgedTrial({"wet": ()}, True, True, 12)
-    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: trial)
+    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: trial)
     found = trial_structures.confirm(None, None, asked)
     assert (found.critical, found.stands, found.factorisations) == (kept, kept, 42)
     assert sought == [(-12.0, 1.25)]
     assert trial_structures.confirm(None, None, asked_of({"wet": 1})) == trial, "where no factor is asked for"
-    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: replace(trial, stands=False))
+    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: replace(trial, stands=False))
     assert trial_structures.confirm(None, None, asked).factorisations == 12, (
         "what falls is looked at no further"
     )
@@ -399,7 +399,7 @@ def test_what_falls_under_several_loads_is_to_bear_the_largest_before_thinning_a
 ):
     asked = asked_of({"wet": 0, "wetter": 0})
     found = JudgedTrial({"wet": (4,), "wetter": (4, 2)}, True, False, 0, {4: 0.3, 2: 0.9})
-    monkeypatch.setattr(trial_structures, "tried", lambda *_, **__: found)
+    monkeypatch.setattr(trial_structures, "try_structures", lambda *_, **__: found)
     assert to_bear(None, None, asked) == {4: 1.0, 2: 1.0}
     assert aims(asked, found) == {4: pytest.approx(0.8), 2: 1.0}
 

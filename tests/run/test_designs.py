@@ -85,14 +85,26 @@ def test_a_design_s_record_counts_by_its_cables_and_by_the_design_load(monkeypat
     monkeypatch.setattr(module, "write_model", lambda file, model: models.append(model))
     monkeypatch.setattr(module, "Model", lambda network, loads, target, supports: (list(loads), supports))
     monkeypatch.setattr(module, "deviations", lambda shell, state: np.array([0.003, 0.004, 0.0]))
-    monkeypatch.setattr(module, "shown", lambda *_: {"thrust_max": 3.5})
+    push = np.zeros((3, 6))
+    push[0, :3], push[1], push[2, :3] = (1.0, 0.0, -1.5), -99.0, (2.1, -2.8, 4.0)
+    assembly = SimpleNamespace(unbalanced=lambda state, load: push)
+    monkeypatch.setattr(module, "assemble", lambda network: assembly)
+    monkeypatch.setattr(module, "edge_utilisation", lambda shell, beams, forces: 0.6)
+    monkeypatch.setattr(module.results, "twist", lambda deformations: np.array([0.1, -0.3, 0.9]))
+    beams = SimpleNamespace(
+        local_deformations=lambda state: None,
+        local_forces=lambda state: None,
+        of_kind=lambda kind: np.array([True, True, False]),
+    )
     cables = SimpleNamespace(tension=lambda state: np.array([4.0, 0.0, 7.0, -1e-9]))
     shell = SimpleNamespace(
         net=SimpleNamespace(supports=np.array([2, 0])),
         network=lambda design: "network",
         target=STATE,
         cables=lambda design: cables,
+        beams=lambda radius: beams,
         bending_utilisation=lambda design, state: np.array([0.2, 0.7, 0.4]),
+        utilisation=lambda design, state: np.array([0.5, 0.8]),
     )
     (tmp_path / "designs").mkdir()
     found = write_design(
@@ -109,6 +121,9 @@ def test_a_design_s_record_counts_by_its_cables_and_by_the_design_load(monkeypat
     assert (row.deviation_max, row.deviation_mean) == (0.004, pytest.approx(7e-3 / 3))
     assert row.deviation_rms == pytest.approx(5e-3 / math.sqrt(3))
     assert (row.stable, row.rod_utilisation_max, row.thrust_max) == (False, 0.7, 3.5)
+    assert (row.stress_utilisation_max, row.edge_utilisation_max) == (0.8, 0.6)
+    assert (row.uplift_max, row.connector_turn_max) == (1.5, 0.3), "of supports and connectors alone"
+    assert (row.cable_force_max, row.cable_force_min, row.cables_slack) == (7.0, -1e-9, 2)
     assert row.slack == ("C1", "C3")
     with np.load(tmp_path / "designs/initial.npz") as kept:
         assert {"design_positions", "none_quaternions", "rest_length"} < set(kept)

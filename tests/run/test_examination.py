@@ -122,7 +122,7 @@ def test_of_the_shape_as_built_the_median_the_worst_and_what_drives_it_are_told(
         (largest,) = paths(run.loads)
         share = paths(run.loads)[largest]["design"]
         workshop = Workshop(perfect(shell, run.designs[name], run.loads[largest]))
-        made = workshop.drawn(tolerances, seed=0, numbers=range(4), resting=share)
+        made = workshop.load_numbers(tolerances, seed=0, numbers=range(4), resting=share)
         places = np.array([each.resting.positions for each in made])
         far = np.linalg.norm(places - shell.target.positions, axis=2)
         drawn = read_drawn(whole[0], name, key_of(shell, run.designs[name], tolerances, run.loads, 0))

@@ -195,7 +195,7 @@ def test_structures_are_drawn_under_the_additional_load_with_larger_errors_until
         def __init__(self, nominal):
             assert nominal == (0.997, 12.0), "1.2 times the load"
 
-        def drawn(self, tolerances, *, seed, numbers):
+        def load_numbers(self, tolerances, *, seed, numbers):
             assert tolerances == ("usual", 1.25)
             found.extend(numbers)
             return [SimpleNamespace(stands=number != falls) for number in numbers]

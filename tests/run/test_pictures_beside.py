@@ -25,7 +25,7 @@ def test_maps_drawn_beside_other_work_are_the_bytes_of_those_drawn_here(run, tmp
     here = shutil.copytree(run.folder, tmp_path / "here")
     with maps_beside(run.folder) as maps:
         assert draw_maps(read_run(here))
-        found = maps.drawn()
+        found = maps.wait()
     assert found == DrawnMaps("initial", True, ())
     assert len(pictures(here)) > 12
     assert pictures(run.folder) == pictures(here)
@@ -34,13 +34,13 @@ def test_maps_drawn_beside_other_work_are_the_bytes_of_those_drawn_here(run, tmp
 def test_a_child_that_fails_has_drawn_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures_beside, "cores", lambda: 2)
     with maps_beside(tmp_path / "nothing") as maps:
-        assert maps.drawn() is None
+        assert maps.wait() is None
 
 
 def test_on_a_single_core_no_child_is_begun(run, monkeypatch):
     monkeypatch.setattr(pictures_beside, "cores", lambda: 1)
     with maps_beside(run.folder) as maps:
-        assert maps.drawn() is None
+        assert maps.wait() is None
     assert pictures(run.folder) == {}
 
 

@@ -548,7 +548,7 @@ def test_drawing_ends_with_the_first_structure_that_falls_and_none_is_drawn_afte
         def __init__(self, nominal):
             pass
 
-        def drawn(self, tolerances, *, seed, numbers):
+        def load_numbers(self, tolerances, *, seed, numbers):
             drawn.extend(numbers)
             return [SimpleNamespace(stands=number != 4) for number in numbers]
 

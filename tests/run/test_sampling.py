@@ -24,7 +24,7 @@ class Bench:
     def __init__(self, nominal):
         assert nominal == (-12.5, {"step": TO_ITS_END})
 
-    def drawn(self, tolerances, *, seed, numbers, marks, resting):
+    def load_numbers(self, tolerances, *, seed, numbers, marks, resting):
         assert (tolerances, seed) == ("tolerances", 7)
         self.asked.append((list(numbers), marks, resting))
         return [

@@ -30,14 +30,14 @@ def require() -> None:
         scene.require()
 
 
-def drawn(pages: Iterable[Canvas]) -> Iterator[NDArray[np.uint8]]:
+def paint(pages: Iterable[Canvas]) -> Iterator[NDArray[np.uint8]]:
     """The pages as arrays (height, width, 3), or 4 without a background. Raises InputError as `require`
     does.
     """
     if shades():
         from shellform.output.pictures import scene
 
-        yield from scene.drawn(pages)
+        yield from scene.paint(pages)
         return
     from shellform.output.pictures import vectors
 

@@ -82,7 +82,7 @@ def pictures(paths: Sequence[str | Path], panels: Sequence[Panel], look: Look | 
     pages = [single([panel], look or Look())[0] for panel in panels]
     endings = {door(path, *FORMATS).suffix.lower() for path in paths}
     if endings == {".png"}:
-        for path, drawn in zip(paths, painter.drawn(pages), strict=True):
+        for path, drawn in zip(paths, painter.paint(pages), strict=True):
             write_png(path, drawn, dots=pages[0].look.dots)
         return
     for path, page in zip(paths, pages, strict=True):
@@ -98,7 +98,7 @@ def film(
     require_count(rate, where="rate", give="pictures a second, such as 12")
     for path in paths:
         door(path, *FILMS)
-    frames = list(painter.drawn(single(panels, look or Look(size=(960, 600)))))
+    frames = list(painter.paint(single(panels, look or Look(size=(960, 600)))))
     for path in paths:
         write_film(path, frames, rate=rate)
 
@@ -111,7 +111,7 @@ def _written(path: str | Path | None, page: Canvas) -> Image:
 
         vectors.write(target, page)
         return vectors.rasterised(page)
-    (picture,) = painter.drawn([page])
+    (picture,) = painter.paint([page])
     if target is not None:
         write_png(target, picture, dots=page.look.dots)
     return picture

@@ -60,7 +60,7 @@ _MATT = {
 }  # colours stay those of the bar
 
 
-def drawn(pages: Iterable[Canvas]) -> Iterator[Image]:
+def paint(pages: Iterable[Canvas]) -> Iterator[Image]:
     """The pages as arrays (height, width, 3), or 4 without a background; all are drawn in one window.
 
     Keys and headings that don't change from page to page are drawn once. Raises InputError where VTK can't
