@@ -1,4 +1,5 @@
-"""Processes that end with the one that began them: readers of files, and those that try nets side by side.
+"""Processes that end with the one that began them: readers of files, those that draw, and those that try nets
+side by side.
 
 A process that is killed can't end its own, which would go on alone, or wait for work for ever.
 """
@@ -9,8 +10,31 @@ import ctypes
 import os
 import signal
 import sys
+from pathlib import Path
 
 _PR_SET_PDEATHSIG = 1  # linux/prctl.h
+
+
+def command_of(module: str) -> list[str]:
+    """What runs a `module` of this package, whose arguments follow, where `surroundings` are its
+    environment."""
+    return [sys.executable, "-P", "-m", module]
+
+
+def surroundings() -> dict[str, str]:
+    """This process's environment, in which another finds this very package."""
+    package = str(Path(__file__).parents[1])
+    path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
+    return {**os.environ, "PYTHONPATH": path}
+
+
+def answering() -> int:
+    """The descriptor of standard output, for this process's answer alone: what libraries write there past
+    Python goes nowhere from now on."""
+    answer = os.dup(1)
+    with open(os.devnull, "wb") as nowhere:
+        os.dup2(nowhere.fileno(), 1)
+    return answer
 
 
 def end_with(parent: int) -> None:

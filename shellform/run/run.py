@@ -368,9 +368,9 @@ def _safety(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) ->
     write_summary(workspace.folder, summary)
     if "figures" not in _wanted(workspace, workspace.until):
         return _Ended(parts, examine(workspace))
-    with maps_beside(workspace.folder) as maps:
+    with maps_beside(workspace.folder) as drawn:
         summary = examine(workspace)
-        return _Ended(replace(parts, maps=maps.wait()), summary)
+        return _Ended(replace(parts, maps=drawn()), summary)
 
 
 def _figures(workspace: Workspace, parts: Parts, summary: Summary, keep: bool) -> _Ended:

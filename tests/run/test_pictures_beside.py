@@ -23,9 +23,9 @@ def pictures(folder):
 def test_maps_drawn_beside_other_work_are_the_bytes_of_those_drawn_here(run, tmp_path, monkeypatch):
     monkeypatch.setattr(pictures_beside, "cores", lambda: 2)
     here = shutil.copytree(run.folder, tmp_path / "here")
-    with maps_beside(run.folder) as maps:
+    with maps_beside(run.folder) as drawn:
         assert draw_maps(read_run(here))
-        found = maps.wait()
+        found = drawn()
     assert found == DrawnMaps("initial", True, ())
     assert len(pictures(here)) > 12
     assert pictures(run.folder) == pictures(here)
@@ -33,14 +33,14 @@ def test_maps_drawn_beside_other_work_are_the_bytes_of_those_drawn_here(run, tmp
 
 def test_a_child_that_fails_has_drawn_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(pictures_beside, "cores", lambda: 2)
-    with maps_beside(tmp_path / "nothing") as maps:
-        assert maps.wait() is None
+    with maps_beside(tmp_path / "nothing") as drawn:
+        assert drawn() is None
 
 
 def test_on_a_single_core_no_child_is_begun(run, monkeypatch):
     monkeypatch.setattr(pictures_beside, "cores", lambda: 1)
-    with maps_beside(run.folder) as maps:
-        assert maps.wait() is None
+    with maps_beside(run.folder) as drawn:
+        assert drawn() is None
     assert pictures(run.folder) == {}
 
 

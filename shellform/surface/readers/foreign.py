@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from shellform.errors import InputError, NotConverged, ShellformError
-from shellform.processes import end_with
+from shellform.processes import answering, command_of, end_with, surroundings
 from shellform.surface.readers.allowance import allow_file, allow_mesh
 from shellform.surface.readers.draft import Choice, Draft
 
@@ -49,15 +49,13 @@ def read_foreign(file: Path, kind: str, settings: Mapping[str, Any], *, longest:
     script `size` and `dimensions`. Raises NotConverged where a script finds no form.
     """
     request = json.dumps({"file": str(file), "kind": kind, "settings": dict(settings), "parent": os.getpid()})
-    package = str(Path(__file__).parents[3])
-    path = os.pathsep.join([package, *filter(None, [os.environ.get("PYTHONPATH")])])
     try:
         child = subprocess.run(
-            [sys.executable, "-P", "-m", "shellform.surface.readers.foreign"],
+            command_of("shellform.surface.readers.foreign"),
             input=request.encode(),
             capture_output=True,
             timeout=longest,
-            env={**os.environ, "PYTHONPATH": path, **_ONE_THREAD},
+            env=surroundings() | _ONE_THREAD,
             check=False,
         )
     except subprocess.TimeoutExpired as error:
@@ -106,9 +104,7 @@ def _remedy(kind: str) -> str:
 def _serve() -> None:
     """The child's whole life: one request from standard input, one answer."""
     request = json.loads(sys.stdin.read())
-    pipe = os.dup(1)
-    with open(os.devnull, "wb") as nowhere:  # libraries write to standard output past Python
-        os.dup2(nowhere.fileno(), 1)
+    pipe = answering()
     end_with(request["parent"])
     _limit_memory()
     file = Path(request["file"])
