@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from shellform.arrays import read_arrays
-from shellform.errors import InputError, NotConverged, require_number
+from shellform.errors import InputError, NotConverged, require_known, require_number
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.layers import rod_forces
 from shellform.records import history
 from shellform.records.progress import Event, Kind, Report, unheard
-from shellform.run.folder import Run, read_run, refuse_unknown
+from shellform.run.folder import Run, read_run
 from shellform.run.scales import colour_limit, force_limit
 from shellform.structure.elements.state import State
 from shellform.written import folder as made
@@ -94,8 +94,8 @@ def wish(
     paper = _paper(width_mm, dpi, font_size, film)
     if force_limit is not None:
         require_number(force_limit, above=0.0, where="--force-limit", give="newtons, such as 20")
-    if film is not None and film not in FILMS:
-        raise InputError("is no film", where="--film", value=film, remedy=f"Known: {', '.join(FILMS)}.")
+    if film is not None:
+        require_known(film, FILMS, where="--film", what="is no film")
     if film is not None and (transparent or quantity in _STILL):
         filmed = ", ".join(each for each in QUANTITIES if each not in _STILL)
         raise InputError(
@@ -104,18 +104,11 @@ def wish(
             value="--transparent" if transparent else quantity,
             remedy="Leave --transparent out." if transparent else f"Films show {filmed}.",
         )
-    if quantity is not None and quantity not in QUANTITIES:
-        raise InputError(
-            "is nothing to draw",
-            where="--quantity",
-            value=quantity,
-            remedy=f"Known: {', '.join(QUANTITIES)}.",
-        )
+    if quantity is not None:
+        require_known(quantity, QUANTITIES, where="--quantity", what="is nothing to draw")
     kinds = ("gif", "mp4") if film else ("png", "svg", "pdf")
-    if kind is not None and kind not in kinds:
-        raise InputError(
-            "is no format of it", where="--format", value=kind, remedy=f"Known: {', '.join(kinds)}."
-        )
+    if kind is not None:
+        require_known(kind, kinds, where="--format", what="is no format of it")
     chosen_kinds = (kind,) if kind else kinds if film else kinds[:1]
     usual = "utilisation" if film == "erection" else "deviation"
     endings = tuple(f".{each}" for each in chosen_kinds)
@@ -304,9 +297,9 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
 def chosen(run: Run, design: str | None, load: str | None) -> tuple[list[str], list[str]]:
     """The designs and loads that are meant. Raises InputError for unknown ones."""
     if design is not None:
-        refuse_unknown("--design", design, run.designs)
+        require_known(design, run.designs, where="--design", what="isn't there")
     if load is not None:
-        refuse_unknown("--load", load, run.loads)
+        require_known(load, run.loads, where="--load", what="isn't there")
     return [design] if design else list(run.designs), [load] if load else list(run.loads)
 
 

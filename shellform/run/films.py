@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from shellform.errors import require_known
 from shellform.records.progress import Event, Report, unheard
 from shellform.run.figures import Wish, look_of, titled
-from shellform.run.folder import Run, refuse_unknown
+from shellform.run.folder import Run
 from shellform.site.erection import erect
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -40,8 +41,8 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> l
     painter.require()  # before minutes are spent on states
     images.require(wish.endings)
     name = wish.design or run.best
-    refuse_unknown("--design", name, run.designs)
-    refuse_unknown("--load", wish.load or "design", run.loads)
+    require_known(name, run.designs, where="--design", what="isn't there")
+    require_known(wish.load or "design", run.loads, where="--load", what="isn't there")
     if kind == "pour":
         stages = _stages(run, wish.load)
         panels = _pour(run, name, stages, wish.quantity, report)

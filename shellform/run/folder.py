@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import contextlib
 import os
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,7 +18,7 @@ import shellform
 from shellform.arrays import Reals, read_arrays, reals
 from shellform.case.build_gridshell import gridshell, rounding_catalogue
 from shellform.case.case import Case, load_case
-from shellform.errors import Damaged, InputError, require_known
+from shellform.errors import Damaged, InputError
 from shellform.gridshell.catalogue import named
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.net.net import Net
@@ -99,12 +99,6 @@ class Run:
         if section is None or catalogue is None:
             return self.shell
         return replace(self.shell, rod=Rod(named(catalogue, section)))
-
-
-def refuse_unknown(option: str, name: str, known: Collection[str]) -> None:
-    """Raises InputError for the `name`, given by an `option`, of a design or a load case that isn't among
-    those `known`."""
-    require_known(name, known, where=option, what="isn't there")
 
 
 def read_run(folder: str | Path) -> Run:

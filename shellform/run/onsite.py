@@ -28,7 +28,7 @@ from shellform.errors import (
     require_number,
 )
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.run.folder import Run, read_run, refuse_unknown
+from shellform.run.folder import Run, read_run
 from shellform.site import calibration, erection, measurements, retensioning
 from shellform.site.scans import Scan, read_points
 from shellform.site.surveys import doubtful, read_survey
@@ -37,9 +37,8 @@ from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
 
-_ABOVE = (
-    1.5  # times the noise: of the hundreds of coordinates of a scan their deviation is told to a few percent
-)
+# times the noise: of the hundreds of coordinates of a scan their deviation is told to a few percent
+_ABOVE = 1.5
 
 
 @dataclass(frozen=True)
@@ -382,7 +381,7 @@ def _design(run: Run, name: str | None, usual: str) -> str:
     """The `name` of a design of the run, or where none is given the `usual` one. Raises InputError for an
     unknown one."""
     chosen = name or usual
-    refuse_unknown("--design", chosen, run.designs)
+    require_known(chosen, run.designs, where="--design", what="isn't there")
     return chosen
 
 
