@@ -30,15 +30,16 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from shellform.arrays import Indices, Reals
-from shellform.errors import NotConverged, require_count, require_number
+from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
 from shellform.optimiser.optimum import Checkpoint, Optimum, Step
+from shellform.optimiser.solver import check_settings
 from shellform.optimiser.trials import reach, staged
 from shellform.problem.evaluation import COUNTS, Evaluated, Evaluator, Linearisation, OffBranch
 from shellform.problem.paths import follow, without_slack
@@ -73,13 +74,7 @@ class MovingAsymptotes:
     least_margin: float = 0.01
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            where, otherwise = f"solver.{each.name}", f"or leave it out for {each.default}"
-            if each.name in ("rows", "starts", "stage"):
-                require_count(value, where=where, give=f"a whole number, {otherwise}")
-            else:
-                require_number(value, above=0.0, where=where, give=f"a positive number, {otherwise}")
+        check_settings(self)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,28 @@ NLopt's MMA goes on from there (proposal.py).
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields
+from typing import Any
 
 from shellform.errors import InputError, require_count, require_number
+
+
+def check_settings(settings: Any, *, may_be_zero: Collection[str] = ()) -> None:
+    """Raises InputError for a number among a solver's `settings` that is out of bounds, and for one that
+    isn't whole where they count: by their types. What may be left out (None) isn't asked for."""
+    for each in fields(settings):
+        value = getattr(settings, each.name)
+        if value is None and each.default is None:
+            continue
+        where, otherwise = f"solver.{each.name}", f"or leave it out for {each.default}"
+        least = 0 if each.name in may_be_zero else 1
+        if str(each.type).startswith("int"):
+            require_count(value, least=least, where=where, give=f"a whole number, {otherwise}")
+        elif least == 0:
+            require_number(value, least=0.0, where=where, give=f"0 or a positive number, {otherwise}")
+        else:
+            require_number(value, above=0.0, where=where, give=f"a positive number, {otherwise}")
 
 
 @dataclass(frozen=True)
@@ -118,18 +137,7 @@ class SequentialConvex:
     model_evaluations: int = 200
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if value is None:
-                continue
-            where, otherwise = f"solver.{each.name}", f"or leave it out for {each.default}"
-            least = 0 if each.name in _MAY_BE_ZERO else 1
-            if each.name in _COUNTS:
-                require_count(value, least=least, where=where, give=f"a whole number, {otherwise}")
-            elif least == 0:
-                require_number(value, least=0.0, where=where, give=f"0 or a positive number, {otherwise}")
-            else:
-                require_number(value, above=0.0, where=where, give=f"a positive number, {otherwise}")
+        check_settings(self, may_be_zero=_MAY_BE_ZERO)
         if not self.shrink < 1.0 <= self.grow:
             raise InputError(
                 "windows must shrink by less than 1 and grow by more",
@@ -139,17 +147,6 @@ class SequentialConvex:
             )
 
 
-_COUNTS = (
-    "most_cables",
-    "guards",
-    "batch",
-    "candidates",
-    "failures",
-    "repairs",
-    "stiffenings",
-    "many",
-    "model_evaluations",
-)
 _MAY_BE_ZERO = (
     "thin",
     "stiffness",
