@@ -31,7 +31,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from shellform.errors import InputError, NotConverged
+from shellform.errors import InputError
 from shellform.structure.elements.state import State, extended
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.equilibrium import TOLERANCE
@@ -158,5 +158,5 @@ def _by_load(walk: Walk, here: OnPath, size: float, goal: float) -> OnPath | Non
         end = goal
     try:
         return walk.by_load(here, end)
-    except (Missed, NotConverged):
+    except Missed:
         return None

@@ -97,7 +97,7 @@ class Walk:
         self.direction = 1.0 if lead is not None or goal > 0.0 else -1.0
 
     def number(self, lead: Lead) -> int:
-        """OnPath among the free degrees of freedom of the one that leads."""
+        """Place among the free degrees of freedom of the one that leads."""
         found = np.flatnonzero(self.assembly.free == 6 * lead[0] + lead[1])
         if not len(found):
             raise InputError(
@@ -202,6 +202,32 @@ class Walk:
                 return reached
         return there  # the factor is close to a turning point: the path goes on and comes by again
 
+    def by_load(self, here: OnPath, end: float) -> OnPath | None:
+        """The point to which the load alone leads on the stable branch from `here`, at the factor `end` or
+        where that branch ends before; None where `here` isn't stable, or nothing is reached. Raises Missed
+        where an element turns too far."""
+        if not here.equilibrium.stable:
+            return None
+        try:
+            found = advance(
+                self.assembly,
+                here.state,
+                self.drive,
+                begin=here.factor,
+                end=end,
+                tolerance=self.tolerance,
+                stay=True,
+                heeding=True,
+            )
+        except NotConverged as error:
+            self.spent += error.iterations
+            return None
+        self.spent += found.factorisations
+        if found.share == 0.0:
+            return None
+        factor = end if found.on_branch else here.factor + found.share * (end - here.factor)
+        return self._settled(here, found.equilibrium.state, factor, _ITERATIONS)
+
     def located(self, here: OnPath, size: float, there: OnPath) -> PathPoint | None:
         """The point between two where the number of negative eigenvalues changes."""
         low, high, before, near = 0.0, 1.0, here, there
@@ -246,27 +272,6 @@ class Walk:
         if found.negative == here.negative and kinked(self.assembly, here.state, state):
             onward = float(np.sign(here.rate))  # a path may bend there by more than a right angle
         return replace(found, rate=onward * abs(found.rate))
-
-    def by_load(self, here: OnPath, end: float) -> OnPath | None:
-        """The point to which the load alone leads on the stable branch from `here`, at the factor `end` or
-        where that branch ends before; None where `here` isn't stable, or nothing is reached."""
-        if not here.equilibrium.stable:
-            return None
-        found = advance(
-            self.assembly,
-            here.state,
-            self.drive,
-            begin=here.factor,
-            end=end,
-            tolerance=self.tolerance,
-            stay=True,
-            heeding=True,
-        )
-        self.spent += found.factorisations
-        if found.share == 0.0:
-            return None
-        factor = end if found.on_branch else here.factor + found.share * (end - here.factor)
-        return self._settled(here, found.equilibrium.state, factor, _ITERATIONS)
 
     def _balanced(
         self, residual: float, before: float, balance: Balance, state: State, factor: float
