@@ -58,11 +58,12 @@ def _in_words(error: Any, root: type[BaseModel]) -> tuple[str, str]:
 
 def _if_per_cents(error: Any) -> str:
     """What to write of a share or factor too large that its hundredth would suit: of 97, or "97", 0.97."""
-    bound = error.get("ctx", {}).get("lt", error.get("ctx", {}).get("le"))
-    if bound is None or bound > _FACTOR or not float(error["input"]) > 1.0:
+    bounds = error.get("ctx", {})
+    bound = bounds.get("lt", bounds.get("le"))
+    if bound is None or bound > _FACTOR:
         return ""
-    share = float(error["input"]) / 100.0
-    return f" For {float(error['input']):g} % write {share:g}." if share < bound else ""
+    given = float(error["input"])
+    return f" For {given:g} % write {given / 100.0:g}." if 1.0 < given < 100.0 * bound else ""
 
 
 @dataclass(frozen=True)

@@ -166,9 +166,8 @@ def _slackening(loading: Loading, low: _Point, above: float, left: float) -> tup
     the stiffness `left` there; None where none does before the factor `above`."""
     ceiling = above
     for _ in range(_STEPS):
-        onward = np.zeros(6 * loading.assembly.count)
-        free = loading.assembly.free
-        onward[free] = loading.assembly.factor(low.here.state).solve(loading.load.ravel()[free])
+        own = loading.assembly
+        onward = own.by_node(own.factor(low.here.state).solve(loading.load.ravel()[own.free])).ravel()
         unit, dofs = _units(loading, low)
         rate = (unit * onward[dofs]).sum(axis=1)
         falling = low.taut & (rate < 0.0)

@@ -51,9 +51,8 @@ def flat_grid(built: Built) -> Sheet:
         marks += _rod(built, name, rod, s)
     marks += block_marks(built.shell)
     marks += _ends(built, s, marks)
-    of_rods = (
-        MM * grid.flat[np.concatenate([rod.nodes for rod in grid.rods]), :2]
-    )  # edge beams aren't laid out flat
+    # edge beams aren't laid out flat
+    of_rods = MM * grid.flat[np.concatenate([rod.nodes for rod in grid.rods]), :2]
     low, high = of_rods.min(axis=0), of_rods.max(axis=0)
     for direction in "uv":
         marks += _lanes(built, direction, names, low, high, s)
