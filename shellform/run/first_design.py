@@ -87,17 +87,34 @@ Say = Callable[[str], None]
 
 
 def first_design(
-    surface: Surface,
-    wish: DesignWish,
-    say: Say = lambda text: None,
-    allowance: Allowance | None = None,
+    surface: Surface, wish: DesignWish, say: Say = lambda _: None, allowance: Allowance | None = None
 ) -> FirstDesign:
-    """The design to propose, found within an `allowance` of work. Raises InputError for a surface of absurd
-    size, a flat one, or one that no net covers or no rod follows, NotConverged where nothing stands; both
-    with the reason and a way out."""
+    """The design to propose, found within an `allowance` of work. Raises what `standing_design` does."""
+    allowance = allowance or Allowance()
+    found = standing_design(surface, wish, say, allowance)
+    return finished_design(found, surface, wish, say, allowance)
+
+
+def standing_design(surface: Surface, wish: DesignWish, say: Say, allowance: Allowance) -> FirstDesign:
+    """The first that stands. Raises InputError for a surface of absurd size, a flat one, or one that no net
+    covers or no rod follows, NotConverged where nothing stands; both with the reason and a way out."""
     refuse_size(surface)
     refuse_flat(surface)
-    return _Search(surface, wish, say, allowance or Allowance()).found()
+    return _Search(surface, wish, say, allowance).that_holds()
+
+
+def finished_design(
+    design: FirstDesign, surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
+) -> FirstDesign:
+    """What stands for the surface and wish, on edge beams that don't sag too far, near enough to its shape,
+    with strands that leave a search room."""
+    search = _Search(surface, wish, say, allowance)
+    search.told, search.reasons = list(design.told), {design.spacing: design.reason}
+    found = straighter(design, surface, search.with_edges, allowance)
+    if too_far(found, surface):
+        found = nearer(found, surface, search.stiffer, search.other, allowance, search.say)
+        found = replace(found, told=tuple(search.told))
+    return with_room(found, surface, search.say)
 
 
 class _Search:
@@ -119,16 +136,7 @@ class _Search:
         self.told.append(text)
         self._say(text)
 
-    def found(self) -> FirstDesign:
-        """What stands, on edge beams that don't sag too far, near enough to its shape, with strands that
-        leave a search room."""
-        found = straighter(self._first_that_holds(), self.surface, self._with_edges, self.allowance)
-        if self.allowance.thorough and too_far(found, self.surface):
-            found = nearer(found, self.surface, self._stiffer, self._other, self.allowance, self.say)
-            found = replace(found, told=tuple(self.told))
-        return with_room(found, self.surface, self.say)
-
-    def _stiffer(self, design: FirstDesign, times: float) -> RodChoice | None:
+    def stiffer(self, design: FirstDesign, times: float) -> RodChoice | None:
         """Rods so many `times` as stiff as those of a design, or the stiffest, in as many layers or more."""
         own = layers_of(design.parts.choice.section)
         possible = [
@@ -139,7 +147,8 @@ class _Search:
         ]
         return stiffer_rods(design.placed.net, possible, design.parts.choice, design.tried.stress, times)
 
-    def _first_that_holds(self) -> FirstDesign:
+    def that_holds(self) -> FirstDesign:
+        """The first that stands."""
         spacing, reason = self._first_spacing()
         self.reasons[spacing] = reason
         thickness = self.wish.thickness or usual_thickness(self.surface)
@@ -296,14 +305,14 @@ class _Search:
         heavier edge beams."""
         spare = layers_of(choice.section) < self.layers[-1]
         for edge in edge_choices(choice)[self.lightest : self.lightest + HEAVY]:
-            result = self._with_edges(placed, choice, edge, spacing, thickness)
+            result = self.with_edges(placed, choice, edge, spacing, thickness)
             if isinstance(result, FirstDesign) or not (placed.net.edges and edges_may_help(result)):
                 break
             if spare and result.why is Why.SCATTER:
                 break
         return result
 
-    def _with_edges(
+    def with_edges(
         self, placed: Placed, choice: RodChoice, edge: EdgeChoice, spacing: float, thickness: float
     ) -> FirstDesign | Obstacle:
         """The design with the strands and the prestrain that are usual."""
@@ -311,7 +320,7 @@ class _Search:
         parts = FirstParts(choice, edge, rest_ratio_for(self.surface, spacing), rope_for(spacing), swivels)
         return self._with_parts(placed, parts, spacing, thickness)
 
-    def _other(self, design: FirstDesign, parts: FirstParts) -> FirstDesign | Obstacle:
+    def other(self, design: FirstDesign, parts: FirstParts) -> FirstDesign | Obstacle:
         """The design of other parts; where its net can't be pulled with the gap that follows their rods, no
         other is looked for."""
         return self._with_parts(design.placed, parts, design.spacing, design.thickness, climbs=False)

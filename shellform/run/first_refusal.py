@@ -4,7 +4,7 @@ Three are tried, each where the reason says that it may help, and offered only w
 walls all round, where the shell tips, gives way or is stressed too much and edge beams carry its edge; a
 rounded surface, where its rods are bent too much (way_out.py), on walls where it falls on edge beams; and as
 much concrete as these bear, where no rounded surface helps. None is begun once the work is done that a
-surface is worth.
+surface is worth. Each ends with the first design that stands; who goes that way has it finished.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from pathlib import Path
 
 from shellform.errors import InputError, NotConverged
 from shellform.net.edges import stretches_of
-from shellform.run.first_design import first_design
+from shellform.run.first_design import standing_design
 from shellform.run.first_net import Allowance
+from shellform.run.first_trial import FirstDesign
 from shellform.run.plinths import plinths_for
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Tips, Unbuildable, Why, flat_between_creases
@@ -38,9 +39,11 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class WayOut:
-    """With what `new` goes on where it refuses a surface: the `wish`, on the surface in a `file` in metres
-    (None: as given); `told` is the sentence that offers it."""
+    """With what `new` goes on where it refuses a surface: the `design` that stands, not finished yet, and the
+    `wish` of which it is, on the surface in a `file` in metres (None: as given); `told` is the sentence that
+    offers it."""
 
+    design: FirstDesign
     wish: DesignWish
     told: str
     file: Path | None = None
@@ -59,13 +62,6 @@ class Refused:
         if self.way_out is None:
             return self.error
         return renewed(self.error, f"{self.way_out.told}. {_TAKEN} goes on so at once")
-
-    def in_vain(self, error: Refusal) -> Refusal:
-        """The same error, where the way out was taken and ended with another."""
-        assert self.way_out is not None
-        return renewed(
-            self.error, f"{self.way_out.told}; but looked at more closely that ends too: {error}".rstrip(".")
-        )
 
 
 def with_ways_out(
@@ -99,7 +95,10 @@ def _to_nearest(
     folder = _unused(output.with_name(f"{output.stem}-{BUILDABLE}"))
     tried = _FLAT_SHARES if flat_between_creases(surface) else shares(refusal)
     nearest = nearest_buildable(surface, refusal.radius, folder, again, say, tried, lambda: again.options)
-    return None if nearest is None else WayOut(again.wish, nearest.told, nearest.file)
+    if nearest is None:
+        return None
+    assert again.design is not None
+    return WayOut(again.design, again.wish, nearest.told, nearest.file)
 
 
 def shares(refusal: Unbuildable) -> list[float]:
@@ -122,11 +121,12 @@ def _unused(folder: Path) -> Path:
 
 
 class _Rounded:
-    """All of the search on a rounded surface, within the work of all such trials; on walls too where a net
-    covers it that falls on edge beams."""
+    """The search on a rounded surface for what stands, within the work of all such trials; on walls too where
+    a net covers it that falls on edge beams."""
 
     def __init__(self, wish: DesignWish, whole: Allowance, say: Say) -> None:
-        self.wish = wish  # with which the last surface went on
+        self.design: FirstDesign | None = None  # of the last surface, where one stands
+        self.wish = wish  # of which it is
         self.options = ""  # of the command, that stand for it
         self.too_late = False  # whether no work was left for even the first
         self._begun = False
@@ -141,26 +141,22 @@ class _Rounded:
         plinths = plinths_for(surface)  # which whoever follows gets too
         surface = surface if plinths is None else plinths.surface
         try:
-            _trial("rounded", self.wish, self._brief, self._say)(surface)
+            self.design = _trial("rounded", surface, self.wish, self._brief, self._say)
         except (InputError, NotConverged) as error:
             covered = not (isinstance(error, Unbuildable) and error.why is Why.NET)
             if not (covered and _on_edge_beams(surface, self.wish)):
                 raise
             self._say(f"rounded: {error}")
             walls = replace(self.wish, edges="wall", angle=self._brief.angle)
-            _trial("rounded, on walls", walls, self._walled, self._say)(surface)
+            self.design = _trial("rounded, on walls", surface, walls, self._walled, self._say)
             self.wish, self.options = replace(self.wish, edges="wall"), _WALLS
 
 
-def _trial(how: str, wish: DesignWish, allowance: Allowance, say: Say) -> Callable[[Surface], None]:
-    """All of the search on another surface, within the allowance of all such trials."""
-
-    def again(surface: Surface) -> None:
-        if allowance.over:
-            raise InputError("left untried, since what was tried before took all the work that is allowed")
-        first_design(surface, wish, lambda text: say(f"{how}, {text}"), allowance)
-
-    return again
+def _trial(how: str, surface: Surface, wish: DesignWish, allowance: Allowance, say: Say) -> FirstDesign:
+    """What stands on another surface or with another wish, within the allowance of all such trials."""
+    if allowance.over:
+        raise InputError("left untried, since what was tried before took all the work that is allowed")
+    return standing_design(surface, wish, lambda text: say(f"{how}, {text}"), allowance)
 
 
 def _walls_may_help(refusal: Refusal, surface: Surface, wish: DesignWish) -> bool:
@@ -182,12 +178,13 @@ def _on_walls(surface: Surface, wish: DesignWish, say: Say, allowance: Allowance
     """Walls all round; None where no design stands on them either."""
     walls = replace(wish, edges="wall")
     try:
-        _trial("on walls", walls, allowance, say)(surface)
+        design = _trial("on walls", surface, walls, allowance, say)
     except (InputError, NotConverged) as error:
         say(f"on walls: {error}")
         return None
     outer = surface.vertices[surface.boundary[0], 2]
     return WayOut(
+        design,
         walls,
         f"With {_WALLS} this goes on: walls all round, up to {outer.max() - outer.min():.3g} m above the lowest of its "
         "edge",
@@ -202,11 +199,12 @@ def _poured_first(
         return None
     how, layer = f"with {1e3 * refusal.bears:g} mm", replace(wish, thickness=refusal.bears)
     try:
-        _trial(how, layer, allowance, say)(surface)
+        design = _trial(how, surface, layer, allowance, say)
     except (InputError, NotConverged) as error:
         say(f"{how}: {error}")
         return None
     return WayOut(
+        design,
         layer,
         f"With --thickness {refusal.bears:g} this goes on: pour that first, and the rest when it has hardened",
     )

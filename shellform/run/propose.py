@@ -22,12 +22,12 @@ from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.remedies import rounded_up
-from shellform.run.first_design import first_design
+from shellform.run.first_design import finished_design, first_design
 from shellform.run.first_edges import TUBES
 from shellform.run.first_finish import far_told
 from shellform.run.first_look import surface_entry
 from shellform.run.first_net import Allowance, larger
-from shellform.run.first_refusal import Refused, with_ways_out
+from shellform.run.first_refusal import WayOut, with_ways_out
 from shellform.run.first_trial import (
     ADDITIONAL,
     ELEMENTS,
@@ -81,48 +81,37 @@ def propose_case(
     InputError or NotConverged where no design stands (unbuildable.py).
     """
     _check(output)
-    asked = _Asked(file, output, allow_scripts, report)
-    first = _proposed(asked, file, options, wish or DesignWish())
-    if isinstance(first, dict):
-        return first
-    refused, taken = first.refused, first.refused.way_out
-    if taken is None or not way_out:
-        raise refused.offered from first.cause
-    asked.say(f"not as it is: {refused.error.what}. {taken.told}")
-    told: tuple[str, ...] = (
-        f"NOT the surface as it is: {refused.error.what}",
-        f"but the way out. {taken.told}",
-    )
-    if taken.file is not None:
-        # its coordinates are those of the surface as it was refused, whose feet may have been cut off
-        options, told = {}, (*told, *first.told)
-    second = _proposed(asked, taken.file or file, options, taken.wish, told, ways_out=False)
-    if isinstance(second, dict):
-        return {"way out": taken.told, **second}
-    raise refused.in_vain(second.refused.error) from second.cause
+    asked, wish = _Asked(file, output, allow_scripts, report), wish or DesignWish()
+    ready = _read(asked, file, options)
+    times = larger(ready.surface, wish.spacing)
+    if times > 1.0:
+        asked.say(f"{times:.2g} times the usual work is allowed, for so many crossings")
+    worth = Allowance.for_size(ready.surface, wish.spacing)
+    try:
+        design = first_design(ready.surface, wish, asked.say, worth.part(_SEARCH))
+    except (InputError, NotConverged) as error:
+        refused = with_ways_out(error, ready.surface, wish, output, asked.say, worth)
+        taken = refused.way_out
+        if taken is None or not way_out:
+            raise refused.offered from error
+        return {"way out": taken.told, **_gone_on(asked, ready, refused.error, taken)}
+    return _written(asked, file, ready, design, wish, ready.told)
 
 
 @dataclass(frozen=True)
-class _Without:
-    """That a surface got no design: how it is `refused`, for what `cause`; and what was `told` of it
-    before."""
+class _Ready:
+    """A `surface` to design for, the `options` of [surface] that lead to it, and what was `told` of it, with
+    what was of its `plinths`, if it has any."""
 
-    refused: Refused
-    cause: InputError | NotConverged
+    surface: Surface
+    options: Mapping[str, Any]
     told: tuple[str, ...]
+    plinths: str
 
 
-def _proposed(
-    asked: _Asked,
-    file: Path,
-    options: Mapping[str, Any],
-    wish: DesignWish,
-    before: tuple[str, ...] = (),
-    *,
-    ways_out: bool = True,
-) -> dict[str, str] | _Without:
-    """The case for the surface in `file`, written, and what it proposes; its head says what came `before`.
-    Where there is no design, `ways_out` are looked for or not."""
+def _read(asked: _Asked, file: Path, options: Mapping[str, Any]) -> _Ready:
+    """The surface in a file, counted from near where it is far away, on plinths where it flares into the
+    ground."""
     told: tuple[str, ...] = ()
     surface = surface_of(surface_entry(file, options), allow_scripts=asked.allow_scripts)
     origin = distant_origin(surface, FAR)
@@ -138,27 +127,50 @@ def _proposed(
         surface, options = plinths.surface, {**options, "above": plinths.above}
         asked.say(plinths.told)
         told = (*told, plinths.told)
+    return _Ready(surface, options, told, "" if plinths is None else plinths.told)
 
-    times = larger(surface, wish.spacing)
-    if times > 1.0:
-        asked.say(f"{times:.2g} times the usual work is allowed, for so many crossings")
-    worth = Allowance.for_size(surface, wish.spacing)
-    try:
-        design = first_design(surface, wish, asked.say, worth.part(_SEARCH))
-    except (InputError, NotConverged) as error:
-        refused = Refused(error)
-        if ways_out:
-            refused = with_ways_out(error, surface, wish, asked.output, asked.say, worth)
-        return _Without(refused, error, told)
+
+def _gone_on(
+    asked: _Asked, ready: _Ready, refusal: InputError | NotConverged, taken: WayOut
+) -> dict[str, str]:
+    """The case of the way out, whose design is finished. The head says so, and what was told of the surface
+    as it is: coordinates in a file that is offered are those of that one, whose feet may have been cut
+    off."""
+    asked.say(f"not as it is: {refusal.what}. {taken.told}")
+    told: tuple[str, ...] = (
+        f"NOT the surface as it is: {refusal.what}",
+        f"but the way out. {taken.told}",
+        *ready.told,
+    )
+    file = asked.file
+    if taken.file is not None:
+        file, ready = taken.file, _read(asked, taken.file, {})
+        told = (*told, *ready.told)
+    worth = Allowance.for_size(ready.surface, taken.wish.spacing)
+    design = finished_design(taken.design, ready.surface, taken.wish, asked.say, worth.part(_SEARCH))
+    return _written(asked, file, ready, design, taken.wish, told)
+
+
+def _written(
+    asked: _Asked,
+    file: Path,
+    ready: _Ready,
+    design: FirstDesign,
+    wish: DesignWish,
+    told: tuple[str, ...],
+) -> dict[str, str]:
+    """The case for the surface in `file`, written, with what was `told` before at its head, and what it
+    proposes."""
+    surface = ready.surface
     edges = _edges_told(stretches_of(surface, Edges(outer=wish.edges)))
-    entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **options}
-    design = replace(design, told=(*before, *told, *design.told))
+    entries = {"file": os.path.relpath(file.resolve(), asked.output.resolve().parent), **ready.options}
+    design = replace(design, told=(*told, *design.told))
     title = asked.file.stem + ("" if file == asked.file else ", nearest buildable surface")
     far = far_told(design, surface)
     write_text(asked.output, _text(asked.file, title, entries, surface, design, wish, edges))
     return {
         "size": size_text(surface.size),
-        **({} if plinths is None else {"plinths": plinths.told}),
+        **({"plinths": ready.plinths} if ready.plinths else {}),
         "spacing": f"{design.spacing:g} m, {design.reason}: {len(design.placed.net.grid.lattice)} crossings",
         "angle": f"{design.placed.angle:g}°",
         "rods": f"{design.parts.choice.label} of {design.parts.choice.catalogue} (equation 1 allows {2e3 * design.allowed:.3g} mm)",

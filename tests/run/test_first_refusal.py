@@ -10,6 +10,8 @@ from shellform.run import first_refusal
 from shellform.run.sizes import DesignWish
 from shellform.run.unbuildable import Tips, Unbuildable, Why
 
+STANDS = object()  # a design
+
 
 def refusal(why):
     return Unbuildable("no", why=why, where="rod", remedy="Round it.", spacing=0.5, radius=2.0)
@@ -46,8 +48,9 @@ def test_walls_are_offered_with_their_height_where_a_design_stands_on_them(monke
         tried.append(wish.edges)
         if not stands:
             raise NotConverged("falls")
+        return STANDS
 
-    monkeypatch.setattr(first_refusal, "first_design", search)
+    monkeypatch.setattr(first_refusal, "standing_design", search)
     points = np.array([[0.0, 0.0, 1.5], [1.0, 0.0, 0.25], [0.0, 1.0, 9.0]])
     surface = SimpleNamespace(vertices=points, boundary=[np.array([0, 1])])
     found = first_refusal._on_walls(surface, DesignWish(), said.append, first_refusal.Allowance(10))
@@ -56,6 +59,7 @@ def test_walls_are_offered_with_their_height_where_a_design_stands_on_them(monke
         assert found is None
         assert said == ["on walls: falls"]
         return
+    assert found.design is STANDS
     assert found.wish.edges == "wall"
     assert "up to 1.25 m above the lowest of its edge" in found.told
     over = first_refusal._on_walls(surface, DesignWish(), said.append, first_refusal.Allowance(0))

@@ -22,7 +22,7 @@ from shellform.gridshell.layers import single
 from shellform.net.chebyshev import pull_net
 from shellform.problem.paths import follow
 from shellform.run import first_net, first_trial, propose
-from shellform.run.first_design import first_design
+from shellform.run.first_design import first_design, standing_design
 from shellform.run.first_edges import edge_choices
 from shellform.run.first_net import Allowance
 from shellform.run.first_refusal import Refused, WayOut
@@ -469,16 +469,20 @@ def test_a_shell_that_tips_stands_on_walls_all_round_where_the_way_out_is_taken_
 def test_the_way_out_taken_may_be_another_surface_which_the_case_then_names(tmp_path, monkeypatch):
     given = as_obj(tmp_path / "given.obj", dish(size=6.0, count=13))
     nearest = as_obj(tmp_path / "near\nest.obj", dish(size=6.0, rise=1.2, count=13))
-    wish, search, seen = DesignWish(spacing=0.6, angle=0.0, layers=1), propose.first_design, []
+    wish, seen = DesignWish(spacing=0.6, angle=0.0, layers=1), []
 
-    def refused_at_first(surface, *rest):
+    def refused(surface, *_):
         seen.append(surface.size[2])
-        if len(seen) == 1:
-            raise InputError("is creased", where="rod")
-        return search(surface, *rest)
+        raise InputError("is creased", where="rod")
 
-    offer = WayOut(wish, f"The nearest is {nearest}", nearest)
-    monkeypatch.setattr(propose, "first_design", refused_at_first)
+    def finished(design, surface, *_):
+        seen.append(surface.size[2])
+        return design
+
+    design = standing_design(read_surface(nearest), wish, print, Allowance())
+    offer = WayOut(design, wish, f"The nearest is {nearest}", nearest)
+    monkeypatch.setattr(propose, "first_design", refused)
+    monkeypatch.setattr(propose, "finished_design", finished)
     monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
     case = tmp_path / "case.toml"
     propose_case(given, case, {"unit": "cm"}, allow_scripts=False, wish=wish, way_out=True)
@@ -491,29 +495,17 @@ def test_the_way_out_taken_may_be_another_surface_which_the_case_then_names(tmp_
     )
 
 
-def test_without_a_way_out_and_where_it_ends_too_the_shell_stays_refused_for_its_own_reason(
-    tmp_path, monkeypatch
-):
-    asked = []
+def test_without_a_way_out_the_shell_stays_refused_for_its_own_reason(tmp_path, monkeypatch):
+    def refused(surface, *_):
+        raise InputError("is creased", where="rod", remedy="Round it.")
 
-    def search(surface, *rest):
-        asked.append(surface)
-        raise InputError(
-            "is creased" if len(asked) == 1 else "falls elsewhere", where="rod", remedy="Round it."
-        )
-
-    monkeypatch.setattr(propose, "first_design", search)
+    monkeypatch.setattr(propose, "first_design", refused)
+    monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error))
     given, case = as_obj(tmp_path / "given.obj", dish(size=6.0, count=13)), tmp_path / "case.toml"
-    for offer in (None, WayOut(DesignWish(edges="wall"), "With walls this goes on")):
-        monkeypatch.setattr(propose, "with_ways_out", lambda error, *_, offer=offer: Refused(error, offer))
-        asked.clear()
-        with pytest.raises(InputError, match="is creased") as refused:
-            propose_case(given, case, {}, allow_scripts=False, way_out=True)
-        assert len(asked) == (1 if offer is None else 2)
-        assert ("With walls this goes on; but" in refused.value.remedy) == (offer is not None)
-        assert ("falls elsewhere" in refused.value.remedy) == (offer is not None)
-        assert "--way-out" not in refused.value.remedy, "it was given"
-        assert not case.exists()
+    with pytest.raises(InputError, match="is creased") as refusal:
+        propose_case(given, case, {}, allow_scripts=False, way_out=True)
+    assert refusal.value.remedy == "Round it."
+    assert not case.exists()
 
 
 def test_what_was_done_to_a_surface_before_it_was_rounded_stays_in_the_case_s_head(tmp_path, monkeypatch):
@@ -522,16 +514,14 @@ def test_what_was_done_to_a_surface_before_it_was_rounded_stays_in_the_case_s_he
     folder = tmp_path / "my  shells \x1b[31m"
     folder.mkdir()
     given, nearest = as_obj(folder / "given.obj", far), as_obj(folder / "nearest.obj", flat)
-    wish, search, seen = DesignWish(spacing=0.6, angle=0.0, layers=1), propose.first_design, []
+    wish = DesignWish(spacing=0.6, angle=0.0, layers=1)
 
-    def refused_at_first(surface, *rest):
-        seen.append(surface)
-        if len(seen) == 1:
-            raise InputError("is creased", where="rod")
-        return search(surface, *rest)
+    def refused(surface, *_):
+        raise InputError("is creased", where="rod")
 
-    monkeypatch.setattr(propose, "first_design", refused_at_first)
-    offer = WayOut(wish, f"The nearest is {nearest}", nearest)
+    design = standing_design(read_surface(nearest), wish, print, Allowance())
+    monkeypatch.setattr(propose, "first_design", refused)
+    offer = WayOut(design, wish, f"The nearest is {nearest}", nearest)
     monkeypatch.setattr(propose, "with_ways_out", lambda error, *_: Refused(error, offer))
     case = folder / "case.toml"
     propose_case(given, case, {}, allow_scripts=False, wish=wish, way_out=True)
