@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from shellform.case.build_gridshell import RodLimits
 from shellform.case.case import Case, check_script, shipped_surfaces
 from shellform.case.entries import NetEntry, SurfaceEntry
 from shellform.errors import InputError
+from shellform.net.chebyshev import NetSettings
 from shellform.net.edges import Edges, Place, stand
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
@@ -161,21 +161,22 @@ def edges_of(case: Case) -> Edges:
     return Edges(places, outer, openings, ground)
 
 
-def net_settings(entry: NetEntry, gap: float) -> dict[str, Any]:
-    """The settings of pull_net in a case but for angle and offset."""
-    names = (
-        "spacing",
-        "spacing_v",
-        "guides",
-        "elements",
-        "method",
-        "start",
-        "spring_density",
-        "shear_stiffness",
-        "merge",
-        "ground",
+def net_settings(entry: NetEntry, gap: float) -> NetSettings:
+    """What a case's net is to be, but for where it lies."""
+    return NetSettings(
+        spacing=entry.spacing,
+        gap=gap,
+        spacing_v=entry.spacing_v,
+        guides=None if entry.guides is None else (entry.guides[0], entry.guides[1]),
+        elements=entry.elements,
+        method=entry.method,
+        start=entry.start,
+        spring_density=entry.spring_density,
+        shear_stiffness=entry.shear_stiffness,
+        merge=entry.merge,
+        ground=entry.ground,
+        outline=entry.outline,
     )
-    return {name: getattr(entry, name) for name in names} | {"outline": entry.outline, "gap": gap}
 
 
 def edge_records(net: Net) -> tuple[EdgeRecord, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Literal
 
@@ -60,7 +60,31 @@ Method = Literal["pull", "compass"]
 Start = Literal["compass", "flat"]
 
 
-@dense_on_one()
+@dataclass(frozen=True, kw_only=True)
+class NetSettings:
+    """What a net is to be, but for where it lies: rods `spacing` m apart along u (`spacing_v` along v; None:
+    the same), the two layers `gap` m apart, and what else `pull_net` says."""
+
+    spacing: float
+    gap: float
+    spacing_v: float | None = None
+    guides: tuple[ArrayLike, ArrayLike] | None = None
+    elements: int = ELEMENTS
+    method: Method = "pull"
+    start: Start = "compass"
+    spring_density: Sequence[float] | None = None
+    shear_stiffness: float = SHEAR_STIFFNESS
+    merge: float = MERGE
+    ground: float | None = None
+    outline: ArrayLike | None = None
+    tuning: NetTuning = field(default_factory=NetTuning)
+
+    @property
+    def spacings(self) -> tuple[float, float]:
+        """Along u and v, m."""
+        return self.spacing, self.spacing if self.spacing_v is None else self.spacing_v
+
+
 def pull_net(
     surface: Surface,
     *,
@@ -96,9 +120,36 @@ def pull_net(
     Raises InputError for settings that can't work on this surface, NoNet for surfaces too curved for one net,
     Stalled where the pull fails.
     """
-    steps = (spacing, spacing if spacing_v is None else spacing_v)
-    tuned = tuning or NetTuning()
-    check_settings(surface, steps, gap, elements, merge)
+    settings = NetSettings(
+        spacing=spacing,
+        gap=gap,
+        spacing_v=spacing_v,
+        guides=guides,
+        elements=elements,
+        method=method,
+        start=start,
+        spring_density=spring_density,
+        shear_stiffness=shear_stiffness,
+        merge=merge,
+        ground=ground,
+        outline=outline,
+        tuning=tuning or NetTuning(),
+    )
+    return net_at(surface, settings, angle=angle, offset=offset, progress=progress)
+
+
+@dense_on_one()
+def net_at(
+    surface: Surface,
+    settings: NetSettings,
+    *,
+    angle: float,
+    offset: tuple[float, float] = (0.0, 0.0),
+    progress: Pulling | None = None,
+) -> Net:
+    """The net with these settings at the `angle`, rad, and `offset`: `pull_net`, whose errors it raises."""
+    steps, tuned = settings.spacings, settings.tuning
+    _check(surface, settings)
     if not np.isfinite([angle, *offset]).all():
         raise InputError(
             "must be numbers",
@@ -106,36 +157,38 @@ def pull_net(
             value=[float(np.rad2deg(angle)), *offset],
             remedy="Give degrees, and spacings.",
         )
-    limits = Limits(ground, None if outline is None else reals("net.outline", outline, (None, 2)))
-    density = _densities(spring_density, start)
+    limits = _limits(settings)
+    density = _densities(settings.spring_density, settings.start)
     for margin in _MARGINS:
         finder = Locator(surface, reach=(margin + _BEYOND) * max(steps))
-        origin, frame, lines = _origin(surface, finder, steps, angle, offset, guides)
+        origin, frame, lines = _origin(surface, finder, steps, angle, offset, settings.guides)
         places, points = covering_lattice(finder, origin, lines, steps, margin=margin * max(steps))
-        grid = lattice_grid(places, spacing=steps, gap=gap, elements=elements, tail=tuned.tail)
+        grid = lattice_grid(
+            places, spacing=steps, gap=settings.gap, elements=settings.elements, tail=tuned.tail
+        )
         begin = compass_start(grid, finder, places, points)
         bare = bare_rods(grid, begin, finder, limits)
         if bare:  # what the compass net leaves bare, no pulling covers
             continue
         try:
-            if method == "compass":
+            if settings.method == "compass":
                 pulled = laid(grid, begin)
             else:
                 pulled = pull(
                     grid,
                     finder,
-                    begin if start == "compass" else flat_start(grid, origin, frame),
+                    begin if settings.start == "compass" else flat_start(grid, origin, frame),
                     origin,
                     frame,
                     spring_density=density,
-                    shear_stiffness=shear_stiffness,
-                    guided=guides is not None,
+                    shear_stiffness=settings.shear_stiffness,
+                    guided=settings.guides is not None,
                     progress=progress,
                     limit=tuned.limit,
                     reach=tuned.reach,
                     tolerance=tuned.tolerance,
                 )
-            trimmed = trim(grid, pulled.state, finder, merge=merge, limits=limits)
+            trimmed = trim(grid, pulled.state, finder, merge=settings.merge, limits=limits)
         except Uncovered as error:
             bare = error.rods
             continue
@@ -143,10 +196,14 @@ def pull_net(
     raise _short(bare, angle)
 
 
-def check_settings(
-    surface: Surface, steps: tuple[float, float], gap: float, elements: int, merge: float
-) -> None:
+def _limits(settings: NetSettings) -> Limits:
+    outline = settings.outline
+    return Limits(settings.ground, None if outline is None else reals("net.outline", outline, (None, 2)))
+
+
+def _check(surface: Surface, settings: NetSettings) -> None:
     """Raises InputError for settings that can't work on this surface."""
+    steps, gap = settings.spacings, settings.gap
     extent = float(max(surface.size[:2]))
     narrow = float(min(surface.size[:2]))
     for name, spacing in zip(("net.spacing", "net.spacing_v"), steps, strict=True):
@@ -174,8 +231,10 @@ def check_settings(
             value=gap,
             remedy=f"Give metres below {0.5 * min(steps):.3g}, at least a rod's diameter.",
         )
-    require_count(elements, where="net.elements", give="beam elements a segment, such as 4")
-    require_number(merge, above=0.0, below=0.5, where="net.merge", give="a share of the spacing, such as 0.2")
+    require_count(settings.elements, where="net.elements", give="beam elements a segment, such as 4")
+    require_number(
+        settings.merge, above=0.0, below=0.5, where="net.merge", give="a share of the spacing, such as 0.2"
+    )
 
 
 def _short(bare: int, angle: float) -> NoNet:

@@ -12,12 +12,11 @@ import dataclasses
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
 
-from shellform.net.chebyshev import NetTuning, pull_net
+from shellform.net.chebyshev import NetSettings, NetTuning, net_at
 from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
-from shellform.net.pull import FROM_COMPASS, FROM_FLAT, SHEAR_STIFFNESS, Pulling
+from shellform.net.pull import FROM_COMPASS, FROM_FLAT, Pulling
 from shellform.net.quality import refuse_nearness
 from shellform.net.refusal import Attempt, Change, NoNet, Reason, Stalled
 from shellform.surface.shape.target import Surface, largest_curvature
@@ -71,7 +70,7 @@ LADDER = (
 
 def climbed_net(
     surface: Surface,
-    settings: dict[str, Any],
+    settings: NetSettings,
     *,
     angle: float,
     offset: tuple[float, float] = (0.0, 0.0),
@@ -82,7 +81,7 @@ def climbed_net(
     progress: Callable[[str], None] = lambda text: None,
     watch: Pulling | None = None,
 ) -> tuple[Net, Attempt]:
-    """The net with the `settings` of pull_net at the `angle`, rad, and `offset`, or the first on the ladder,
+    """The net with the `settings` at the `angle`, rad, and `offset`, or the first on the ladder,
     turned by at most `tolerance`, rad; and the attempt that gave it.
 
     `most`: factorisations of pulls that fail, all rungs together; `failed`: what the first rung is known to
@@ -103,14 +102,7 @@ def climbed_net(
         try:
             if failed is not None and not attempts:
                 raise failed
-            net = pull_net(
-                surface,
-                **_changed(settings, rung),
-                angle=turned,
-                offset=shifted,
-                tuning=rung.tuning,
-                progress=watch,
-            )
+            net = net_at(surface, _changed(settings, rung), angle=turned, offset=shifted, progress=watch)
             if not near:
                 refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
@@ -131,26 +123,25 @@ def climbed_net(
     raise _refused(first, attempts, surface) from first
 
 
-def _vain(rung: Rung, settings: dict[str, Any], first: NoNet | Stalled | None) -> bool:
+def _vain(rung: Rung, settings: NetSettings, first: NoNet | Stalled | None) -> bool:
     """Whether a rung changes nothing: guides fix the angle and the origin, the compass method has no springs,
     a density given is kept to, and a tolerance ends no stall far from rest."""
     if rung.change is Change.LOOSER:
         return not (isinstance(first, Stalled) and first.residual < _SMALL)
-    placed = settings.get("guides") is not None and rung.change in (Change.TURNED, Change.SHIFTED)
-    alone = settings.get("method", "pull") == "compass" and rung.against <= _PULL
-    return placed or alone or (settings.get("spring_density") is not None and bool(rung.density))
+    placed = settings.guides is not None and rung.change in (Change.TURNED, Change.SHIFTED)
+    alone = settings.method == "compass" and rung.against <= _PULL
+    return placed or alone or (settings.spring_density is not None and bool(rung.density))
 
 
-def _changed(settings: dict[str, Any], rung: Rung) -> dict[str, Any]:
+def _changed(settings: NetSettings, rung: Rung) -> NetSettings:
     """The settings as the rung has them."""
-    changed = dict(settings)
-    if rung.shear != 1.0:
-        changed["shear_stiffness"] = rung.shear * settings.get("shear_stiffness", SHEAR_STIFFNESS)
-    if rung.density:
-        changed["spring_density"] = rung.density
-    if rung.flat:
-        changed["start"] = "flat"
-    return changed
+    return dataclasses.replace(
+        settings,
+        shear_stiffness=rung.shear * settings.shear_stiffness,
+        spring_density=rung.density or settings.spring_density,
+        start="flat" if rung.flat else settings.start,
+        tuning=rung.tuning,
+    )
 
 
 def _refused(first: NoNet | Stalled, attempts: list[Attempt], surface: Surface) -> NoNet | Stalled:

@@ -14,7 +14,7 @@ import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from typing import Any, Literal
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from shellform.compiled import set_num_threads
 from shellform.errors import InputError, ShellformError
-from shellform.net.chebyshev import Method, NetTuning, pull_net
+from shellform.net.chebyshev import Method, NetSettings, NetTuning, net_at
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
 from shellform.net.pull import SHEAR_STIFFNESS
@@ -61,14 +61,14 @@ def cost(net: Net) -> float:
 
 def oriented_net(
     surface: Surface,
-    settings: dict[str, Any],
+    settings: NetSettings,
     *,
     angle: float | Literal["auto"],
     offset: tuple[float, float] = (0.0, 0.0),
     workers: int = 2,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[Net, float, tuple[float, float]]:
-    """The net with the other `settings` of pull_net at the `angle`, rad, and `offset`, or at those that
+    """The net with the `settings` at the `angle`, rad, and `offset`, or at those that
     `best_orientation` finds, or the first on the ladder from there; and which these are."""
     if angle == "auto":
         best, _ = best_orientation(surface, settings, workers=workers, progress=progress)
@@ -83,18 +83,17 @@ def oriented_net(
 
 def best_orientation(
     surface: Surface,
-    settings: dict[str, Any],
+    settings: NetSettings,
     *,
     workers: int = 1,
     progress: Callable[[str], None] = lambda text: None,
 ) -> tuple[TriedNet, list[TriedNet]]:
-    """The best trial and all of those pulled, the best compass net's where no pull succeeds; `settings` are
-    those of pull_net but for angle and offset.
+    """The best trial and all of those pulled, the best compass net's where no pull succeeds.
 
     Raises InputError where no orientation gives a net.
     """
     quarter = 0.5 * math.pi
-    if settings.get("spacing_v") not in (None, settings["spacing"]):
+    if settings.spacing_v not in (None, settings.spacing):
         quarter = math.pi  # u and v differ
     angles = [quarter * k / _ANGLES for k in range(_ANGLES)]
     tried: list[TriedNet] = []
@@ -144,7 +143,7 @@ def best_orientation(
 
 @contextmanager
 def _runner(
-    surface: Surface, settings: dict[str, Any], workers: int
+    surface: Surface, settings: NetSettings, workers: int
 ) -> Iterator[Callable[[list[Job]], Iterator[TriedNet]]]:
     """Runs trials one by one, or in processes that each know the surface; gives them back in their order."""
     if workers == 1:
@@ -166,7 +165,7 @@ def _runner(
 _work: dict[str, Any] = {}
 
 
-def _begin(parent: int, surface: Surface, settings: dict[str, Any]) -> None:
+def _begin(parent: int, surface: Surface, settings: NetSettings) -> None:
     end_with(parent)
     set_num_threads(1)
     _work.update(surface=surface, settings=settings)
@@ -176,12 +175,12 @@ def _run(job: Job) -> TriedNet:
     return _try(_work["surface"], _work["settings"], job)
 
 
-def _try(surface: Surface, settings: dict[str, Any], job: Job) -> TriedNet:
+def _try(surface: Surface, settings: NetSettings, job: Job) -> TriedNet:
     angle, offset, method, tail = job
-    changed = {**settings, "angle": angle, "offset": offset, "method": method}
-    changed["elements"] = min(settings.get("elements", _ELEMENTS), _ELEMENTS)
+    elements = min(settings.elements, _ELEMENTS)
+    changed = replace(settings, method=method, elements=elements, tuning=NetTuning(tail=tail))
     try:
-        net = pull_net(surface, **changed, tuning=NetTuning(tail=tail))
+        net = net_at(surface, changed, angle=angle, offset=offset)
     except ShellformError as error:
         return TriedNet(angle, offset, math.inf, str(error))
     return TriedNet(angle, offset, float(np.round(cost(net), 12)))

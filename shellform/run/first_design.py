@@ -29,8 +29,6 @@ from shellform.run.first_net import ANGLES, Allowance, bends_to, least_bent_net,
 from shellform.run.first_trial import (
     DRAWN,
     NEEDED,
-    PULLED,
-    STRESSED,
     FirstDesign,
     FirstParts,
     Followed,
@@ -43,6 +41,7 @@ from shellform.run.next_trial import (
     bears_most,
     edges_may_help,
     fails_by,
+    relieved,
     stiffer_rods,
     thinned,
 )
@@ -79,9 +78,6 @@ LEAST_THICKNESS = 0.015  # m: a first layer of sprayed concrete
 _FINER = 0.75  # from one spacing to the next
 _SPACINGS = 3
 _STEPS = 4  # sections tried on one net
-_EASED = 5  # times that cables are eased, by less prestrain or thicker strands
-_STRONGER = 3  # times that strands are made stronger for rods that break
-_SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 _TURNED = 0.5  # of the rods' strength lost to joints that resist turning: beyond it no others are tried
 Say = Callable[[str], None]
 
@@ -366,26 +362,7 @@ class _Search:
     ) -> tuple[FirstParts, Followed, Obstacle | None]:
         """The parts with cables below their limit, what the design came to, and what it fails by, if it
         does."""
-        tried = self._followed(placed, parts, thickness)
-        for turn in range(_EASED):
-            easier = parts.easier(tried, PULLED if turn == 0 else STRESSED)
-            if easier is None:
-                break
-            before = parts, tried
-            parts, tried = easier, self._followed(placed, easier, thickness)
-            fell = tried.factor < NEEDED  # joints that turn and slacker cables stiffen less
-            if fell or tried.stress > max(STRESSED, _SPARED * before[1].stress):
-                if fell or tried.stress > before[1].stress:
-                    parts, tried = before
-                break
-        for _ in range(_STRONGER):
-            stronger = parts.stronger(tried)
-            if stronger is None:
-                break
-            held = self._followed(placed, stronger, thickness)
-            if held.factor < NEEDED or held.stress >= tried.stress:
-                break
-            parts, tried = stronger, held
+        parts, tried = relieved(parts, lambda each: self._followed(placed, each, thickness))
         why = fails_by(tried)
         if why is None:
             return parts, tried, None

@@ -20,6 +20,7 @@ from shellform.case.entries import Entry
 from shellform.case.wrong_entries import refusal
 from shellform.errors import InputError, require_file
 from shellform.gridshell.joints import usual_gap
+from shellform.net.chebyshev import NetSettings
 from shellform.net.edges import stand
 from shellform.net.net import Net
 from shellform.net.orientation import oriented_net
@@ -206,7 +207,7 @@ def net_alone(
         )
     surface = surface_of(surface_entry(file, options), allow_scripts=allow_scripts)
     report(Event("surface", f"size {size_text(surface.size)}", Kind.NOTE))
-    settings = {"spacing": spacing, "gap": gap or usual_gap(spacing)}
+    settings = NetSettings(spacing=spacing, gap=gap or usual_gap(spacing))
 
     def say(text: str) -> None:
         report(Event("net", text))

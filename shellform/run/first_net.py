@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
-from shellform.net.chebyshev import NetTuning, pull_net
+from shellform.net.chebyshev import NetSettings, NetTuning, net_at
 from shellform.net.edges import Edges, stand
 from shellform.net.ladder import climbed_net
 from shellform.net.net import Net
@@ -98,15 +97,14 @@ def least_bent_net(
     the best of these half a spacing off; and up to two angles that bend them nearly as little, none where
     only the ladder gave a net. `say` hears what fails, `tell` what doesn't; the `allowance` is spent. Raises
     NoNet or Stalled."""
-    settings: dict[str, Any] = {"spacing": spacing, "gap": gap, "elements": ELEMENTS}
+    limit = _PULL if allowance.thorough else _BRIEF
+    settings = NetSettings(spacing=spacing, gap=gap, elements=ELEMENTS, tuning=NetTuning(limit=limit))
 
     def at(angle: float, offset: tuple[float, float]) -> Placed | NoNet | Stalled:
         crossings = surface.area / spacing**2
-        where, limit = f"net at {angle:g}°, {spacing:g} m", _PULL if allowance.thorough else _BRIEF
+        where = f"net at {angle:g}°, {spacing:g} m"
         try:
-            net = pull_net(
-                surface, **settings, angle=math.radians(angle), offset=offset, tuning=NetTuning(limit=limit)
-            )
+            net = net_at(surface, settings, angle=math.radians(angle), offset=offset)
             refuse_nearness(net.quality, net.grid, net.target)
         except (NoNet, Stalled) as error:
             say(f"{where}: {error.reason.value}")
@@ -162,7 +160,7 @@ def with_gap(
     `climbs` the ladder, or doesn't. Raises NoNet or Stalled."""
     net, given = climbed_net(
         surface,
-        {"spacing": spacing, "gap": gap, "elements": ELEMENTS},
+        NetSettings(spacing=spacing, gap=gap, elements=ELEMENTS),
         angle=math.radians(placed.angle),
         offset=placed.offset,
         most=_worth(surface, spacing) if climbs else 0,

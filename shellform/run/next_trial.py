@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 from shellform.net.net import Net
-from shellform.run.first_trial import NEEDED, STRESSED, Followed
+from shellform.run.first_trial import NEEDED, PULLED, STRESSED, FirstParts, Followed
 from shellform.run.sizes import Placed, RodChoice, load_borne, next_choice, next_thinner, whole_mm
 from shellform.run.unbuildable import Obstacle, Why
 
@@ -16,6 +16,9 @@ _THINNED = 8  # trials with less concrete
 _TOO_THIN = 0.3  # of the least layer: nobody pours so little
 AIMED = 0.92  # of what rods may be stressed to, for which concrete is thinned
 _NEAR = 0.8  # of what is needed: where a design falls above it, stronger edge beams may help
+_EASED = 5  # times that cables are eased, by less prestrain or thicker strands
+_STRONGER = 3  # times that strands are made stronger for rods that break
+_SPARED = 0.95  # of the stress before, at the most, for which cables are made slacker once more
 Stands = TypeVar("Stands")
 
 
@@ -26,6 +29,32 @@ def fails_by(tried: Followed) -> Why | None:
     if max(tried.stress, tried.edge) > STRESSED:
         return Why.STRENGTH if tried.stress > STRESSED else Why.EDGES
     return Why.CABLES if tried.pull > 1.0 else None
+
+
+def relieved(parts: FirstParts, follow: Callable[[FirstParts], Followed]) -> tuple[FirstParts, Followed]:
+    """The parts with cables below their limit, by less prestrain or thicker strands, and what they come to
+    when they are followed."""
+    tried = follow(parts)
+    for turn in range(_EASED):
+        easier = parts.easier(tried, PULLED if turn == 0 else STRESSED)
+        if easier is None:
+            break
+        before = parts, tried
+        parts, tried = easier, follow(easier)
+        fell = tried.factor < NEEDED  # joints that turn and slacker cables stiffen less
+        if fell or tried.stress > max(STRESSED, _SPARED * before[1].stress):
+            if fell or tried.stress > before[1].stress:
+                parts, tried = before
+            break
+    for _ in range(_STRONGER):
+        stronger = parts.stronger(tried)
+        if stronger is None:
+            break
+        held = follow(stronger)
+        if held.factor < NEEDED or held.stress >= tried.stress:
+            break
+        parts, tried = stronger, held
+    return parts, tried
 
 
 def edges_may_help(failure: Obstacle) -> bool:

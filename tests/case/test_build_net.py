@@ -100,7 +100,7 @@ def test_a_net_lies_at_its_angle_in_radians_with_the_joint_s_gap(monkeypatch, an
     asked = []
 
     def oriented(surface, settings, *, angle, offset, progress):
-        asked.append((angle, offset, settings["gap"], settings["spacing"], settings["elements"]))
+        asked.append((angle, offset, settings.gap, settings.spacing, settings.elements))
         return "net", 0.4, (0.25, 0.0)
 
     monkeypatch.setattr(module, "oriented_net", oriented)

@@ -10,6 +10,7 @@ import pytest
 
 import shellform as sf
 from shellform.errors import InputError, NotConverged
+from shellform.net.chebyshev import NetSettings, net_at
 from shellform.net.ladder import LADDER, Rung, _changed, _vain, climbed_net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.orientation import oriented_net
@@ -20,7 +21,8 @@ from shellform.surface.shape.target import make_surface
 from tests.net.test_settings import ball, bowl
 from tests.surface.test_fairing import sheet
 
-SETTINGS = {"spacing": 0.9, "gap": 0.9 / 27.5, "elements": 2}
+SETTINGS = NetSettings(spacing=0.9, gap=0.9 / 27.5, elements=2)
+ANY = NetSettings(spacing=0.25, gap=0.005)
 
 
 @pytest.fixture(scope="module")
@@ -37,8 +39,8 @@ def umbrella():
 
 
 def test_where_the_first_attempt_succeeds_nothing_is_changed():
-    surface, settings = bowl(), {"spacing": 0.25, "gap": 0.005, "elements": 2}
-    plain = sf.pull_net(surface, **settings, angle=0.3)
+    surface, settings = bowl(), NetSettings(spacing=0.25, gap=0.005, elements=2)
+    plain = sf.pull_net(surface, spacing=0.25, gap=0.005, elements=2, angle=0.3)
     net, given = climbed_net(surface, settings, angle=0.3)
     assert given == Attempt(Change.NOTHING, 0.3, (0.0, 0.0), None)
     assert net.attempts == ()
@@ -65,7 +67,7 @@ def test_no_further_rung_is_climbed_once_failed_pulls_took_what_they_may(umbrell
 
 def test_a_net_that_stays_off_creases_is_pulled_tighter_and_says_so(umbrella, tmp_path):
     with pytest.raises(NoNet) as caught:
-        sf.pull_net(umbrella, **SETTINGS, angle=math.pi / 4)
+        net_at(umbrella, SETTINGS, angle=math.pi / 4)
     assert caught.value.reason is Reason.OFF
     said = []
     net, angle, _ = oriented_net(umbrella, SETTINGS, angle=math.pi / 4, progress=said.append)
@@ -87,27 +89,27 @@ def test_a_surface_that_takes_no_net_is_refused_with_all_that_was_tried():
     with pytest.raises(
         NoNet, match=r"bends to a radius of .* attempts, with other angles.* one direction"
     ) as caught:
-        climbed_net(ball(30), {"spacing": 0.3, "gap": 0.005, "elements": 2}, angle=0.1)
+        climbed_net(ball(30), NetSettings(spacing=0.3, gap=0.005, elements=2), angle=0.1)
     assert caught.value.reason is Reason.BROKEN
 
 
 def test_settings_that_can_not_work_are_refused_at_once():
     tried = []
     with pytest.raises(InputError, match="must be numbers"):
-        climbed_net(bowl(), {"spacing": 0.25, "gap": 0.005}, angle=math.nan, progress=tried.append)
+        climbed_net(bowl(), ANY, angle=math.nan, progress=tried.append)
     assert tried == []
 
 
 def test_the_net_turns_no_further_than_its_tolerance(monkeypatch):
     turns = []
 
-    def fails(surface, *, angle, offset, tuning, progress, **settings):
+    def fails(surface, settings, *, angle, offset, progress):
         turns.append(math.degrees(angle))
         raise NoNet(Reason.SHORT, "too short")
 
-    monkeypatch.setattr("shellform.net.ladder.pull_net", fails)
+    monkeypatch.setattr("shellform.net.ladder.net_at", fails)
     with pytest.raises(NoNet, match="too short"):
-        climbed_net(bowl(), {}, angle=math.radians(45.0), tolerance=math.radians(6.0))
+        climbed_net(bowl(), ANY, angle=math.radians(45.0), tolerance=math.radians(6.0))
     assert min(turns) == pytest.approx(40.0)
     assert max(turns) == pytest.approx(50.0)
 
@@ -115,13 +117,13 @@ def test_the_net_turns_no_further_than_its_tolerance(monkeypatch):
 def test_the_ladder_is_left_where_pulls_that_failed_have_cost_too_much(monkeypatch):
     calls = []
 
-    def stalls(surface, *, progress, **settings):
+    def stalls(surface, settings, *, angle, offset, progress):
         calls.append(settings)
         raise Stalled("stalled", residual=0.9, iterations=250)
 
-    monkeypatch.setattr("shellform.net.ladder.pull_net", stalls)
+    monkeypatch.setattr("shellform.net.ladder.net_at", stalls)
     with pytest.raises(Stalled, match="4 attempts") as caught:
-        climbed_net(bowl(), {}, angle=0.0)
+        climbed_net(bowl(), ANY, angle=0.0)
     assert len(calls) == 4
     assert caught.value.residual == 0.9
 
@@ -129,39 +131,39 @@ def test_the_ladder_is_left_where_pulls_that_failed_have_cost_too_much(monkeypat
 def test_pulls_whose_net_is_refused_cost_as_much_as_those_that_stall(monkeypatch):
     calls = []
 
-    def leaves(surface, *, progress, **settings):
+    def leaves(surface, settings, *, angle, offset, progress):
         calls.append(settings)
         error = NoNet(Reason.OFF, "stays off")
         error.factorisations = 300
         raise error
 
-    monkeypatch.setattr("shellform.net.ladder.pull_net", leaves)
+    monkeypatch.setattr("shellform.net.ladder.net_at", leaves)
     with pytest.raises(NoNet, match="3 attempts"):
-        climbed_net(bowl(), {}, angle=0.0)
+        climbed_net(bowl(), ANY, angle=0.0)
     assert len(calls) == 3
 
 
 def test_a_net_that_is_refused_tells_what_its_pull_took(umbrella):
     with pytest.raises(NoNet) as caught:
-        sf.pull_net(umbrella, **SETTINGS, angle=math.pi / 4)
+        net_at(umbrella, SETTINGS, angle=math.pi / 4)
     assert caught.value.factorisations > 0
 
 
 def test_rungs_keep_to_what_was_stated():
-    placed = {"guides": ([], [])}
+    placed = dataclasses.replace(ANY, guides=([], []))
     assert all(
         _vain(rung, placed, None) == (rung.change in (Change.TURNED, Change.SHIFTED))
         for rung in LADDER
         if rung.change is not Change.LOOSER
     )
     tighter = next(rung for rung in LADDER if rung.change is Change.TIGHTER)
-    assert _vain(tighter, {"spring_density": [5.0]}, None)
-    assert not _vain(tighter, {"spring_density": None}, None)
+    assert _vain(tighter, dataclasses.replace(ANY, spring_density=[5.0]), None)
+    assert not _vain(tighter, ANY, None)
     looser = next(rung for rung in LADDER if rung.change is Change.LOOSER)
-    assert _vain(looser, {}, Stalled("", residual=0.5, iterations=1))
-    assert not _vain(looser, {}, Stalled("", residual=1e-6, iterations=1))
-    sheared = _changed({"shear_stiffness": 0.2}, dataclasses.replace(Rung(Change.SHEAR), shear=5.0))
-    assert sheared == {"shear_stiffness": 1.0}
+    assert _vain(looser, ANY, Stalled("", residual=0.5, iterations=1))
+    assert not _vain(looser, ANY, Stalled("", residual=1e-6, iterations=1))
+    softer, stiffer = (dataclasses.replace(ANY, shear_stiffness=each) for each in (0.2, 1.0))
+    assert _changed(softer, dataclasses.replace(Rung(Change.SHEAR), shear=5.0)) == stiffer
 
 
 def test_a_relaxation_that_comes_no_nearer_is_ended_early_but_not_one_on_its_way():
@@ -182,8 +184,7 @@ def test_a_corrugated_barrel_is_covered_at_an_angle_where_rods_run_far_past_its_
     x, y, _ = (sheet(lambda x, y: 0.0 * x, size=15.0, count=61).vertices * [2.0, 1.0, 1.0]).T
     height = 3.0 + 0.7 * np.cos(x) - 2.5 * (y / 7.5) ** 2
     surface = make_surface(np.column_stack([x, y, height]), sheet(lambda x, y: 0.0 * x, count=61).triangles)
-    settings = {"spacing": 0.9, "gap": 0.03, "elements": 2, "method": "compass"}
-    net = sf.pull_net(surface, angle=np.pi / 4, **settings)
+    net = sf.pull_net(surface, spacing=0.9, gap=0.03, elements=2, method="compass", angle=np.pi / 4)
     assert net.quality.uncovered_area < 0.01 * surface.area
 
 

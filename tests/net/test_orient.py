@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from shellform.errors import InputError
+from shellform.net.chebyshev import NetSettings
 from shellform.net.orientation import best_orientation, oriented_net
 from tests.net.test_closed_forms import roof
 from tests.net.test_settings import ball
@@ -23,7 +24,7 @@ def cylinder():
 def test_on_a_cylinder_rods_bend_least_at_45_degrees(cylinder):
     """At the angle a the mean of the squared curvatures is (cos⁴ a + sin⁴ a) / 2, smallest at 45°."""
     said = []
-    best, tried = best_orientation(cylinder, {"spacing": 0.25, "gap": 0.005}, progress=said.append)
+    best, tried = best_orientation(cylinder, NetSettings(spacing=0.25, gap=0.005), progress=said.append)
     # A cut-out of so few rods isn't quite even: one step of the search, 7.5°, is allowed.
     assert math.degrees(best.angle) == pytest.approx(45.0, abs=7.501)
     assert best.cost == min(trial.cost for trial in tried)
@@ -33,7 +34,7 @@ def test_on_a_cylinder_rods_bend_least_at_45_degrees(cylinder):
 
 
 def test_two_processes_find_what_one_finds(cylinder):
-    settings = {"spacing": 0.4, "gap": 0.005}
+    settings = NetSettings(spacing=0.4, gap=0.005)
     net, angle, offset = oriented_net(cylinder, settings, angle="auto", workers=2)
     best, _ = best_orientation(cylinder, settings)
     assert (angle, offset) == (best.angle, best.offset)
@@ -41,13 +42,15 @@ def test_two_processes_find_what_one_finds(cylinder):
 
 
 def test_a_given_angle_is_kept(cylinder):
-    _, angle, offset = oriented_net(cylinder, {"spacing": 0.4, "gap": 0.005}, angle=0.2, offset=(0.5, 0.0))
+    _, angle, offset = oriented_net(
+        cylinder, NetSettings(spacing=0.4, gap=0.005), angle=0.2, offset=(0.5, 0.0)
+    )
     assert (angle, offset) == (0.2, (0.5, 0.0))
 
 
 def test_where_no_angle_gives_a_net_it_is_said_why():
     with pytest.raises(InputError, match=r"no angle gives a net: .*curved too much"):
-        best_orientation(ball(30), {"spacing": 0.3, "gap": 0.005})
+        best_orientation(ball(30), NetSettings(spacing=0.3, gap=0.005))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="where no other system ends them with their run")
@@ -55,13 +58,15 @@ def test_processes_that_try_nets_end_with_the_one_that_is_killed():
     """They waited for work for ever."""
     code = (
         "import multiprocessing, os, signal\n"
+        "from shellform.net.chebyshev import NetSettings\n"
         "from shellform.net.orientation import best_orientation\n"
         "from tests.net.test_closed_forms import roof\n"
         "def told(text):\n"
         "    print(*(each.pid for each in multiprocessing.active_children()), flush=True)\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
         "if __name__ == '__main__':\n"
-        "    best_orientation(roof(1.0, 0.8, 2.0, n=20), {'spacing': 0.25, 'gap': 0.005}, workers=2, progress=told)\n"
+        "    settings = NetSettings(spacing=0.25, gap=0.005)\n"
+        "    best_orientation(roof(1.0, 0.8, 2.0, n=20), settings, workers=2, progress=told)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == -signal.SIGKILL, done.stderr

@@ -2,6 +2,7 @@
 
 import math
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,10 @@ import pytest
 
 from shellform.errors import InputError
 from shellform.net import orientation
+from shellform.net.chebyshev import NetSettings
 from shellform.net.orientation import TriedNet, best_orientation, cost, oriented_net
+
+SETTINGS = NetSettings(spacing=0.1, gap=0.005)
 
 
 def test_the_cost_is_the_mean_energy_of_a_segment_and_its_joint():
@@ -39,7 +43,7 @@ def searched(monkeypatch, price, settings=None):
         yield run
 
     monkeypatch.setattr(orientation, "_runner", runner)
-    best, tried = best_orientation(None, settings or {"spacing": 0.1})
+    best, tried = best_orientation(None, settings or SETTINGS)
     return best, tried, stages
 
 
@@ -71,7 +75,7 @@ def test_the_best_of_twelve_compass_nets_are_pulled_and_the_best_turned_by_half_
 
 @pytest.mark.parametrize(("spacing_v", "last"), [(None, 82.5), (0.1, 82.5), (0.2, 165.0)])
 def test_angles_go_round_a_quarter_turn_and_round_a_half_where_u_and_v_differ(monkeypatch, spacing_v, last):
-    settings = {"spacing": 0.1} | ({} if spacing_v is None else {"spacing_v": spacing_v})
+    settings = replace(SETTINGS, spacing_v=spacing_v)
     _, _, stages = searched(monkeypatch, lambda angle, *_: angle, settings)
     assert math.degrees(stages[0][-1][0]) == pytest.approx(last)
     step = last / 11.0
@@ -111,37 +115,32 @@ def test_an_angle_that_is_left_open_is_that_of_the_search_and_one_given_is_kept(
     monkeypatch.setattr(
         orientation, "best_orientation", lambda *_, **__: (TriedNet(0.3, (0.5, 0.0), 1.0), [])
     )
-    assert oriented_net(None, {}, angle="auto") == ("net", 1.3, (0.5, 0.0))
-    assert oriented_net(None, {}, angle=0.7, offset=(0.0, 0.5)) == ("net", 1.7, (0.0, 0.5))
+    assert oriented_net(None, SETTINGS, angle="auto") == ("net", 1.3, (0.5, 0.0))
+    assert oriented_net(None, SETTINGS, angle=0.7, offset=(0.0, 0.5)) == ("net", 1.7, (0.0, 0.5))
     assert asked == [(0.3, (0.5, 0.0)), (0.7, (0.0, 0.5))]
 
 
-@pytest.mark.parametrize(("elements", "made"), [(None, 2), (8, 2), (1, 1)])
+@pytest.mark.parametrize(("elements", "made"), [(4, 2), (8, 2), (1, 1)])
 def test_trials_have_two_elements_a_segment_at_most_and_cost_infinitely_where_there_is_no_net(
     monkeypatch, elements, made
 ):
-    asked = {}
+    asked = []
 
-    def pull(_surface, **how):
-        asked.update(how)
+    def pull(_surface, settings, *, angle, offset):
+        asked.append((settings.elements, angle, settings.method, settings.tuning.tail))
         return "net"
 
-    monkeypatch.setattr(orientation, "pull_net", pull)
+    monkeypatch.setattr(orientation, "net_at", pull)
     monkeypatch.setattr(orientation, "cost", lambda net: 0.1234567890123456)
-    settings = {"spacing": 0.1} | ({} if elements is None else {"elements": elements})
+    settings = replace(SETTINGS, elements=elements)
     found = orientation._try(None, settings, (0.4, (0.5, 0.0), "compass", 2))
     assert found == TriedNet(0.4, (0.5, 0.0), 0.123456789012)
-    assert (asked["elements"], asked["angle"], asked["method"], asked["tuning"].tail) == (
-        made,
-        0.4,
-        "compass",
-        2,
-    )
+    assert asked == [(made, 0.4, "compass", 2)]
 
-    def fail(_surface, **_how):
+    def fail(_surface, _settings, **_where):
         raise InputError("it can't be", where="net")
 
-    monkeypatch.setattr(orientation, "pull_net", fail)
+    monkeypatch.setattr(orientation, "net_at", fail)
     assert orientation._try(None, settings, (0.4, (0.5, 0.0), "pull", 0)) == TriedNet(
         0.4, (0.5, 0.0), math.inf, "net: it can't be"
     )

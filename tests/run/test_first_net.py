@@ -25,9 +25,9 @@ class Pulls:
     def __init__(self, **nets):
         self.nets, self.asked = nets, []
 
-    def __call__(self, surface, *, spacing, gap, elements, angle, offset, tuning):
+    def __call__(self, surface, settings, *, angle, offset):
         name = f"a{math.degrees(angle):.0f}" + ("s" if offset == (0.5, 0.5) else "")
-        self.asked.append((name, tuning.limit))
+        self.asked.append((name, settings.tuning.limit))
         if name not in self.nets:
             raise Stalled("stalls", residual=0.1, iterations=60)
         return self.nets[name]
@@ -37,7 +37,7 @@ class Pulls:
 def pulled(monkeypatch):
     def found(allowance, angles, shifted=False, **nets):
         pulls, said, told = Pulls(**nets), [], []
-        monkeypatch.setattr(first_net, "pull_net", pulls)
+        monkeypatch.setattr(first_net, "net_at", pulls)
         monkeypatch.setattr(first_net, "refuse_nearness", lambda *_: None)
         monkeypatch.setattr(first_net, "cost", lambda own: own.cost)
         placed, near = least_bent_net(
@@ -98,7 +98,7 @@ def test_where_no_angle_gives_a_net_the_ladder_is_climbed_from_the_first_with_th
     climbed, asked = net(1.0), []
 
     def climb(surface, settings, *, angle, most, failed, near, progress):
-        asked.append((settings["spacing"], math.degrees(angle), most, near))
+        asked.append((settings.spacing, math.degrees(angle), most, near))
         return climbed, SimpleNamespace(angle=math.radians(40.0), offset=(0.25, 0.0))
 
     monkeypatch.setattr(first_net, "climbed_net", climb)
@@ -119,7 +119,7 @@ def test_a_net_is_pulled_anew_with_another_gap_and_stands_on_its_edges(monkeypat
     asked = []
 
     def climb(surface, settings, *, angle, offset, most, near, progress):
-        asked.append((settings["gap"], round(math.degrees(angle), 9), offset, most, near))
+        asked.append((settings.gap, round(math.degrees(angle), 9), offset, most, near))
         return "net", SimpleNamespace(angle=math.radians(22.5), offset=(0.5, 0.0))
 
     monkeypatch.setattr(first_net, "climbed_net", climb)
