@@ -33,7 +33,7 @@ def turned_up(points: Reals, up: str) -> Reals:
             f"must be one of {', '.join(_AXES)}",
             where="surface.up",
             value=up,
-            remedy="Give z for CAD files, y for most viewers', -z for a form that hangs.",
+            remedy="Give z for CAD files, y for most viewers', x for a shell that was drawn so, -z for a form that hangs.",
         )
     if up == "z":
         return points
@@ -41,6 +41,19 @@ def turned_up(points: Reals, up: str) -> Reals:
     return np.column_stack(
         [points[:, k] if sign > 0 else -points[:, k] for k, sign in zip(order, signs, strict=True)]
     )
+
+
+def turned_back(points: Reals, up: str) -> Reals:
+    """Points (k, 3) that `turned_up` made of a file's with its axis `up`, in the file's axes again."""
+    order, signs = _AXES[up]
+    back = np.empty_like(points)
+    back[:, list(order)] = points * np.array(signs, dtype=float)
+    return back
+
+
+def downwards(up: str) -> str:
+    """The axis `up` of a file pointing the other way, by its name: "-z" for "z"."""
+    return up[1:] if up.startswith("-") else f"-{up}"
 
 
 def level_axes(up: str) -> tuple[int, int]:

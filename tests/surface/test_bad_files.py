@@ -21,6 +21,7 @@ from shellform.errors import InputError
 from shellform.surface import cad
 from shellform.surface.readers import draft, foreign, reading
 from shellform.surface.readers.reading import read_surface
+from shellform.surface.units import turned_back
 from tests.surface.shells import cap, compas_mesh, split, write_gltf, write_obj, write_off, write_stl
 
 ROOT = Path(__file__).parent.parent.parent
@@ -443,6 +444,42 @@ def test_a_form_drawn_as_it_hangs_is_told_and_turned_over_where_that_is_asked_fo
     turned = read_surface(file, up="-z")
     np.testing.assert_allclose(turned.vertices, POINTS)
     assert not turned.mended
+
+
+def told_axis(notes):
+    """The one that what was told of a surface names to give."""
+    (axis,) = {found for note in notes for found in re.findall(r"--up (\S+)\)", note)}
+    return axis
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z", "-x", "-y", "-z"])
+@pytest.mark.parametrize("given", ["x", "y", "z", "-x", "-y", "-z", None])
+def test_the_axis_that_is_told_of_a_shell_on_its_side_or_its_head_sets_it_upright(tmp_path, axis, given):
+    """Saddles don't tell which side is up: a dome on a level edge does."""
+    x, y = np.meshgrid(np.linspace(-1.0, 1.0, 9), np.linspace(-1.0, 1.0, 9))
+    dome = np.column_stack([x.ravel(), y.ravel(), 0.4 * ((1.0 - x**2) * (1.0 - y**2)).ravel()])
+    grid = np.arange(81).reshape(9, 9)
+    faces = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    file = write_obj(tmp_path / "a.obj", turned_back(dome, axis), faces)
+    found = read_surface(file, up=given)
+    if given == axis or (given is None and not axis.startswith("-")):
+        assert not any("turn it over" in note or "stands upright" in note for note in found.mended)
+        return
+    found = read_surface(file, up=told_axis(n for n in found.mended if "is taken" not in n))
+    assert not found.mended
+    np.testing.assert_allclose(found.size, [2.0, 2.0, 0.4], atol=1e-6)
+    assert found.vertices[np.concatenate(found.boundary), 2].max() < 1e-6
+
+
+def test_a_wall_is_told_to_stand_upright_whichever_axis_is_vertical(tmp_path):
+    """A ring of walls with little of a roof."""
+    turn, level = np.meshgrid(np.linspace(0.0, 2.0 * np.pi, 25)[:-1], np.linspace(0.0, 2.0, 5))
+    ring = np.column_stack([np.cos(turn.ravel()), np.sin(turn.ravel()), level.ravel()])
+    grid = np.column_stack([np.arange(120).reshape(5, 24), 24 * np.arange(5)])
+    faces = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    (told,) = read_surface(write_obj(tmp_path / "a.obj", ring, faces)).mended
+    assert "any other of its axes" in told
+    assert "--up" not in told
 
 
 def test_coordinates_that_32_bits_have_rounded_are_told(tmp_path):

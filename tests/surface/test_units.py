@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shellform.errors import InputError
-from shellform.surface.units import level_axes, turned_up, unit_factor
+from shellform.surface.units import downwards, level_axes, turned_back, turned_up, unit_factor
 
 
 def test_units_are_so_many_metres():
@@ -38,6 +38,8 @@ def test_the_axis_named_becomes_the_vertical_and_nothing_is_mirrored(up, vertica
     np.testing.assert_array_equal(turned_up(np.array([vertical], dtype=float), up) + 0.0, [[0.0, 0.0, 1.0]])
     turned = turned_up(np.eye(3), up)
     np.testing.assert_array_equal(turned @ turned.T, np.eye(3))
+    np.testing.assert_array_equal(turned_back(turned, up), np.eye(3))
+    np.testing.assert_array_equal(turned_up(np.array([vertical], dtype=float), downwards(up))[0, 2], -1.0)
     assert np.linalg.det(turned) == pytest.approx(1.0)
     corners = np.array([[1.0, 2.0, 3.0]])
     assert set(level_axes(up)) == set(range(3)) - {int(np.flatnonzero(vertical)[0])}

@@ -12,13 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
+from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, require_file, unreadable
 from shellform.surface.readers import compas, foreign, plain
 from shellform.surface.readers.draft import Choice, Draft
 from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended, noted
 from shellform.surface.shape.target import Surface, make_surface
-from shellform.surface.units import turned_up, unit_factor
+from shellform.surface.units import downwards, turned_back, turned_up, unit_factor
 
 ENDINGS = {
     ".step": "step", ".stp": "step", ".iges": "iges", ".igs": "iges", ".brep": "brep", ".brp": "brep",
@@ -38,7 +39,7 @@ _HEAD = 65536
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
 _STATED_UP = ("gltf",)  # formats that say which axis is vertical
 _TURNED = "its {} axis is taken for the vertical: with z up it would lie on its side (surface.up, --up)"
-# that are taken for the vertical, in this order, where a shell would lie on its side
+# that are taken for the vertical, in this order, where a shell would lie on its side; z is looked at first
 _OTHER_AXES = ("y", "x")
 _LEVEL = 0.01  # of the rise: points as high as others
 _COARSE = 1e-4  # of the extent, that coordinates lie apart: rounding bends what is flat
@@ -46,7 +47,8 @@ _STEPS = (
     "its coordinates are numbers of 32 bits, {:.2g} m apart so far from the origin, which creases it: export it nearer to "
     "its origin, or in a format of 64 bits (OBJ, STEP, 3DM)"
 )
-_HANGS = "its highest point lies on its edge and its lowest does not: where it is drawn as it hangs, turn it over (surface.up, --up -z)"
+_HANGS = "its highest point lies on its edge and its lowest does not: where it is drawn as it hangs, turn it over (surface.up, --up {})"
+_UPRIGHT_AS_READ = "it stands upright, with a plan of {:.0f} % of its area"
 _OWN = {
     "obj": plain.read_obj,
     "off": plain.read_off,
@@ -103,7 +105,8 @@ def read_surface(
             remedy="Leave it out for a file that holds a surface and no solid.",
         )
 
-    def whole(axis: str | None) -> Draft:
+    def whole(axis: str | None) -> tuple[Draft, str]:
+        """What is in the file, mended, and which of its axes is vertical."""
         if kind in _OWN:
             draft = _OWN[kind](file, Choice(layer, name))
         else:
@@ -120,16 +123,17 @@ def read_surface(
         if step > 0.0:
             metres = unit_factor(unit or "m") if draft.metres is None else draft.metres
             draft = noted(draft, _STEPS.format(metres * step))
-        return mended(_upright(draft, unit, axis), str(file), face=face, piece=piece)
+        vertical = axis or draft.up
+        return mended(_upright(draft, unit, vertical), str(file), face=face, piece=piece), vertical
 
-    as_given = whole(up)
+    as_given, vertical = whole(up)
     # told from the skin as it is: what fills its openings depends on the axis
-    if up is None and kind not in _STATED_UP and _plan_share(as_given) < _UPRIGHT:
+    if up is None and kind not in _STATED_UP and _plan_share(as_given.points, as_given.triangles) < _UPRIGHT:
         for axis in _OTHER_AXES:
-            turned = whole(axis)
-            if _plan_share(turned) >= _UPRIGHT:
-                return _closed(noted(turned, _TURNED.format(axis)), str(file), fill, ground)
-    return _closed(as_given, str(file), fill, ground)
+            turned, _ = whole(axis)
+            if _plan_share(turned.points, turned.triangles) >= _UPRIGHT:
+                return _closed(noted(turned, _TURNED.format(axis)), axis, str(file), fill, ground)
+    return _closed(as_given, vertical, str(file), fill, ground)
 
 
 def surface_of(
@@ -142,25 +146,32 @@ def surface_of(
     ground: float | None = None,
 ) -> Surface:
     """A draft in metres, z up, mended and closed as `read_surface` says."""
-    return _closed(mended(draft, source, face=face, piece=piece), source, fill, ground)
+    return _closed(mended(draft, source, face=face, piece=piece), "z", source, fill, ground)
 
 
-def _closed(whole: Draft, source: str, fill: str | None, ground: float | None) -> Surface:
-    """Of a mended draft, its openings closed where that is asked for."""
+def _closed(whole: Draft, vertical: str, source: str, fill: str | None, ground: float | None) -> Surface:
+    """Of a mended draft whose `vertical` is that axis of its file, its openings closed where that is asked
+    for."""
     if fill is not None:
         whole = filled(whole, source, what=fill, ground=ground)
     surface = make_surface(whole.points, whole.triangles, normals=whole.normals, source=source)
-    notes = whole.notes + surface.mended
-    plan = _plan_share(whole)
-    if _hangs(surface):
-        notes = (*notes, _HANGS)
-    if plan < _UPRIGHT:
-        notes = (
-            *notes,
-            f"it stands upright, with a plan of {100.0 * plan:.0f} % of its area: check the vertical axis "
-            "(surface.up, --up)",
-        )
+    notes = (*whole.notes, *surface.mended, *_doubts(surface, vertical))
     return Surface(surface.vertices, surface.triangles, surface.normals, source, notes)
+
+
+def _doubts(surface: Surface, vertical: str) -> tuple[str, ...]:
+    """What tells that another axis of a surface's file is the vertical one, with that axis."""
+    plan = _plan_share(surface.vertices, surface.triangles)
+    if plan >= _UPRIGHT:
+        return (_HANGS.format(downwards(vertical)),) if _hangs(surface.vertices, surface) else ()
+    told = _UPRIGHT_AS_READ.format(100.0 * plan)
+    as_in_file = turned_back(surface.vertices, vertical)
+    for axis in ("z", *_OTHER_AXES):
+        points = turned_up(as_in_file, axis)
+        if _plan_share(points, surface.triangles) >= _UPRIGHT:
+            found = downwards(axis) if _hangs(points, surface) else axis
+            return (f"{told}: give its {found} axis for the vertical (surface.up, --up {found})",)
+    return (f"{told}, and so it does with any other of its axes for the vertical",)
 
 
 def _step_of_32_bits(draft: Draft) -> float:
@@ -175,10 +186,10 @@ def _step_of_32_bits(draft: Draft) -> float:
     return step if step > _COARSE * float(np.ptp(points, axis=0).max()) else 0.0
 
 
-def _hangs(surface: Surface) -> bool:
-    """Whether a surface looks like a form that hangs from its edge: its highest point lies on that, and its
-    lowest doesn't."""
-    level = surface.vertices[:, 2]
+def _hangs(points: Reals, surface: Surface) -> bool:
+    """Whether a surface whose vertices are turned to these `points` (v, 3) looks like a form that hangs from
+    its edge: its highest point lies on that, and its lowest doesn't."""
+    level = points[:, 2]
     edge = level[np.concatenate(surface.boundary)] if surface.boundary else level
     slack = _LEVEL * float(np.ptp(level))
     return bool(edge.max() >= level.max() - slack and edge.min() > level.min() + slack)
@@ -263,16 +274,16 @@ def _content(head: bytes, file: Path) -> str | None:
     return None
 
 
-def _plan_share(draft: Draft) -> float:
+def _plan_share(points: Reals, triangles: Indices) -> float:
     """Of its area, the plan's: little where a shell lies on its side."""
-    corner = draft.points[draft.triangles]
+    corner = points[triangles]
     area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return abs(float(area[:, 2].sum())) / float(np.linalg.norm(area, axis=1).sum())
 
 
-def _upright(draft: Draft, unit: str | None, up: str | None) -> Draft:
+def _upright(draft: Draft, unit: str | None, vertical: str) -> Draft:
     """The draft in metres and z up."""
     factor = unit_factor(unit or "m") if draft.metres is None else draft.metres
-    axis = up or draft.up
-    normals = None if draft.normals is None else turned_up(draft.normals, axis)
-    return Draft(factor * turned_up(draft.points, axis), draft.triangles, normals, 1.0, "z", draft.notes)
+    normals = None if draft.normals is None else turned_up(draft.normals, vertical)
+    points = factor * turned_up(draft.points, vertical)
+    return Draft(points, draft.triangles, normals, 1.0, "z", draft.notes)
