@@ -76,9 +76,11 @@ def require_number(
     least: float = -math.inf,
     below: float = math.inf,
     most: float = math.inf,
+    share: bool = False,
 ) -> None:
     """Raises InputError for what is no finite number above or from its lower bound and below or up to its
-    upper one; `give` is what to give instead, with unit and example.
+    upper one; `give` is what to give instead, with unit and example. Of a `share` or factor that can only be
+    meant in per cent the remedy names the number to write.
     """
     try:
         fits = math.isfinite(value) and above < value < below and least <= value <= most
@@ -86,7 +88,14 @@ def require_number(
         raise InputError("must be a number", where=where, value=value, remedy=f"Give {give}.") from error
     if not fits:
         what = f"must be {_between(above, least, below, most)}"
-        raise InputError(what, where=where, value=value, remedy=f"Give {give}.")
+        hint = if_per_cents(value, min(below, most)) if share else ""
+        raise InputError(what, where=where, value=value, remedy=f"Give {give}.{hint}")
+
+
+def if_per_cents(value: float, most: float) -> str:
+    """What to write of a share or factor larger than the `most` that it may be whose hundredth would suit: of
+    97 0.97."""
+    return f" For {value:g} % write {value / 100.0:g}." if 1.0 < value < 100.0 * most else ""
 
 
 def require_count(value: int, *, where: str, give: str, least: int = 1, most: float = math.inf) -> None:

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, field_validator
 
 from shellform.case.entries import Entry
-
-_BROKEN = 2.0  # times the rods' strength: what is beyond can only be per cents
+from shellform.problem.engineering import BROKEN, ConnectorTurn
 
 
 class LimitsEntry(Entry):
@@ -22,7 +19,7 @@ class LimitsEntry(Entry):
     built_deviation: PositiveFloat | None = Field(None, description="the same as built, at worst, m")
     utilisation: PositiveFloat | None = Field(
         None,
-        le=_BROKEN,
+        le=BROKEN,
         description="largest fibre stress of the rods over their strength, erection stress included",
     )
     connector_turn: PositiveFloat | None = Field(
@@ -40,12 +37,7 @@ class LimitsEntry(Entry):
     @field_validator("connector_turn")
     @classmethod
     def _less_than_a_right_angle(cls, turn: float | None) -> float | None:
-        if turn is not None and turn >= 0.5 * math.pi:
-            raise ValueError(
-                f"{turn:g} rad limit nothing, since crossing rods lie on each other at 1.57; "
-                f"if degrees are meant, write {math.radians(turn):.3g}"
-            )
-        return turn
+        return None if turn is None else ConnectorTurn("").at_limit(turn)
 
 
 class RobustEntry(Entry):

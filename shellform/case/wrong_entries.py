@@ -12,7 +12,7 @@ from typing import Annotated, Any, get_args, get_origin
 
 from pydantic import BaseModel, Tag, ValidationError
 
-from shellform.errors import InputError
+from shellform.errors import InputError, if_per_cents
 
 _FACTOR = 100.0  # the largest upper bound of shares and factors: from there on they can only be per cents
 
@@ -62,8 +62,7 @@ def _if_per_cents(error: Any) -> str:
     bound = bounds.get("lt", bounds.get("le"))
     if bound is None or bound > _FACTOR:
         return ""
-    given = float(error["input"])
-    return f" For {given:g} % write {given / 100.0:g}." if 1.0 < given < 100.0 * bound else ""
+    return if_per_cents(float(error["input"]), bound)
 
 
 @dataclass(frozen=True)

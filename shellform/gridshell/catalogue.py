@@ -140,6 +140,7 @@ def _material(given: _Material) -> Material:
         most=1.0,
         where="material.lasting",
         give="a share of the strength, such as 0.4",
+        share=True,
     )
     strength = given.strength * given.lasting
     if given.shear is None:

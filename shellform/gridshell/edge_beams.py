@@ -58,6 +58,7 @@ class Bundle(Circular):
             most=1.0,
             where="edges.beam.composite",
             give="0 for loose rods to 1 for glued ones, such as 0.5",
+            share=True,
         )
 
     @property

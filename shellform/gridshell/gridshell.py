@@ -212,6 +212,7 @@ class Gridshell:
             below=1.0,
             where="cable.rest_ratio",
             give="a share of the length, such as 0.99",
+            share=True,
         )
         every = np.ones(len(self.cable_ends), dtype=bool)
         return Design(rest_ratio * self.cable_lengths, every, self.rod.radius)

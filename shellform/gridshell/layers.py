@@ -57,6 +57,7 @@ class TwoLayers:
             most=1.0,
             where="rod.composite",
             give="0 for loose laths to 1 for glued ones, such as 0.5",
+            share=True,
         )
 
     @property

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from shellform.errors import InputError, require_known, require_number
+from shellform.errors import InputError, if_per_cents, require_known, require_number
 from shellform.gridshell.gridshell import Gridshell
 
 SCALE_MODEL_BELOW: Final = 2.0  # m of span
@@ -94,7 +94,7 @@ class Tolerances:
                     f"is a share and must not exceed {LARGEST_SHARE:g}",
                     where=where,
                     value=value,
-                    remedy="Write 0.1 for 10 %.",
+                    remedy=f"Write 0.1 for 10 %.{if_per_cents(value, LARGEST_SHARE)}",
                 )
 
     def only(self, *names: str) -> Tolerances:

@@ -39,6 +39,7 @@ from shellform.surface.shape.locate import Locator
 from shellform.surface.shape.target import Surface, triangle_areas
 
 MERGE = 0.2  # of the spacing
+_ROUND = 2.0 * np.pi * (1.0 + 1e-9)  # rad, a whole turn
 ELEMENTS = 4  # a segment, as in section 4.1
 # Spacings past the edge; the next is tried where the pulled grid left the surface's rim bare
 _MARGINS = (1.5, 2.5, 4.0, 6.5, 10.0)
@@ -150,13 +151,7 @@ def net_at(
     """The net with these settings at the `angle`, rad, and `offset`: `pull_net`, whose errors it raises."""
     steps, tuned = settings.spacings, settings.tuning
     _check(surface, settings)
-    if not np.isfinite([angle, *offset]).all():
-        raise InputError(
-            "must be numbers",
-            where="net.angle, net.offset",
-            value=[float(np.rad2deg(angle)), *offset],
-            remedy="Give degrees, and spacings.",
-        )
+    _check_place(angle, offset)
     limits = _limits(settings)
     density = _densities(settings.spring_density, settings.start)
     for margin in _MARGINS:
@@ -232,9 +227,19 @@ def _check(surface: Surface, settings: NetSettings) -> None:
             remedy=f"Give metres below {0.5 * min(steps):.3g}, at least a rod's diameter.",
         )
     require_count(settings.elements, where="net.elements", give="beam elements a segment, such as 4")
-    require_number(
-        settings.merge, above=0.0, below=0.5, where="net.merge", give="a share of the spacing, such as 0.2"
-    )
+    give = "a share of the spacing, such as 0.2"
+    require_number(settings.merge, above=0.0, below=0.5, where="net.merge", give=give, share=True)
+
+
+def _check_place(angle: float, offset: tuple[float, float]) -> None:
+    """Raises InputError for an angle, rad, and an offset, in spacings, that say no place of the net."""
+    place, what, remedy = [angle, *offset], "must be numbers", "Give degrees, and spacings."
+    if np.isfinite(place).all():
+        if abs(angle) <= _ROUND:
+            return
+        what = f"{angle:g} rad is more than a whole turn"
+        remedy = f"Leave whole turns out; if degrees are meant, give {np.deg2rad(angle):.4g} rad."
+    raise InputError(what, where="net.angle, net.offset", value=place, remedy=remedy)
 
 
 def _short(bare: int, angle: float) -> NoNet:

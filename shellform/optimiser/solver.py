@@ -8,6 +8,7 @@ NLopt's MMA goes on from there (proposal.py).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection
 from dataclasses import dataclass, fields
 from typing import Any
@@ -15,9 +16,10 @@ from typing import Any
 from shellform.errors import InputError, require_count, require_number
 
 
-def check_settings(settings: Any, *, may_be_zero: Collection[str] = ()) -> None:
-    """Raises InputError for a number among a solver's `settings` that is out of bounds, and for one that
-    isn't whole where they count: by their types. What may be left out (None) isn't asked for."""
+def check_settings(settings: Any, *, may_be_zero: Collection[str] = (), shares: Collection[str] = ()) -> None:
+    """Raises InputError for a number among a solver's `settings` that is out of bounds, as the named `shares`
+    are above 1, and for one that isn't whole where they count: by their types. What may be left out (None)
+    isn't asked for."""
     for each in fields(settings):
         value = getattr(settings, each.name)
         if value is None and each.default is None:
@@ -26,10 +28,16 @@ def check_settings(settings: Any, *, may_be_zero: Collection[str] = ()) -> None:
         least = 0 if each.name in may_be_zero else 1
         if str(each.type).startswith("int"):
             require_count(value, least=least, where=where, give=f"a whole number, {otherwise}")
-        elif least == 0:
-            require_number(value, least=0.0, where=where, give=f"0 or a positive number, {otherwise}")
+            continue
+        share = each.name in shares
+        kind = "share up to 1" if share else "positive number"
+        most = 1.0 if share else math.inf
+        if least == 0:
+            give = f"0 or a {kind}, {otherwise}"
+            require_number(value, least=0.0, most=most, where=where, give=give, share=share)
         else:
-            require_number(value, above=0.0, where=where, give=f"a positive number, {otherwise}")
+            give = f"a {kind}, {otherwise}"
+            require_number(value, above=0.0, most=most, where=where, give=give, share=share)
 
 
 @dataclass(frozen=True)
@@ -137,7 +145,7 @@ class SequentialConvex:
     model_evaluations: int = 200
 
     def __post_init__(self) -> None:
-        check_settings(self, may_be_zero=_MAY_BE_ZERO)
+        check_settings(self, may_be_zero=_MAY_BE_ZERO, shares=_SHARES)
         if not self.shrink < 1.0 <= self.grow:
             raise InputError(
                 "windows must shrink by less than 1 and grow by more",
@@ -160,6 +168,8 @@ _MAY_BE_ZERO = (
     "least_tension",
     "stiffenings",
 )
+
+_SHARES = ("recovery", "kept", "allowance", "idle", "softer")
 
 # A polished design serves the shape alone and is near: smaller windows, and of the stiffness kept before it
 # may use up a fifth.

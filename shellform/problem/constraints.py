@@ -42,6 +42,7 @@ class _OneSided:
 
     def __post_init__(self) -> None:
         _check(self.limit, self.of)
+        _check_unit(self.limit, self.term)
 
     @property
     def _at(self) -> float:
@@ -103,6 +104,8 @@ class Between:
                 value=(self.least, self.most),
                 remedy="Change places of the two, or take AtLeast or AtMost for one side only.",
             )
+        for limit in (self.least, self.most):
+            _check_unit(limit, self.term)
 
     @property
     def lower(self) -> float:
@@ -158,3 +161,11 @@ def _check(limit: float, of: float | None) -> None:
         require_number(
             of, above=0.0, where="constraints.of", give="the size of values that matter, in the term's unit"
         )
+
+
+def _check_unit(limit: float, term: Term) -> None:
+    """Raises InputError for a limit that can't be in the unit in which the term takes them."""
+    try:
+        term.at_limit(limit)
+    except InputError as error:
+        raise error.within("constraints") from error

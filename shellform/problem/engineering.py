@@ -37,6 +37,7 @@ SHARPNESS = 200.0
 # would hop from cable to cable
 _EASED = 10.0
 _MODES = 4
+BROKEN = 2.0  # times the rods' strength: what is beyond can only be per cents
 _TURN = 0.1  # rad, the unit of turns
 
 
@@ -48,6 +49,11 @@ class RodUtilisation(Term):
 
     name = "utilisation"
     load: str
+
+    def at_limit(self, limit: float) -> float:
+        """The same. Raises InputError for one that can only be in per cent."""
+        require_number(limit, most=BROKEN, where="utilisation", give="a share of the strength", share=True)
+        return limit
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value. Raises InputError where the rods' strength isn't known."""
@@ -96,6 +102,15 @@ class ConnectorTurn(Term):
 
     name = "connector_turn"
     load: str
+
+    def at_limit(self, limit: float) -> float:
+        """The same, rad. Raises InputError for one that can only be in degrees."""
+        if limit >= 0.5 * np.pi:
+            raise InputError(
+                f"{limit:g} rad limit nothing, since crossing rods lie on each other at 1.57",
+                remedy=f"If degrees are meant, write {np.radians(limit):.3g}.",
+            )
+        return limit
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, rad."""

@@ -123,7 +123,8 @@ class Term(ABC):
         """The values and their partial derivatives."""
 
     def at_limit(self, limit: float) -> float:
-        """The value that belongs to a `limit` in the unit in which users give it."""
+        """The value that belongs to a `limit` in the unit in which users give it. Raises InputError for one
+        that can only be in another unit."""
         return limit
 
     @property

@@ -84,12 +84,10 @@ class RestLengths(Variable):
     of_each_cable = True
 
     def __post_init__(self) -> None:
-        for name, usual in (("least", 0.01), ("most", 1.1)):
-            where, give = (
-                f"variables.rest_lengths.{name}",
-                f"a share of the length at the start, such as {usual}",
-            )
-            require_number(getattr(self, name), above=0.0, where=where, give=give)
+        where = "variables.rest_lengths"
+        require_number(self.least, above=0.0, where=f"{where}.least", give="metres, such as 0.01")
+        give = "a factor of the lengths at the start, such as 1.1"
+        require_number(self.most, above=0.0, below=100.0, where=f"{where}.most", give=give, share=True)
 
     def size(self, shell: Gridshell) -> int:
         """As many as candidate cables."""

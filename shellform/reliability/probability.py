@@ -41,7 +41,8 @@ def counted(drawn: int, standing: int, *, seed: int, confidence: float = CONFIDE
             value=(drawn, standing),
             remedy="Give how many were drawn, then how many of them stand.",
         )
-    require_number(confidence, above=0.0, below=1.0, where="confidence", give="a share, such as 0.95")
+    give = "a share, such as 0.95"
+    require_number(confidence, above=0.0, below=1.0, where="confidence", give=give, share=True)
     least = 0.0 if standing == 0 else float(betaincinv(standing, drawn - standing + 1, 1.0 - confidence))
     most = 1.0 if standing == drawn else float(betaincinv(standing + 1, drawn - standing, confidence))
     return Standing(drawn, standing, least, most, confidence, seed)

@@ -60,15 +60,16 @@ class Safety:
             value = getattr(self, name)
             if value is not None:
                 give = "a share of structures, such as 0.99"
-                require_number(value, least=0.0, below=1.0, where=f"safety.{name}", give=give)
+                require_number(value, least=0.0, below=1.0, where=f"safety.{name}", give=give, share=True)
         if self.critical_factor is not None:
             give = "a factor of the load, such as 1.25, or None for any"
-            require_number(self.critical_factor, least=1.0, where="safety.critical_factor", give=give)
+            where = "safety.critical_factor"
+            require_number(self.critical_factor, least=1.0, below=100.0, where=where, give=give, share=True)
         for name, usual in (("drawn", 60), ("tried", 12)):
             give = f"a number of structures, such as {usual}"
             require_count(getattr(self, name), where=f"safety.{name}", give=give)
         give = "a share of the start's stiffness, such as 0.5"
-        require_number(self.stiffness, above=0.0, where="safety.stiffness", give=give)
+        require_number(self.stiffness, above=0.0, most=1.0, where="safety.stiffness", give=give, share=True)
         give = "a factor of the errors, such as 1.5"
         require_number(self.enlarged, least=1.0, most=3.0, where="safety.enlarged", give=give)
 

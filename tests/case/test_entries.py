@@ -391,5 +391,5 @@ def test_a_factor_or_share_of_the_strength_that_may_be_meant_is_taken():
 def test_a_limit_on_the_connectors_turn_in_degrees_is_refused_with_the_radians():
     assert load_case(SCALE_MODEL, ["limits.connector_turn=1.57"]).limits.connector_turn == 1.57
     for degrees, radians in ((23, "0.401"), (90, "1.57")):
-        with pytest.raises(InputError, match=f"limits.connector_turn.*write {radians}$"):
+        with pytest.raises(InputError, match=rf"limits.connector_turn.*write {radians}\.$"):
             load_case(SCALE_MODEL, [f"limits.connector_turn={degrees}"])

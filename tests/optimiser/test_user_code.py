@@ -190,11 +190,29 @@ def test_a_term_or_variable_whose_shapes_are_not_those_that_it_says_is_refused(c
         (lambda: sf.SequentialConvex(batch=2.5), r"solver\.batch: must be a whole number"),
         (lambda: sf.SequentialConvex(most_cables=40.0), r"solver\.most_cables: must be a whole number"),
         (lambda: sf.MovingAsymptotes(stage=8.0), r"solver\.stage: must be a whole number"),
+        (lambda: sf.SequentialConvex(allowance=8.0), r"solver\.allowance: .* For 8 % write 0\.08\.$"),
+        (lambda: sf.SequentialConvex(idle=20.0), r"solver\.idle: .* For 20 % write 0\.2\.$"),
+        (lambda: sf.RestLengths(most=110.0), r"rest_lengths\.most: .* For 110 % write 1\.1\.$"),
+        (lambda: sf.AtMost(97.0, sf.RodUtilisation("wet")), r"^constraints: .* For 97 % write 0\.97\.$"),
+        (lambda: sf.AtLeast(120.0, sf.RodUtilisation("wet")), r"^constraints: .* For 120 % write 1\.2\.$"),
+        (lambda: sf.Between(1.0, 97.0, sf.RodUtilisation("wet")), r"For 97 % write 0\.97\.$"),
+        (lambda: sf.AtMost(23.0, sf.ConnectorTurn("wet")), r"^constraints: 23 rad .*write 0\.401\.$"),
+        (lambda: sf.Between(1.0, 90.0, sf.ConnectorTurn("wet")), r"^constraints: 90 rad .*write 1\.57\.$"),
+        (lambda: sf.Safety(sf.Tolerances(), probability_design=99.0), r"For 99 % write 0\.99\.$"),
+        (lambda: sf.Safety(sf.Tolerances(), critical_factor=125.0), r"For 125 % write 1\.25\.$"),
+        (lambda: sf.Safety(sf.Tolerances(), stiffness=50.0), r"For 50 % write 0\.5\.$"),
+        (lambda: sf.Tolerances(rod_stiffness=3.0), r"For 3 % write 0\.03\.$"),
     ],
 )
 def test_limits_bounds_and_settings_that_make_no_sense_are_refused(make, said):
     with pytest.raises(sf.InputError, match=said):
         make()
+
+
+def test_limits_that_may_be_meant_are_taken():
+    assert sf.AtMost(2.0, sf.RodUtilisation("wet")).upper == 2.0
+    assert sf.AtMost(1.57, sf.ConnectorTurn("wet")).upper == 1.57
+    assert sf.Safety(sf.Tolerances(), critical_factor=20.0).critical_factor == 20.0
 
 
 @pytest.mark.parametrize(
