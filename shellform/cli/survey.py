@@ -17,7 +17,8 @@ def survey(
         Path | None,
         typer.Argument(
             metavar="SURVEY.csv",
-            help="node or crossing, x, y, z in the model's axes; or x, y, z in any axes and order.",
+            help="node or crossing, x, y, z in the model's axes, counted from the case's origin or the survey's; "
+            "or x, y, z in any axes and order.",
         ),
     ] = None,
     design: Annotated[

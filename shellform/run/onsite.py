@@ -30,13 +30,14 @@ from shellform.errors import (
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.run.folder import Run, read_run
 from shellform.site import calibration, erection, measurements, retensioning
-from shellform.site.scans import Scan, read_points
+from shellform.site.scans import Scan, counted_alike, read_points
 from shellform.site.surveys import doubtful, read_survey
 from shellform.structure.elements.state import State
 from shellform.tables import Table, table_text
 from shellform.written import folder as made
 from shellform.written import write_arrays, write_text
 
+_Origin = tuple[float, float, float] | None  # (3,), m
 # times the noise: of the hundreds of coordinates of a scan their deviation is told to a few percent
 _ABOVE = 1.5
 
@@ -67,8 +68,9 @@ def calibrate(
     a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
     Raises InputError, NotConverged."""
     measurements.check_noise(noise)
-    shell, built, loads, folder = _built(source, design, output, allow_scripts=allow_scripts)
+    shell, built, loads, origin, folder = _built(source, design, output, allow_scripts=allow_scripts)
     pairs = [_scan(each, shell, loads, unit, None if placed else 0) for each in scans]
+    pairs, counted = counted_alike(pairs, shell.target.positions, origin)
     nodes = (
         shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
     )
@@ -81,7 +83,7 @@ def calibrate(
     write_text(files[1], tomli_w.dumps({"joint": joint}))
     seen = 1e3 * found.after[np.isfinite(found.after)]
     line = f"distances to the model: {seen.mean():.3f} mm on average, {seen.max():.3f} mm at most"
-    lines = [*found.sentences(), line]
+    lines = [*counted, *found.sentences(), line]
     if found.residual > _ABOVE * noise:
         lines.append(
             f"doubtful: that is {1e3 * found.residual:.2f} mm a coordinate, {found.residual / noise:.1f} times --noise: check that "
@@ -92,12 +94,14 @@ def calibrate(
 
 def _built(
     source: Path, design: str | None, output: Path | None, *, allow_scripts: bool
-) -> tuple[Gridshell, Design, Mapping[str, Reals], Path]:
-    """The shell, its design, its loads and where results go, from a run folder or a case file."""
+) -> tuple[Gridshell, Design, Mapping[str, Reals], _Origin, Path]:
+    """The shell, its design, its loads, where its coordinates count from in a survey's, and where results
+    go, from a run folder or a case file."""
     if source.suffix.lower() != ".toml":
         run = read_run(source)
         name = _design(run, design, "unbraced")
-        return run.shell_of(name), run.designs[name], run.loads, made(output or run.folder / "schedules")
+        folder, origin = made(output or run.folder / "schedules"), run.case.surface.origin
+        return run.shell_of(name), run.designs[name], run.loads, origin, folder
     if design not in (None, "unbraced"):
         raise InputError(
             "a case has no designs yet: the grid is taken unbraced",
@@ -109,7 +113,7 @@ def _built(
     surface = surface_of(case.surface, allow_scripts=allow_scripts)
     net, _, _ = net_of(case, surface)
     shell, loads = gridshell(case, net, surface)
-    return shell, shell.unbraced(), loads, made(output or Path.cwd())
+    return shell, shell.unbraced(), loads, case.surface.origin, made(output or Path.cwd())
 
 
 def _scan(text: str, shell: Gridshell, loads: Mapping[str, Reals], unit: str, frame: int | None) -> Scan:
@@ -159,7 +163,8 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     run = read_run(folder)
     name, shell, belief = _believed(run, options)
     goal = run.states[name][options.load].positions
-    seen = read_survey(measured, shell, belief.state, unit=options.unit)
+    origin = run.case.surface.origin
+    seen = read_survey(measured, shell, belief.state, unit=options.unit, origin=origin)
     learnt = retensioning.learn(shell, belief, seen.nodes, seen.places, noise=options.noise)
     step = retensioning.adjust(shell, learnt, goal, options.crew, noise=options.noise)
     where = made(output or run.folder / "schedules")
@@ -180,6 +185,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     count = int(np.count_nonzero(step.turns))
     size = len(goal)
     lines = [
+        *seen.counted,
         *seen.doubts,
         *doubtful(seen, belief, learnt, noise=options.noise),
         f"{how_many(len(seen.nodes), 'node was', 'nodes were')} seen; the grid lies {_mm(step.misfit_before, size)} mm from where it "
@@ -272,10 +278,12 @@ def erect(
     name = _design(run, design, run.best)
     shell = run.shell_of(name)
     carried = [None if each is None else _load(each, shell, run.loads) for each in (load, weight, lift)]
+    origin = run.case.surface.origin
+    stops, counted = ([], ()) if way is None else measurements.read_way(way, shell, origin)
     done = erection.erect(
         shell,
         run.designs[name],
-        way=[] if way is None else measurements.read_way(way, shell),
+        way=stops,
         groups=None if groups is None else measurements.read_groups(groups, run.designs[name]),
         load=carried[0],
         weight=carried[1],
@@ -294,6 +302,7 @@ def erect(
     breaks = "rods break on the way: give the supports other --way points, or choose thinner or stronger rods"
     return SiteResult(
         [
+            *counted,
             f"{len(done.steps)} steps: {', '.join(dict.fromkeys(each.stage for each in done.steps))}",
             f"largest rod stress {1e-6 * worst.stress:.0f} MPa, {worst.stress / done.strength:.2f} of the "
             f"strength, at {worst.share:.2f} of {worst.stage}; "

@@ -7,6 +7,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -189,6 +190,24 @@ def read_places(path: str | Path, shell: Gridshell) -> tuple[Indices, Reals]:
     return nodes_of(path, rows, shell), np.array([[row.values[axis] for axis in "xyz"] for row in rows])
 
 
+def counted_alike(
+    places: Reals, expected: Reals, origin: Sequence[float] | None, *, reach: float
+) -> tuple[Reals, tuple[str, ...]]:
+    """Measured `places` (k, 3), m, near the `expected` (m, 3), in coordinates that count from where the
+    model's do: from `origin` (3,), m, in a survey's. Where they lie nearer so, it is taken off, and what was
+    done is said; an origin within `reach`, m, couldn't be told from what is measured.
+    """
+    if origin is None or float(np.linalg.norm(origin)) <= reach:
+        return places, ()
+    apart = np.nanmean(places, axis=0) - expected.mean(axis=0)
+    if np.linalg.norm(apart - origin) >= np.linalg.norm(apart):
+        return places, ()
+    told = ", ".join(f"{each:.9g}" for each in origin)
+    return places - np.array(origin), (
+        f"surface.origin, ({told}) m, was taken off the coordinates that were given",
+    )
+
+
 def read_groups(path: str | Path, design: Design) -> list[Indices]:
     """Groups of candidate cables by rising number from a CSV file: `cable`, its number among the design's own
     cables, as in drawings and model files, and `group`."""
@@ -201,9 +220,11 @@ def read_groups(path: str | Path, design: Design) -> list[Indices]:
     return [np.array(teams[group], dtype=np.int64) for group in sorted(teams)]
 
 
-def read_way(path: str | Path, shell: Gridshell) -> list[Reals]:
+def read_way(
+    path: str | Path, shell: Gridshell, origin: Sequence[float] | None = None
+) -> tuple[list[Reals], tuple[str, ...]]:
     """Places (s, 3), m, of all supports at stops by rising number, from a CSV file: `stop`, `node` (a
-    support's), x, y, z.
+    support's), x, y, z; and how they were made to count from `origin` (3,), m, as the model does, in words.
     """
     supports = [int(each) for each in shell.net.supports]
     stops: dict[float, dict[int, list[float]]] = {}
@@ -237,7 +258,11 @@ def read_way(path: str | Path, shell: Gridshell) -> list[Reals]:
             )
     for stop, places in stops.items():
         _refuse_far_ends(stop, places, path, shell)
-    return [np.array([stops[stop][node] for node in supports]) for stop in sorted(stops)]
+    given = np.array([[stops[stop][node] for node in supports] for stop in sorted(stops)])
+    target = shell.target.positions
+    reach = float(np.ptp(target, axis=0).max())
+    alike, told = counted_alike(given.reshape(-1, 3), target[supports], origin, reach=reach)
+    return list(alike.reshape(-1, len(supports), 3)), told
 
 
 def _refuse_far_ends(stop: float, places: dict[int, list[float]], path: str | Path, shell: Gridshell) -> None:

@@ -20,6 +20,7 @@ from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals, indices, reals
 from shellform.errors import InputError
+from shellform.site import measurements
 from shellform.site.measurements import cells_of, text_of, too_many_cells
 from shellform.structure.elements.state import State
 from shellform.surface.units import unit_factor
@@ -129,6 +130,21 @@ def read_points(path: str | Path, *, unit: str = "m") -> Reals:
             "has no points", where=str(file), remedy="Give a text file: x, y, z of a point in each line."
         )
     return metres * reals(str(file), found, (None, 3))
+
+
+def counted_alike(
+    scans: Sequence[Scan], target: Reals, origin: Sequence[float] | None
+) -> tuple[list[Scan], tuple[str, ...]]:
+    """The scans, those in the model's own axes with coordinates that count as its `target` (n, 3), m, does,
+    from `origin` (3,), m, in a survey's; and what was done for that, in words."""
+    reach = float(np.ptp(target, axis=0).max())
+    alike, told = list(scans), dict[str, None]()
+    for k, scan in enumerate(scans):
+        if scan.frame is None:
+            points, words = measurements.counted_alike(scan.points, target, origin, reach=reach)
+            alike[k] = replace(scan, points=points)
+            told |= dict.fromkeys(words)
+    return alike, tuple(told)
 
 
 def rigid_fit(points: Reals, places: Reals) -> Motion:

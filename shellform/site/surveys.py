@@ -1,13 +1,14 @@
 """A survey of the erected grid: read from its file, and held against what it is believed to be.
 
-Nodes come by name in the model's axes, or as points in any axes and order, which are laid onto the crossings
-(scans.py). What cables' lengths can't explain of a survey is told, for the turns that follow from it are no
-better than the survey: a benchmark that is off looks like a grid that is, a point that is confused like a
-slack cable.
+Nodes come by name, in the model's axes or in those of a survey from which the model's count, or as points in
+any axes and order, which are laid onto the crossings (scans.py). What cables' lengths can't explain of a
+survey is told, for the turns that follow from it are no better than the survey: a benchmark that is off looks
+like a grid that is, a point that is confused like a slack cable.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -32,18 +33,23 @@ _TOGETHER = 0.5  # of what is left: where a rigid motion leaves less, the axes a
 @dataclass(frozen=True)
 class Surveyed:
     """The `nodes` (k,) that were seen, their `places` (k, 3), m, in the model's axes, what each is called,
-    and what is doubtful, a sentence each. `laid`: the points were laid onto the model by a rigid motion."""
+    and what is doubtful, a sentence each. `laid`: the points were laid onto the model by a rigid motion;
+    `counted`: how their coordinates were made to count as the model's, in words."""
 
     nodes: Indices
     places: Reals
     names: tuple[str, ...]
     doubts: tuple[str, ...] = ()
     laid: bool = False
+    counted: tuple[str, ...] = ()
 
 
-def read_survey(path: Path, shell: Gridshell, expected: State, *, unit: str) -> Surveyed:
-    """The survey in a CSV file, near the `expected` state. Raises InputError where a named node lies more
-    than half a spacing from there, or points can't be laid onto the crossings."""
+def read_survey(
+    path: Path, shell: Gridshell, expected: State, *, unit: str, origin: Sequence[float] | None = None
+) -> Surveyed:
+    """The survey in a CSV file, near the `expected` state; the model counts from `origin` (3,), m, in the
+    survey's coordinates, which named nodes may have. Raises InputError where a named node lies more than half
+    a spacing from there, or points can't be laid onto the crossings."""
     crossings, reach = shell.net.grid.crossing_nodes[:, 1], 0.5 * shell.net.spacing
     if not any(measurements.has_column(path, name) for name in ("node", "crossing")):
         points = read_points(path, unit=unit)
@@ -67,7 +73,9 @@ def read_survey(path: Path, shell: Gridshell, expected: State, *, unit: str) -> 
         raise InputError("no node was seen", where=str(path), remedy=remedy)
     nodes, places = nodes[seen], places[seen]
     names = _called(nodes, crossings, measurements.named_by(path))
-    away = np.linalg.norm(places - expected.positions[nodes], axis=1)
+    there = expected.positions[nodes]
+    places, counted = measurements.counted_alike(places, there, origin, reach=shell.net.spacing)
+    away = np.linalg.norm(places - there, axis=1)
     worst = int(np.argmax(away))
     if away[worst] > reach:
         raise InputError(
@@ -76,7 +84,7 @@ def read_survey(path: Path, shell: Gridshell, expected: State, *, unit: str) -> 
             remedy="Check the unit, the axes and the numbering; leave the columns node and crossing out to have points laid "
             "onto the model.",
         )
-    return Surveyed(nodes, places, names)
+    return Surveyed(nodes, places, names, counted=counted)
 
 
 def doubtful(survey: Surveyed, before: Belief, after: Belief, *, noise: float) -> list[str]:

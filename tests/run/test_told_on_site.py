@@ -16,6 +16,7 @@ POSITIONS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 1
 SHELL = SimpleNamespace(
     net=SimpleNamespace(spacing=0.4, grid=SimpleNamespace(crossing_nodes=np.array([[0, 1], [2, 3], [2, 4]]))),
     cable_ends=np.zeros((3, 2)),
+    target=SimpleNamespace(positions=POSITIONS),
 )
 STATE = SimpleNamespace(positions=POSITIONS, quaternions=np.ones((5, 4)))
 
@@ -30,6 +31,7 @@ def run(monkeypatch, tmp_path):
         folder=tmp_path, best="polished", designs={"initial": "first", "polished": "last"},
         states={"polished": {"none": moved([0.0, 0.0, 0.01]), "wet": moved([0.0, 0.02, 0.0])}},
         loads={"none": "no load", "wet": "concrete"}, shell_of=lambda name: SHELL,
+        case=SimpleNamespace(surface=SimpleNamespace(origin=(430_000.0, 81_000.0, 400.0))),
     )  # fmt: skip
     monkeypatch.setattr(onsite, "read_run", lambda folder: own)
     return own
@@ -62,8 +64,12 @@ def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
     )  # fmt: skip
     asked = []
     monkeypatch.setattr(onsite, "_believed", lambda *_: ("polished", SHELL, belief))
-    seen = SimpleNamespace(nodes=[1, 3], places=[0, 0], doubts=("One point is far.",))
-    monkeypatch.setattr(onsite, "read_survey", lambda *_, unit: seen)
+    seen = SimpleNamespace(
+        nodes=[1, 3], places=[0, 0], doubts=("One point is far.",), counted=("Taken off.",)
+    )
+    monkeypatch.setattr(
+        onsite, "read_survey", lambda *_, unit, origin: seen if origin[0] == 430_000.0 else None
+    )
     monkeypatch.setattr(onsite, "doubtful", lambda *_, noise: [f"Noise is {noise}."])
     monkeypatch.setattr(onsite.retensioning, "learn", lambda *how, noise: asked.append(noise) or learnt)
 
@@ -74,12 +80,12 @@ def test_a_survey_tells_turns_and_how_far_the_grid_is_off_before_and_after(
 
     monkeypatch.setattr(onsite.retensioning, "adjust", adjust)
     found = onsite.survey(tmp_path, tmp_path / "survey.csv", options)
-    assert found.lines[:2] == ["One point is far.", "Noise is 0.0002."]
-    assert "2 nodes were seen; the grid lies 5.000 mm from" in found.lines[2]
-    assert found.lines[3].startswith(second)
-    assert len(found.lines) == lines + 2
+    assert found.lines[:3] == ["Taken off.", "One point is far.", "Noise is 0.0002."]
+    assert "2 nodes were seen; the grid lies 5.000 mm from" in found.lines[3]
+    assert found.lines[4].startswith(second)
+    assert len(found.lines) == lines + 3
     if halved:
-        assert "halved 2 times" in found.lines[4]
+        assert "halved 2 times" in found.lines[5]
     assert asked[0] == 0.2e-3
     assert (asked[1][0].step, asked[1][0].largest, asked[1][0].cables) == (0.5e-3, 0.002, 20)
     with (tmp_path / "schedules/predicted.csv").open(encoding="utf-8", newline="") as file:
@@ -157,7 +163,7 @@ def test_a_calibration_that_leaves_more_than_the_noise_is_doubtful(
         sentences=lambda: ["torsion = 2"],
         table=lambda: "",
     )
-    monkeypatch.setattr(onsite, "_built", lambda *_, **__: (SHELL, None, {}, tmp_path))
+    monkeypatch.setattr(onsite, "_built", lambda *_, **__: (SHELL, None, {}, None, tmp_path))
     monkeypatch.setattr(onsite.calibration, "calibrate", lambda *_, **__: found)
     lines = onsite.calibrate(tmp_path, [], noise=0.2e-3).lines
     assert lines[:2] == ["torsion = 2", "distances to the model: 2.000 mm on average, 3.000 mm at most"]

@@ -11,6 +11,7 @@ from shellform.site import measurements
 from shellform.site.measurements import (
     MeasuredRow,
     check_noise,
+    counted_alike,
     has_column,
     read_groups,
     read_loads,
@@ -32,7 +33,9 @@ SHELL = SimpleNamespace(
         ),
         supports=np.array([4, 2]),
     ),
+    target=SimpleNamespace(positions=np.array([[k, 0.5 * k, 0.1 * k] for k in range(6)])),
 )
+ORIGIN = (430_000.0, 81_000.0, 400.0)
 
 
 @pytest.fixture
@@ -134,7 +137,7 @@ def test_a_table_that_is_not_there_is_said_not_to_be(tmp_path):
 
 def test_supports_on_their_way_come_in_the_order_of_the_net_s_stop_after_stop(written):
     head = "stop,node,x,y,z\n"
-    way = read_way(written(head + "2,2,1,2,3\n1,4,0.5,0,0\n2,4,4,5,6\n1,2,0,0.5,0\n"), SHELL)
+    way, _ = read_way(written(head + "2,2,1,2,3\n1,4,0.5,0,0\n2,4,4,5,6\n1,2,0,0.5,0\n"), SHELL)
     assert [stop.tolist() for stop in way] == [
         [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]],
         [[4.0, 5.0, 6.0], [1.0, 2.0, 3.0]],
@@ -150,7 +153,33 @@ def test_supports_on_their_way_come_in_the_order_of_the_net_s_stop_after_stop(wr
     ]:
         with pytest.raises(InputError, match=said):
             read_way(written(head + text), SHELL)
-    assert len(read_way(written(head + "1,2,0,0,0\n1,4,0,6.05,0\n"), SHELL)) == 1
+    assert len(read_way(written(head + "1,2,0,0,0\n1,4,0,6.05,0\n"), SHELL)[0]) == 1
+
+
+def test_places_in_a_survey_s_coordinates_count_from_the_model_s_origin_and_are_said_to(written):
+    head, stop = "stop,node,x,y,z\n", np.array([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0]])
+    for text in ("1,4,430000.5,81000,400\n1,2,430000,81000.5,400\n", "1,4,0.5,0,0\n1,2,0,0.5,0\n"):
+        (found,), told = read_way(written(head + text), SHELL, ORIGIN)
+        np.testing.assert_allclose(found, stop, atol=1e-9)
+        assert [*told] == (
+            ["surface.origin, (430000, 81000, 400) m, was taken off the coordinates that were given"]
+            if "81000" in text
+            else []
+        )
+    (found,), _ = read_way(written(head + "1,4,430000.5,81000,400\n1,2,430000,81000.5,400\n"), SHELL)
+    assert found[0, 0] == 430_000.5
+
+
+def test_an_origin_too_near_to_be_told_from_what_is_measured_stays():
+    expected = np.zeros((2, 3))
+    off = expected + np.array([0.3, 0.0, 0.0])
+    for reach, gone in ((0.29, 0.3), (0.31, 0.0)):
+        places, told = counted_alike(off, expected, (0.3, 0.0, 0.0), reach=reach)
+        np.testing.assert_allclose(places, off - [gone, 0.0, 0.0])
+        assert bool(told) is bool(gone)
+    hidden = np.array([[430_000.0, 81_000.0, 400.0], [np.nan, np.nan, np.nan]])
+    places, _ = counted_alike(hidden, expected, ORIGIN, reach=1.0)
+    np.testing.assert_array_equal(places, [[0.0, 0.0, 0.0], [np.nan] * 3])
 
 
 def test_noise_is_between_a_nanometre_and_a_kilometre():

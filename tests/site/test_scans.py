@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from shellform.errors import InputError
 from shellform.site import scans
-from shellform.site.scans import Match, Motion, Scan, apart, distances, laid, match, rigid_fit
+from shellform.site.scans import Match, Motion, Scan, apart, counted_alike, distances, laid, match, rigid_fit
 
 MARKERS = np.array(
     [[0, 0, 0], [4, 0, 0.5], [7, 1, 0], [1, 3, 0.9], [5, 4, 0.3], [2, 6, 0], [8, 5, -0.4], [-3, 2, 0.2]]
@@ -208,6 +208,19 @@ def test_scans_of_one_frame_share_a_motion_and_one_in_the_model_s_axes_keeps_its
     for k, each in enumerate(found):
         np.testing.assert_allclose(each.distance, told[:, k])
     assert distances([], [], [], nodes).shape == (8, 0)
+
+
+def test_placed_scans_in_a_survey_s_coordinates_count_from_the_model_s_origin():
+    target, origin = np.random.default_rng(0).random((9, 3)), (430_000.0, 81_000.0, 400.0)
+    away, load = target[:4] + origin, np.zeros((9, 6))
+    (placed, own, loose), told = counted_alike(
+        [Scan(away, load, None), Scan(target, load, None), Scan(away, load, 0)], target, origin
+    )
+    np.testing.assert_allclose(placed.points, target[:4], atol=1e-9)
+    np.testing.assert_array_equal(own.points, target)
+    np.testing.assert_array_equal(loose.points, away)
+    assert len(told) == 1
+    assert told[0].startswith("surface.origin, (430000, 81000, 400) m, was taken off")
 
 
 def test_how_far_two_motions_lay_points_apart_is_that_of_the_farthest():

@@ -43,6 +43,27 @@ def test_named_nodes_are_taken_as_far_as_they_were_seen_and_refused_beyond_half_
         read_survey(tmp_path, SHELL, STATE, unit="m")
 
 
+@pytest.mark.parametrize("zero", [(0.0, 0.0, 0.0), (430_000.0, 81_000.0, 400.0)])
+def test_named_nodes_may_have_the_coordinates_of_the_survey_that_the_model_counts_from(tmp_path, zero):
+    lines = [
+        f"{k},{','.join(f'{x:.6f}' for x in place + zero + [0.0, 0.0, 0.01])}"
+        for k, place in enumerate(POSITIONS)
+    ]
+    file = tmp_path / "survey.csv"
+    file.write_text("\n".join(["node,x,y,z", *lines]), encoding="utf-8")
+    shell = SimpleNamespace(net=SHELL.net, node_count=5)
+    found = read_survey(file, shell, STATE, unit="m", origin=(430_000.0, 81_000.0, 400.0))
+    np.testing.assert_allclose(found.places, POSITIONS + np.array([0.0, 0.0, 0.01]), atol=1e-9)
+    assert [*found.counted] == (
+        ["surface.origin, (430000, 81000, 400) m, was taken off the coordinates that were given"]
+        if any(zero)
+        else []
+    )
+    if any(zero):
+        with pytest.raises(InputError, match="from where it is expected"):
+            read_survey(file, shell, STATE, unit="m")
+
+
 def test_points_without_names_are_laid_onto_the_crossings_within_half_a_spacing(monkeypatch, tmp_path):
     asked = []
 
