@@ -101,6 +101,7 @@ def tell_as_built(summary: Summary) -> None:
     """Of each design, up to which factor its loads may grow and how many drawn structures stand; how the one
     to build fails first."""
     from shellform.records.words import (
+        before_load_words,
         built_shape_words,
         cause_title,
         critical_words,
@@ -125,8 +126,11 @@ def tell_as_built(summary: Summary) -> None:
             if parts:
                 print(f"{name:>10}  {load}: {', '.join(parts)}")
     if summary.verdict is not None:
-        for note in shape_notes(summary, summary.verdict.design):
-            print(f"{note}.")
+        name = summary.verdict.design
+        limit = None if summary.optimisation is None else summary.optimisation.cable_force_limit
+        for note in (*shape_notes(summary, name), before_load_words(summary.designs, name, limit)):
+            if note:
+                print(f"{note}.")
     found = summary.failure
     if found is not None:
         slack = "goes slack" if len(found.cables) == 1 else "go slack"

@@ -235,9 +235,20 @@ def _limited(rows: Mapping[str, DesignRecord], designs: Sequence[str], bounds: B
         ),
     ]
     found = [_at_most(each, each.most, rows, designs) for each in limits if each.most is not None]
+    found[1:1] = _pulled_before(rows, designs, bounds.force)
     if bounds.slack is not None:
         found += [_taut(rows, designs, load, bounds.slack) for load in bounds.slack_loads]
     return found
+
+
+def _pulled_before(rows: Mapping[str, DesignRecord], designs: Sequence[str], force: float) -> list[Check]:
+    """The largest cable force before any load, which is told and not asked for, where it is known; `force`,
+    N: the limit under load."""
+    pulls = {name: row.loads["none"].cable_force_max for name, row in rows.items() if "none" in row.loads}
+    told = {name: Cell(f"{number(pull)} N", None, False) for name, pull in pulls.items() if pull is not None}
+    cells = {name: told.get(name, UNASKED) for name in designs}
+    limit = f"told; the limit, {number(force)} N, counts under load"
+    return [Check("Largest cable force before any load", limit, cells)] if told else []
 
 
 def _at_most(limit: _Limit, most: float, rows: Mapping[str, DesignRecord], designs: Sequence[str]) -> Check:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 
 from shellform.records.failures import RareRecord
-from shellform.records.summary import BuiltShapeRecord, DesignRecord, StandingRecord, Summary
+from shellform.records.summary import BuiltShapeRecord, DesignRecord, LoadRecord, StandingRecord, Summary
 
 _SPENT = 1.25  # times the initial design's deviation as built, from which on it is worth a word
 LOADS = {"none": "no load", "design": "the design load", "additional": "the additional load"}
@@ -117,6 +117,49 @@ def driven_words(own: BuiltShapeRecord) -> str:
     """By which cause of error nodes are moved farthest; "" where none is known."""
     driver = max(own.causes, key=lambda name: own.causes[name], default="")
     return f", driven by {cause_title(driver)}" if driver else ""
+
+
+def listed(names: Sequence[str], most: int = 8) -> str:
+    """Names, the first of them where there are many."""
+    return (
+        ", ".join(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"
+    )
+
+
+def before_load_words(designs: Mapping[str, DesignRecord], name: str, limit: float | None) -> str:
+    """How much a cable of the design pulls before any load, where that is more than the `limit`, N, which
+    counts under load (None: not known), and which cables hang slack then; "" where there is neither."""
+    row = designs[name].loads.get("none") if name in designs else None
+    if row is None:
+        return ""
+    found = []
+    if exceeds(row.cable_force_max, limit):
+        pull, most = (number(each) for each in (row.cable_force_max or 0.0, limit or 0.0))
+        found.append(
+            f"a cable pulls {pull} N, more than the {most} N of cable.force_max, which counts under load"
+        )
+    if row.slack:
+        found.append(f"{listed(row.slack)} {'hangs' if len(row.slack) == 1 else 'hang'} slack")
+    return f"Before any load {', and '.join(found)}: schedules/cables.csv" if found else ""
+
+
+def above_words(row: LoadRecord | None, limit: float | None) -> str:
+    """How much a cable pulls at most before any load, and that it is more than the `limit`, N, under load
+    where it is; "" where it isn't known."""
+    pull = None if row is None else row.cable_force_max
+    if pull is None:
+        return ""
+    more = (
+        f", more than the {number(limit)} N that it may pull under load"
+        if limit and exceeds(pull, limit)
+        else ""
+    )
+    return f"{number(pull)} N at most before any load{more}"
+
+
+def exceeds(pull: float | None, limit: float | None) -> bool:
+    """Whether a cable pulls more than the limit, both known, by what is told of them."""
+    return pull is not None and limit is not None and pull > limit and number(pull) != number(limit)
 
 
 def shape_notes(summary: Summary, name: str) -> list[str]:

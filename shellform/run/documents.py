@@ -32,6 +32,7 @@ def built_design(run: Run) -> Built:
         block=TitleBlock(block.date, block.revision, block.author),
         origin=run.case.surface.origin,
         loads=run.loads,
+        force_limit=run.case.cable.force_max,
     )
 
 

@@ -101,6 +101,7 @@ def optimise(workspace: Workspace, shell: Gridshell, loads: Mapping[str, Reals],
         cables_max=cable_count,
         symmetric=symmetry,
         deviation_wished=_wished(workspace.case),
+        cable_force_limit=workspace.case.cable.force_max,
     )
     drop_checkpoint(workspace.folder)
     return replace(summary, optimisation=record)

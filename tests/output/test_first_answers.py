@@ -199,17 +199,29 @@ def test_what_to_buy_is_told_in_metres_and_kilograms_of_both_laths(monkeypatch, 
     lath = Rectangle(0.050, 0.035, Material(12e9, 0.75e9, density, 24e6))
     shell = shell_of(TwoLayers(lath) if layers == 2 else lath, 24e6)
     summary = SimpleNamespace(
-        designs={"best": SimpleNamespace(loads={"design": MORE, "none": replace(MORE, slack=())})},
+        designs={
+            "best": SimpleNamespace(
+                loads={"design": MORE, "none": replace(MORE, slack=(), cable_force_max=61.0)}
+            )
+        },
         documents=SimpleNamespace(cut_lengths=2),
     )
     monkeypatch.setattr(first_answers, "shape_notes", lambda *_: [])
     far, many, which, buy = answers(
-        shell, "best", SimpleNamespace(radius=0.02), {"design": 2.0}, summary, next_size="60 × 40 mm"
+        shell,
+        "best",
+        SimpleNamespace(radius=0.02),
+        {"design": 2.0},
+        summary,
+        next_size="60 × 40 mm",
+        force_max=60.0,
     )
     assert far.words == "12 mm at most"
     assert many.words == "3 of 8"
     assert (
-        many.detail == "60 N at most in one, 75 N in all, under the design load; none slack before the load"
+        many.detail
+        == "60 N at most in one, 75 N in all, under the design load; 61 N at most before any load, more than the "
+        "60 N that it may pull under load; none slack before the load"
     )
     assert which.detail.startswith("3 rods of up to 4\u202f000 mm; at 62 % of their strength")
     assert ("lath by lath" in which.detail) == (layers == 2)

@@ -19,6 +19,7 @@ from shellform.gridshell.layers import TwoLayers
 from shellform.gridshell.reactions import reactions
 from shellform.net.grid import lattice_grid
 from shellform.output.workshop import nesting, schedules
+from shellform.output.workshop.cable_forces import force_notes
 from shellform.output.workshop.setting_out import elevations, support_plan
 from shellform.site.measurements import read_places
 from shellform.structure.elements.sections import Material, Rectangle
@@ -222,6 +223,23 @@ def test_lengths_that_differ_in_their_last_bits_alone_are_one(built):
     lengths[every_other] += 1e-6
     apart = replace(built, design=replace(built.design, rest_length=lengths))
     assert schedules.cut_counts(apart)["rest_lengths"] == 2
+
+
+def test_the_cable_schedule_tells_the_largest_force_at_each_stage_and_what_is_above_the_limit_before_it():
+    pulls = {"erected": np.array([20.79, 0.0, 3.0]), "design": np.array([19.8, 7.0, 19.9])}
+    assert force_notes(pulls, "erected", 20.0) == (
+        "Largest force: erected 20.8 N (C0), design 19.9 N (C2). The limit, 20 N, counts under load alone (cable.force_max).",
+        "Before any load more than that: C0. Choose cables, ends and turnbuckles for it.",
+        "Slack before any load: C1.",
+    )
+    assert len(force_notes(pulls, "erected", 20.79)) == 2
+    assert force_notes(pulls, "erected", None)[0] == "Largest force: erected 20.8 N (C0), design 19.9 N (C2)."
+    assert force_notes({"erected": np.zeros(0)}, "erected", 20.0) == (), "no cables"
+
+
+def test_the_cable_schedule_of_a_design_has_these_notes(built):
+    notes = schedules.cables(replace(built, force_limit=1e-3)).notes
+    assert any(note.startswith("Before any load more than that: C") for note in notes)
 
 
 def test_cables_are_tightened_from_the_supports_to_the_crown(read, built):

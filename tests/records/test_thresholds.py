@@ -14,6 +14,8 @@ from shellform.records.summary import BuiltShapeRecord, StandingRecord
 from shellform.records.thicker_rods import ThickerRodsRecord
 from shellform.records.verdict import failed, headline, to_build, verdict
 from shellform.records.words import (
+    above_words,
+    before_load_words,
     built_shape_words,
     critical_words,
     far_off_words,
@@ -290,6 +292,10 @@ def test_the_largest_cable_force_is_that_of_the_worst_load_but_for_none(shell, d
     made = summary(designs).with_design("polished", design(loads=loads, cable_force_max=30.0))
     cell = {c.name: c for c in checks({"polished": shell}, designs, made, BOUNDS)}[name].cells["polished"]
     assert cell.found == "6 N"
+    before = {c.name: c for c in checks({"polished": shell}, designs, made, BOUNDS)}[
+        "Largest cable force before any load"
+    ].cells["polished"]
+    assert (before.found, before.holds, before.asked) == ("30 N", None, False), "told, not limited"
     assert found(shell, designs)[name].found == "7 N", "the design's own where no load's is known"
 
 
@@ -395,6 +401,31 @@ def test_a_shape_farther_off_than_was_wished_for_is_told_with_what_would_require
     assert told.endswith("limits.deviation does")
     assert [far_off_words(rows, "polished", each) for each in (None, 0.2612, 0.26119)] == [""] * 3
     assert far_off_words(rows, "optimised", 0.032) == "", "a design that isn't there"
+
+
+def test_a_cable_that_pulls_most_before_any_load_is_told_beside_the_limit_under_load():
+    def rows(pull=None, slack=()):
+        return {"polished": design("none", cable_force_max=pull, slack=slack)}
+
+    told = before_load_words(rows(20.79, ("C5", "C7")), "polished", 20.0)
+    assert told == (
+        "Before any load a cable pulls 20.8 N, more than the 20 N of cable.force_max, which counts under load, and C5, C7 hang "
+        "slack: schedules/cables.csv"
+    )
+    assert before_load_words(rows(19.0, ("C5",)), "polished", 20.0) == (
+        "Before any load C5 hangs slack: schedules/cables.csv"
+    )
+    for pull, limit in ((20.04, 20.0), (19.0, 20.0), (None, 20.0), (30.0, None)):
+        assert before_load_words(rows(pull), "polished", limit) == "", (
+            "as much by what is told of both, or unknown"
+        )
+    assert before_load_words(rows(30.0), "optimised", 20.0) == "", "a design that isn't there"
+    row = rows(20.79)["polished"].loads["none"]
+    assert above_words(row, 20.0) == (
+        "20.8 N at most before any load, more than the 20 N that it may pull under load"
+    )
+    assert above_words(row, 21.0) == above_words(row, None) == "20.8 N at most before any load"
+    assert above_words(None, 20.0) == above_words(replace(row, cable_force_max=None), 20.0) == ""
 
 
 def test_words_of_loads_paths_and_structures_keep_their_numbers():

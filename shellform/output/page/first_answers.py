@@ -18,7 +18,14 @@ from shellform.gridshell.layers import layers_of
 from shellform.net.net import Net
 from shellform.records.check import SLACK, Cell
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
-from shellform.records.words import critical_words, driven_words, number, shape_notes
+from shellform.records.words import (
+    above_words,
+    critical_words,
+    driven_words,
+    listed,
+    number,
+    shape_notes,
+)
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 
@@ -51,10 +58,12 @@ def answers(
     *,
     as_built: Cell | None = None,
     next_size: str = "",
+    force_max: float | None = None,
 ) -> list[Answer]:
     """How far off is the shell, how many cables, which rods, is it safe beyond the load, what to buy: for the
     design to build, whose check `as_built` says how many drawn structures stand under the additional load;
-    `next_size` is the size of the catalogue that its rods would be rounded to."""
+    `next_size` is the size of the catalogue that its rods would be rounded to; `force_max`, N: what cables
+    may pull under load."""
     row = summary.designs.get(name)
     main, more = (None if row is None else row.loads.get(load) for load in ("design", "additional"))
     found = [] if main is None else [_how_far(main, shape_notes(summary, name))]
@@ -65,7 +74,7 @@ def answers(
             "How many cables?",
             f"{len(cables.ends)} of {len(shell.cable_ends)}",
             f"{number(float(pull.max(initial=0.0)))} N at most in one, {number(float(pull.sum()))} N in all, "
-            f"under the design load{_slack(main, row)}",
+            f"under the design load{_before(row, force_max)}{_slack(main, row)}",
         )
     )
     section = shell.rod.resized(design.radius).section
@@ -113,22 +122,22 @@ def _beams(shell: Gridshell) -> str:
     return f", {count} of {length} m in all{weight}, {label(shell.edge.section)}"
 
 
+def _before(row: DesignRecord | None, force_max: float | None) -> str:
+    """How much a cable pulls at most before any load, beside what it may pull."""
+    told = above_words(None if row is None else row.loads.get("none"), force_max)
+    return f"; {told}" if told else ""
+
+
 def _slack(main: LoadRecord | None, row: DesignRecord | None) -> str:
     """Which cables hang slack, before the load and under it."""
     before = None if row is None or "none" not in row.loads else row.loads["none"].slack
     found = [
-        f"{'slack ' + when}: {_listed(names)}"
+        f"{'slack ' + when}: {listed(names)}"
         for when, names in [("before any load", before), ("under it", None if main is None else main.slack)]
         if names
     ]
     return "".join(f"; {each}" for each in found) or (
         "; none slack before the load" if before is not None else ""
-    )
-
-
-def _listed(names: Sequence[str], most: int = 8) -> str:
-    return (
-        ", ".join(names) if len(names) <= most else f"{', '.join(names[:most])} and {len(names) - most} more"
     )
 
 

@@ -41,6 +41,7 @@ from shellform.gridshell.grouping import cut_lengths
 from shellform.gridshell.layers import layers_of
 from shellform.net.grid import Grid
 from shellform.output.workshop.block_schedule import block_table
+from shellform.output.workshop.cable_forces import force_notes
 from shellform.output.workshop.edge_schedule import edge_names, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.splice_schedule import cutting_notes, splice_table
@@ -69,7 +70,8 @@ class Built:
     state in which cables are hung in, the erected grid before bracing (None: the target). `adjustment`, m:
     the turnbuckles' range, by which cables are let out from the lengths that they are cut to (None: each is
     cut for itself). `origin` (3,), m: where coordinates count from in those of a survey (None: the file's).
-    `loads` (n, 6), N, of the states: what stands on a support goes straight into it (left out: nothing)."""
+    `loads` (n, 6), N, of the states: what stands on a support goes straight into it (left out: nothing).
+    `force_limit`, N: what cables may pull under load (None: not known)."""
 
     shell: Gridshell
     design: Design
@@ -81,6 +83,7 @@ class Built:
     block: TitleBlock = TitleBlock()
     origin: tuple[float, float, float] | None = None
     loads: Mapping[str, Reals] = field(default_factory=dict)
+    force_limit: float | None = None
 
     def __post_init__(self) -> None:
         if "none" not in self.states:
@@ -190,9 +193,7 @@ def rounds(shell: Gridshell, design: Design) -> Indices:
 
 
 def tension_order(shell: Gridshell, design: Design) -> Indices:
-    """The design's cables in the order of tensioning (c,): round after round, and each round about the middle
-    of the plan.
-    """
+    """The design's cables (c,) in the order of tensioning: by rounds, in each about the plan's middle."""
     ends = shell.cable_ends[design.present]
     middle = shell.target.positions[ends].mean(axis=1)[:, :2]
     away = middle - shell.net.crossings[:, :2].mean(axis=0)
@@ -210,9 +211,7 @@ def cable_crossings(shell: Gridshell, design: Design) -> Indices:
 
 
 def cables(built: Built) -> Table:
-    """The cables: crossings, rest length, turnbuckle, order of tensioning, and clear length and force at each
-    load.
-    """
+    """The cables: crossings, rest length, turnbuckle, order of tensioning, clear length and force by load."""
     shell, design = built.shell, built.design
     ties = shell.cables(design)
     pairs = cable_crossings(shell, design)
@@ -236,14 +235,15 @@ def cables(built: Built) -> Table:
         "turnbuckle shortest [m]": shortest,
         "turnbuckle longest [m]": longest,
     }
-    for name in _in_order(built):
-        state = built.states[name]
-        columns[f"{_stage(name)}: clear length [m]"] = ties.lengths(state)
-        columns[f"{_stage(name)}: force [N]"] = ties.tension(state)
+    pulls = {_stage(name): ties.tension(built.states[name]) for name in _in_order(built)}
+    for name, state in _told_states(built).items():
+        columns[f"{name}: clear length [m]"] = ties.lengths(state)
+        columns[f"{name}: force [N]"] = pulls[name]
     rows = tuple((f"C{k}", *(values[k].item() for values in columns.values())) for k in range(len(pairs)))
     notes = (
         f"Lengths between the pins' axes. {how_many(len(pairs), 'cable', 'cables')}, EA = {shell.cable.stiffness:g} N. A force of "
         "0: slack at that stage.",
+        *force_notes(pulls, _stage("none"), built.force_limit),
         *cutting_of_cables(built),
     )
     return Table("cables", ("cable", *columns), rows, notes)
@@ -388,9 +388,7 @@ def _told_states(built: Built) -> dict[str, State]:
 
 
 def _in_order(built: Built) -> list[str]:
-    """The load cases as they come on site: before the pour, the stages of pouring, all of it, and what is
-    only checked.
-    """
+    """The load cases as they come on site: before the pour, its stages, all of it, what is only checked."""
     last = [name for name in ("design", "additional") if name in built.states]
     return ["none", *(name for name in built.states if name not in ("none", *last)), *last]
 
