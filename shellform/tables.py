@@ -1,4 +1,4 @@
-"""Tables that leave the house: CSV files, and one workbook of them; the door to openpyxl.
+"""Tables that leave the house: CSV files, the notes on them, and one workbook of all; the door to openpyxl.
 
 Values are in SI units, said in the column's head: "length [m]"; `for_the_workshop` makes mm and degrees of
 them. An empty cell means that the value isn't known. Words that a spreadsheet would take for a formula, which
@@ -108,8 +108,19 @@ def _harmless(value: Value) -> Value:
     return f"'{value}"
 
 
+def notes_text(tables: Sequence[Table]) -> str:
+    """What is to be noted of the tables, by the names of their CSV files, which hold the table alone."""
+    parts = [
+        "\n".join([f"{table.name}.csv", *(f"- {note}" for note in table.notes)])
+        for table in tables
+        if table.notes
+    ]
+    return "\n\n".join(["Notes on the tables in this folder.", *parts]) + "\n"
+
+
 def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:
-    """Writes NAME.csv for each table, and all of them as the sheets of schedules.xlsx; returns the files.
+    """Writes NAME.csv for each table, what is to be noted of them as notes.txt, and all of it as the sheets
+    of schedules.xlsx; returns the files.
 
     Raises InputError where the folder can't be written to.
     """
@@ -117,6 +128,8 @@ def write_tables(folder: str | Path, tables: Sequence[Table]) -> list[Path]:
     for table in tables:
         files.append(Path(folder) / f"{table.name}.csv")
         write_text(files[-1], table_text(table))
+    files.append(Path(folder) / "notes.txt")
+    write_text(files[-1], notes_text(tables))
     files.append(Path(folder) / "schedules.xlsx")
     content = io.BytesIO()
     _workbook(tables).save(content)

@@ -6,6 +6,7 @@ import io
 import math
 import re
 import zipfile
+from dataclasses import replace
 
 import openpyxl
 import pytest
@@ -82,6 +83,7 @@ def test_a_workbook_has_notes_above_the_heads_and_numbers_to_a_tenth_of_a_mm(tmp
     assert [file.name for file in files] == [
         "rods.csv",
         "a name of more letters than thirty-one.csv",
+        "notes.txt",
         "schedules.xlsx",
     ]
     assert files[0].read_text(encoding="utf-8") == table_text(RODS)
@@ -97,6 +99,14 @@ def test_a_workbook_has_notes_above_the_heads_and_numbers_to_a_tenth_of_a_mm(tmp
     assert sheet.freeze_panes == "B4"
     assert sheet.auto_filter.ref == "A3:F5"
     assert sheet.print_title_rows == "$3:$3"
+
+
+def test_what_is_to_be_noted_of_csv_files_stands_beside_them_by_their_names(tmp_path):
+    bare = Table("marks", ("mark",), ((1.5,),))
+    *_, notes, _ = write_tables(tmp_path, [RODS, bare, replace(bare, name="cables", notes=("Hung in.",))])
+    assert notes.read_text(encoding="utf-8") == (
+        "Notes on the tables in this folder.\n\nrods.csv\n- Cut with a saw.\n- + 2 mm for the kerf\n\ncables.csv\n- Hung in.\n"
+    )
 
 
 def test_columns_are_as_wide_as_their_longest_word_up_to_80_letters(tmp_path):

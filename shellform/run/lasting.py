@@ -21,6 +21,7 @@ _MAPS = ("net-distance", "net-curvature", "net-skew", "net-springs", "deviations
 _DOCUMENTS = (
     *(f"drawings/{name}{ending}" for name in _SHEETS for ending in (".dxf", ".pdf")),
     *(f"schedules/{name}.csv" for name in _TABLES),
+    "schedules/notes.txt",
     "schedules/schedules.xlsx",
     *(
         f"models/{name}"

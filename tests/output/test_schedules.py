@@ -360,6 +360,7 @@ def test_splices_are_told_with_the_moment_that_they_bear(built, net):
 def test_without_splices_their_list_says_so(built, tmp_path):
     tables.write_tables(tmp_path, [schedules.splices(built, nesting.cut(built.grid))])
     assert (tmp_path / "splices.csv").read_text(encoding="utf-8").count("\n") == 1
+    assert "splices.csv\n- No rod is spliced.\n" in (tmp_path / "notes.txt").read_text(encoding="utf-8")
     assert load_workbook(tmp_path / "schedules.xlsx")["splices"]["A1"].value == "No rod is spliced."
 
 

@@ -50,7 +50,7 @@ def test_all_documents_of_the_best_design_are_written_and_splices_are_said(run):
         for name in ("rods", "bars", "splices", "marks", "cables", "supports", "survey")
     } < names
     assert {f"models/gridshell{end}" for end in (".vtu", ".3dm", ".glb", ".step", "-opensees.py")} < names
-    assert "schedules/schedules.xlsx" in names
+    assert {"schedules/schedules.xlsx", "schedules/notes.txt"} <= names
     assert not [name for name in names if ".part" in name]
     with (run.folder / "schedules/cables.csv").open(encoding="utf-8", newline="") as file:
         assert len(list(csv.DictReader(file))) == run.designs["polished"].present.sum()

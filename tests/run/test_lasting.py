@@ -31,7 +31,11 @@ def whole(tmp_path_factory):
         f"schedules/{each}.csv"
         for each in ("rods", "bars", "splices", "marks", "cables", "supports", "survey")
     ]
-    names += ["schedules/schedules.xlsx", *(f"models/gridshell{each}" for each in (".vtu", ".3dm", ".glb"))]
+    names += [
+        "schedules/notes.txt",
+        "schedules/schedules.xlsx",
+        *(f"models/gridshell{each}" for each in (".vtu", ".3dm", ".glb")),
+    ]
     names += ["models/blender.py", "models/grasshopper.py", "report.html"]
     for name in names:
         (folder / name).parent.mkdir(exist_ok=True)

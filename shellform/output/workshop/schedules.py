@@ -376,7 +376,7 @@ def all_tables(built: Built, cutting: Cutting) -> list[Table]:
 
 
 def write_schedules(folder: str | Path, built: Built, cutting: Cutting) -> list[Path]:
-    """Writes every schedule as NAME.csv and all of them as schedules.xlsx, lengths in mm and angles in
+    """Writes every schedule as NAME.csv, their notes as notes.txt and all of it as schedules.xlsx, in mm and
     degrees as workshops read them; returns the files. Raises InputError where they can't be written.
     """
     return write_tables(folder, [for_the_workshop(table) for table in all_tables(built, cutting)])
