@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from shellform.arrays import Reals
+from shellform.errors import NotConverged
+from shellform.reliability.outlook import Outlook, View
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
-from shellform.structure.solve.equilibrium import TOLERANCE, TURN
+from shellform.structure.solve.equilibrium import TOLERANCE, TURN, find_equilibrium
 from shellform.structure.solve.factorisation import Factor, NotPositiveDefinite
 from shellform.structure.solve.residual import STAGNANT, ResidualNorm, held
 
@@ -20,6 +22,9 @@ ON_THE_WAY = 1e-5  # residual of states between, from which the next step starts
 _PATIENCE = 10  # factorisations of one step
 _FAR_OFF = 5.0  # rad, a step that leads nowhere
 _EASED, _HALF = 0.1, 0.5  # of a mass that is left after a step, at first and at most
+_KINK = 1 / 64  # of the load, a step so short may turn by a cable's kink: it counts where it leads back …
+_RETURNED, _BACK = 0.1, 60  # … to within this share of its way, in so many factorisations
+_WINDOW = 1 / 512  # of the load, a step so short may pass over bifurcations that lie within it
 _LEAST, _MOST = 0.01, 1e4  # of the first mass: less is none, and more leads nowhere
 
 Foreseen = tuple[Reals, ...] | None  # deformations of each part of beams
@@ -76,27 +81,64 @@ class Branch:
         step: float,
         smallest: float,
         report: Callable[[float, State], None] | None = None,
+        *,
+        heeding: bool = False,
     ) -> tuple[Here, float]:
         """The last state on the branch and its load factor, `most` where the branch goes on, from the state
-        `here` at the `factor` on; `report` is told each one's load factor and state."""
+        `here` at the `factor` on; `report` is told each one's load factor and state. `heeding`: steps that
+        may pass over an unstable stretch are halved (outlook.py)."""
         width, good = step, 0
+        outlook = Outlook(self.assembly, self.load, self.span) if heeding else None
+        view = None if outlook is None else outlook.view(here.state, here.balance, here.factor, factor, None)
         while factor < most:
             goal = most if factor + width > most - 1e-12 else factor + width
             there = self.step(here, goal, last=goal == most)
+            onward = None
+            if there is not None and outlook is not None and view is not None:
+                onward = outlook.view(there.state, there.balance, there.factor, goal, view)
+                there = self._heeded(outlook, view, onward, there)
             if there is None:
                 width, good = 0.5 * width, 0
                 again = self.at(here.state)  # its factor was replaced
                 assert again is not None
                 here = again
-                if width < smallest:
+                if width < (smallest if onward is None else min(smallest, _WINDOW)):
                     break
                 continue
-            here, factor, good = there, goal, good + 1
+            here, factor, view, good = there, goal, onward, good + 1
             if report is not None:
                 report(factor, here.state)
             if good == 2:
                 width, good = min(2.0 * width, step), 0
         return here, factor
+
+    def _heeded(self, outlook: Outlook, before: View, after: View, there: Here) -> Here | None:
+        """The state `there` to which a step has led from one view to the other; None where it may have passed
+        over an unstable stretch."""
+        width = after.factor - before.factor
+        if outlook.turns(before, after):
+            if width > _KINK or not self._returns(before, after):
+                return None
+            return self.at(there.state)  # its factor was replaced
+        if width > _KINK and outlook.bends(before, after):
+            return None
+        return None if width > _WINDOW and outlook.sinks(before, after) else there
+
+    def _returns(self, before: View, after: View) -> bool:
+        """Whether the structure comes back to the state before a step where its load is taken back: on one
+        branch it does, with all kinks that cables make. Both are brought to rest, for what is left
+        unbalanced ON_THE_WAY takes a soft structure far."""
+        places = []
+        for state in (before.state, after.state):
+            try:
+                rest = find_equilibrium(self.assembly, state, before.factor * self.load, limit=_BACK)
+            except NotConverged as error:
+                self.spent += error.iterations
+                return False
+            self.spent += rest.factorisations
+            places.append(rest.state.positions)
+        way, off = (float(np.linalg.norm(each - places[0])) for each in (after.state.positions, places[1]))
+        return off <= _RETURNED * way
 
     def step(self, here: Here, goal: float, *, last: bool) -> Here | None:
         """From a state on the branch to the load factor `goal`."""

@@ -220,18 +220,20 @@ class Loading(Branch):
         *,
         begin: tuple[float, State] | None = None,
         marks: Sequence[float] = (),
+        heeding: bool = False,
     ) -> tuple[Here | None, float]:
         """The last state on the stable branch and its load factor, `most` where the branch goes on; None
         where there is no unloaded state. With `begin` from a state at a load factor that is known to lie on
         the branch. The end is known to the `smallest` step, but next to factors in `marks`, where it decides
-        whether a structure stands, to MARKED."""
+        whether a structure stands, to MARKED. `heeding` what steps may pass over (Branch.along)."""
         factor, here = (0.0, self._unloaded()) if begin is None else (begin[0], self.at(begin[1]))
         if here is None:
             return None, factor
-        here, factor = self.along(here, factor, most, step, smallest)
+        here, factor = self.along(here, factor, most, step, smallest, heeding=heeding)
         for mark in sorted(marks):
             if factor < mark <= min(factor + 2.0 * smallest, most):
-                here, factor = self.along(here, factor, mark, mark - factor, min(MARKED, smallest))
+                finest = min(MARKED, smallest)
+                here, factor = self.along(here, factor, mark, mark - factor, finest, heeding=heeding)
         return here, factor
 
     def kind(self, here: Here) -> str:

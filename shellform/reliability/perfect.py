@@ -111,7 +111,7 @@ def _perfect(
     reached = 0.0
     if here is not None:
         _, reached = branch.along(
-            here, 0.0, 1.0, step, SMALLEST, lambda factor, state: kept.append((factor, state))
+            here, 0.0, 1.0, step, SMALLEST, lambda factor, state: kept.append((factor, state)), heeding=True
         )
     soft = modes(assembly, kept[-1][1], shapes).shapes if shapes else np.zeros((0, *load.shape))
     return Perfect(

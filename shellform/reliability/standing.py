@@ -126,10 +126,10 @@ class Workshop:
     ) -> Limit:
         """Where the structure with the errors loses stability under its growing load, which with `begin` is
         known to bear a factor of it in a state, and surely on which side of factors in `marks`; what ends its
-        path is looked into only to `tell` it."""
+        path is looked into only to `tell` it. Steps heed what they may pass over (outlook.py)."""
 
         def ended(loading: Loading) -> Limit:
-            here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks)
+            here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks, heeding=True)
             return self._ended(loading, here, factor, most, tell)
 
         return self.with_structure(errors, ended)

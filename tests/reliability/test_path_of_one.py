@@ -221,18 +221,23 @@ def test_a_snap_is_local_where_no_node_goes_farther_than_a_hundredth_of_the_span
 def test_the_end_of_a_branch_is_known_more_closely_next_to_marks(ends, marks, asked):
     ends, heard, first = list(ends), [], ends[-1]
 
-    def along(there, factor, most, step, smallest):
+    def along(there, factor, most, step, smallest, *, heeding):
         heard.append((most, step, smallest))
-        return there, ends.pop(0)
+        assert heeding is asked_heeding
+        return there, told.pop(0)
 
     loading = loading_of(along=along, at=lambda state: f"at {state}", _unloaded=lambda: "unloaded")
-    assert loading.followed(1.0, 0.5, 1 / 64, marks=marks) == ("unloaded", first)
-    assert heard == asked
+    for asked_heeding in (False, True):
+        told = list(ends)
+        heard.clear()
+        found = loading.followed(1.0, 0.5, 1 / 64, marks=marks, heeding=asked_heeding)
+        assert found == ("unloaded", first)
+        assert heard == asked
 
 
 def test_a_path_begins_at_a_known_state_or_at_the_unloaded_one_which_there_may_not_be():
     loading = loading_of(
-        along=lambda there, factor, *_: (there, factor),
+        along=lambda there, factor, *_, **__: (there, factor),
         at=lambda state: f"at {state}",
         _unloaded=lambda: None,
     )

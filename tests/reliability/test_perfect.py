@@ -26,7 +26,8 @@ def path(monkeypatch):
         def at(self, state):
             return "here" if told.stable else None
 
-        def along(self, here, begin, most, step, smallest, report):
+        def along(self, here, begin, most, step, smallest, report, *, heeding):
+            assert heeding, "of what a step may pass over"
             told.seen.append(("along", here, begin, most, step, smallest))
             for factor in told.factors:
                 report(factor, f"at {factor}")

@@ -1,0 +1,126 @@
+"""Whether a step along a branch may pass over an unstable stretch, told from both its ends.
+
+A step counts where every tangent that is made on it is positive definite (branch.py). Those are few, and a
+structure may lose its stability and have it again between two of them. With K the tangent, u the motion with
+the load factor by K at either end, and h the change of the factor, a step may have passed over something if
+
+- it turns: the cubic of the factor over the way between both states, with its rates at both, turns round
+  twice (loading.py), as where the step has led beyond a snap;
+- it bends: the way isn't the mean of both h u to within a fifth of it, as where much happens in between;
+- it sinks: K, going on as it changes at one end, isn't positive definite any more before the other. So steps
+  never go beyond where the tangent foretells a limit point or a bifurcation, which the shape of the path
+  doesn't tell.
+
+The last is looked at through the softest modes V, V'MV = 1: V'KV + h V'K'V has to be positive definite. They
+come by inverse iteration from one state to the next, with the factor at hand; K' is a difference over a short
+way along u to the inside of the step. What comes at once, as a cable that goes slack, isn't foretold.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from shellform.arrays import Reals
+from shellform.structure.elements.state import State, moved
+from shellform.structure.solve.assembly import Assembly, Balance
+from shellform.structure.solve.factorisation import Factor
+from shellform.structure.solve.loading import turns_between
+from shellform.structure.solve.residual import ResidualNorm
+
+_MODES = 6  # the softest ones, through which the tangent is looked at
+_ROUNDS, _AGAIN = 8, 2  # of inverse iteration, at the beginning and from one state to the next
+_BENT = 0.2  # of the way of a step, by which the mean of the motions at its ends may miss it
+_SHORT, _TURNED = 1e-5, 1e-3  # of the span, and rad: the way over which differences are taken
+
+
+@dataclass(frozen=True)
+class View:
+    """A stable `state` at a load `factor`: its tangent's lower `values` (nnz,); `onward` (n, 6), m and rad,
+    the motion with the factor; the `soft` shapes (f, k) with unit mass and their `stiffness` (k,), N/m."""
+
+    state: State
+    factor: float
+    values: Reals
+    onward: Reals
+    soft: Reals
+    stiffness: Reals
+
+
+class Outlook:
+    """What is to be seen from the states of one structure's path under the dead `load` (n, 6)."""
+
+    def __init__(self, assembly: Assembly, load: Reals, span: float) -> None:
+        self.assembly, self.load, self.span = assembly, load, span
+        self.mass = ResidualNorm(assembly).mass_shape[:, None]
+
+    def view(self, state: State, balance: Balance, factor: Factor, share: float, before: View | None) -> View:
+        """From a state with its balance and its tangent's factor at a load factor, `share`, after the one
+        `before`."""
+        own = self.assembly
+        assert balance.tangent is not None
+        onward = own.by_node(factor.solve(self.load.ravel()[own.free]))
+        shapes, rounds = (_first(len(own.free)), _ROUNDS) if before is None else (before.soft, _AGAIN)
+        stiffness = np.zeros(0)
+        for _ in range(rounds):
+            inert = self.mass * shapes
+            solved = np.asarray(factor.solve(inert))
+            stiffness, mixed = _ritz(solved.T @ inert, solved.T @ (self.mass * solved))
+            shapes = solved @ mixed
+        return View(state, share, balance.tangent, onward, shapes, stiffness)
+
+    def turns(self, before: View, after: View) -> bool:
+        """Whether the step may have led to another branch."""
+        way = after.state.positions - before.state.positions
+        length = float(np.linalg.norm(way))
+        rates = [float(np.einsum("ij,ij", way, each.onward[:, :3])) for each in (before, after)]
+        if length == 0.0 or 0.0 in rates:
+            return False
+        mean = (after.factor - before.factor) / length
+        return turns_between(length / rates[0], length / rates[1], mean)
+
+    def bends(self, before: View, after: View) -> bool:
+        """Whether the nodes go otherwise than by the mean of their motions at both ends of the step."""
+        way = after.state.positions - before.state.positions
+        mean = 0.5 * (after.factor - before.factor) * (before.onward + after.onward)[:, :3]
+        return bool(np.linalg.norm(way - mean) > _BENT * np.linalg.norm(way))
+
+    def sinks(self, before: View, after: View) -> bool:
+        """Whether the tangent, going on as it changes at one end of the step, loses definiteness before the
+        other."""
+        width = after.factor - before.factor
+        return any(self._lost(view, side * width) for view, side in ((before, 1.0), (after, -1.0)))
+
+    def _lost(self, view: View, change: float) -> bool:
+        """Whether the tangent does by a `change` of the load factor."""
+        matrix, soft = self.assembly.matrix, view.soft
+        rate = change * self._rate(view, float(np.sign(change)))
+        lower = sp.csc_array((rate, matrix.indices, matrix.indptr), shape=(matrix.size, matrix.size))
+        half = soft.T @ (lower @ soft)
+        rises = half + half.T - soft.T @ (rate[matrix.diagonal][:, None] * soft)
+        return bool(np.linalg.eigvalsh(np.diag(view.stiffness) + rises)[0] <= 0.0)
+
+    def _rate(self, view: View, side: float) -> Reals:
+        """How the tangent's lower values (nnz,) change with the load factor, to the `side` 1 or -1."""
+        far = float(np.abs(view.onward[:, :3]).max()) / (_SHORT * self.span)
+        change = side / max(far, float(np.abs(view.onward[:, 3:]).max()) / _TURNED, 1.0)
+        motion = self.assembly.chords.corrected(view.state, change * view.onward)
+        then = self.assembly.evaluate(moved(view.state, motion)).tangent
+        assert then is not None
+        return (then - view.values) / change
+
+
+def _first(size: int) -> Reals:
+    """Shapes (f, k) with a share of all modes: fixed, so that results are repeatable."""
+    return np.cos(1.7 * np.arange(size)[:, None] * np.arange(1.0, 1.0 + min(_MODES, size)))
+
+
+def _ritz(stiffness: Reals, mass: Reals) -> tuple[Reals, Reals]:
+    """Eigenvalues (k,) of both (k, k), the smallest first, and the vectors (k, k) with unit mass."""
+    size = 1.0 / np.sqrt(np.diag(mass))
+    heavy, turned = np.linalg.eigh(size[:, None] * mass * size)
+    unit = size[:, None] * turned / np.sqrt(np.maximum(heavy, 1e-14 * heavy[-1]))
+    found, mixed = np.linalg.eigh(unit.T @ stiffness @ unit)
+    return found, unit @ mixed
