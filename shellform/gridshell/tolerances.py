@@ -125,6 +125,13 @@ def tolerances_of_size(span: float, *, longest_rod: float, longest_cable: float)
     )
 
 
+def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
+    """The same causes with deviations larger by a factor, as far as shares go."""
+    lengths = ("cable_length", "supports", "marks")
+    most = {each.name: np.inf if each.name in lengths else LARGEST_SHARE for each in fields(Tolerances)}
+    return Tolerances(**{name: min(factor * getattr(tolerances, name), own) for name, own in most.items()})
+
+
 def default_tolerances(shell: Gridshell) -> Tolerances:
     """The defaults for a gridshell of its size."""
     return tolerances_of_size(

@@ -70,12 +70,13 @@ def perfect(
     *,
     shapes: int = SHAPES,
     step: float = NOMINAL_STEP,
+    heeding: bool = True,
 ) -> Perfect:
     """The perfect structure of a design and its path under the dead `load` (n, 6), in steps of a share of it;
-    0: it isn't followed, since drawn structures begin at its unloaded state. Raises NotConverged where there
-    is none."""
+    0: it isn't followed, since drawn structures begin at its unloaded state. `heeding`: steps that may pass
+    over an unstable stretch are halved (outlook.py). Raises NotConverged where there is no unloaded state."""
     network, present = shell.network(design), np.asarray(design.present)
-    return _perfect(network, members_of(shell), present, load, shell.target, shapes, step)
+    return _perfect(network, members_of(shell), present, load, shell.target, shapes, step, heeding)
 
 
 def perfect_of(model: Model, load: str, *, shapes: int = SHAPES, step: float = NOMINAL_STEP) -> Perfect:
@@ -90,7 +91,7 @@ def perfect_of(model: Model, load: str, *, shapes: int = SHAPES, step: float = N
         )
     every = np.ones(len(network.cables.ends), dtype=bool)
     start = with_supports_moved(network, model.start)
-    return _perfect(network, members, every, model.loads[load], start, shapes, step)
+    return _perfect(network, members, every, model.loads[load], start, shapes, step, heeding=True)
 
 
 def _perfect(
@@ -101,6 +102,7 @@ def _perfect(
     target: State,
     shapes: int,
     step: float,
+    heeding: bool,
 ) -> Perfect:
     assembly = assemble(network)
     none = np.zeros_like(load)
@@ -111,7 +113,13 @@ def _perfect(
     reached = 0.0
     if here is not None:
         _, reached = branch.along(
-            here, 0.0, 1.0, step, SMALLEST, lambda factor, state: kept.append((factor, state)), heeding=True
+            here,
+            0.0,
+            1.0,
+            step,
+            SMALLEST,
+            lambda factor, state: kept.append((factor, state)),
+            heeding=heeding,
         )
     soft = modes(assembly, kept[-1][1], shapes).shapes if shapes else np.zeros((0, *load.shape))
     return Perfect(

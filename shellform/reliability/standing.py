@@ -123,13 +123,14 @@ class Workshop:
         tell: bool = True,
         begin: tuple[float, State] | None = None,
         marks: Sequence[float] = (),
+        heeding: bool = True,
     ) -> Limit:
         """Where the structure with the errors loses stability under its growing load, which with `begin` is
         known to bear a factor of it in a state, and surely on which side of factors in `marks`; what ends its
-        path is looked into only to `tell` it. Steps heed what they may pass over (outlook.py)."""
+        path is looked into only to `tell` it. `heeding`: what steps may pass over (outlook.py)."""
 
         def ended(loading: Loading) -> Limit:
-            here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks, heeding=True)
+            here, factor = loading.followed(most, step, resolution, begin=begin, marks=marks, heeding=heeding)
             return self._ended(loading, here, factor, most, tell)
 
         return self.with_structure(errors, ended)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -25,7 +25,7 @@ from scipy.special import ndtr, ndtri
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.tolerances import LARGEST_SHARE, Tolerances
+from shellform.gridshell.tolerances import Tolerances, enlarged
 from shellform.reliability.drawing import PERFECT, draw_errors
 from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import Safety, allowed, critical_on_halved, paths
@@ -219,7 +219,7 @@ def try_structures(
     order = [*first, *(number for number in asked.numbers if number not in set(first))]
     kept = True
     for largest, shares in paths(asked.loads).items():
-        nominal = perfect(shell, design, asked.loads[largest], step=TO_ITS_END)
+        nominal = perfect(shell, design, asked.loads[largest], step=TO_ITS_END, heeding=False)
         workshop = Workshop(nominal)
         wanted = _critical(asked, shares) if critical else 0.0
 
@@ -236,7 +236,13 @@ def try_structures(
             if number == PERFECT:  # whose path is known so far
                 begin = nominal.known_to(wanted)
                 found = workshop.limit(
-                    errors, most=wanted, resolution=_RESOLUTION, tell=False, begin=begin, marks=marks
+                    errors,
+                    most=wanted,
+                    resolution=_RESOLUTION,
+                    tell=False,
+                    begin=begin,
+                    marks=marks,
+                    heeding=False,  # a fifth of a trial; the design to build is judged heeding
                 )
             else:
                 found = workshop.rests(errors, resolution=_RESOLUTION, marks=marks)
@@ -390,10 +396,3 @@ def _known(safety: Safety, name: str, design_load: str) -> int:
     """How many of the structures tried may fall under a load by the probability that is asked for."""
     wanted = safety.required(name, design_load, None)
     return allowed(float(ndtr(ndtri(wanted) / safety.enlarged)), safety.tried)
-
-
-def enlarged(tolerances: Tolerances, factor: float) -> Tolerances:
-    """The same causes with deviations larger by a factor, as far as shares go."""
-    lengths = ("cable_length", "supports", "marks")
-    most = {each.name: np.inf if each.name in lengths else LARGEST_SHARE for each in fields(Tolerances)}
-    return Tolerances(**{name: min(factor * getattr(tolerances, name), own) for name, own in most.items()})

@@ -18,12 +18,11 @@ from shellform.gridshell.edge_beams import EdgeBeam, weight
 from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace
 from shellform.gridshell.joints import following, swivelling
 from shellform.gridshell.loads import concrete, rods
-from shellform.gridshell.tolerances import default_tolerances
+from shellform.gridshell.tolerances import default_tolerances, enlarged
 from shellform.net.net import Net
 from shellform.problem.paths import deviations
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
-from shellform.reliability.trial_structures import enlarged
 from shellform.run.first_edges import EdgeChoice
 from shellform.run.sizes import LEAST_PRESTRAIN, STRAINED, Placed, RodChoice, Rope, thicker
 from shellform.structure.elements.state import State

@@ -11,6 +11,7 @@ from shellform.gridshell.tolerances import (
     SOURCES,
     Tolerances,
     default_tolerances,
+    enlarged,
     span_of,
     tolerances_of_size,
 )
@@ -97,3 +98,9 @@ def test_a_shell_s_own_span_longest_rod_and_longest_cable_tell_its_tolerances():
     assert default_tolerances(shell).cable_length == pytest.approx(2e-3)
     shell.target.positions = 0.1 * places
     assert default_tolerances(shell).cable_length == 1e-4, "a model of 1.8 m"
+
+
+def test_enlarged_errors_are_larger_by_the_factor_as_far_as_shares_go():
+    found = enlarged(Tolerances(cable_length=1e-3, supports=2e-3, marks=0.4, rod_bow=1e-3, load_all=0.4), 1.5)
+    assert (found.cable_length, found.supports, found.marks) == pytest.approx((1.5e-3, 3e-3, 0.6))
+    assert (found.rod_bow, found.load_all, found.shape) == (pytest.approx(1.5e-3), 0.5, 0.0)
