@@ -8,11 +8,13 @@ moves by
     X_j = u_j on the degrees of freedom that are held, u_j the places of its supports that are off,
     K X_j = -F_j on the free ones,
 
-K being the perfect structure's tangent. With d the distances from the target the value is the mean over j of
-|d + X_j|². Errors are drawn in pairs of opposite ones, so that what is linear in them moves the mean nowhere:
-else the few structures' own mean would be made up for, and other structures would lie farther off.
+K being the perfect structure's tangent. With d the distances from the target the value is the mean m over j
+of the misfits q_j = |d + X_j|², and, where that is asked for, k of their standard deviations s. Errors are
+drawn in pairs of opposite ones, so that what is linear in them moves the mean nowhere: else the few
+structures' own mean would be made up for, and other structures would lie farther off.
 
-The derivative is exact: with G_j = d(value)/dX_j and K L_j = G_j the terms -L_j'(dK X_j + dF_j) hold the
+The derivative is exact: with G_j = d(value)/dX_j = 2 (1 + k (q_j - m) / s) (d + X_j) / n of n structures, and
+K L_j = G_j, the terms -L_j'(dK X_j + dF_j) hold the
 third derivative of the energy contracted with the sum of L_j X_j', and the structures' own tangents. Spins
 don't commute: the derivative of a node's moment m has -S(m)/2 beside the symmetric tangent, and the nodes of
 structure j are in no equilibrium.
@@ -26,7 +28,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Reals
-from shellform.errors import NotConverged, require_count
+from shellform.errors import NotConverged, require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.problem import LoadCase
@@ -45,24 +47,28 @@ from shellform.structure.elements.threads import side_by_side
 from shellform.structure.solve.assembly import Assembly
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 
-PAIRS = 12  # of structures with opposite errors
+PAIRS = 12  # of structures with opposite errors, by which a mean is told
+PAIRS_OF_DEVIATIONS = 48  # the same where deviations are added, which few structures tell badly
 FIRST = 50_000  # the number from which on they are drawn: neither those that a search tries nor fresh ones
 
 
 @dataclass(frozen=True)
 class BuiltMisfit(Term):
-    """The mean misfit, m², of structures with some `errors` under the load case `load`, to first order about
-    the perfect structure's equilibrium; their shapes have these `imperfections`. The step model takes the
-    perfect structure's misfit's curvature for its own."""
+    """The mean misfit, m², of structures with some `errors` under the load case `load`, and so many standard
+    `deviations` of it, to first order about the perfect structure's equilibrium; their shapes have these
+    `imperfections`. The step model takes the perfect structure's misfit's curvature for its own."""
 
     name = "built_misfit"
     of_shape = True
     load: str
     errors: tuple[Errors, ...]
     imperfections: Imperfections
+    deviations: float = 0.0
 
     def __post_init__(self) -> None:
         require_count(len(self.errors), where="built_misfit.errors", give="at least one structure's errors")
+        give = "how many standard deviations are added to the mean, such as 1"
+        require_number(self.deviations, least=0.0, where="built_misfit.deviations", give=give)
 
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m². Raises NotConverged where the state isn't stable."""
@@ -75,17 +81,32 @@ class BuiltMisfit(Term):
             what, remedy = "The state isn't a stable equilibrium of the design", "Solve for it first."
             raise NotConverged(what, state=at.state, remedy=remedy) from error
         places = at.state.positions - at.shell.target.positions + moved.translations
-        value = np.array([float((places**2).sum()) / len(self.errors)])
-        return Measurement(value, late=lambda: self._whole(at, assembly, moved, value, places))
+        value, shares = self._of(places)
+        return Measurement(
+            np.array([value]),
+            late=lambda: self._whole(at, assembly, moved, value, 2.0 * shares * places.transpose(1, 2, 0)),
+        )
+
+    def _of(self, places: Reals) -> tuple[float, Reals]:
+        """The value at distances (k, n, 3), and its derivative (k,) by each structure's misfit."""
+        count = len(places)
+        mean, even = float((places**2).sum()) / count, np.full(count, 1.0 / count)
+        if self.deviations == 0.0:
+            return mean, even
+        over = (places**2).sum(axis=(1, 2)) - mean
+        deviation = float(np.sqrt((over**2).mean()))
+        if deviation == 0.0:
+            return mean, even
+        return mean + self.deviations * deviation, even * (1.0 + self.deviations * over / deviation)
 
     def _whole(
-        self, at: LoadedDesign, assembly: Assembly, moved: Moved, value: Reals, places: Reals
+        self, at: LoadedDesign, assembly: Assembly, moved: Moved, value: float, by_place: Reals
     ) -> Measurement:
-        """With the derivatives."""
+        """With the derivatives, by the structures' places `by_place` (n, 3, k) first."""
         shell, design, state = at.shell, at.design, at.state
         count = len(self.errors)
         right = np.zeros_like(moved.motions)
-        right.reshape(-1, 6, count)[:, :3] = (2.0 / count) * places.transpose(1, 2, 0)
+        right.reshape(-1, 6, count)[:, :3] = by_place
         by_dof = right.sum(axis=1)
         multipliers = solved(assembly, state, right)
         rate = shell.beams_by_radius(design.radius)
@@ -112,7 +133,7 @@ class BuiltMisfit(Term):
             by_rest = by_rest + pulls
             by_radius += stiffer
         return Measurement(
-            value,
+            np.array([value]),
             sp.csr_array(by_dof[None]),
             sp.csr_array(design.among_candidates(-by_rest)[None]),
             np.array([-by_radius]),
@@ -127,11 +148,15 @@ def built_misfit(
     tolerances: Tolerances,
     *,
     seed: int,
-    pairs: int = PAIRS,
+    pairs: int | None = None,
+    deviations: float = 0.0,
 ) -> BuiltMisfit:
-    """The term for so many pairs of structures drawn with the `tolerances` under the `seed`; imperfections of
-    shape follow the softest modes of the `start` under the load `case`. Raises InputError for no pairs,
-    NotConverged where the start has no unloaded equilibrium."""
+    """The term for so many pairs of structures (None: PAIRS, or PAIRS_OF_DEVIATIONS where `deviations` are
+    added) drawn with the `tolerances` under the `seed`; imperfections of shape follow the softest modes of
+    the `start` under the load `case`. Raises InputError for no pairs, NotConverged where the start has no
+    unloaded equilibrium."""
+    if pairs is None:
+        pairs = PAIRS_OF_DEVIATIONS if deviations else PAIRS
     require_count(pairs, where="built_misfit.pairs", give=f"pairs of structures, such as {PAIRS}")
     nominal = perfect(shell, start, case.force, step=TO_ITS_END)
     errors = []
@@ -140,4 +165,4 @@ def built_misfit(
         for sign in (1.0, -1.0):
             own = {name: sign * value for name, value in z.items()}
             errors.append(errors_of(nominal.members, tolerances, own))
-    return BuiltMisfit(case.name, tuple(errors), nominal.imperfections)
+    return BuiltMisfit(case.name, tuple(errors), nominal.imperfections, deviations)

@@ -9,12 +9,10 @@ import pytest
 import shellform as sf
 from shellform.errors import InputError, NotConverged
 from shellform.problem.terms import LoadedDesign
-from shellform.reliability.built_misfit import BuiltMisfit, built_misfit
+from shellform.reliability.built_misfit import PAIRS, PAIRS_OF_DEVIATIONS, BuiltMisfit, built_misfit
 from shellform.reliability.perfect import perfect
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.state import State
-from shellform.structure.network import assemble
-from shellform.structure.solve.equilibrium import find_equilibrium
 from tests.problems import assert_gradient_as_re_solved, solved
 
 CAUSES = {
@@ -33,15 +31,6 @@ CAUSES = {
 ALL = sf.Tolerances(**CAUSES)
 
 
-@pytest.fixture(scope="module")
-def loaded(dome):
-    """A small shell's initial design under a fraction of the paper's load."""
-    load, design = dome.point_load(3.0, every=2), dome.design()
-    assembly = assemble(dome.network(design))
-    unloaded = find_equilibrium(assembly, dome.target, np.zeros_like(load)).state
-    return design, find_equilibrium(assembly, unloaded, load, on_branch=True).state, load
-
-
 def term_of(shell, design, load, tolerances, **more):
     return built_misfit(shell, design, sf.LoadCase("wet", load), tolerances, seed=7, **more)
 
@@ -51,6 +40,34 @@ def test_its_gradient_agrees_with_re_solved_equilibria(dome, loaded, cause):
     design, state, load = loaded
     term = term_of(dome, design, load, ALL if cause == "all" else ALL.only(cause), pairs=2)
     assert_gradient_as_re_solved(dome, design, state, load, term)
+
+
+@pytest.mark.parametrize("cause", [*CAUSES, "all"])
+def test_with_deviations_added_its_gradient_agrees_with_re_solved_equilibria(dome, loaded, cause):
+    design, state, load = loaded
+    off = ALL if cause == "all" else ALL.only(cause)
+    term = term_of(dome, design, load, off, pairs=2, deviations=2.0)
+    assert_gradient_as_re_solved(dome, design, state, load, term)
+
+
+def test_deviations_are_those_of_its_structures_misfits(dome, loaded):
+    """Each structure's own misfit is the value of the term of it alone."""
+    design, state, load = loaded
+    at = LoadedDesign(dome, design, solved(dome, design, state, load), load)
+    term = term_of(dome, design, load, ALL, pairs=3, deviations=1.5)
+    each = [replace(term, errors=(one,), deviations=0.0).measure(at).value[0] for one in term.errors]
+    assert np.std(each) > 0.1 * np.mean(each)
+    assert term.measure(at).value[0] == pytest.approx(np.mean(each) + 1.5 * np.std(each), rel=1e-9)
+    alone = replace(term, errors=term.errors[:1])
+    assert alone.measure(at).value[0] == pytest.approx(each[0], rel=1e-9), "one has no deviation"
+    assert alone.measure(at).whole().value[0] == pytest.approx(each[0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("deviations", "pairs"), [(0.0, PAIRS), (0.5, PAIRS_OF_DEVIATIONS)])
+def test_a_deviation_takes_more_structures_than_a_mean(dome, loaded, deviations, pairs):
+    design, _, load = loaded
+    term = term_of(dome, design, load, sf.Tolerances(load_all=0.1), deviations=deviations)
+    assert (len(term.errors), term.deviations) == (2 * pairs, deviations)
 
 
 def test_its_value_is_the_mean_misfit_of_structures_that_are_built(dome, loaded):
