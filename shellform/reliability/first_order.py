@@ -70,7 +70,9 @@ def moved_from(
         )
         built = assembly.with_parts(own)
         more = built_load(load, errors) - built.evaluate(state, tangent=False).force
-        return built, (more - assembly.force_along(state, errors.supports)).ravel()
+        if errors.supports.any():
+            more -= assembly.force_along(state, errors.supports)
+        return built, more.ravel()
 
     found = side_by_side(one, list(some))
     motions = solved(assembly, state, np.column_stack([more for _, more in found]))
