@@ -21,6 +21,7 @@ from shellform.records.summary import DesignRecord, LoadRecord, Summary
 from shellform.records.words import constraint_titles, load_title, number
 
 BUILT = ("optimised", "rounded", "polished")  # in the order in which they are made
+_SQUARED = ("misfit", "built_misfit")  # sums of squares of what users limit as a root mean square
 _AT_LEAST = ("softness", "slackness")  # of which as much is demanded, not at most
 _SETTLED = 1e-6  # unbalanced over largest force: what an equilibrium that counts as found stays below
 _EVALUATIONS = "Give the search twice the evaluations (optimise.evaluations), or loosen the limit."
@@ -331,7 +332,7 @@ def _settled(row: LoadRecord) -> Cell:
 
 
 def _constraint(name: str, value: float) -> Cell:
-    """From value / limit - 1 <= 0. A misfit counts by its square, a softness is 1 - (stiffness / least)², a
+    """From value / limit - 1 <= 0. Misfits count by their squares, a softness is 1 - (stiffness / least)², a
     slackness 1 - pull / least, and an uplift is offset, so that its share tells nothing."""
     if not math.isfinite(value):
         return Cell("not known", False)
@@ -341,7 +342,7 @@ def _constraint(name: str, value: float) -> Cell:
         return Cell(f"{ratio:.2f} ×", holds)
     if kind == "uplift":
         return Cell("within" if holds else "beyond", holds)
-    share = math.sqrt(max(1.0 + value, 0.0)) if kind == "misfit" else 1.0 + value
+    share = math.sqrt(max(1.0 + value, 0.0)) if kind in _SQUARED else 1.0 + value
     return Cell(f"{100.0 * share:.0f} %", holds)
 
 

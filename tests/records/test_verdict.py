@@ -87,6 +87,7 @@ def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, de
     values = {
         "cable_force": -0.65,
         "misfit.additional": -0.75,
+        "built_misfit": 0.44,
         "softness.additional": 0.19,
         "slackness.none": -0.5,
         "uplift.wind": 0.5,
@@ -101,13 +102,23 @@ def test_a_constraint_fails_above_zero_and_reads_as_share_of_its_limit(shell, de
     assert [cell.found for cell in found.values()] == [
         "35 %",
         "50 %",
+        "120 %",
         "0.90 ×",
         "1.50 ×",
         "beyond",
         "within",
         "not known",
     ]
-    assert [cell.holds for cell in found.values()] == [True, True, False, True, False, True, False]
+    assert [cell.holds for cell in found.values()] == [
+        True,
+        True,
+        False,
+        False,
+        True,
+        False,
+        True,
+        False,
+    ]
     assert {"Optimiser: uplift of supports, wind load", "Optimiser: other thing"} < set(found)
 
 
