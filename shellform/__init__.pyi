@@ -48,7 +48,6 @@ from shellform.output.pictures import render as render
 from shellform.output.workshop import drawings as drawings
 from shellform.output.workshop import nesting as nesting
 from shellform.output.workshop import schedules as schedules
-from shellform.problem import robust as robust
 from shellform.problem.constraints import AtLeast as AtLeast
 from shellform.problem.constraints import AtMost as AtMost
 from shellform.problem.constraints import Between as Between
@@ -66,7 +65,6 @@ from shellform.problem.paths import follow as follow
 from shellform.problem.problem import FEASIBLE as FEASIBLE
 from shellform.problem.problem import LoadCase as LoadCase
 from shellform.problem.problem import Problem as Problem
-from shellform.problem.robust import RobustMisfit as RobustMisfit
 from shellform.problem.terms import Bulges as Bulges
 from shellform.problem.terms import CableForce as CableForce
 from shellform.problem.terms import CableForces as CableForces
@@ -82,6 +80,7 @@ from shellform.problem.variables import FreeRadius as FreeRadius
 from shellform.problem.variables import Rates as Rates
 from shellform.problem.variables import RestLengths as RestLengths
 from shellform.problem.variables import Variable as Variable
+from shellform.reliability import robust as robust
 from shellform.reliability.built_misfit import BuiltMisfit as BuiltMisfit
 from shellform.reliability.built_misfit import built_misfit as built_misfit
 from shellform.reliability.drawing import Errors as Errors

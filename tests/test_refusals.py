@@ -168,7 +168,7 @@ def joint(**given):
         ("crew.step", lambda x: crew(step=x)),
         ("crew.largest", lambda x: crew(largest=x)),
         ("crew.cables", lambda x: crew(cables=x)),
-        ("robust.deviations", lambda x: sf.RobustMisfit("wet", sf.Tolerances(supports=1e-4), x)),
+        ("built_misfit.deviations", lambda x: sf.BuiltMisfit("wet", (None,), None, x)),
         ("figures.limit", lambda x: Look(limit=x)),
         ("dots", lambda x: Look(dots=x)),
         ("letters", lambda x: Look(letters=x)),

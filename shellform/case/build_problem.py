@@ -33,7 +33,6 @@ from shellform.problem.engineering import (
 )
 from shellform.problem.paths import follow
 from shellform.problem.problem import LoadCase, Problem
-from shellform.problem.robust import RobustMisfit
 from shellform.problem.terms import CableForce, CableForces, Misfit, RmsMisfit, RodRadius, Share, Term
 from shellform.problem.variables import FreeRadius, RestLengths, Variable
 from shellform.reliability.built_misfit import built_misfit
@@ -61,9 +60,9 @@ def case_problem(
     variables = varied(case, shell, frees_radius=frees_radius)
     if frees_radius:
         shares.append((entry.rod_radius, RodRadius()))
+    design, seed = LoadCase("design", loads["design"]), case.safety.seed + SEED
     if entry.built_misfit > 0.0 and entry.method != "paper":  # whose objective is (2)
-        design = LoadCase("design", loads["design"])
-        tolerances, seed = case_tolerances(case, shell), case.safety.seed + SEED
+        tolerances = case_tolerances(case, shell)
         shares.append((entry.built_misfit, built_misfit(shell, start, design, tolerances, seed=seed)))
     total = sum(share for share, _ in shares)
     others = [name for name in loads if name not in ("none", "design")]
@@ -73,9 +72,12 @@ def case_problem(
         if entry.method != "paper":  # whose constraint (5) is on the design load
             constraints.append(AtMost(case.cable.force_max, LargestCableForce(name, case.cable.force_max)))
     constraints += _engineers(case, shell, loads)
-    if case.robust is not None and case.robust.limit is not None:
-        robust = RobustMisfit("design", case_tolerances(case, shell), case.robust.deviations)
-        constraints.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
+    if case.robust is not None:
+        tolerances, added = case_tolerances(case, shell), case.robust.deviations
+        tolerances.require_causes()  # before the search: what the design to build is off by needs some
+        if case.robust.limit is not None:
+            robust = built_misfit(shell, start, design, tolerances, seed=seed, deviations=added)
+            constraints.append(AtMost(case.robust.limit**2 * shell.node_count, robust))
     used = dict(loads)
     further = {name: factor for name, factor in critical_factors_asked(case).items() if name != "design"}
     for name in further:

@@ -97,6 +97,21 @@ class Tolerances:
                     remedy=f"Write 0.1 for 10 %.{if_per_cents(value, LARGEST_SHARE)}",
                 )
 
+    @property
+    def causes(self) -> tuple[str, ...]:
+        """The names of those that aren't left out."""
+        return tuple(each.name for each in fields(self) if getattr(self, each.name) > 0.0)
+
+    def require_causes(self) -> None:
+        """Raises InputError where all are left out."""
+        if not self.causes:
+            raise InputError(
+                "nothing is off",
+                where="tolerances",
+                remedy=f"Give one of {', '.join(each.name for each in fields(self))} more than 0, such as "
+                "rod_stiffness = 0.03.",
+            )
+
     def only(self, *names: str) -> Tolerances:
         """The same with all other causes left out. Raises InputError for an unknown name."""
         known = [each.name for each in fields(self)]

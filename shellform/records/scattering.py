@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class CauseRecord:
-    """A cause of scatter: its share of the scatter of the `shape`, and of the misfit's `variance`."""
+    """A cause of error: its share of the scatter of the `shape`, and of that part of the misfit's `variance`
+    that comes of where the design as planned is off."""
 
     shape: float
     variance: float
@@ -16,8 +17,8 @@ class CauseRecord:
 
 @dataclass(frozen=True)
 class SampleRecord:
-    """Drawn structures: their `count`, those `lost` without an equilibrium, and the others' `misfit_mean` and
-    `misfit_deviation`, m²."""
+    """Drawn structures that were loaded: their `count`, those `lost` since they fall, and the others'
+    `misfit_mean` and `misfit_deviation`, m²."""
 
     count: int
     lost: int
@@ -27,10 +28,10 @@ class SampleRecord:
 
 @dataclass(frozen=True)
 class RobustRecord:
-    """What scatter does to a `design`: its `misfit` as planned, `misfit_mean` and `misfit_deviation`, m², as
-    sums over all nodes; `deviation_rms` as planned and `deviation_rms_mean`, m, root mean squares over the
-    nodes; `wander_max`, m: the largest scatter of a node; `causes` by name; the same in `sentences`; and a
-    drawn `sample`."""
+    """What scatter does to a `design`: its `misfit` as planned, `misfit_mean` and `misfit_deviation` as
+    built, to first order in the errors, m², as sums over all nodes; `deviation_rms` as planned and
+    `deviation_rms_mean`, m, root mean squares over the nodes; `wander_max`, m: the largest scatter of a
+    node; `causes` by name; the same in `sentences`; and a drawn `sample`."""
 
     design: str
     misfit: float

@@ -21,7 +21,6 @@ TITLES = {
 _CONSTRAINTS = {
     "cable_force": "cable forces",
     "misfit": "misfit",
-    "robust_misfit": "misfit with scatter",
     "built_misfit": "misfit as built",
     "softness": "stiffness of the softest mode",
     "utilisation": "rods' stress",

@@ -26,13 +26,12 @@ G the turn of its chord, so that its forces there are those of the perfect struc
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from shellform.arrays import Reals, reals
 from shellform.errors import require_count
-from shellform.gridshell.scatter import halves
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.members import Members
 from shellform.structure.elements import rotation
@@ -44,8 +43,6 @@ PERFECT = -1  # the number of the structure without errors
 SHAPES = 3  # softest modes in which the shape is off
 _LEAST = 0.2  # of an element's length is left to it by errors of marks
 _LEAST_CABLE = 0.05  # of a cable's rest length
-
-CAUSES = tuple(each.name for each in fields(Tolerances))
 
 
 @dataclass(frozen=True)
@@ -186,6 +183,13 @@ def built_cables(
 def built_load(load: Reals, errors: Errors) -> Reals:
     """The dead load (n, 6) with the errors."""
     return np.asarray(load * errors.load[:, None])
+
+
+def halves(places: Reals) -> Reals:
+    """Shares (n, 2) of a load that make one half of the plan heavier by as much as the other is lighter, in
+    two directions at right angles: a plane each, whose mean size over the nodes at `places` (n, 3) is 1."""
+    plan = places[:, :2] - places[:, :2].mean(axis=0)
+    return np.asarray(plan / np.maximum(np.abs(plan).mean(axis=0), 1e-300))
 
 
 def _load_factors(members: Members, t: Tolerances, z: Mapping[str, Reals]) -> Reals:

@@ -18,7 +18,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import CAUSES, built_cables, errors_of, variables
+from shellform.reliability.drawing import built_cables, errors_of, variables
 from shellform.reliability.path_of_one import Limit
 from shellform.reliability.standing import Workshop
 from shellform.structure.answers.stability import modes
@@ -66,7 +66,7 @@ def explained(workshop: Workshop, tolerances: Tolerances, *, seed: int, number: 
             value=number,
             remedy="Choose a structure that falls under this load.",
         )
-    active = [cause for cause in CAUSES if getattr(tolerances, cause) > 0.0]
+    active = list(tolerances.causes)
 
     def left(cause: str) -> Limit:
         other = {**z, cause: np.zeros_like(z[cause])}

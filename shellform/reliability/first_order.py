@@ -15,7 +15,6 @@ import numpy as np
 from shellform.arrays import Flags, Reals
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import (
-    CAUSES,
     Errors,
     Imperfections,
     built_beams,
@@ -95,7 +94,7 @@ def moved_by_cause(
     """By cause of error, the root mean square motion of a node, m, from its place in the perfect structure at
     the end of its path, where no other cause is off; nothing where that structure isn't stable."""
     assembly, state, load = assemble(nominal.network), nominal.states[-1], nominal.factors[-1] * nominal.load
-    causes = [name for name in CAUSES if getattr(tolerances, name) > 0.0]
+    causes = tolerances.causes
     some = [
         errors_of(
             nominal.members,

@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Gridshell
 from shellform.gridshell.layers import LOCK
-from shellform.gridshell.scatter import zones_of
 from shellform.structure.elements.beam import Beams
 from shellform.structure.model import Model
 
@@ -85,6 +85,13 @@ def members_of(shell: Gridshell) -> Members:
         places=shell.target.positions,
         beam_length=beams.rest_length,  # edge beams come last, and are made without error
     )
+
+
+def zones_of(shell: Gridshell) -> Indices:
+    """The crossing (n,) that each node's load is counted to: the nearest in the flat grid."""
+    grid = shell.net.grid
+    middle = grid.flat[grid.crossing_nodes].mean(axis=1)[:, :2]
+    return np.asarray(cKDTree(middle).query(grid.flat[:, :2])[1], dtype=np.int64)
 
 
 def members_of_model(model: Model) -> Members:

@@ -19,7 +19,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import CAUSES, errors_of, sizes
+from shellform.reliability.drawing import errors_of, sizes
 from shellform.reliability.members import Members
 from shellform.reliability.standing import Workshop
 from shellform.reliability.subset import Rare, subset_simulation
@@ -60,7 +60,7 @@ def rare_failure(
     call with the same arguments told, so that it goes on from there. Raises InputError for a `count` that
     isn't a multiple of ten of at least 20."""
     members = workshop.nominal.members
-    names = [name for name in CAUSES if getattr(tolerances, name) > 0.0]
+    names = list(tolerances.causes)
     counts = sizes(members)
 
     def one(z: Reals) -> float:

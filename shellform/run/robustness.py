@@ -12,8 +12,8 @@ from shellform.arrays import Reals
 from shellform.case.limit_entries import RobustEntry
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.problem import robust
 from shellform.records.scattering import CauseRecord, RobustRecord, SampleRecord
+from shellform.reliability import robust
 from shellform.structure.elements.state import State
 from shellform.tables import Table
 
@@ -35,23 +35,31 @@ class Robustness:
             misfit_mean=spread.mean,
             misfit_deviation=spread.deviation,
             deviation_rms=float(np.sqrt(spread.nominal / self.nodes)),
-            deviation_rms_mean=float(np.sqrt(max(spread.mean, 0.0) / self.nodes)),
+            deviation_rms_mean=float(np.sqrt(spread.mean / self.nodes)),
             wander_max=float(spread.node_deviation.max()),
             causes={name: CauseRecord(shape, variance) for name, (shape, variance) in spread.causes.items()},
-            sentences=(*spread.sentences(), *self._lost()),
+            sentences=(*spread.sentences(), *self._checked()),
             sample=self._sampled(),
         )
 
-    def _lost(self) -> list[str]:
-        """What drawn structures without an equilibrium mean, in words."""
-        if self.sample is None or not self.sample.lost:
+    def _checked(self) -> list[str]:
+        """What the structures that were loaded say of the prediction, in words."""
+        told = self._sampled()
+        if told is None:
             return []
-        drawn = len(self.sample.misfits) + self.sample.lost
-        return [
-            f"{self.sample.lost} of {drawn} structures drawn have no equilibrium on the stable branch: the "
-            "design is too near the end of its path for these tolerances. Ask for a larger "
-            "safety.critical_factor, or limit the robust misfit (robust.limit)."
-        ]
+        stand, found = told.count - told.lost, []
+        if told.misfit_mean is not None and told.misfit_deviation is not None:
+            found.append(
+                f"Of {told.count} structures drawn and loaded {stand} stand, with a misfit of "
+                f"{told.misfit_mean:.3g} ± {told.misfit_deviation:.2g} m²."
+            )
+        if told.lost:
+            found.append(
+                f"{told.lost} of {told.count} structures drawn fall under the load: the design is too near "
+                "the end of its path for these tolerances. Ask for a larger safety.critical_factor, or limit "
+                "the misfit as built (robust.limit)."
+            )
+        return found
 
     def _sampled(self) -> SampleRecord | None:
         if self.sample is None:
@@ -75,11 +83,12 @@ class Robustness:
             "share of the variance of the misfit",
         )
         causes = sorted(self.spread.causes.items(), key=lambda each: -each[1][0])
+        squared = (self.spread.mean - self.spread.nominal) / self.nodes
         rows = tuple(
             (
                 name,
                 f"{shape:.4f}",
-                f"{1e3 * np.sqrt(shape * self.spread.linear / self.nodes):.4f}",
+                f"{1e3 * np.sqrt(shape * squared):.4f}",
                 f"{variance:.4f}",
             )
             for name, (shape, variance) in causes
@@ -90,10 +99,11 @@ class Robustness:
 def robustness(
     entry: RobustEntry, shell: Gridshell, design: Design, state: State, load: Reals, tolerances: Tolerances
 ) -> Robustness:
-    """Of the design's stable `state` under the `load`. Raises NotConverged where it isn't stable."""
-    spread = robust.spread(shell, design, state, load, tolerances)
+    """Of the design's stable `state` under the `load`. Raises InputError where no tolerance is given,
+    NotConverged where the state isn't stable."""
+    spread = robust.spread(shell, design, state, load, tolerances, seed=entry.seed)
     drawn = (
-        robust.sample(shell, design, state, load, tolerances, count=entry.samples, seed=entry.seed)
+        robust.sample(shell, design, load, tolerances, count=entry.samples, seed=entry.seed)
         if entry.samples
         else None
     )

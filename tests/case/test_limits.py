@@ -10,12 +10,14 @@ import pytest
 
 import shellform as sf
 from shellform.case.build_problem import case_problem
+from shellform.case.build_safety import case_tolerances
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
 from shellform.gridshell.reactions import reactions
 from shellform.optimiser import rounding
 from shellform.records.progress import Kind
-from shellform.reliability.built_misfit import PAIRS
+from shellform.reliability.built_misfit import PAIRS, PAIRS_OF_DEVIATIONS, built_misfit
+from shellform.reliability.trial_structures import SEED
 from shellform.run.designs import load_record
 from shellform.run.folder import read_run
 from shellform.run.optimising import _solver
@@ -61,7 +63,7 @@ def test_every_limit_of_the_case_reaches_the_problem_under_every_load(shell, loa
     assert [load for name, load in kinds if name == "LeastTension"] == ["none", "additional"]
     assert ("LargestCableForce", "additional") in kinds
     assert ("ModalStiffness", "critical additional") in kinds
-    assert ("RobustMisfit", "design") in kinds
+    assert ("BuiltMisfit", "design") in kinds
     plain = case_problem(load_case(CASE), shell, loads, shell.design())
     assert list(plain.loads) == ["design", "none", "additional"]
     assert len(plain.constraints) == 3
@@ -97,7 +99,9 @@ def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
     assert above("CableForces", "design") == 18.0
     assert above("LargestCableForce", "additional") == 18.0
     assert above("RmsMisfit", "additional") == pytest.approx(0.004**2)
-    assert above("RobustMisfit", "design") == pytest.approx(0.003**2 * shell.node_count)
+    robust = found["BuiltMisfit", "design"].term
+    assert (robust.deviations, len(robust.errors)) == (1.0, 2 * PAIRS_OF_DEVIATIONS)
+    assert above("BuiltMisfit", "design") == pytest.approx(0.003**2 * shell.node_count)
     least = found["LeastTension", "none"]
     assert (least.lower, least.upper, least.term.scale) == (0.05, np.inf, 0.05)
     assert least.term.let_out == pytest.approx(
@@ -110,6 +114,31 @@ def test_every_limit_has_the_case_s_amount_in_the_term_s_own_unit(shell, loads):
     assert kept.upper == np.inf
     assert problem.decisive_load() == "critical additional"
     assert problem.built_under == ("design", "additional")
+
+
+def test_the_misfit_as_built_is_limited_by_structures_that_neither_try_nor_judge_a_design(shell, loads):
+    """By the case's own tolerances and deviations, under the seed of the search and with later numbers."""
+    settings = ["tolerances.supports=3e-4", "robust.limit=0.003", "robust.deviations=0.5", "safety.seed=2"]
+    (limit,) = [
+        each
+        for each in case_problem(load_case(CASE, settings), shell, loads, shell.design()).constraints
+        if isinstance(each.term, sf.BuiltMisfit)
+    ]
+    case = load_case(CASE, settings)
+    wet = sf.LoadCase("design", loads["design"])
+    same = built_misfit(
+        shell, shell.design(), wet, case_tolerances(case, shell), seed=2 + SEED, deviations=0.5
+    )
+    assert limit.term.deviations == 0.5
+    for one, other in zip(limit.term.errors, same.errors, strict=True):
+        np.testing.assert_array_equal(one.supports, other.supports)
+
+
+def test_where_nothing_is_off_a_case_that_asks_what_it_does_is_refused_before_the_search(shell, loads):
+    causes = [each.name for each in dataclasses.fields(sf.Tolerances)]
+    case = load_case(CASE, ["robust.samples=5", *(f"tolerances.{name}=0" for name in causes)])
+    with pytest.raises(InputError, match="tolerances: nothing is off"):
+        case_problem(case, shell, loads, shell.design())
 
 
 def test_an_uplift_is_measured_against_what_a_support_bears_where_less_is_allowed(shell, loads):
@@ -286,7 +315,15 @@ def test_a_run_keeps_its_limits_and_tells_what_scatter_does(tmp_path):
     assert summary.robust.sample.count == 5
     with (tmp_path / "schedules/robust.csv").open(encoding="utf-8", newline="") as file:
         causes = list(csv.DictReader(file))
-    assert {each["cause"] for each in causes} == {"supports", "load_all", "load_uneven"}
+    assert {each["cause"] for each in causes} == {
+        "supports",
+        "marks",
+        "rod_stiffness",
+        "rod_bow",
+        "load_all",
+        "load_uneven",
+        "shape",
+    }
     assert sum(float(each["share of the scatter of the shape"]) for each in causes) == pytest.approx(
         1.0, abs=1e-3
     )

@@ -57,6 +57,14 @@ def test_only_leaves_all_other_causes_out():
     assert found == Tolerances(supports=2e-3)
 
 
+def test_causes_are_those_that_are_not_left_out_and_where_none_is_it_is_said_what_to_give():
+    rough = Tolerances(marks=1e-3, load_all=0.1)
+    assert rough.causes == ("marks", "load_all")
+    rough.require_causes()
+    with pytest.raises(InputError, match=r"tolerances: nothing is off.*cable_length.*rod_stiffness = 0\.03"):
+        Tolerances(marks=0.0).require_causes()
+
+
 def test_an_unknown_cause_is_refused_with_the_known_ones():
     with pytest.raises(InputError, match="Known: cable_length"):
         Tolerances().only("cables")

@@ -245,7 +245,7 @@ def test_seeds_that_are_none_are_refused_before_anything_is_drawn():
         with pytest.raises(sf.InputError, match="seed: must be"):
             sf.retensioning.replay(*[None] * 6, noise=1e-4, rounds=1, seed=seed)
         with pytest.raises(sf.InputError, match=r"sample\.seed: must be"):
-            sf.robust.sample(*[None] * 5, count=1, seed=seed)
+            sf.robust.sample(*[None] * 4, count=1, seed=seed)
 
 
 @dataclass(frozen=True)

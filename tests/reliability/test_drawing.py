@@ -15,6 +15,7 @@ from shellform.reliability.drawing import (
     built_load,
     draw_errors,
     errors_of,
+    halves,
     sizes,
     variables,
 )
@@ -182,6 +183,14 @@ def test_rods_bow_and_stiffen_with_their_locks_and_connectors_each_and_all_toget
     found = errors_of(members, Tolerances(supports=0.01, shape=0.001), z)
     assert found.supports[1].tolist() == pytest.approx([0.01, 0.0, -0.02, 0.0, 0.0, 0.0])
     assert found.shape == pytest.approx([0.004, 0.0, -0.004]), "of the longest side, 4 m"
+
+
+def test_one_half_of_the_plan_is_heavier_by_as_much_as_the_other_is_lighter_and_by_the_share_on_average():
+    places = np.array([[0.0, 10.0, 1.0], [1.0, 10.0, 2.0], [5.0, 40.0, 3.0], [6.0, 20.0, 9.0]])
+    shares = halves(places)
+    assert shares[:, 0] == pytest.approx(np.array([-3.0, -2.0, 2.0, 3.0]) / 2.5)
+    assert shares[:, 1] == pytest.approx(np.array([-10.0, -10.0, 20.0, 0.0]) / 10.0)
+    assert halves(places * [1.0, 0.0, 1.0])[:, 1].tolist() == [0.0] * 4, "in a row there is no other half"
 
 
 def test_loads_of_zones_halves_and_the_whole_multiply():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import CAUSES, errors_of, variables
+from shellform.reliability.drawing import errors_of, variables
 from shellform.reliability.first_order import moved_by_cause, moved_from
 from shellform.reliability.standing import Workshop
 from shellform.structure.network import assemble
@@ -19,7 +19,7 @@ def of_one(cause, times=1.0):
     return replace(Tolerances(), **{cause: times * SIZES.get(cause, 0.02)})
 
 
-@pytest.mark.parametrize("cause", CAUSES)
+@pytest.mark.parametrize("cause", ONE.causes)
 def test_the_error_of_the_first_order_falls_with_the_square_of_the_errors(nominal, cause):
     """The slope of |x(h) - x(0) - h dx| over h between 1/4, 1/8 and 1/16 of an error is two."""
     state, load, workshop = nominal.states[-1], nominal.factors[-1] * nominal.load, Workshop(nominal)

@@ -1,9 +1,11 @@
 """Which beams of a model file are one rod, in which sense, and where it is marked; and the box round it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from shellform.reliability.members import members_of_model
+from shellform.reliability.members import members_of_model, zones_of
 from shellform.structure.elements.beam import make_beams
 from shellform.structure.elements.cable import make_cables
 from shellform.structure.elements.state import at_rest
@@ -104,3 +106,20 @@ def test_the_span_is_the_longest_side_of_the_box_round_the_start_or_without_one_
     assert found.span == pytest.approx(3.0 + np.sqrt(0.75))
     tall = model_of(PLACES * [1.0, 1.0, 20.0], start=False)
     assert members_of_model(tall).span == pytest.approx(5.0)
+
+
+def test_a_node_s_load_is_counted_to_the_crossing_that_is_nearest_on_the_flat_grid():
+    """The first crossing's rods lie on each other, the second's 1 apart in plan, its middle at 2.5."""
+    flat = np.array(
+        [
+            [0.0, 0.0, 0.0],
+            [0.0, 0.0, 1.0],
+            [3.0, 1.0, 0.0],
+            [2.0, 1.0, 1.0],
+            [1.2, 0.5, 0.0],
+            [1.4, 0.5, 9.0],
+        ]
+    )
+    grid = SimpleNamespace(flat=flat, crossing_nodes=np.array([[0, 1], [2, 3]]))
+    shell = SimpleNamespace(net=SimpleNamespace(grid=grid))
+    assert zones_of(shell).tolist() == [0, 0, 1, 1, 0, 1]

@@ -10,7 +10,7 @@ from shellform.errors import InputError
 from shellform.gridshell.tolerances import Tolerances, default_tolerances
 from shellform.reliability import path_of_one, standing
 from shellform.reliability.branch import STRAY, Branch
-from shellform.reliability.drawing import CAUSES, built_beams, built_cables, built_load, errors_of, variables
+from shellform.reliability.drawing import built_beams, built_cables, built_load, errors_of, sizes, variables
 from shellform.reliability.path_of_one import BORNE, ENDED, UNLOADED, Limit
 from shellform.reliability.perfect import perfect, perfect_of
 from shellform.reliability.standing import Workshop, sample
@@ -116,12 +116,13 @@ def test_a_structure_has_the_same_bits_whatever_the_count_the_order_and_the_thre
 
 
 def test_causes_are_drawn_each_on_its_own_with_mean_zero_and_deviation_one(nominal):
-    z = {name: [] for name in CAUSES}
+    causes = list(sizes(nominal.members))
+    z = {name: [] for name in causes}
     for number in range(40):
         for name, values in variables(nominal.members, 1, number).items():
             z[name].append(values)
-    every = [np.concatenate(z[name]) for name in CAUSES]
-    for name, values in zip(CAUSES, every, strict=True):
+    every = [np.concatenate(z[name]) for name in causes]
+    for name, values in zip(causes, every, strict=True):
         assert abs(values.mean()) < 4.0 / np.sqrt(len(values)), name
         assert abs(values.std() - 1.0) < 4.0 / np.sqrt(2 * len(values)), name
     assert len(np.unique(np.concatenate(every))) == sum(map(len, every))

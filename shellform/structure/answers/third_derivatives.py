@@ -2,8 +2,8 @@
 of the elements' energies, exact.
 
 For motions l_k, r_k of the nodes at fixed l, r the tangent K gives B = sum of l_k'K r_k; l = r = a mode is
-that mode's stiffness, l the multipliers of linear answers r what a robust design derives. B is linear in the
-sum of l_k r_k', so that any number of motions costs what one does. Of beams it is derived in one compiled
+that mode's stiffness, l the multipliers of linear answers r what a misfit as built derives. B is linear in
+the sum of l_k r_k', so that any number of motions costs what one does. Of beams it is derived in one compiled
 pass (beam_thirds.py). A cable with its ends' relative motions p_k, q_k along l_k, r_k, a = e·p, b = e·q, has
 
     B = EA/l0 (p·q - (l0/l) (p·q - a b)),
