@@ -184,7 +184,7 @@ def _part(entry: Any, shell: Gridshell, surface: Surface) -> Reals:
     if isinstance(entry, JointsWeightEntry):
         return loads.joints(net, entry.mass)
     own = loads.rods(net, shell.rod.section)
-    return own if shell.edge is None or not net.edges else own + weight(net, shell.edge)
+    return own if shell.edge is None else own + weight(net, shell.edge)
 
 
 def _region(entry: ConcreteEntry | SheetEntry) -> Region:

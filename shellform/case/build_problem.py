@@ -152,6 +152,6 @@ def _stiffness(shell: Gridshell, start: Design, load: Reals) -> float:
 
 def edge_utilisation(shell: Gridshell, beams: Beams, forces: Reals) -> float:
     """Largest stress of the edge beams over their strength; 0 without edge beams."""
-    if shell.edge is None or not shell.net.edges:
+    if shell.edge is None:
         return 0.0
     return float(np.nanmax(results.utilisation(beams, forces, {EDGE: shell.edge.section})))

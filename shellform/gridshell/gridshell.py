@@ -163,7 +163,7 @@ class Design:
 @dataclass(frozen=True)
 class Gridshell:
     """A net with its rod, joint and candidate cables: `cable_ends` (c, 2) nodes, `cable_lengths` (c,), m, in
-    the target; `edge`, what its edge beams are, if it has any.
+    the target; `edge`, what its edge beams are (None where the net has none, whatever was given).
     """
 
     net: Net
@@ -185,6 +185,7 @@ class Gridshell:
         lengths = np.linalg.norm(place[:, 1] - place[:, 0], axis=1)
         object.__setattr__(self, "cable_lengths", reals("cable_lengths", lengths, (count,), positive=True))
         object.__setattr__(self, "_edges", edge_beams(self.net, self.edge, self.rod.stiffness))
+        object.__setattr__(self, "edge", self.edge if self.net.edges else None)
         object.__setattr__(self, "_locks", locks(self.net, self.rod.section, self.target))
         object.__setattr__(self, "_made", {})
 

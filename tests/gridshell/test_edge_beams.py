@@ -232,6 +232,13 @@ def test_a_net_with_edge_beams_needs_to_know_what_they_are(arches):
         replace(shell, edge=None)
 
 
+def test_a_net_without_edge_beams_has_none_whatever_is_said_of_them(arches):
+    shell, _ = arches
+    plain = replace(shell, net=replace(shell.net, edges=()))
+    assert shell.edge is not None
+    assert plain.edge is None
+
+
 def test_opensees_refuses_what_it_cannot_say(arches, solved):
     shell, load = arches
     with pytest.raises(InputError, match="built into the bent state") as caught:

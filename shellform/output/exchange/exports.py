@@ -198,7 +198,7 @@ def write_glb(path: str | Path, built: Built, target: Surface, *, load: str = "d
         ways = [state.positions[nodes] + level * up[nodes] for nodes in rods for level in _levels(built)]
         solids.append(Solid(f"rods {direction}", *_tubes(ways, radius), _shade(f"rods {direction}")))
     shell = built.shell
-    if shell.edge is not None and shell.net.edges:
+    if shell.edge is not None:
         ways = [state.positions[_path(line)] for line in shell.net.edges]
         thick = max(shell.edge.section.fibres)
         solids.append(Solid("edge beams", *_tubes(ways, thick), _shade("edge beams")))

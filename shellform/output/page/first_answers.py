@@ -114,7 +114,7 @@ def answers(
 
 def _beams(shell: Gridshell) -> str:
     """The edge beams to buy, which may be heavier than all rods."""
-    if shell.edge is None or not shell.net.edges:
+    if shell.edge is None:
         return ""
     heavy = mass(shell.net, shell.edge)
     length, weight = number(float(lengths(shell.net).sum())), f" ({number(heavy)} kg)" if heavy > 0.0 else ""
