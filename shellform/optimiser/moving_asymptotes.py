@@ -38,7 +38,7 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.convex import minimise
-from shellform.optimiser.optimum import Checkpoint, Optimum, Step
+from shellform.optimiser.optimum import Checkpoint, Optimum, Step, largest, summed
 from shellform.optimiser.solver import check_settings
 from shellform.optimiser.trials import reach, staged
 from shellform.problem.evaluation import COUNTS, Evaluated, Evaluator, Linearisation, OffBranch
@@ -295,14 +295,14 @@ def _step(search: _Search, point: Evaluated, accepted: bool) -> Step:
     return Step(
         evaluation=search.evaluator.evaluations,
         objective=point.objective,
-        terms={
-            problem.column(part.term): float(value)
+        terms=summed(
+            (problem.column(part.term), float(value))
             for part, value in zip(problem.minimise, point.terms, strict=True)
-        },
-        constraints={
-            problem.column(part.term): float(point.constraints[own].max(initial=-np.inf))
+        ),
+        constraints=largest(
+            (problem.column(part.term), float(point.constraints[own].max(initial=-np.inf)))
             for part, own in zip(problem.constraints, problem.places(), strict=True)
-        },
+        ),
         cables=int((pull > 0.0).sum()),
         stage=search.stage,
         accepted=accepted,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,8 +20,8 @@ class Step:
     """One trial in the history.
 
     - `evaluation`: its number.
-    - `objective` and its weighted `terms` by name; `constraints` by name, the largest value of each, at most
-      0 where kept.
+    - `objective` and its weighted `terms` by name, those of one name added up; `constraints` by name, the
+      largest value of all of that name, at most 0 where they are kept.
     - `cables` in tension under the design load; `stage`: share of the additional loads.
     - `accepted`: whether it was; `seconds` since the start.
     - `phase` of the search, "" where it has none or it isn't known.
@@ -56,8 +56,8 @@ class Optimum:
     The design:
     - `design`, without its slack cables, and how it carries each load on the documented path, `loaded`,
       "none" first.
-    - `objective`, and of the start `objective_start`; `constraints` by name, the largest value of each, at
-      most 0 where kept.
+    - `objective`, and of the start `objective_start`; `constraints` by name, the largest value of all of that
+      name, at most 0 where they are kept.
     - `problem` that it answers; `stiffness`, N/m, that the softest mode had to keep under the additional
       loads.
 
@@ -100,3 +100,19 @@ class Optimum:
     def states(self) -> dict[str, State]:
         """The equilibrium state by load case."""
         return {name: loaded.equilibrium.state for name, loaded in self.loaded.items()}
+
+
+def summed(named: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Values by name, those of one name added up."""
+    found: dict[str, float] = {}
+    for name, value in named:
+        found[name] = found.get(name, 0.0) + value
+    return found
+
+
+def largest(named: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """Values by name, of one name the largest."""
+    found: dict[str, float] = {}
+    for name, value in named:
+        found[name] = max(found.get(name, value), value)
+    return found

@@ -14,7 +14,7 @@ from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.guards import Guard, solved_guard, whole_guard
-from shellform.optimiser.optimum import Checkpoint, Optimum, Step
+from shellform.optimiser.optimum import Checkpoint, Optimum, Step, largest, summed
 from shellform.optimiser.solver import SequentialConvex
 from shellform.optimiser.step_model import StepModel, step_model
 from shellform.problem.constraints import AtLeast, Constraint, residuals
@@ -257,11 +257,11 @@ def kept_in_mind(search: Search, design: Design, least: Mapping[int, float]) -> 
     the factors of the largest load that they are to bear, remembered in the design. Raises NotConverged."""
     assert search.asked is not None
     problem, asked, safety = search.problem, search.asked.trial, search.asked.trial.safety
-    largest, _ = largest_on_path(asked)
+    decisive, _ = largest_on_path(asked)
     drawn = scenarios(
         problem.shell,
         design,
-        LoadCase(largest, asked.loads[largest]),
+        LoadCase(decisive, asked.loads[decisive]),
         asked.tolerances,
         seed=safety.seed + SEED,
         least=least,
@@ -302,8 +302,8 @@ def violation(search: Search, point: Evaluated) -> float:
     values = [float(point.constraints[:limits].max(initial=-1.0))]
     pull = tensions(search, point).max(initial=0.0)
     values += [float(residuals(part, np.array([pull]))[0]) for part in search.bounded]
-    largest = max(values)
-    return largest if largest > FEASIBLE else 0.0
+    worst = max(values)
+    return worst if worst > FEASIBLE else 0.0
 
 
 def missed(search: Search, point: Evaluated) -> float:
@@ -333,22 +333,22 @@ def noted(search: Search, it: Iterate, point: Evaluated, accepted: bool) -> Iter
 def record(search: Search, point: Evaluated, stage: float, accepted: bool, phase: str) -> Step:
     """A trial as a step of the history, told to who watches."""
     problem, pull = search.evaluator.problem, tensions(search, point)
-    terms = {
-        problem.column(part.term): float(value)
+    terms = summed(
+        (problem.column(part.term), float(value))
         for part, value in zip(problem.minimise, point.terms, strict=True)
-    }
-    largest = np.array([pull.max(initial=0.0)])
-    constraints = {problem.column(part.term): float(residuals(part, largest)[0]) for part in search.bounded}
-    constraints |= {
-        problem.column(part.term): float(point.constraints[own].max(initial=-np.inf))
+    )
+    most = np.array([pull.max(initial=0.0)])
+    limits = [(problem.column(part.term), float(residuals(part, most)[0])) for part in search.bounded]
+    limits += [
+        (problem.column(part.term), float(point.constraints[own].max(initial=-np.inf)))
         for part, own in zip(problem.constraints, problem.places(), strict=True)
         if own.stop <= len(point.constraints) - in_mind(search)
-    }
+    ]
     step = Step(
         evaluation=search.evaluator.evaluations,
         objective=point.objective,
         terms=terms,
-        constraints=constraints,
+        constraints=largest(limits),
         cables=int((pull > 0.0).sum()),
         stage=stage,
         accepted=accepted,

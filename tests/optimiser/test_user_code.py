@@ -284,3 +284,32 @@ def test_late_derivatives_of_another_shape_are_refused_as_early_ones_are(coarse)
     told = measured(LateSag("wet", (30,), rows=2), at)
     with pytest.raises(sf.InputError, match=r"by_dof.*another shape"):
         told.whole()
+
+
+@pytest.mark.parametrize("solver", [sf.SequentialConvex(), sf.MovingAsymptotes()])
+def test_a_broken_limit_shows_beside_a_kept_one_of_the_same_name_whichever_comes_first(coarse, solver):
+    (node,), (drop,) = lowest(coarse, 1)
+    sag = Sag("wet", (node,))
+    kept, broken = sf.AtLeast(-1.0, sag, of=1.0), sf.AtMost(-1.0, sag, of=1.0)
+    few = sf.AtMost(0.001, sf.CableForces("wet", (0, 1)))
+    for limits in ([broken, kept], [kept, broken]):
+        asked = problem(coarse, *limits, variables=[sf.RestLengths()])
+        best = sf.optimise(asked, coarse.design(), evaluations=1, solver=solver)
+        assert best.history[0].constraints["sag"] == pytest.approx(1.0 + drop)
+        assert best.constraints["sag"] > 0.5
+    for limits in (
+        [sf.AtMost(20.0, sf.CableForces("wet")), few],
+        [few, sf.AtMost(20.0, sf.CableForces("wet"))],
+    ):
+        asked = problem(coarse, *limits, variables=[sf.RestLengths()])
+        best = sf.optimise(asked, coarse.design(), evaluations=1, solver=solver)
+        assert best.history[0].constraints["cable_force"] > 10.0
+
+
+@pytest.mark.parametrize("solver", [sf.SequentialConvex(), sf.MovingAsymptotes()])
+def test_the_told_terms_of_an_objective_add_up_to_it_where_two_have_one_name(coarse, solver):
+    shares = [sf.Share(0.5, sf.Misfit("wet")), sf.Share(0.5, sf.RmsMisfit("wet"))]
+    asked = problem(coarse, variables=[sf.RestLengths()], minimise=shares)
+    best = sf.optimise(asked, coarse.design(), evaluations=2, solver=solver)
+    for step in best.history:
+        assert sum(step.terms.values()) == pytest.approx(step.objective, rel=1e-12)
