@@ -15,6 +15,7 @@ from dataclasses import replace
 from shellform.optimiser.descent import descend
 from shellform.optimiser.going_back import last_sound
 from shellform.optimiser.minding import WORTH, finely, led_by, turned
+from shellform.optimiser.optimum import worse
 from shellform.optimiser.search_state import Iterate, Search, accepted_design, taut_count
 from shellform.optimiser.trials import fresh, sound
 from shellform.reliability.trial_structures import aims
@@ -75,7 +76,7 @@ def agreed(search: Search, it: Iterate) -> tuple[bool, Iterate]:
             found, before = it.point.objective, it.led_to
             if found < before:
                 it = replace(it, stood=len(it.accepted), led_to=found)
-            if it.mind is None or it.paused or not found < (1.0 - WORTH) * before:
+            if it.mind is None or it.paused or not found < worse(before, -WORTH):
                 break
         least = {} if judged.stands else aims(asked.sample(it.samples), judged)
         it = led_by(search, it, it.accepted[-1].built, least)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from shellform.optimiser.optimum import worse
 from shellform.optimiser.proposal import propose
 from shellform.optimiser.resuming import tell
 from shellform.optimiser.search_state import (
@@ -67,7 +68,7 @@ def descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
         if status:
             it = replace(it, status=status)
             worth = solver.settled if search.asked is None else _WORTH
-            turned = it.guarded and it.point.objective > (1.0 - worth) * it.before
+            turned = it.guarded and it.point.objective > worse(it.before, -worth)
             idle = not it.guarded and it.point.objective == it.before  # guarded it would try the same again
             # without further loads there are no guards
             if search.always_guarded or turned or idle or len(search.evaluator.problem.used()) == 1:
@@ -93,7 +94,7 @@ def _settled(search: Search, it: Iterate, predicted: float) -> str:
     if it.stage < 1.0:
         return ""
     kept = violation(search, it.point) <= 0.0
-    if kept and -predicted < solver.settled * it.point.objective and it.window >= search.tension:
+    if kept and -predicted < solver.settled * abs(it.point.objective) and it.window >= search.tension:
         return f"the model predicts less than {solver.settled:.1%} improvement"
     if it.window < solver.smallest * search.tension:
         return (

@@ -20,6 +20,7 @@ from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.optimiser.descent import descend
 from shellform.optimiser.going_back import last_sound
+from shellform.optimiser.optimum import worse
 from shellform.optimiser.search_state import (
     Iterate,
     Search,
@@ -73,7 +74,7 @@ def led(search: Search, it: Iterate) -> Iterate:
             before = it.led_to
             if found.objective < before:
                 it = replace(it, stood=len(it.accepted), led_to=found.objective)
-            if not found.objective < (1.0 - WORTH) * before:
+            if not found.objective < worse(before, -WORTH):
                 break
         if search.evaluator.evaluations >= last:
             break

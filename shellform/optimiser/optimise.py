@@ -58,7 +58,7 @@ from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.minding import as_borne, finely
 from shellform.optimiser.moving_asymptotes import MovingAsymptotes, minimise_directly
-from shellform.optimiser.optimum import Checkpoint, Optimum, Step
+from shellform.optimiser.optimum import Checkpoint, Optimum, Step, worse
 from shellform.optimiser.phases import run
 from shellform.optimiser.resuming import resumed
 from shellform.optimiser.search_state import (
@@ -184,7 +184,7 @@ def polish(
     found = _polished(best, solver, evaluations, groups, progress, judging)
     if groups is not None or found.design is best.design:
         return found
-    while found.mind and found.objective < (1.0 - _AGAIN) * found.objective_start:
+    while found.mind and found.objective < worse(found.objective_start, -_AGAIN):
         spent = found.evaluations
         if spent >= evaluations:
             break

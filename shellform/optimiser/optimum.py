@@ -116,3 +116,8 @@ def largest(named: Iterable[tuple[str, float]]) -> dict[str, float]:
     for name, value in named:
         found[name] = max(found.get(name, value), value)
     return found
+
+
+def worse(objective: float, share: float) -> float:
+    """What is worse than an objective of either sign by a `share` of its size; better, of a share below 0."""
+    return (1.0 + share) * objective if objective >= 0.0 else (1.0 - share) * objective

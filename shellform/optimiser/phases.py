@@ -23,6 +23,7 @@ from shellform.optimiser.minding import (
     ready_to_lead,
     remembering,
 )
+from shellform.optimiser.optimum import worse
 from shellform.optimiser.proposal import propose
 from shellform.optimiser.resuming import tell
 from shellform.optimiser.search_state import (
@@ -225,7 +226,7 @@ def _thin(search: Search, it: Iterate) -> Iterate:
         # constraints that it breaks are the repair's business; but repairs serve the objective too, with what
         # made a design stand
         if found is None and not it.fell and trial is not None:
-            if trial.objective < 2.0 * budget.objective:
+            if trial.objective < worse(budget.objective, 1.0):
                 trial, it = _repaired(search, it, trial)
             found, it = _made_to_stand(search, it, trial, budget)
         if found is None:

@@ -21,10 +21,10 @@ from shellform.optimiser.moving_asymptotes import MovingAsymptotes
 from shellform.optimiser.optimise import optimise
 from shellform.optimiser.optimum import Optimum
 from shellform.optimiser.solver import SequentialConvex
-from shellform.problem.evaluation import start_weights
 from shellform.problem.paths import deviations, follow
 from shellform.problem.problem import FEASIBLE, Problem
 from shellform.problem.terms import LoadedDesign, measured
+from shellform.problem.weights import start_weights
 from shellform.reliability.safety import Safety
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.sections import mass_per_length

@@ -12,6 +12,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
+from shellform.optimiser.optimum import worse
 from shellform.optimiser.proposal import Task
 from shellform.optimiser.search_state import (
     Accepted,
@@ -29,7 +30,7 @@ from shellform.reliability.trial_structures import FRESH, JudgedTrial, Required,
 from shellform.structure.elements.state import State
 from shellform.structure.solve.loading import SMALLEST, apply_load
 
-_ELSEWHERE = 1.1  # times the objective: a design that is worse has come to another equilibrium
+_ELSEWHERE = 0.1  # of the objective: a design that is worse by more has come to another equilibrium
 _COARSE = 0.5  # the first load step of a search for the end of a branch
 
 
@@ -99,7 +100,7 @@ def sound(search: Search, before: Accepted) -> Evaluated | None:
     except OffBranch:
         return None
     kept = violation(search, found) <= max(before.violation, 0.0)
-    return found if kept and found.objective <= _ELSEWHERE * before.objective else None
+    return found if kept and found.objective <= worse(before.objective, _ELSEWHERE) else None
 
 
 def standing(search: Search, it: Iterate, built: Design) -> tuple[bool, Iterate]:

@@ -22,8 +22,9 @@ from shellform.gridshell.gridshell import Design
 from shellform.problem.constraints import residual_rows, residuals
 from shellform.problem.paths import follow
 from shellform.problem.problem import FEASIBLE, Problem
-from shellform.problem.terms import LoadedDesign, Measurement, Term, measured
+from shellform.problem.terms import LoadedDesign, Measurement, NotANumber, Term, measured
 from shellform.problem.variables import Blocks
+from shellform.problem.weights import start_weights
 from shellform.structure.answers.sensitivity import (
     by_rest_length,
     by_stiffness,
@@ -127,7 +128,7 @@ class Evaluator:
         """Loads the start design step by step, sets the objective's weights, and returns how far each load
         case came.
 
-        Raises NotConverged where the design load snaps through.
+        Raises NotConverged where the design load snaps through, InputError where a term can't be weighed.
         """
         reached = follow(self.shell, self.start, self.problem.loads)
         for each in reached.values():
@@ -149,12 +150,16 @@ class Evaluator:
 
     def seed(self, design: Design, states: Mapping[str, State], stage: float) -> Evaluated:
         """The values of a design whose equilibria `states` at the stage are known. Raises OffBranch where a
-        term can't be measured.
+        term can't be measured, InputError where one of the start is no number.
         """
         problem, assembly = self.problem, self.assembly(design)
         try:
             places = [self._at(term, design, states, stage, assembly) for term in problem.terms]
             found = [self._measured(term, at) for term, at in zip(problem.terms, places, strict=True)]
+        except NotANumber as error:
+            if not self.evaluations:  # the start's: the term's own fault
+                raise
+            raise OffBranch(str(error)) from error
         except (NotPositiveDefinite, NotConverged) as error:
             raise OffBranch(str(error)) from error
         summands, kept = found[: len(problem.minimise)], found[len(problem.minimise) :]
@@ -343,17 +348,6 @@ class Evaluator:
         """Where the term is measured."""
         name = term.load or self.base
         return LoadedDesign(self.shell, design, states[name], self.load(name, stage), assembly)
-
-
-def start_weights(problem: Problem, start: Design, reached: Mapping[str, Loaded]) -> Reals:
-    """What the objective's terms are multiplied by, so that each makes up its share of 1 at the start; those
-    at a load that the start doesn't bear are taken at the design load."""
-    base, loads, values = problem.design_load.name, problem.loads, []
-    for part in problem.minimise:
-        name = part.term.load if part.term.load and reached[part.term.load].on_branch else base
-        at = LoadedDesign(problem.shell, start, reached[name].equilibrium.state, loads[name])
-        values.append(measured(part.term, at).value.sum())
-    return np.array([part.share for part in problem.minimise]) / np.maximum(np.abs(values), 1e-300)
 
 
 def _whole(point: Evaluated) -> list[Measurement]:

@@ -89,7 +89,7 @@ class Measurement:
                     value=np.shape(found),
                     remedy="Give arrays of those shapes, or another size.",
                 )
-        rows = {each: sp.csr_array(shapes[each]) if found is None else found for each, found in made.items()}
+        rows = {each: sp.csr_array(shapes[each] if found is None else found) for each, found in made.items()}
         return Measurement(
             np.asarray(self.value, dtype=float),
             rows["by_dof"],
@@ -134,10 +134,21 @@ class Term(ABC):
         return False
 
 
+class NotANumber(InputError):
+    """A term whose value is nan."""
+
+
 def measured(term: Term, at: LoadedDesign) -> Measurement:
     """The term's measurement, complete but for derivatives that come late. Raises InputError where its shapes
-    aren't those that it says."""
+    aren't those that it says, NotANumber where a value is none."""
     shell, found = at.shell, term.measure(at)
+    if np.isnan(np.asarray(found.value, dtype=float)).any():
+        raise NotANumber(
+            "is no number",
+            where=f"{term.name}.value",
+            value=found.value,
+            remedy="Let the term give numbers wherever a design has an equilibrium.",
+        )
 
     def complete(measurement: Measurement) -> Measurement:
         return measurement.completed(term.size(shell), shell.node_count, len(shell.cable_ends), term.name)
@@ -268,7 +279,7 @@ class RodRadius(Term):
 @dataclass(frozen=True)
 class Share:
     """A summand of the objective: its weight is such that it makes up `share` of the objective's value 1 at
-    the start. Of a term with several values it is their sum.
+    the start, of -1 where it is below 0 there. Of a term with several values it is their sum.
     """
 
     share: float

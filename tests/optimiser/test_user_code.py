@@ -313,3 +313,77 @@ def test_the_told_terms_of_an_objective_add_up_to_it_where_two_have_one_name(coa
     best = sf.optimise(asked, coarse.design(), evaluations=2, solver=solver)
     for step in best.history:
         assert sum(step.terms.values()) == pytest.approx(step.objective, rel=1e-12)
+
+
+@dataclass(frozen=True)
+class Height(sf.Term):  # of the node that the target has highest, m, times a factor
+    name = "height"
+    load: str
+    factor: float = -1.0
+
+    def measure(self, at):
+        node = int(np.argmax(at.shell.target.positions[:, 2]))
+        by_dof = np.zeros((1, 6 * len(at.state.positions)))
+        by_dof[0, 6 * node + 2] = self.factor
+        return sf.Measurement(self.factor * at.state.positions[[node], 2], by_dof)
+
+
+def test_a_search_whose_objective_is_below_0_ends_with_the_best_design_that_it_found(coarse):
+    shares = [sf.Share(0.2, sf.Misfit("wet")), sf.Share(0.2, sf.CableForce("wet"))]
+    shares.append(sf.Share(0.6, Height("wet")))
+    asked = problem(coarse, variables=[sf.RestLengths()], minimise=shares)
+    best = sf.optimise(asked, coarse.design(), evaluations=10)
+    assert best.objective_start == pytest.approx(-0.2)
+    assert best.history[0].terms["height"] == pytest.approx(-0.6)
+    assert best.objective < -0.4
+    assert best.objective <= min(step.objective for step in best.history if step.accepted) + 0.1
+
+
+def test_derivatives_may_be_dense(coarse):
+    asked = problem(
+        coarse,
+        variables=[sf.RestLengths(), sf.FreeRadius(0.0008, 0.0012)],
+        minimise=[sf.Share(1.0, Height("wet"))],
+    )
+    assert_taylor(asked, coarse.design())
+
+
+@pytest.mark.parametrize("factor", [0.0, np.inf])
+def test_a_term_that_no_weight_gives_its_share_of_the_objective_is_refused(coarse, factor):
+    shares = [sf.Share(0.5, sf.Misfit("wet")), sf.Share(0.5, Height("wet", factor))]
+    asked = problem(coarse, variables=[sf.RestLengths()], minimise=shares)
+    for solver in (sf.SequentialConvex(), sf.MovingAsymptotes()):
+        with pytest.raises(sf.InputError, match="minimise: height: has no share of the objective"):
+            sf.optimise(asked, coarse.design(), solver=solver, evaluations=2)
+
+
+@dataclass(frozen=True)
+class Slope(Height):  # no number where the node is higher than a level, m
+    level: float = 0.0
+
+    def measure(self, at):
+        found = super().measure(at)
+        value = found.value if abs(found.value[0]) <= self.level else np.array([np.nan])
+        return replace(found, value=value)
+
+
+def test_a_term_that_is_no_number_is_refused_at_the_start_and_refuses_designs_later(coarse):
+    start, wet = coarse.design(), coarse.point_load(1.0)
+    state = sf.follow(coarse, start, {"wet": wet})["wet"].equilibrium.state
+    height = float(state.positions[np.argmax(coarse.target.positions[:, 2]), 2])
+    for solver in (sf.SequentialConvex(), sf.MovingAsymptotes()):
+        for nowhere in (
+            problem(coarse, sf.AtMost(0.0, Slope("wet"), of=1.0), variables=[sf.RestLengths()]),
+            problem(coarse, variables=[sf.RestLengths()], minimise=[sf.Share(1.0, Slope("wet"))]),
+        ):
+            with pytest.raises(sf.InputError, match=r"height\.value: is no number"):
+                sf.optimise(nowhere, start, solver=solver, evaluations=2)
+        up = problem(
+            coarse,
+            variables=[sf.RestLengths()],
+            minimise=[sf.Share(1.0, Slope("wet", level=height + 1e-4))],
+        )
+        best = sf.optimise(up, start, solver=solver, evaluations=6)
+        assert best.objective_start == pytest.approx(-1.0)
+        assert -1.0 - 1.1e-4 / height <= best.objective <= -0.99
+        assert best.rejected > 0

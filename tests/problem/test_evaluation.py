@@ -8,8 +8,8 @@ import pytest
 
 import shellform as sf
 from shellform.errors import NotConverged
-from shellform.problem import evaluation
-from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch, start_weights
+from shellform.problem import evaluation, weights
+from shellform.problem.evaluation import Evaluated, Evaluator, OffBranch
 from shellform.structure.solve.factorisation import NotPositiveDefinite
 
 TARGET = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [2.0, 1.0, 0.5], [0.0, 1.0, 0.5]])  # of 2 m
@@ -283,8 +283,8 @@ def test_terms_are_weighted_to_their_shares_of_1_at_the_start_whatever_their_sig
         taken.append(name)
         return SimpleNamespace(value=np.array(values[term.load]))
 
-    monkeypatch.setattr(evaluation, "measured", measured)
-    found = start_weights(problem, "start", paths)
+    monkeypatch.setattr(weights, "measured", measured)
+    found = weights.start_weights(problem, "start", paths)
     assert found == pytest.approx([0.4 / 4.0, 0.3 / 0.5, 0.2 / 2.0, 0.1 / 9.0])
     assert taken == ["wet", "wetter", "wet", "wet"]
 
