@@ -266,8 +266,15 @@ class Gridshell:
         return replace(beams, axial=axial, torsion=torsion, bending_y=bending_y, bending_z=bending_z)
 
     def cables(self, design: Design) -> Cables:
-        """The cables that exist in the design."""
+        """The cables that exist in the design. Raises InputError for a design of another gridshell."""
         here = design.present
+        if len(here) != len(self.cable_ends):
+            raise InputError(
+                f"is of another gridshell: this one has {len(self.cable_ends)} candidate cables",
+                where="design.present",
+                value=len(here),
+                remedy="Take a design of this gridshell, as its design() makes one.",
+            )
         return make_cables(
             self.cable_ends[here], rest_length=design.rest_length[here], stiffness=self.cable.stiffness
         )

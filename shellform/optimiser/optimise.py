@@ -53,7 +53,7 @@ from functools import partial
 import numpy as np
 
 from shellform.arrays import Indices
-from shellform.errors import require_count
+from shellform.errors import InputError, require_count
 from shellform.gridshell.gridshell import Design
 from shellform.gridshell.grouping import averaged
 from shellform.optimiser.minding import as_borne, finely
@@ -115,7 +115,8 @@ def optimise(
     and `keep(checkpoint)` before each trial: with `resume` the same call goes on from there to the same
     result.
 
-    Raises NotConverged where the start doesn't carry the design load, with the paper's advice.
+    Raises NotConverged where the start doesn't carry the design load, with the paper's advice; InputError
+    where it has no cables and their lengths are to vary.
     """
     require_count(evaluations, where="evaluations", give="a number of designs to try, such as 100")
     solver = solver or SequentialConvex()
@@ -290,6 +291,12 @@ def begin(
     below under the further loads, from that of the start's softest mode under the design load; what is
     `asked` of designs as built."""
     began = time.perf_counter()
+    if not start.present.any() and any(block.of_each_cable for block in problem.variables):
+        raise InputError(
+            "has no cable whose length could vary",
+            where="start",
+            remedy="Begin with cables, as shell.design() has them, or leave RestLengths out of the variables.",
+        )
     # Limits on the design load's cable forces are bounds of the model; the others stay constraints.
     bounded = tuple(part for part in problem.constraints if _is_bound(part, problem))
     inner = replace(

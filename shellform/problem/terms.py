@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 import scipy.sparse as sp
 
-from shellform.arrays import Reals
+from shellform.arrays import Reals, indices
 from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.structure.elements.state import State
@@ -216,8 +216,8 @@ class RmsMisfit(Term):
         return Measurement(whole.value / count, whole.by_dof / count)
 
     def at_limit(self, limit: float) -> float:
-        """Its square."""
-        return limit**2
+        """Its square, with its sign: below 0 is no limit from below."""
+        return limit * abs(limit)
 
 
 @dataclass(frozen=True)
@@ -233,11 +233,11 @@ class CableForces(Term):
         return len(shell.cable_ends) if self.chosen is None else len(self.chosen)
 
     def measure(self, at: LoadedDesign) -> Measurement:
-        """`size` values, N."""
+        """`size` values, N. Raises InputError where a chosen cable isn't there."""
         value, by_dof, by_rest, by_tension = _tensions(at)
         if self.chosen is None:
             return Measurement(value, by_dof, by_rest, by_tension=by_tension)
-        rows = list(self.chosen)
+        rows = indices("cable_forces.chosen", self.chosen, (None,), below=len(value))
         return Measurement(value[rows], by_dof[rows], by_rest[rows], by_tension=by_tension[rows])
 
     @property

@@ -102,8 +102,17 @@ class RestLengths(Variable):
         return Design(values, design.present, design.radius)
 
     def bounds(self, shell: Gridshell, start: Design) -> tuple[Reals, Reals]:
-        """m."""
-        return np.full(len(start.rest_length), self.least), self.most * start.rest_length
+        """m. Raises InputError where they contradict each other."""
+        longest = self.most * start.rest_length
+        if (longest < self.least).any():
+            shortest = float(longest.min())
+            raise InputError(
+                f"is more than the largest length of a cable, {shortest:.3g} m",
+                where="variables.rest_lengths.least",
+                value=self.least,
+                remedy=f"Give metres below that, such as {0.5 * shortest:.2g} (in a case: optimise.rest_length_min).",
+            )
+        return np.full(len(start.rest_length), self.least), longest
 
     def rates(self, shell: Gridshell, design: Design) -> Rates:
         """Each is its own."""

@@ -196,3 +196,12 @@ def test_no_cable_is_laid_that_rises_above_the_surface_at_a_quarter_a_half_or_th
         assert laid([[x, 0.0, 0.0]]) == [[1, 3]]
         assert laid([[1.0 + x, 1.0, 0.0]]) == [[0, 2]]
     assert laid([[2.5, 0.5, 0.0]], edge_cells=True) == [[0, 2], [1, 3]]
+
+
+def test_a_design_of_another_gridshell_is_refused(shell):
+    count = len(shell.cable_ends) + 1
+    other = sf.Design(np.ones(count), [True] * count, 0.001)
+    with pytest.raises(
+        InputError, match=r"design\.present: is of another gridshell: this one has \d+ candid"
+    ):
+        shell.network(other)

@@ -387,3 +387,40 @@ def test_a_term_that_is_no_number_is_refused_at_the_start_and_refuses_designs_la
         assert best.objective_start == pytest.approx(-1.0)
         assert -1.0 - 1.1e-4 / height <= best.objective <= -0.99
         assert best.rejected > 0
+
+
+@pytest.mark.parametrize("solver", [sf.SequentialConvex(), sf.MovingAsymptotes()])
+def test_lengths_that_can_not_vary_are_refused(coarse, solver):
+    asked = problem(coarse, variables=[sf.RestLengths(least=0.5)])
+    with pytest.raises(
+        sf.InputError, match=r"rest_lengths\.least: is more than the largest length .* 0\.\d+ m"
+    ):
+        sf.optimise(asked, coarse.design(), solver=solver, evaluations=2)
+
+
+def test_a_start_without_cables_is_refused_where_their_lengths_vary_and_taken_where_only_the_radius_does(
+    coarse,
+):
+    for more in ([], [sf.FreeRadius()]):
+        asked = problem(coarse, variables=[sf.RestLengths(), *more])
+        with pytest.raises(sf.InputError, match="start: has no cable whose length could vary"):
+            sf.optimise(asked, coarse.unbraced(), evaluations=2)
+    light = sf.LoadCase("light", coarse.point_load(0.1))
+    shares = [sf.Share(1.0, sf.Misfit("light"))]
+    asked = sf.Problem(coarse, light, shares, variables=[sf.FreeRadius(0.0009, 0.0012)])
+    best = sf.optimise(asked, coarse.unbraced(), evaluations=2)
+    assert best.objective < best.objective_start
+    assert not best.design.present.any()
+
+
+@pytest.mark.parametrize("chosen", [(0, 28), (-1,)])
+def test_cables_that_are_not_there_have_no_force_to_limit(coarse, chosen):
+    asked = problem(coarse, sf.AtMost(4.0, sf.CableForces("wet", chosen)), variables=[sf.RestLengths()])
+    with pytest.raises(sf.InputError, match=r"cable_forces\.chosen\(\d,\) is out of range"):
+        sf.optimise(asked, coarse.design(), evaluations=1)
+
+
+def test_a_distance_below_0_limits_nothing_from_below():
+    between = sf.Between(-0.1, 0.05, sf.RmsMisfit("wet"))
+    assert between.lower < 0.0 < between.upper == pytest.approx(0.05**2)
+    assert between.scale == pytest.approx(0.1**2 + 0.05**2)
