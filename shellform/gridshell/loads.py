@@ -46,6 +46,13 @@ class Region:
     ring: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
+        if self.half is not None:
+            require_number(self.half, where="load.half", give=_ANGLE)
+        if self.strip is not None:
+            _numbers("strip", self.strip, f"{_ANGLE}, and two places along it, m")
+            require_number(self.strip[0], where="load.strip[0]", give=_ANGLE)
+        if self.ring is not None:
+            _numbers("ring", self.ring, "two levels, m")
         for name, limits in [("strip", self.strip and self.strip[1:]), ("ring", self.ring)]:
             if limits and not limits[0] < limits[1]:
                 raise InputError(
@@ -181,6 +188,14 @@ def combined(
     for name, factor in factors.items():
         require_known(name, parts, where=where, what="there is no such part of the load")
         require_number(factor, where=f"{where}.{name}", give="a factor of that part, such as 1.2")
+    shapes = {name: np.shape(parts[name]) for name in factors}
+    if len(set(shapes.values())) > 1:
+        raise InputError(
+            "adds up parts of different nets",
+            where=where,
+            value=shapes,
+            remedy="Make all parts of one net, a row of each for each of its nodes.",
+        )
     return np.asarray(sum(factor * parts[name] for name, factor in factors.items()))
 
 
@@ -195,8 +210,16 @@ def staged(
     """Load cases "NAME 1", "NAME 2", …: the parts `steps` are added one after the other, as layers or
     sections are poured.
 
-    `factors` are what is there from the beginning; a part named there too has its factor, another 1.
+    `factors` are what is there from the beginning; a part named there too has its factor, another 1. Raises
+    InputError where there is no step or a part is added twice.
     """
+    if not steps or len(set(steps)) < len(steps):
+        raise InputError(
+            "each part is added once, and one at least",
+            where=where,
+            value=list(steps),
+            remedy=f"Name parts in their order, of {', '.join(parts)}.",
+        )
     before = {part: factor for part, factor in factors.items() if part not in steps}
     result = {}
     for k in range(len(steps)):
@@ -262,3 +285,19 @@ _UNITS = {
 def _positive(name: str, value: float) -> float:
     require_number(value, above=0.0, where=f"load.{name}", give=_UNITS[name])
     return value
+
+
+_ANGLE = "a direction in plan in radians, such as 1.57"
+_LENGTHS = {"strip": 3, "ring": 2}
+
+
+def _numbers(name: str, given: object, give: str) -> None:
+    """Raises InputError for what aren't as many numbers as are needed; infinite ones are no limit."""
+    try:
+        found = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        found = np.empty(0)
+    if found.shape != (_LENGTHS[name],) or np.isnan(found).any():
+        raise InputError(
+            f"must be {_LENGTHS[name]} numbers", where=f"load.{name}", value=given, remedy=f"Give {give}."
+        )

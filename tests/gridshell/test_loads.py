@@ -306,6 +306,46 @@ def test_loads_that_cannot_be_are_refused_with_their_entry(flat):
             call()
 
 
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda: Region(half=np.nan), r"load\.half: must be finite"),
+        (lambda: Region(half="west"), r"load\.half: must be a number"),
+        (lambda: Region(strip=(0.0, 0.1)), r"load\.strip: must be 3 numbers"),
+        (lambda: Region(strip=(0.0, np.nan, 0.1)), r"load\.strip: must be 3 numbers"),
+        (lambda: Region(strip=(np.inf, 0.0, 0.1)), r"load\.strip\[0\]: must be finite"),
+        (lambda: Region(ring=(0.1, "top")), r"load\.ring: must be 2 numbers"),
+        (lambda: Region(ring=(0.1,)), r"load\.ring: must be 2 numbers"),
+        (lambda: Region(ring=(0.1, np.nan)), r"load\.ring: must be 2 numbers"),
+    ],
+)
+def test_a_region_whose_limits_are_no_numbers_is_refused(make, said):
+    with pytest.raises(InputError, match=said):
+        make()
+
+
+def test_a_strip_or_ring_may_have_no_limit_on_one_side(flat):
+    net, surface = flat
+    whole = loads.area_load(net, surface, Q)
+    parts = [Region(strip=(0.3, -np.inf, 0.4)), Region(strip=(0.3, 0.4, np.inf))]
+    np.testing.assert_allclose(
+        sum(loads.area_load(net, surface, Q, part) for part in parts), whole, atol=1e-9
+    )
+
+
+def test_parts_of_different_nets_are_not_added_up(flat):
+    weight = loads.area_load(*flat, Q)
+    with pytest.raises(InputError, match=r"load\.factors: adds up parts of different nets .*'b': \(3, 6\)"):
+        loads.combined({"a": weight, "b": weight[:3]}, {"a": 1.0, "b": 1.0})
+
+
+@pytest.mark.parametrize("steps", [[], ["west", "east", "west"]])
+def test_a_pour_of_nothing_or_of_one_part_twice_is_refused(flat, steps):
+    parts = dict.fromkeys(("west", "east"), loads.area_load(*flat, Q))
+    with pytest.raises(InputError, match=r"load\.stages: each part is added once"):
+        loads.staged(parts, steps, name="pour", factors={})
+
+
 def test_a_gridshell_s_point_load_is_the_same(shell):
     np.testing.assert_array_equal(shell.point_load(6.9, every=2), loads.points(shell.net, 6.9, every=2))
     assert sf.Region is Region
