@@ -305,7 +305,7 @@ def read_table(folder: str | Path, columns: Sequence[str] | None = None, filters
         return pq.read_table(file, columns=names, filters=filters)
     except InputError:
         raise
-    except (pa.ArrowException, OSError, ValueError) as error:
+    except (pa.ArrowException, OSError, TypeError, ValueError) as error:
         if filters is not None:
             read_table(folder, names)  # a table that is damaged says so
             raise InputError(

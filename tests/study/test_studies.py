@@ -111,6 +111,8 @@ def test_a_study_has_a_row_a_design_and_a_second_call_computes_nothing(tmp_path,
     for wrong in (("cabels", "<", 46), ("cables", "<<", 46), ("cables", "<", "few"), ("cables", 46)):
         with pytest.raises(InputError, match=r"filters: can't be used.*Name a column"):
             read_table(tmp_path / "out", ["cables"], [wrong])
+    with pytest.raises(InputError, match=r"filters: can't be used.*Name a column"):
+        read_table(tmp_path / "out", ["cables"], ("cables", "<", 46))
     seconds = (tmp_path / "out/seconds.csv").read_text()
     assert seconds.count(",here,here,0.01\n") == 12
     assert "<h1>Study of dome.toml</h1>" in (tmp_path / "out/study.html").read_text(encoding="utf-8")
