@@ -23,6 +23,7 @@ SOUND = {
     "lead": (6, 2, -0.05),
     "limit": 30,
     "mode_count": 3,
+    "critical_to": 3.0,
     "count": 7,
 }
 
@@ -37,6 +38,9 @@ def test_sound_requests_pass_to_their_bounds():
         {"increments": 1_000_000},
         {"increments": 1, "limit": 1},
         {"mode_count": 0},
+        {"critical_to": None},
+        {"critical_to": -2.0},
+        {"method": "newton", "lead": None},
     ):
         check_request(**SOUND | other)
 
@@ -56,6 +60,13 @@ def test_sound_requests_pass_to_their_bounds():
         ({"lead": (6, 2, 0.0)}, "--lead"),
         ({"lead": (6, 2, np.inf)}, "--lead"),
         ({"lead": (6, 2, np.nan)}, "--lead"),
+        ({"lead": (6, 2)}, "--lead"),
+        ({"method": "relaxation"}, "--lead"),
+        ({"critical_to": 0.0}, "--critical"),
+        ({"critical_to": np.nan}, "--critical"),
+        ({"critical_to": np.inf}, "--critical"),
+        ({"critical_to": "3"}, "--critical"),
+        ({"factor": "2"}, "--factor"),
         ({"limit": 0}, "--limit"),
         ({"mode_count": -1}, "--modes"),
         ({"mode_count": 2.0}, "--modes"),

@@ -100,7 +100,7 @@ def analyse(
     """
     began = time.perf_counter()
     chosen = chosen_load(model, load)
-    check_request(factor, increments, tolerance, method, lead, limit, mode_count, len(model.network.nodes))
+    check_request(factor, increments, tolerance, method, lead, limit, mode_count, critical_to, len(chosen))
     assembly = assemble(model.network)
     walk = _Analysis(model, assembly, chosen, factor, tolerance, limit, progress)
     message, converged = "", True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import InputError, require_count, require_known
+from shellform.errors import InputError, require_count, require_known, require_number
 from shellform.structure.elements import rotation
 from shellform.structure.elements.state import State
 from shellform.structure.model import Model
@@ -24,21 +24,40 @@ def check_request(
     lead: Lead | None,
     limit: int,
     mode_count: int,
+    critical_to: float | None,
     count: int,
 ) -> None:
     """Raises InputError for numbers, methods and leads that make no sense on `count` nodes."""
     require_count(increments, where="--increments", give="a number of load steps, such as 10", most=_MOST)
-    if not (np.isfinite(factor) and 0.0 < tolerance < 1.0):
+    require_number(factor, where="--factor", give="a factor of the load, such as 1")
+    if not 0.0 < tolerance < 1.0:
         raise InputError(
-            "--factor must be finite and --tolerance between 0 and 1",
-            value=(factor, tolerance),
-            remedy="For example --factor 1 --tolerance 1e-9.",
+            "must be between 0 and 1", where="--tolerance", value=tolerance, remedy="For example 1e-9."
         )
     require_known(method, METHODS, where="--method", what="unknown method")
     require_count(limit, where="--limit", give="a number of iterations, such as 100")
     require_count(mode_count, least=0, where="--modes", give="a number of modes, such as 3, or 0 for none")
+    if critical_to is not None:
+        require_number(critical_to, where="--critical", give="a factor of the load, such as 3")
+        if critical_to == 0.0:
+            raise InputError(
+                "no path leads to the factor 0",
+                where="--critical",
+                remedy="Give a factor of the load other than 0, such as 3.",
+            )
+    if lead is not None and method != "path":
+        raise InputError(
+            "leads a path, and none is followed",
+            where="--lead",
+            value=method,
+            remedy='Ask for the method "path", or leave the lead out.',
+        )
     if lead is not None and not (
-        0 <= lead[0] < count and lead[1] in (0, 1, 2) and np.isfinite(lead[2]) and lead[2] != 0.0
+        len(lead) == 3
+        and 0 <= lead[0] < count
+        and lead[1] in (0, 1, 2)
+        and np.isfinite(lead[2])
+        and lead[2] != 0.0
     ):
         raise InputError(
             "must be a node, an axis 0 to 2 and a displacement other than 0",
