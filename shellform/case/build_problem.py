@@ -18,7 +18,7 @@ from shellform.arrays import Reals
 from shellform.case.build_gridshell import rod_bounds
 from shellform.case.build_safety import case_tolerances, critical_factors_asked
 from shellform.case.case import Case
-from shellform.errors import NotConverged, require_known
+from shellform.errors import InputError, NotConverged, require_known
 from shellform.gridshell.edge_beams import EDGE
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.problem.constraints import AtLeast, AtMost, Constraint
@@ -107,6 +107,13 @@ def varied(case: Case, shell: Gridshell, *, frees_radius: bool = True) -> list[V
     entry, bounds = case.optimise, rod_bounds(case, shell)
     blocks: list[Variable] = [RestLengths(entry.rest_length_min, entry.rest_length_max)]
     if frees_radius and entry.rod_radius > 0.0:
+        if entry.radius_min is not None and entry.radius_min > shell.rod.radius:
+            raise InputError(
+                "is above the radius of the rods, from which the search starts",
+                where="optimise.radius_min",
+                value=entry.radius_min,
+                remedy=f"Give at most {shell.rod.radius:g}, or thicker rods in [rod].",
+            )
         blocks.append(FreeRadius(*bounds))
     return blocks
 

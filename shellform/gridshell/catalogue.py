@@ -229,7 +229,8 @@ def largest(catalogue: Catalogue, net: Net) -> Section:
 
 def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, float]:
     """Bounds (4), m, of the radius of sections similar to the rod's: from as stiff as the softest section
-    that the net allows to as stiff as the stiffest, so that each can be rounded up.
+    that the net allows, or from the rod's own where that is softer, to as stiff as the stiffest, so that each
+    can be rounded up.
 
     Raises InputError where the rod is stiffer than the stiffest.
     """
@@ -237,7 +238,7 @@ def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, floa
     low, high = (radius_as_stiff(rod, sections[k]) for k in (0, -1))
     if rod.radius > high * (1.0 + _EQUAL):
         raise _too_stiff(rod.radius, catalogue, sections)
-    return low, max(high, rod.radius)
+    return min(low, rod.radius), max(high, rod.radius)
 
 
 def radius_as_stiff(rod: Rod, section: Section) -> float:

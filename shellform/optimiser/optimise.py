@@ -116,7 +116,7 @@ def optimise(
     result.
 
     Raises NotConverged where the start doesn't carry the design load, with the paper's advice; InputError
-    where it has no cables and their lengths are to vary.
+    where it lies outside the variables' bounds, or has no cables and their lengths are to vary.
     """
     require_count(evaluations, where="evaluations", give="a number of designs to try, such as 100")
     solver = solver or SequentialConvex()
@@ -303,6 +303,7 @@ def begin(
         problem, constraints=[part for part in problem.constraints if not _is_bound(part, problem)]
     )
     evaluator = Evaluator(inner, start)
+    evaluator.blocks.check_start()
     reached = evaluator.begin()
     used, base = inner.used(), evaluator.base
     state = reached[base].equilibrium.state

@@ -21,6 +21,8 @@ from shellform.arrays import Reals
 from shellform.errors import InputError, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 
+_SAME = 1e-9  # relative
+
 
 @dataclass(frozen=True)
 class Rates:
@@ -220,6 +222,22 @@ class Blocks:
         sides = [each.bounds(self.shell, self.start) for each in self.variables]
         lower, upper = (np.concatenate(side) for side in zip(*sides, strict=True))
         return lower, upper
+
+    def check_start(self) -> None:
+        """Raises InputError where the start lies outside the bounds; lengths of absent cables don't count."""
+        values, (lower, upper) = self.values(self.start), self.value_bounds()
+        outside = (values < lower - _SAME * np.abs(lower)) | (values > upper + _SAME * np.abs(upper))
+        if self.each_cable is not None:
+            outside[self.each_cable] &= self.start.present
+        if outside.any():
+            first = int(np.argmax(outside))
+            raise InputError(
+                "the start lies outside the bounds",
+                where=f"variables[{first}]",
+                value=float(values[first]),
+                remedy=f"Start from a design within the bounds, here {lower[first]:.4g} to {upper[first]:.4g}, or "
+                "widen them.",
+            )
 
     def bounds(self) -> tuple[Reals, Reals]:
         """Lower and upper bounds (s,) of the variables."""

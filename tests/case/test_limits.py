@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import shellform as sf
-from shellform.case.build_problem import case_problem
+from shellform.case.build_problem import case_problem, varied
 from shellform.case.build_safety import case_tolerances
 from shellform.case.case import load_case
 from shellform.errors import InputError, NotConverged
@@ -388,3 +388,13 @@ def test_sections_that_bear_nothing_are_told_with_the_reason(shell, loads):
     assert "loses stability" in trials[0].why
     assert trials[0].optimum is None
     assert rounding.chosen(trials) is None
+
+
+def test_a_least_radius_above_the_rods_own_is_refused_where_the_radius_is_free(shell):
+    above = f"optimise.radius_min={1.1 * shell.rod.radius}"
+    free = ["optimise.rod_radius=0.2", "optimise.misfit=0.3"]
+    with pytest.raises(InputError, match=r"optimise\.radius_min: is above the radius of the rods"):
+        varied(load_case(CASE, [*free, above]), shell)
+    assert len(varied(load_case(CASE, [*free, above]), shell, frees_radius=False)) == 1
+    blocks = varied(load_case(CASE, [*free, f"optimise.radius_min={shell.rod.radius}"]), shell)
+    assert blocks[1].bounds(shell, shell.design())[0] == shell.rod.radius

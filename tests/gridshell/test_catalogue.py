@@ -14,6 +14,8 @@ from shellform.gridshell.catalogue import (
     largest,
     named,
     neighbours,
+    radius_as_stiff,
+    radius_bounds,
     read_catalogue,
     rounded_up,
     sections_allowed,
@@ -299,3 +301,11 @@ def test_the_stress_of_any_section_follows_its_radius(shell, section):
     # The target bends the straight elements a little less than their net's circles, and axial stress and the
     # smooth maximum come on top: 0.2 to 0.6 % less in all.
     assert measured.value[0] == pytest.approx(bending, rel=0.01)
+
+
+def test_a_free_radius_may_begin_below_the_softest_section_of_a_catalogue(mine, shell):
+    softest = radius_as_stiff(shell.rod, mine.sections[0])
+    for radius in (0.8 * softest, 1.01 * softest):
+        low, high = radius_bounds(shell.net, shell.rod.resized(radius), mine)
+        assert low == pytest.approx(min(radius, softest))
+        assert low <= radius <= high

@@ -383,6 +383,7 @@ def test_a_search_begins_at_its_start_as_far_as_that_bears_the_further_loads(
 
     class Begun:
         base = "wet"
+        blocks = SimpleNamespace(check_start=lambda: None)
 
         def __init__(self, inner, start):
             self.problem = inner

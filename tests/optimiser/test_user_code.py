@@ -424,3 +424,29 @@ def test_a_distance_below_0_limits_nothing_from_below():
     between = sf.Between(-0.1, 0.05, sf.RmsMisfit("wet"))
     assert between.lower < 0.0 < between.upper == pytest.approx(0.05**2)
     assert between.scale == pytest.approx(0.1**2 + 0.05**2)
+
+
+@pytest.mark.parametrize("solver", [sf.SequentialConvex(), sf.MovingAsymptotes()])
+@pytest.mark.parametrize(
+    "variables",
+    [
+        [sf.RestLengths(), sf.FreeRadius(0.0011, 0.0012)],
+        [sf.RestLengths(), sf.FreeRadius(0.0006, 0.0009)],
+        [sf.RestLengths(most=0.9)],
+        [sf.RestLengths(least=0.15)],
+    ],
+)
+def test_a_start_outside_the_bounds_is_refused(coarse, solver, variables):
+    asked = problem(coarse, variables=variables)
+    with pytest.raises(sf.InputError, match="the start lies outside the bounds"):
+        sf.optimise(asked, coarse.design(), solver=solver, evaluations=2)
+
+
+def test_cables_that_are_absent_may_be_shorter_than_the_bound(coarse):
+    start = coarse.design()
+    rest, present = start.rest_length.copy(), start.present.copy()
+    rest[3], present[3] = 0.05, False
+    asked = problem(coarse, variables=[sf.RestLengths(least=0.1, most=2.5)])
+    best = sf.optimise(asked, replace(start, rest_length=rest, present=present), evaluations=2)
+    assert best.objective < 1.0
+    assert not best.design.present[3]
