@@ -130,7 +130,7 @@ def test_a_path_gets_over_the_kinks_that_cables_make(seed):
     np.testing.assert_allclose(
         found.equilibrium.state.positions, expected.equilibrium.state.positions, rtol=0.0, atol=1e-7
     )
-    factors = [each["factor"] for each in found.increments]
+    factors = [each.reached.factor for each in found.increments]
     assert factors[-1] == 1.0
     assert factors == sorted(factors), "on a stable branch the load grows"
 
@@ -226,7 +226,7 @@ def test_a_dead_end_moment_in_space_bends_a_rod_into_its_helix_by_the_default_me
 def test_relaxation_falls_back_to_the_path_of_an_increment_and_says_from_where():
     found = analyse(twisted(20, [2.0, 0.0, 5.0]), increments=2)
     assert found.converged
-    assert [step["factor"] for step in found.increments] == [0.5, 1.0]
+    assert [step.reached.factor for step in found.increments] == [0.5, 1.0]
     np.testing.assert_allclose(
         found.equilibrium.state.positions,
         analyse(twisted(20, [2.0, 0.0, 5.0]), method="path").equilibrium.state.positions,

@@ -50,11 +50,11 @@ def test_increments_of_newton_s_and_of_dynamic_relaxation_are_equal_and_supports
     walk = walking(imposed=0.5, told=lambda *each: told.append(each))
     walk.increments(2, method)
     assert asked == [(0.75, 0.0, -6.0, 1e-7), (0.75, 0.0, -12.0, 1e-7)]
-    assert [(each["factor"], each["iterations"], each["steps"]) for each in walk.documented] == [
-        (1.5, 5, []),
-        (3.0, 5, []),
+    assert [(each.reached.factor, each.reached.factorisations, each.waypoints) for each in walk.behind] == [
+        (1.5, 5, ()),
+        (3.0, 5, ()),
     ]
-    assert walk.documented[1]["displacements"] == {"2": [0.0, 0.0, 0.25]}
+    assert walk.behind[1].document()["displacements"] == {"2": [0.0, 0.0, 0.25]}
     assert (walk.reached, walk.spent, walk.on_branch) == (3.0, 10, None)
     assert told == [(1.5, 4), (1.5, 5), (3.0, 9), (3.0, 10)]
 
@@ -78,7 +78,7 @@ def test_a_relaxation_that_leaves_the_branch_says_at_which_factor(monkeypatch):
     assert asked == [(0.0, 2.0, 1e-7, 321), (2.0, 4.0, 1e-7, 321), (4.0, 6.0, 1e-7, 321)]
     assert (walk.on_branch, walk.left_at) == (False, 2.5)
     assert "ends near load factor 2.5:" in walk.warnings()[0]
-    assert [each["steps"] for each in walk.documented] == [
+    assert [each.document()["steps"] for each in walk.behind] == [
         [{"factor": factor, "iterations": 3, "stable": True}] for factor in (1.0, 3.0, 5.0)
     ]
     assert told == [(1.0, 3), (2.0, 8), (3.0, 11), (4.0, 16), (5.0, 19), (6.0, 24)]
@@ -112,7 +112,7 @@ def test_under_moments_that_turn_nodes_the_relaxation_is_given_up_sooner_and_the
     assert drives == [(0.0, 10.0, 0.5, 1e-7), (10.0, 20.0, 0.5, 1e-7)]
     assert walk.spent == 2 * 59
     assert (walk.followed_from, walk.left_at, walk.on_branch) == (0.0, 4.0, False)
-    assert [each["factor"] for each in walk.documented[1]["steps"]] == [3.0, 4.0]
+    assert [each.factor for each in walk.behind[1].waypoints] == [3.0, 4.0]
     assert told == [(1.0, 54), (2.0, 59), (2.0, 59), (3.0, 113), (4.0, 118), (4.0, 118)]
     assert [("semi-tangential" in each, "from load factor 0 on" in each) for each in walk.warnings()[1:]] == [
         (True, False),
@@ -156,13 +156,13 @@ def test_a_path_tells_its_points_what_each_took_and_where_the_branch_was_left_fi
     walk = walking()
     walk.path((2, 2, -0.5), parts)
     assert given == {"goal": 3.0, "lead": (2, 2, -0.5), "first": first, "tolerance": 1e-7}
-    assert [(each["factor"], each["iterations"], each["event"]) for each in walk.documented] == [
+    assert [(each.reached.factor, each.reached.factorisations, each.event) for each in walk.behind] == [
         (0.7, 4, ""),
         (1.2, 5, "limit point"),
         (0.0, 2, ""),
         (3.0, 4, ""),
     ]
-    assert [each["negative_pivots"] for each in walk.documented] == [0, 0, 2, 2]
+    assert [each.reached.negative for each in walk.behind] == [0, 0, 2, 2]
     assert (walk.spent, walk.reached, walk.left_at, walk.on_branch) == (15, 3.0, 1.2, False)
 
 

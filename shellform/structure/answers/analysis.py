@@ -14,13 +14,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import NotConverged
 from shellform.structure.answers.halved import Refined, critical_error
+from shellform.structure.answers.increments import LoadIncrement, PathIncrement, Reached, Waypoint
 from shellform.structure.answers.request import (
     check_imposed_turns,
     check_request,
@@ -53,7 +53,7 @@ class Analysis:
     """The last state reached and why it ended there.
 
     `load` (n, 6) at that state; `reactions` (n, 6), what held degrees of freedom bear there, N and N·m;
-    `converged`; `increments` as result.json has them, each with the `steps` it took; `modes` and `critical`
+    `converged`; the `increments` by which it was come to, or the points of a path; `modes` and `critical`
     where they were asked for; `warnings`, a sentence each. `on_branch`: whether the state lies on the stable
     branch from the start; None where Newton's method doesn't tell. `critical_sought`: the factor up to which
     no other is critical, 0 where that wasn't found out; `critical_mesh`: on this mesh and with beams halved.
@@ -64,7 +64,7 @@ class Analysis:
     reactions: Reals
     equilibrium: Equilibrium
     converged: bool
-    increments: tuple[dict[str, Any], ...]
+    increments: tuple[LoadIncrement | PathIncrement, ...]
     seconds: Mapping[str, float]
     message: str = ""
     warnings: tuple[str, ...] = ()
@@ -134,7 +134,7 @@ def analyse(
         reactions=assembly.unbalanced(found.state, loaded),
         equilibrium=replace(found, factorisations=walk.spent),
         converged=converged,
-        increments=tuple(walk.documented),
+        increments=tuple(walk.behind),
         seconds=_seconds(assembly, time.perf_counter() - began),
         message=message,
         warnings=(
@@ -165,7 +165,7 @@ class _Analysis:
     progress: PathWatch | None
     spent: int = 0
     reached: float = 0.0
-    documented: list[dict[str, Any]] = field(default_factory=list)
+    behind: list[LoadIncrement | PathIncrement] = field(default_factory=list)
     found: Equilibrium | None = None
     on_branch: bool | None = True
     left_at: float | None = None  # the factor at which the stable branch ended
@@ -205,7 +205,7 @@ class _Analysis:
         """Equal increments up to the factor."""
         for k in range(1, count + 1):
             before, after = (k - 1) / count * self.factor, k / count * self.factor
-            steps: list[dict[str, Any]] = []
+            waypoints: list[Waypoint] = []
             if method in ("newton", "dynamic"):
                 motion = (after - before) * self.drive.imposed
                 if turns_half(motion):
@@ -226,13 +226,13 @@ class _Analysis:
                 spent = found.factorisations
                 self.on_branch = None
             else:
-                found, spent = self._relaxed(before, after, steps)
+                found, spent = self._relaxed(before, after, waypoints)
             self.accept(found, after, spent)
-            self.documented.append(self._increment(after, spent) | {"steps": steps})
+            self.behind.append(LoadIncrement(self._reached(found, after, spent), tuple(waypoints)))
 
-    def _relaxed(self, before: float, after: float, steps: list[dict[str, Any]]) -> tuple[Equilibrium, int]:
+    def _relaxed(self, before: float, after: float, waypoints: list[Waypoint]) -> tuple[Equilibrium, int]:
         """The equilibrium at the factor `after` from the one at `before`, and factorisations spent; along the
-        path where moments without potential don't let the relaxation come to rest.
+        path where moments without potential don't let the relaxation come to rest. Adds its `waypoints`.
         """
         try:
             arrived = advance(
@@ -244,21 +244,21 @@ class _Analysis:
                 tolerance=self.tolerance,
                 heeding=not len(self.swinging),
                 limit=min(self.limit, _TURNING) if self.turns else self.limit,
-                report=self._reporter(steps, before, after),
+                report=self._reporter(waypoints, before, after),
             )
         except NotConverged as error:
             if not self.turns or isinstance(error, Drowned):
                 raise
-            steps.clear()
-            found = self._followed(before, after, steps, error.iterations)
+            waypoints.clear()
+            found = self._followed(before, after, waypoints, error.iterations)
             return found, error.iterations + found.factorisations
         if not arrived.on_branch:
             self._left(before + arrived.share * (after - before))
         return arrived.equilibrium, arrived.factorisations
 
-    def _followed(self, before: float, after: float, steps: list[dict[str, Any]], wasted: int) -> Equilibrium:
+    def _followed(self, before: float, after: float, waypoints: list[Waypoint], wasted: int) -> Equilibrium:
         """The equilibrium at the factor `after` along the path from the one at `before`, after `wasted`
-        factorisations."""
+        factorisations. Adds its `waypoints`."""
         change = after - before
         rest = Drive(change * self.drive.load, change * self.drive.imposed, self.drive.at(before))
         if self.followed_from is None:
@@ -269,13 +269,7 @@ class _Analysis:
             factor = before + last.factor * change
             if last.event or not last.equilibrium.stable:
                 self._left(factor)
-            steps.append(
-                {
-                    "factor": factor,
-                    "iterations": last.equilibrium.factorisations,
-                    "stable": last.equilibrium.stable,
-                }
-            )
+            waypoints.append(Waypoint(factor, last.equilibrium.factorisations, last.equilibrium.stable))
             if self.progress is not None:
                 self.progress(factor, self.spent + wasted + last.equilibrium.factorisations)
         return last.equilibrium
@@ -297,14 +291,13 @@ class _Analysis:
         )
         for point in points:
             spent = point.equilibrium.factorisations
-            if point.factor == 0.0 and not self.documented:
+            if point.factor == 0.0 and not self.behind:
                 continue
             if point.event or not point.equilibrium.stable:
                 self._left(point.factor)
             self.accept(point.equilibrium, point.factor, spent - before)
-            self.documented.append(
-                self._increment(point.factor, spent - before) | {"rate": point.rate, "event": point.event}
-            )
+            reached = self._reached(point.equilibrium, point.factor, spent - before)
+            self.behind.append(PathIncrement(reached, point.rate, point.event))
             before = spent
 
     def _left(self, factor: float) -> None:
@@ -354,23 +347,17 @@ class _Analysis:
         stable, negative = stability(assembly, balance)
         return Equilibrium(state, balance.energy, residual, self.spent, stable, negative)
 
-    def _increment(self, factor: float, spent: int) -> dict[str, Any]:
-        assert self.found is not None
-        moves = (self.state.positions - self.model.network.nodes)[self.loaded]
-        return {
-            "factor": factor,
-            "iterations": spent,
-            "displacements": {str(n): d for n, d in zip(self.loaded.tolist(), moves.tolist(), strict=True)},
-            "stable": self.found.stable,
-            "negative_pivots": self.found.negative,
-        }
+    def _reached(self, found: Equilibrium, factor: float, spent: int) -> Reached:
+        moves = (found.state.positions - self.model.network.nodes)[self.loaded]
+        moved_by = dict(zip(self.loaded.tolist(), moves, strict=True))
+        return Reached(factor, spent, moved_by, found.stable, found.negative)
 
     def _reporter(
-        self, steps: list[dict[str, Any]], before: float, after: float
+        self, waypoints: list[Waypoint], before: float, after: float
     ) -> Callable[[float, Equilibrium], None]:
         def report(share: float, found: Equilibrium) -> None:
             factor = before + share * (after - before)
-            steps.append({"factor": factor, "iterations": found.factorisations, "stable": found.stable})
+            waypoints.append(Waypoint(factor, found.factorisations, found.stable))
             if self.progress is not None:
                 self.progress(factor, self.spent + found.factorisations)
 

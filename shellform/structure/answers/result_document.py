@@ -42,7 +42,7 @@ def result(analysis: Analysis, *, sections: Mapping[str, Section] | None = None)
             for node in analysis.model.supported
         ],
         "energy": found.energy,
-        "increments": list(analysis.increments),
+        "increments": [each.document() for each in analysis.increments],
         "seconds": dict(analysis.seconds),
         "warnings": list(analysis.warnings),
         "beam_twists": twist(network.beams.local_deformations(found.state)).tolist(),
