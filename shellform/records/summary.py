@@ -160,22 +160,22 @@ class LoadRecord:
     built_shape: BuiltShapeRecord | None = None
     expected_stiffness: float | None = None
 
-
-_UNEXAMINED: dict[str, Any] = dict.fromkeys(
-    [
-        "critical_sought",
-        "critical_factor",
-        "critical_factor_error",
-        "critical_factor_halved",
-        "critical_kind",
-        "deviation_max_error",
-        "deviation_mean_error",
-        "rod_utilisation_error",
-        "stands",
-        "built_shape",
-        "expected_stiffness",
-    ]
-)
+    def unexamined(self) -> LoadRecord:
+        """Without what the stage "safety" finds."""
+        return replace(
+            self,
+            critical_sought=None,
+            critical_factor=None,
+            critical_factor_error=None,
+            critical_factor_halved=None,
+            critical_kind=None,
+            deviation_max_error=None,
+            deviation_mean_error=None,
+            rod_utilisation_error=None,
+            stands=None,
+            built_shape=None,
+            expected_stiffness=None,
+        )
 
 
 @dataclass(frozen=True)
@@ -277,7 +277,7 @@ class Summary:
         designs = {
             name: replace(
                 design,
-                loads={each: replace(row, **_UNEXAMINED) for each, row in design.loads.items()},
+                loads={load: row.unexamined() for load, row in design.loads.items()},
                 critical_factor_kept=None,
             )
             for name, design in self.designs.items()

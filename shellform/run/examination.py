@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -32,6 +31,7 @@ from shellform.records.progress import Event, Kind
 from shellform.records.summary import (
     BuiltShapeRecord,
     DesignRecord,
+    LoadRecord,
     StandingRecord,
     Summary,
     write_summary,
@@ -155,8 +155,7 @@ def _critical(case: Case, each: _Examined, record: DesignRecord) -> DesignRecord
     rows = dict(record.loads)
     for largest, shares in paths(each.loads).items():
         followed = "design" if "design" in shares else largest
-        for name, found in _ends(each, followed, shares, asked).items():
-            rows[name] = replace(rows[name], **found)
+        rows |= _with_ends({name: rows[name] for name in shares}, each, followed, shares, asked)
     kept = all(
         (rows[name].critical_factor or 0.0) >= least * (1.0 - EQUAL)
         for name, least in asked.items()
@@ -165,34 +164,39 @@ def _critical(case: Case, each: _Examined, record: DesignRecord) -> DesignRecord
     return replace(record, loads=rows, critical_factor_kept=kept if asked else None)
 
 
-def _ends(
-    each: _Examined, followed: str, shares: Mapping[str, float], asked: Mapping[str, float]
-) -> dict[str, dict[str, Any]]:
-    """The fields of the loads' records that the path of one of them tells, whose `shares` of the largest are
-    given.
-    """
+def _with_ends(
+    rows: Mapping[str, LoadRecord],
+    each: _Examined,
+    followed: str,
+    shares: Mapping[str, float],
+    asked: Mapping[str, float],
+) -> dict[str, LoadRecord]:
+    """The loads' records with what the path of the one that is `followed` tells of each; their `shares` of
+    the largest are given."""
     sought = max(SOUGHT, _BEYOND * max((asked.get(name, 0.0) for name in shares), default=0.0))
     try:
         error = mesh_error(each.shell, each.design, each.loads[followed], sought=sought)
     except NotConverged as lost:
-        return {name: {"critical_kind": f"not found: {lost.what}"} for name in shares}
-    found: dict[str, dict[str, Any]] = {}
+        return {name: replace(rows[name], critical_kind=f"not found: {lost.what}") for name in shares}
+    ended = {}
     for name, share in shares.items():
         times = shares[followed] / share
-        found[name] = {
-            "critical_sought": sought * times,
-            "critical_factor": error.critical.coarse * times,
-            "critical_factor_halved": error.critical.fine * times,
-            "critical_factor_error": error.critical.error * times,
-            "critical_kind": error.kinds[0],
-        }
-    found[followed] |= {
-        "deviation_max_error": error.deviation_max.error,
-        "deviation_mean_error": error.deviation_mean.error,
-    }
-    if np.isfinite(each.shell.rod.strength):
-        found[followed]["rod_utilisation_error"] = error.stress.error / each.shell.rod.strength
-    return found
+        ended[name] = replace(
+            rows[name],
+            critical_sought=sought * times,
+            critical_factor=error.critical.coarse * times,
+            critical_factor_halved=error.critical.fine * times,
+            critical_factor_error=error.critical.error * times,
+            critical_kind=error.kinds[0],
+        )
+    strength = each.shell.rod.strength
+    ended[followed] = replace(
+        ended[followed],
+        deviation_max_error=error.deviation_max.error,
+        deviation_mean_error=error.deviation_mean.error,
+        rod_utilisation_error=error.stress.error / strength if np.isfinite(strength) else None,
+    )
+    return ended
 
 
 def _stand(workspace: Workspace, each: _Examined, count: int, summary: Summary, clock: Clock) -> Summary:

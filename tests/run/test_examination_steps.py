@@ -88,27 +88,30 @@ def test_what_one_path_tells_of_its_loads_is_counted_by_each_of_them(monkeypatch
         return mesh_error()
 
     monkeypatch.setattr(examination, "mesh_error", halved)
-    found = examination._ends(examined(), "design", {"additional": 1.0, "design": 0.8}, asked)
+    rows = told().designs["initial"].loads
+    found = examination._with_ends(rows, examined(), "design", {"additional": 1.0, "design": 0.8}, asked)
     assert followed == [("initial itself", -10.0, pytest.approx(sought))]
-    assert found["design"] == {
-        "critical_sought": pytest.approx(sought),
-        "critical_factor": 1.6,
-        "critical_factor_halved": 1.5,
-        "critical_factor_error": 0.13,
-        "critical_kind": "limit point",
-        "deviation_max_error": 0.004,
-        "deviation_mean_error": 0.002,
-        "rod_utilisation_error": 0.25,
-    }
-    assert found["additional"] == {
-        "critical_sought": pytest.approx(0.8 * sought),
-        "critical_factor": pytest.approx(1.28),
-        "critical_factor_halved": pytest.approx(1.2),
-        "critical_factor_error": pytest.approx(0.104),
-        "critical_kind": "limit point",
-    }
-    endless = examination._ends(examined(strength=np.inf), "design", {"design": 1.0}, {})
-    assert "rod_utilisation_error" not in endless["design"], "of rods whose strength isn't known"
+    assert found["design"] == replace(
+        rows["design"],
+        critical_sought=pytest.approx(sought),
+        critical_factor=1.6,
+        critical_factor_halved=1.5,
+        critical_factor_error=0.13,
+        critical_kind="limit point",
+        deviation_max_error=0.004,
+        deviation_mean_error=0.002,
+        rod_utilisation_error=0.25,
+    )
+    assert found["additional"] == replace(
+        rows["additional"],
+        critical_sought=pytest.approx(0.8 * sought),
+        critical_factor=pytest.approx(1.28),
+        critical_factor_halved=pytest.approx(1.2),
+        critical_factor_error=pytest.approx(0.104),
+        critical_kind="limit point",
+    )
+    endless = examination._with_ends(rows, examined(strength=np.inf), "design", {"design": 1.0}, {})
+    assert endless["design"].rod_utilisation_error is None, "of rods whose strength isn't known"
 
 
 def test_a_path_that_is_lost_is_told_of_every_load_on_it(monkeypatch):
@@ -116,8 +119,11 @@ def test_a_path_that_is_lost_is_told_of_every_load_on_it(monkeypatch):
         raise NotConverged("no way")
 
     monkeypatch.setattr(examination, "mesh_error", lost)
-    found = examination._ends(examined(), "design", {"additional": 1.0, "design": 0.8}, {})
-    assert found == {name: {"critical_kind": "not found: no way"} for name in ("additional", "design")}
+    rows = told().designs["initial"].loads
+    found = examination._with_ends(rows, examined(), "design", {"additional": 1.0, "design": 0.8}, {})
+    assert found == {
+        name: replace(rows[name], critical_kind="not found: no way") for name in ("additional", "design")
+    }
 
 
 @pytest.mark.parametrize(
@@ -135,12 +141,13 @@ def test_a_path_that_is_lost_is_told_of_every_load_on_it(monkeypatch):
 def test_critical_factors_are_kept_where_every_one_that_is_asked_for_is(monkeypatch, asked, kept):
     seen = []
 
-    def ends(each, followed, shares, wanted):
+    def with_ends(rows, each, followed, shares, wanted):
         seen.append((followed, sorted(shares)))
-        return {name: {"critical_factor": 1.3 if followed == "design" else 2.0} for name in shares}
+        factor = 1.3 if followed == "design" else 2.0
+        return {name: replace(rows[name], critical_factor=factor) for name in shares}
 
     monkeypatch.setattr(examination, "critical_factors_asked", lambda case: asked)
-    monkeypatch.setattr(examination, "_ends", ends)
+    monkeypatch.setattr(examination, "_with_ends", with_ends)
     record = examination._critical(CASE, examined(), told().designs["initial"])
     assert seen == [("design", ["additional", "design"]), ("wind", ["wind"])], "by the design load, if it can"
     assert record.critical_factor_kept is kept
