@@ -89,16 +89,24 @@ def number(value: float, digits: int = 3) -> str:
 
 
 def standing_words(own: StandingRecord) -> str:
+    """How many structures as built stand, and how sure that is."""
+    return f"{standing_count_words(own)} ({confidence_words(own)})"
+
+
+def standing_count_words(own: StandingRecord) -> str:
     """How many structures as built stand."""
     snapped = (
         f", {own.snapped} of them after a rod's end or a cell has snapped by up to {number(1e3 * own.snap, 2)} mm"
         if own.snapped
         else ""
     )
-    return (
-        f"{own.standing} of {own.drawn} structures as built stand{snapped} (at least {math.floor(100.0 * own.at_least):.0f} % "
-        f"with {number(100.0 * own.confidence)} % confidence)"
-    )
+    return f"{own.standing} of {own.drawn} structures as built stand{snapped}"
+
+
+def confidence_words(own: StandingRecord) -> str:
+    """Which share stands at the least, and how sure that is."""
+    least, sure = math.floor(100.0 * own.at_least), number(100.0 * own.confidence)
+    return f"at least {least:.0f} % with {sure} % confidence"
 
 
 def built_shape_words(own: BuiltShapeRecord) -> str:

@@ -16,12 +16,13 @@ from shellform.output.page.measures import found, given
 from shellform.output.page.profile_table import profile_table
 from shellform.records.check import SLACK, Cell
 from shellform.records.profile import Profile, StageProfile, WorkRecord
-from shellform.records.summary import LoadRecord
+from shellform.records.summary import LoadRecord, StandingRecord
+from shellform.records.words import standing_words
 from shellform.structure.elements.sections import Material, Rectangle
 
 MORE = LoadRecord(1.5, 0.0123, 0.0045, 0.0061, True, 0.625)
-STANDS = SimpleNamespace(standing=97, drawn=100)
-AS_BUILT = Cell("97 of 100 structures as built stand (at least 92 % with 95 % confidence)", holds=True)
+STANDS = StandingRecord(100, 97, 0.9234, 0.95, 0)
+AS_BUILT = Cell(standing_words(STANDS), holds=True)
 
 
 def safe(more=MORE, as_built=AS_BUILT, *, stands=STANDS, strength_known=True, **changed):
@@ -62,13 +63,11 @@ def test_what_stands_worst_with_the_perfect_shell_is_told_first_and_then_the_dra
 
 @pytest.mark.parametrize(("standing", "sure"), [(95, True), (94, False), (40, False), (100, True)])
 def test_fewer_than_95_of_a_hundred_are_not_surely_safe_though_no_more_are_asked_for(standing, sure):
-    told = safe(stands=SimpleNamespace(standing=standing, drawn=100))
+    told = safe(stands=replace(STANDS, standing=standing))
     assert told.good is (True if sure else None)
-    assert told.words == f"{'' if sure else 'Not surely: '}97 of 100 structures as built stand"
+    assert told.words == f"{'' if sure else 'Not surely: '}{standing} of 100 structures as built stand"
     assert ("No more are asked for." in told.detail) != sure
-    fallen = safe(
-        as_built=replace(AS_BUILT, holds=False), stands=SimpleNamespace(standing=standing, drawn=100)
-    )
+    fallen = safe(as_built=replace(AS_BUILT, holds=False), stands=replace(STANDS, standing=standing))
     assert fallen.good is False
     assert "Not surely" not in fallen.words
 

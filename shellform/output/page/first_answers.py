@@ -20,11 +20,13 @@ from shellform.records.check import SLACK, Cell
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
 from shellform.records.words import (
     above_words,
+    confidence_words,
     critical_words,
     driven_words,
     listed,
     number,
     shape_notes,
+    standing_count_words,
 )
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
@@ -201,8 +203,9 @@ def _is_safe(
     elif as_built is None or more.stands is None:
         safe, words = None, "Not examined as built"
     else:
-        safe, (words, _, more_words) = as_built.holds, as_built.found.partition(" (")
-        sure = f"{more_words[:1].upper()}{more_words[1:].rstrip(')')}. " if more_words else ""
+        safe, words = as_built.holds, standing_count_words(more.stands)
+        least = confidence_words(more.stands)
+        sure = f"{least[:1].upper()}{least[1:]}. "
         if (
             safe and more.stands.standing < _SAFE * more.stands.drawn
         ):  # no fewer than of an initial design that falls as often
