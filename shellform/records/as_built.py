@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-from shellform.records.check import UNASKED, UNKNOWN, Cell, Check
+from shellform.records.check import UNASKED, UNKNOWN, Cell, Check, Subject
 from shellform.records.remedies import RodsOf
 from shellform.records.summary import DesignRecord, LoadRecord
 from shellform.records.words import critical_words, load_title, number, standing_words
@@ -51,7 +51,8 @@ def standing_checks(
             for name in rods
         }
         limit = f"at least {safety.drawn - fallen} of {safety.drawn}" if safety.required else "told only"
-        found.append(Check(f"As built under {load_title(load, factors[load])}", limit, cells))
+        title = f"As built under {load_title(load, factors[load])}"
+        found.append(Check(title, limit, cells, Subject.DRAWN, load))
     return found
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum, auto
 
 from shellform.records.words import number
 
@@ -26,13 +27,29 @@ class Cell:
     share: float | None = None
 
 
+class Subject(Enum):
+    """What a check is of, for those who show some apart."""
+
+    DESIGN = auto()
+    DRAWN = auto()  # how many structures, drawn as they will be built, stand
+    SEARCH = auto()  # a constraint of the optimiser's own
+
+
 @dataclass(frozen=True)
 class Check:
-    """One check of all designs: its `name`, the `limit` in words, and a cell by design."""
+    """One check of all designs: its `title`, the `limit` in words, and a cell by design; its `subject`, and
+    under which `load` drawn structures stand."""
 
-    name: str
+    title: str
     limit: str
     cells: Mapping[str, Cell]
+    subject: Subject = Subject.DESIGN
+    load: str = ""
+
+    @property
+    def name(self) -> str:
+        """The title among those of all checks."""
+        return f"Optimiser: {self.title}" if self.subject is Subject.SEARCH else self.title
 
 
 UNASKED = Cell("–", None, False)

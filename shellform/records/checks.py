@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 from shellform.gridshell.gridshell import Design, Gridshell, max_radius
 from shellform.records.as_built import AsBuilt, critical_checks, guide_checks, standing_checks
-from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, below, share_of
+from shellform.records.check import SLACK, UNASKED, UNKNOWN, Cell, Check, Subject, below, share_of
 from shellform.records.optimisation import OptimisationRecord
 from shellform.records.remedies import RodSizes, RodsOf, allow, allow_count, allow_less
 from shellform.records.summary import DesignRecord, LoadRecord, Summary
@@ -92,7 +92,7 @@ def checks(
     )
     misfit = 1e3 * bounds.misfit
     deviating = [
-        Check(f"{check.name}, root mean square (6)", check.limit, check.cells)
+        replace(check, title=f"{check.title}, root mean square (6)")
         for check in under(
             "Deviation",
             f"{number(misfit)} mm",
@@ -276,7 +276,7 @@ def _of_the_optimiser(
         cell = replace(_constraint(name, value), remedy=_EVALUATIONS)
         limit = "at least what is demanded" if name.partition(".")[0] in _AT_LEAST else "up to the limit"
         cells = {design: cell if design == "optimised" else UNASKED for design in designs}
-        found.append(Check(f"Optimiser: {titles[name]}", limit, cells))
+        found.append(Check(titles[name], limit, cells, Subject.SEARCH))
     if record.cables_max is not None:
         most = record.cables_max.asked
         cells = {

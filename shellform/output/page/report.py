@@ -28,7 +28,7 @@ from shellform.output.page.template import filled, part
 from shellform.output.page.view_data import ViewedShell, controls, view_data
 from shellform.output.pictures.colours import VIRIDIS
 from shellform.records import words
-from shellform.records.check import UNASKED, Cell, Check
+from shellform.records.check import UNASKED, Cell, Check, Subject
 from shellform.records.summary import Summary
 from shellform.records.verdict import asked, headline
 
@@ -68,9 +68,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
     rows = [(name, words.design_title(name), summary.designs[name]) for name in run.designs]
     best = summary.designs[run.best]
     ended = [
-        check
-        for check in run.checks
-        if check.name.startswith("Optimiser: ") and not check.cells[run.best].asked
+        check for check in run.checks if check.subject is Subject.SEARCH and not check.cells[run.best].asked
     ]
     return {
         "id": f"run{number}",
@@ -99,7 +97,7 @@ def _content(run: ShownRun, number: int) -> dict[str, Any]:
         "designs": rows,
         "shown_first": sorted(rows, key=lambda each: each[0] != run.best),
         "checks": [check for check in run.checks if check not in ended],
-        "ended": [(check.name.removeprefix("Optimiser: "), check.limit, _told(check)) for check in ended],
+        "ended": [(check.title, check.limit, _told(check)) for check in ended],
         "charts": _charts(run.history),
         "pictures": [(picture, _caption(picture.name)) for picture in run.pictures],
         "notes": [
@@ -140,8 +138,14 @@ def viewed(run: ShownRun) -> ViewedShell:
 
 def _as_built(run: ShownRun, load: str) -> Cell | None:
     """How many drawn structures of the design to build stand, as its check says."""
-    title = f"As built under {words.load_title(load, _factor(run.summary, load))}"
-    return next((check.cells.get(run.best) for check in run.checks if check.name == title), None)
+    return next(
+        (
+            check.cells.get(run.best)
+            for check in run.checks
+            if check.subject is Subject.DRAWN and check.load == load
+        ),
+        None,
+    )
 
 
 def _factor(summary: Summary, load: str) -> float | None:
