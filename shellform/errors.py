@@ -14,7 +14,11 @@ from typing import Any
 
 
 class ShellformError(Exception):
-    """Base of both, for callers who catch everything that this package says on purpose."""
+    """Base of both, for callers who catch everything that this package says on purpose: the message is the
+    `cause`, then the `remedy`, "" where there is none."""
+
+    cause: str
+    remedy: str
 
 
 class InputError(ShellformError, ValueError):
@@ -31,8 +35,8 @@ class InputError(ShellformError, ValueError):
         self.remedy = remedy
         head = f"{printable(where)}: {what}" if where else what
         found = "" if value is None else f" (found {value!r})"
-        tail = f". {remedy}" if remedy else ""
-        super().__init__(f"{head}{found}{tail}")
+        self.cause = f"{head}{found}"
+        super().__init__(f"{self.cause}. {remedy}" if remedy else self.cause)
 
     def within(self, place: str) -> InputError:
         """The same, found in a part of `place`."""
@@ -166,7 +170,7 @@ class NotConverged(ShellformError, RuntimeError):
         iterations: int = 0,
         remedy: str = "",
     ) -> None:
-        self.what = what
+        self.what = self.cause = what
         self.state = state
         self.residual = residual
         self.iterations = iterations

@@ -121,3 +121,14 @@ def test_a_file_that_can_not_be_read_is_told_in_words_without_the_system_s_numbe
     assert unreadable(missing.value) == "can't be read: No such file or directory"
     assert unreadable(OSError("gone")) == "can't be read: gone"
     assert unreadable(ValueError("no text")) == "can't be read: no text"
+
+
+def test_a_refusal_is_its_cause_and_then_its_remedy():
+    given = {"where": "rod.radius", "value": -1.0}
+    for error, cause in (
+        (InputError("is odd", **given, remedy="Give 2."), "rod.radius: is odd (found -1.0)"),
+        (NotConverged("It stalls", remedy="Give 2."), "It stalls"),
+    ):
+        assert (error.cause, error.remedy, str(error)) == (cause, "Give 2.", f"{cause}. Give 2.")
+    for bare in (InputError("is odd", **given), NotConverged("It stalls")):
+        assert (str(bare), bare.remedy) == (bare.cause, "")

@@ -39,8 +39,6 @@ def break_off(workspace: Workspace, stage: str, error: ShellformError) -> None:
 
 def _ended(workspace: Workspace, stage: str, error: ShellformError, summary: Summary) -> EndedRun:
     folder = workspace.folder
-    remedy = str(getattr(error, "remedy", ""))
-    cause = str(error).removesuffix(f". {remedy}") if remedy else str(error)
     done = read_stages(folder)
     lines = workspace.path(log.FILE).read_text(encoding="utf-8", errors="replace").splitlines()
     return EndedRun(
@@ -48,8 +46,8 @@ def _ended(workspace: Workspace, stage: str, error: ShellformError, summary: Sum
         place=folder.name or str(folder),
         version=shellform.__version__,
         stage=stage,
-        cause=cause,
-        remedy=remedy,
+        cause=error.cause,
+        remedy=error.remedy,
         stages=[(name, "ended" if name == stage else "done" if name in done.keys else "") for name in STAGES],
         facts=facts(summary),
         notes=(
