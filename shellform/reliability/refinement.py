@@ -52,10 +52,15 @@ def mesh_error(shell: Gridshell, design: Design, load: Reals, *, sought: float =
     NotConverged where there is no unloaded equilibrium."""
     section = shell.rod.resized(design.radius).section
     model = model_under(shell, design, load)
-    coarse = _numbers(model, shell.target.positions, section, sought)
-    fine = _numbers(rods_halved(model), shell.target.positions, section, sought)
-    pairs = [Refined(one, other) for one, other in zip(coarse[:4], fine[:4], strict=True)]
-    return MeshError(pairs[0], pairs[1], pairs[2], pairs[3], (coarse[4], fine[4]))
+    coarse = _on_mesh(model, shell.target.positions, section, sought)
+    fine = _on_mesh(rods_halved(model), shell.target.positions, section, sought)
+    return MeshError(
+        deviation_max=Refined(coarse.deviation_max, fine.deviation_max),
+        deviation_mean=Refined(coarse.deviation_mean, fine.deviation_mean),
+        stress=Refined(coarse.stress, fine.stress),
+        critical=Refined(coarse.limit.factor, fine.limit.factor),
+        kinds=(coarse.limit.kind, fine.limit.kind),
+    )
 
 
 def critical_factor(shell: Gridshell, design: Design, load: Reals, *, sought: float = SOUGHT) -> Limit:
@@ -141,11 +146,19 @@ def _limit(model: Model, sought: float, resolution: float) -> tuple[Workshop, Li
     )
 
 
-def _numbers(
-    model: Model, target: Reals, section: Section, sought: float
-) -> tuple[float, float, float, float, str]:
+@dataclass(frozen=True)
+class _OnMesh:
+    """What one mesh says: as in `MeshError`, and where the path ends."""
+
+    deviation_max: float
+    deviation_mean: float
+    stress: float
+    limit: Limit
+
+
+def _on_mesh(model: Model, target: Reals, section: Section, sought: float) -> _OnMesh:
     workshop, limit = _limit(model, sought, _RESOLUTION)
     state, beams = workshop.nominal.states[-1], model.network.beams
     away = np.linalg.norm(state.positions[: len(target)] - target, axis=1)
     stress = float(rod_bending_stress(section, beams, beams.local_forces(state)).max())
-    return float(away.max()), float(away.mean()), stress, limit.factor, limit.kind
+    return _OnMesh(float(away.max()), float(away.mean()), stress, limit)
