@@ -171,19 +171,18 @@ def first_spacing(surface: Surface) -> tuple[float, str]:
     radius = 1.0 / max(bent, 1e-12)
     curved, finest = radius / _BY_RADIUS, math.sqrt(area / CURVED)
     shown = f"a third of the surface's radius of {radius:.3g} m"
-    wanted = {
-        f"about {_CROSSINGS:.0f} crossings": math.sqrt(area / _CROSSINGS),
-        "usual on site": max(_USUAL, math.sqrt(area / MOST_CROSSINGS)),
-        shown: max(curved, finest),
-    }
-    reason = min(wanted, key=lambda each: wanted[each])
-    if reason == shown and curved < finest:
+    enough = math.sqrt(area / _CROSSINGS)
+    usual = max(_USUAL, math.sqrt(area / MOST_CROSSINGS))
+    spacing = min(enough, usual, max(curved, finest))
+    if spacing == enough:
+        told = f"about {_CROSSINGS:.0f} crossings"
+    elif spacing == usual:
+        told = "usual on site" if usual == _USUAL else f"{MOST_CROSSINGS} crossings at the most"
+    elif curved < finest:
         told = f"{CURVED} crossings at the most, where {shown} asks for {curved:.2g} m"
-    elif wanted[reason] > _USUAL and reason == "usual on site":
-        told = f"{MOST_CROSSINGS} crossings at the most"
     else:
-        told = reason
-    return practical(wanted[reason]), told
+        told = shown
+    return practical(spacing), told
 
 
 def practical(spacing: float) -> float:
