@@ -199,28 +199,13 @@ def refused(
     """What to say of a shell that can't be built: as an error, to be raised. `bears`: a thickness of
     concrete, m, that was found to stand."""
     if failure is None or failure.why is Why.NET:
-        error = None if failure is None else failure.error
-        most, radius = sharpest_bend(surface)
-        spacing = 0.0 if failure is None else failure.spacing
-        needed = max(COVERED * spacing, _RATHER * radius)
-        if failure is not None:
-            needed = max(needed, _rounding(surface, failure, wish))
-        return Unbuildable(
-            f"no net of {spacing:g} m covers the surface{'' if error is None else f' ({_said(error)})'}; it is "
-            f"curved most at {_at(surface.vertices[most])}, to a radius of {radius:.3g} m",
-            why=Why.NET,
-            where="net.spacing",
-            remedy=f"Round the surface there to {needed:.2g} m or more.",
-            spacing=spacing,
-            radius=needed,
-        )
-    choice, stress = failure.choice, failure.stress
+        return _uncovered(surface, failure, wish)
+    choice = failure.choice
     assert choice is not None
     much = bears is not None and bears >= 0.5 * failure.thickness
     crease = None if much else _crease(surface, failure, wish, bears)
     if crease is not None:
         return crease
-    place = "" if failure.where is None else f" at {_at(failure.where)}"
     if failure.why is Why.SPACING:
         return InputError(
             f"rods of {choice.label} are too thick for a spacing of {failure.spacing:g} m",
@@ -228,35 +213,62 @@ def refused(
             remedy=f"Give --spacing {least_spacing(choice):g} or more, or thinner rods with --rod.",
         )
     if failure.why is Why.CURVATURE or (failure.why is Why.STRENGTH and bears is None):
-        placed = failure.placed
-        bends = 0.0 if placed is None else 1.0 / max(placed.net.quality.curvature_max, 1e-12)
-        loaded = failure.why is Why.STRENGTH and failure.factor > 0.0
-        done = "bent" if failure.why is Why.CURVATURE else "stressed"
-        allowed = (
-            f" and with {1e3 * failure.thickness:.3g} mm of concrete, where {STRESSED:.0%} is allowed"
-            if loaded
-            else ""
-        )
-        return Unbuildable(
-            f"{choice.label} of {choice.catalogue} would be {done} to {stress:.0%} of its "
-            f"strength{place}, at a spacing of {failure.spacing:g} m{allowed}",
-            why=failure.why,
-            where="rod",
-            remedy=_thinner_rods(wish)
-            if wish.rod
-            else f"Round the surface there: {max(stress, 1.0):.2g} times its radius is needed.",
-            spacing=failure.spacing,
-            radius=max(
-                _SPARE * max(stress, 1.0) * bends, 0.0 if wish.rod else _rounding(surface, failure, wish)
-            ),
-        )
+        return _broken(surface, failure, choice, wish)
+    return _fallen(failure, choice, bears)
+
+
+def _uncovered(surface: Surface, failure: Obstacle | None, wish: DesignWish) -> Unbuildable:
+    """The refusal of a surface that no net covers."""
+    error = None if failure is None else failure.error
+    most, radius = sharpest_bend(surface)
+    spacing = 0.0 if failure is None else failure.spacing
+    needed = max(COVERED * spacing, _RATHER * radius)
+    if failure is not None:
+        needed = max(needed, _rounding(surface, failure, wish))
+    return Unbuildable(
+        f"no net of {spacing:g} m covers the surface{'' if error is None else f' ({_said(error)})'}; it is "
+        f"curved most at {_at(surface.vertices[most])}, to a radius of {radius:.3g} m",
+        why=Why.NET,
+        where="net.spacing",
+        remedy=f"Round the surface there to {needed:.2g} m or more.",
+        spacing=spacing,
+        radius=needed,
+    )
+
+
+def _broken(surface: Surface, failure: Obstacle, choice: RodChoice, wish: DesignWish) -> Unbuildable:
+    """The refusal of a surface into which rods can't be bent, or in which the load breaks them."""
+    placed, stress = failure.placed, failure.stress
+    bends = 0.0 if placed is None else 1.0 / max(placed.net.quality.curvature_max, 1e-12)
+    loaded = failure.why is Why.STRENGTH and failure.factor > 0.0
+    done = "bent" if failure.why is Why.CURVATURE else "stressed"
+    allowed = (
+        f" and with {1e3 * failure.thickness:.3g} mm of concrete, where {STRESSED:.0%} is allowed"
+        if loaded
+        else ""
+    )
+    return Unbuildable(
+        f"{choice.label} of {choice.catalogue} would be {done} to {stress:.0%} of its "
+        f"strength{_place(failure)}, at a spacing of {failure.spacing:g} m{allowed}",
+        why=failure.why,
+        where="rod",
+        remedy=_thinner_rods(wish)
+        if wish.rod
+        else f"Round the surface there: {max(stress, 1.0):.2g} times its radius is needed.",
+        spacing=failure.spacing,
+        radius=max(_SPARE * max(stress, 1.0) * bends, 0.0 if wish.rod else _rounding(surface, failure, wish)),
+    )
+
+
+def _fallen(failure: Obstacle, choice: RodChoice, bears: float | None) -> NotConverged:
+    """The refusal of a shell that falls under its load, or is stressed too much by it."""
     bearing = {Why.EDGES: "edge beams", Why.CABLES: "cables"}.get(failure.why, "rods")
     falls = failure.factor < NEEDED or failure.why is Why.SCATTER
     what = (
         f"The shell doesn't stand: {failure.why.value}. The stiffest that stands out is {choice.label} of {choice.catalogue} at "
         f"{failure.spacing:g} m; with {1e3 * failure.thickness:.3g} mm of concrete it stands up to {failure.factor:.2f} × its load, "
-        f"where {NEEDED:g} is needed, its {bearing} at {stress:.0%} of {'what they may bear' if failure.why is Why.CABLES else 'their strength'}"
-        f"{f', and gives way first{place}' if falls else ''}"
+        f"where {NEEDED:g} is needed, its {bearing} at {failure.stress:.0%} of {'what they may bear' if failure.why is Why.CABLES else 'their strength'}"
+        f"{f', and gives way first{_place(failure)}' if falls else ''}"
     )
     if bears is not None:
         layer = (
@@ -266,6 +278,10 @@ def refused(
     else:
         remedy = "Give the surface more rise: buckling grows with the square of its curvature."
     return NotConverged(what, residual=math.nan, iterations=0, remedy=remedy)
+
+
+def _place(failure: Obstacle) -> str:
+    return "" if failure.where is None else f" at {_at(failure.where)}"
 
 
 def _rounding(surface: Surface, failure: Obstacle, wish: DesignWish) -> float:
