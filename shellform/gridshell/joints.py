@@ -28,13 +28,13 @@ _TURNING = 0.1  # of table 1's resistance to turning: what friction leaves
 _OFF = 4.0  # times what fits: as much as a rod's EI changes where its radius is √2 times as large
 _WIDE = 1.5  # the same of the gap
 _NARROW = 0.95  # of what fits, below which rods would be pressed into each other
-_SPACING = 0.055  # m, of the paper's rods
+PAPER_SPACING = 0.055  # m, of the paper's rods
 
 
 def usual_gap(spacing: float) -> float:
     """The gap, m, of rods that aren't chosen yet: the depth of the paper's at that spacing. Once they are, it
     is theirs (`following`)."""
-    return _PAPER.gap * spacing / _SPACING
+    return _PAPER.gap * spacing / PAPER_SPACING
 
 
 def following(rod: Rod) -> Joint:

@@ -18,6 +18,7 @@ from shellform.records.profile import (
     write_profile,
 )
 from shellform.structure.elements.threads import cores
+from shellform.structure.solve.memory import kernel_entry
 from shellform.work_clock import Work, WorkClock
 
 _SET_BACK = "5"  # what /proc/self/clear_refs takes for the peak (man 5 proc)
@@ -76,8 +77,4 @@ def _set_back_peak() -> bool:
 
 def _peak() -> int | None:
     """Bytes, at the most since the peak was set back; None where the system doesn't tell."""
-    try:
-        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
-    except OSError:
-        return None
-    return next((1024 * int(line.split()[1]) for line in lines if line.startswith("VmHWM:")), None)
+    return kernel_entry(Path("/proc/self/status"), "VmHWM:")

@@ -17,6 +17,7 @@ from shellform.case.build_net import FAR, counted_from, distant_origin, size_tex
 from shellform.errors import InputError, NotConverged, how_many, printable
 from shellform.gridshell.catalogue import label
 from shellform.gridshell.edge_beams import Bundle
+from shellform.gridshell.joints import PAPER_SPACING
 from shellform.gridshell.layers import layers_of, single
 from shellform.net.edges import Edges, stretches_of
 from shellform.net.net import Stretch
@@ -42,7 +43,6 @@ from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.written import write_text
 
-_SPACING = 0.055  # m, of the paper's scale model
 _EVALUATIONS, _POLISHED = 30, 10
 _SEARCH = 2 / 3  # of the work that a surface is worth: the search for a design of it as it is
 _BUILT = f"errors of building {ENLARGED:g} times as large as is usual"
@@ -269,7 +269,7 @@ def _optimise(surface: Surface, design: FirstDesign) -> str:
 misfit = 0.7         # w1
 cable_force = 0.3    # w2
 # built_misfit = 0.3 # of the shape as built, with 0.35 for the others: keeps cables that hold structures as built in shape
-misfit_rms_additional = {_short(0.005 * design.spacing / _SPACING)!r}     # m, constraint (6): the paper's 5 mm × {design.spacing / _SPACING:.3g}
+misfit_rms_additional = {_short(0.005 * design.spacing / PAPER_SPACING)!r}     # m, constraint (6): the paper's 5 mm × {design.spacing / PAPER_SPACING:.3g}
 deviation = {rounded_up(off)!r}    # m, {why}: beyond it no cable is taken away for shape; limits.deviation requires it{far and f"; {far}"}
 evaluations = {_EVALUATIONS}     # a first answer in minutes; 100 leave fewer cables
 polish = {_POLISHED}

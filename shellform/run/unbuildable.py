@@ -25,6 +25,7 @@ from shellform.run.first_trial import NEEDED, STRESSED
 from shellform.run.sizes import DesignWish, Placed, RodChoice, curvature_usual, least_spacing, radius_for
 from shellform.run.way_out import COVERED
 from shellform.surface.shape.target import Surface, sharpest_bend
+from shellform.surface.units import METRES
 
 SMALLEST, LARGEST = 0.2, 150.0  # m, of a shell's larger side in plan
 _RATHER = 1.5  # times the least radius, where that alone isn't the reason
@@ -34,7 +35,7 @@ _ARCHED = 0.5  # of its larger side: a radius that makes a vault of a roof of fl
 _WORTH = 1.3  # times the radius to which rods bend now, at the least, for rounding to be worth while
 _FLAT = 0.01  # of the larger side: a surface that keeps to a plane so closely is a plate
 _IN_A_LINE = 0.02  # of the net's extent: supports that keep so near to a line don't keep it from tipping
-_UNITS = {"mm": 0.001, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "m": 1.0}
+_SUSPECTED = ("mm", "cm", "in", "ft")  # units of files that were taken for metres, the likeliest first
 
 
 class Unbuildable(InputError):
@@ -149,11 +150,9 @@ def refuse_size(surface: Surface) -> None:
     if SMALLEST <= side <= LARGEST:
         return
     x, y, z = surface.size
-    fitting = [
-        unit for unit, factor in _UNITS.items() if factor != 1.0 and 2.0 <= side * factor <= 0.5 * LARGEST
-    ]
+    fitting = [unit for unit in _SUSPECTED if 2.0 <= side * METRES[unit] <= 0.5 * LARGEST]
     remedy = (
-        f"Give the file's unit: --unit {fitting[0]} makes it {side * _UNITS[fitting[0]]:.3g} m."
+        f"Give the file's unit: --unit {fitting[0]} makes it {side * METRES[fitting[0]]:.3g} m."
         if fitting
         else "Scale the file to the size that is meant."
     )

@@ -18,14 +18,13 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.net import Net
-from shellform.output.pictures.panel import scale_end
+from shellform.output.pictures.panel import marked_nodes, scale_end
 from shellform.problem.paths import deviations
 from shellform.records import words
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 
 _MOST_TRIANGLES = 30_000  # of the surface in the view; more are merged
-_MARKED = 0.2  # of the largest load on a node: smaller ones get no arrow
 
 
 @dataclass(frozen=True)
@@ -106,7 +105,7 @@ def view_data(viewed: ViewedShell) -> dict[str, Any]:
             {
                 "name": name,
                 "title": viewed.load_titles[name],
-                "points": _marked(load),
+                "points": marked_nodes(load).tolist(),
             }
             for name, load in viewed.loads.items()
         ],
@@ -230,11 +229,6 @@ def _utilisation(shell: Gridshell, design: Design, state: State) -> Reals:
     use = np.zeros(shell.node_count)
     np.maximum.at(use, shell.net.grid.rod_ends, shell.bending_utilisation(design, state))
     return use
-
-
-def _marked(load: Reals) -> list[int]:
-    weight = np.linalg.norm(load[:, :3], axis=1)
-    return [int(node) for node in np.flatnonzero(weight > _MARKED * weight.max())]
 
 
 def _light(surface: Surface) -> tuple[Reals, Any]:

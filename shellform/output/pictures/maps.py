@@ -18,7 +18,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import ROD
 from shellform.net.net import Net
 from shellform.net.quality import shear_angles
-from shellform.output.pictures.panel import Panel
+from shellform.output.pictures.panel import Panel, marked_nodes
 from shellform.problem.paths import deviations
 from shellform.structure.answers.stability import modes
 from shellform.structure.elements.sections import stiffness
@@ -26,10 +26,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 
 DEGREE = float(np.pi / 180.0)
-# of the largest load on a node: smaller ones, such as of the rods' own weight, would hide the shell behind
-# arrows
-_MARKED = 0.2
-_AMPLITUDE = 0.05  # of the shell's size, at which a mode is drawn
+AMPLITUDE = 0.05  # of the size of a shell or model, at which a mode is drawn
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,6 @@ def panel_of(
     chosen = shell.unbraced() if design is None else design
     seen = QUANTITIES[quantity](shell, chosen, state)
     cables = shell.cables(chosen)
-    weight = np.zeros(len(state.positions)) if load is None else np.linalg.norm(load[:, :3], axis=1)
     return Panel(
         title=f"{title}{seen.note}",
         positions=seen.positions,
@@ -80,7 +76,7 @@ def panel_of(
         cables=cables.ends,
         cable_forces=cables.tension(state),
         supports=shell.net.supports,
-        load_points=np.flatnonzero(weight > _MARKED * weight.max(initial=0.0)),
+        load_points=np.empty(0, dtype=np.int64) if load is None else marked_nodes(load),
         rod_radius=chosen.radius,
         quantity=seen.quantity,
         unit=seen.unit,
@@ -125,7 +121,7 @@ def sunk(positions: Reals, shift: Reals) -> Reals:
     which is 1, so far that it is seen. A mode has no sign: where it moves most up or down it sinks."""
     size = float(np.ptp(positions, axis=0).max())
     upright = 1.0 if shift[np.argmax(np.abs(shift[:, 2])), 2] <= 0.0 else -1.0
-    return positions + _AMPLITUDE * size * upright * shift
+    return positions + AMPLITUDE * size * upright * shift
 
 
 QUANTITIES: dict[str, Callable[[Gridshell, Design, State], Map]] = {

@@ -8,11 +8,10 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.output.pictures import render
+from shellform.output.pictures.maps import AMPLITUDE
 from shellform.output.pictures.panel import Look, Panel
 from shellform.structure.answers.analysis import Analysis
 from shellform.written import folder as made
-
-_AMPLITUDE = 0.05  # of the model's size, at which modes are drawn
 
 
 def draw_analysis(analysis: Analysis, folder: str | Path) -> list[Path]:
@@ -52,7 +51,7 @@ def draw_analysis(analysis: Analysis, folder: str | Path) -> list[Path]:
 
 def _mode(analysis: Analysis, title: str, place: Reals, shape: Reals, target: Path) -> Path:
     size = float(np.ptp(place, axis=0).max())
-    shift = _AMPLITUDE * size * shape[:, :3]
+    shift = AMPLITUDE * size * shape[:, :3]
     return _draw(
         analysis, title, "amplitude (arbitrary)", place + shift, np.linalg.norm(shift, axis=1), target
     )

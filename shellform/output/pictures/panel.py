@@ -22,7 +22,17 @@ EDGE_BEAM = 1.8  # times as thick as rods edge beams are drawn
 VIEWS = ("best", "top", "front", "side")
 SMALLEST = (160, 120)  # pixels; below it the title leaves no room for the shell
 LARGEST = 8000  # pixels a side: drawn at twice that, near which drivers end
+FORMATS = (".png", ".svg", ".pdf")
+# of the largest load on a node: smaller ones, such as of the rods' own weight, would hide the shell behind
+# arrows
+_MARKED = 0.2
 _THIN = 0.0024  # half the width at which a rod is drawn at least, over the width of the picture
+
+
+def marked_nodes(load: Reals) -> Indices:
+    """The nodes at which a `load` (n, 6), N, is marked."""
+    weight = np.linalg.norm(load[:, :3], axis=1)
+    return np.flatnonzero(weight > _MARKED * weight.max(initial=0.0))
 
 
 def scale_end(largest: float) -> float:

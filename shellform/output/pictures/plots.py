@@ -27,13 +27,13 @@ from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.output.pictures.curves import read_history as read_history
 from shellform.output.pictures.legend import Ramp, Word
+from shellform.output.pictures.panel import FORMATS
 from shellform.records.words import constraint_titles
 from shellform.written import door, whole
 
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
 _DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
 _FAR = -1.5  # values further below their limit than this run out of the picture: what is near is what counts
-FORMATS = (".png", ".svg", ".pdf")
 _DOTS = 160.0  # pixels an inch
 _INCH, _POINTS = 25.4, 72.0  # mm and points in an inch
 _CAPITAL = 0.73  # height of a capital over the font's size

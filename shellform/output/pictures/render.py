@@ -21,13 +21,12 @@ from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.output.pictures import maps, painter
 from shellform.output.pictures.images import FILMS, write_film, write_png
-from shellform.output.pictures.panel import LIMIT, Look, Panel
+from shellform.output.pictures.panel import FORMATS, LIMIT, Look, Panel
 from shellform.output.pictures.sheets import Canvas, single, table
 from shellform.structure.elements.state import State
 from shellform.written import door
 
 Image = NDArray[np.uint8]
-FORMATS = (".png", ".svg", ".pdf")
 
 
 def deviation(

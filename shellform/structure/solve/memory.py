@@ -44,7 +44,7 @@ def free_memory() -> int | None:
     """Bytes that can be had without swapping: the system's, or what is left of a container's share; None
     where neither is told.
     """
-    system = _entry(Path("/proc/meminfo"), "MemAvailable:")
+    system = kernel_entry(Path("/proc/meminfo"), "MemAvailable:")
     group = Path("/sys/fs/cgroup")
     try:
         limit = (group / "memory.max").read_text(encoding="ascii").strip()
@@ -60,11 +60,11 @@ def free_memory() -> int | None:
 
 
 def _data_size() -> int:
-    return _entry(Path("/proc/self/status"), "VmData:") or 0
+    return kernel_entry(Path("/proc/self/status"), "VmData:") or 0
 
 
-def _entry(file: Path, name: str) -> int | None:
-    """A value in kB of a file of the kernel's, in bytes."""
+def kernel_entry(file: Path, name: str) -> int | None:
+    """A value in kB of a file of the kernel's, in bytes; None where there is none."""
     try:
         line = next(line for line in file.read_text(encoding="ascii").splitlines() if line.startswith(name))
     except (OSError, StopIteration):

@@ -16,6 +16,7 @@ from shellform.errors import InputError, how_many, require_number
 
 _MOST_CORNERS = 1000  # of a face: cutting its ears takes seconds
 MOST_TRIANGLES = 2_000_000
+MOST_BYTES = 512 * 1024**2  # of one file
 _NAMES_TOLD = 12
 _TRIANGLES = 2.5  # in a square of the mesh size, with what a surface's rise adds to its plan
 _ENTRIES = ("surface.layer", "surface.object")

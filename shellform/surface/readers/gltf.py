@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError
 from shellform.surface.readers.draft import (
+    MOST_BYTES,
     MOST_TRIANGLES,
     Choice,
     Draft,
@@ -36,7 +37,6 @@ _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126:
 _WIDTH = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _JSON, _BIN = 0x4E4F534A, 0x004E4942
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
-_MOST_BYTES = 512 * 1024**2  # of one buffer, as of any file
 _TOLD = 80  # characters of an address that are quoted
 _VERTICES, _ELEMENTS = 34962, 34963  # what a buffer view is for
 
@@ -311,7 +311,7 @@ class _Scene:
                 where=str(self._file),
                 remedy="Copy both, or export a GLB.",
             )
-        if beside.stat().st_size > _MOST_BYTES:
+        if beside.stat().st_size > MOST_BYTES:
             raise InputError(
                 f"its buffer {uri[:_TOLD]} is {beside.stat().st_size / 1024**2:,.0f} MB large",
                 where=str(self._file),

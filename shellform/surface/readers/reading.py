@@ -15,7 +15,7 @@ import numpy as np
 from shellform.arrays import Indices, Reals
 from shellform.errors import InputError, require_file, unreadable
 from shellform.surface.readers import compas, foreign, plain
-from shellform.surface.readers.draft import Choice, Draft
+from shellform.surface.readers.draft import MOST_BYTES, Choice, Draft
 from shellform.surface.readers.fills import filled
 from shellform.surface.readers.mend import mended, noted
 from shellform.surface.shape.target import Surface, make_surface
@@ -34,7 +34,6 @@ FORMATS = {
     "off": "OFF", "gltf": "glTF", "vtk": "VTK", "vtu": "VTU", "vtp": "VTP", "msh": "MSH",
     "compas": "COMPAS JSON",
 }  # fmt: skip
-MOST_BYTES = 512 * 1024**2
 _HEAD = 65536
 _UPRIGHT = 0.25  # plan over area, below which a shell is likely to lie on its side
 _STATED_UP = ("gltf",)  # formats that say which axis is vertical
