@@ -149,7 +149,7 @@ def refusal(path: Path, error: OSError) -> InputError:
     return InputError(f"can't be written: {error.strerror or error}", where=str(path), remedy=remedy)
 
 
-def folder(path: str | Path) -> Path:
+def make_folder(path: str | Path) -> Path:
     """Makes a folder and those above it. Raises InputError where that can't be done, and where its name is no
     UTF-8, so that no page could name it."""
     place = Path(path)

@@ -10,7 +10,7 @@ import pytest
 
 from shellform.arrays import read_arrays
 from shellform.errors import InputError
-from shellform.written import clear, folder, is_partial, whole, write_arrays, write_text
+from shellform.written import clear, is_partial, make_folder, whole, write_arrays, write_text
 
 
 def test_a_file_takes_its_place_when_it_is_whole(tmp_path):
@@ -37,7 +37,7 @@ def test_names_that_python_could_not_read_are_written_as_they_were_given_or_refu
         write_text(tmp_path / "a.txt", "the shell\udcff stands")
     assert (tmp_path / "a.txt").read_bytes() == "of Schüssel".encode()
     with pytest.raises(InputError, match="the folder: has letters that are no UTF-8"):
-        folder(tmp_path / "run\udcff")
+        make_folder(tmp_path / "run\udcff")
     assert [file.name for file in tmp_path.iterdir()] == ["a.txt"]
 
 

@@ -102,7 +102,7 @@ def _built(file: Path, entry: SurfaceEntry) -> Surface:
         draft = cad.read_script(file, size=entry.size, dimensions=entry.dimensions)
     else:
         draft = read_foreign(file, "script", {"size": entry.size, "dimensions": entry.dimensions})
-    return occ.made(draft.points, draft.triangles, draft.normals, str(file))
+    return occ.surface_from(draft.points, draft.triangles, draft.normals, str(file))
 
 
 def surface_record(surface: Surface, source: str) -> SurfaceRecord:

@@ -22,7 +22,7 @@ from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.run.folder import Run, read_run
 from shellform.run.scales import colour_limit, force_limit
 from shellform.structure.elements.state import State
-from shellform.written import folder as made
+from shellform.written import make_folder
 
 FAILURE = "states/failure.npz"  # of the stage "safety"
 _LOADS = {"none": "no load", "design": "design load", "additional": "additional load"}
@@ -209,7 +209,7 @@ def draw_failure(run: Run) -> list[Path]:
         load=run.loads[told.load],
         title=f"{told.design} design, structure {told.number} as it fails at {told.factor:.2f} of {_LOADS.get(told.load, told.load)}",
     )
-    made(file.parent)
+    make_folder(file.parent)
     render.pictures([file], [titled(run, panel)], look_of(run, Wish(), [panel]))
     return [file]
 
@@ -230,7 +230,7 @@ def draw_histories(run: Run, *, ending: str = ".png") -> list[Path]:
     at = [float(step.evaluation) for step in steps]
     terms = {name: [step.terms[name] for step in steps] for name in steps[0].terms}
     constraints = {name: [step.constraints[name] for step in steps] for name in steps[0].constraints}
-    files = [made(run.folder / "figures") / f"{name}{ending}" for name in ("objective", "constraints")]
+    files = [make_folder(run.folder / "figures") / f"{name}{ending}" for name in ("objective", "constraints")]
     plots.objective_history(files[0], at, terms, cables=[float(step.cables) for step in steps])
     plots.constraint_history(files[1], at, constraints)
     return files
@@ -261,7 +261,7 @@ def draw_designs(run: Run, wish: Wish | None = None, *, report: Report = unheard
     from shellform.output.pictures.panel import Look
 
     asked = wish or Wish()
-    figures = made(run.folder / "figures")
+    figures = make_folder(run.folder / "figures")
     if asked.quantity == "history":
         return draw_histories(run, ending=asked.endings[0])
     if asked.quantity == "spring":  # what the springs still pull is the net's, whatever the design

@@ -24,7 +24,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.equilibrium import Equilibrium
 from shellform.structure.solve.loading import apply_load
-from shellform.written import folder as made
+from shellform.written import make_folder
 
 _FRAMES = 24  # of a stage
 _SIZE = (960, 600)
@@ -51,7 +51,7 @@ def draw_film(run: Run, kind: str, wish: Wish, *, report: Report = unheard) -> l
         panels = _erection(run, name, wish, report)
         stem = f"erection-{name}"
     look = look_of(run, replace(wish, size=wish.size or _SIZE), panels)
-    files = [made(run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings]
+    files = [make_folder(run.folder / "figures") / f"{stem}{ending}" for ending in wish.endings]
     report(Event("film", f"drawing {len(panels)} frames"))
     render.film(files, [titled(run, panel) for panel in panels], look)
     return files

@@ -28,8 +28,7 @@ from shellform.records.files import ANEW
 from shellform.records.summary import Summary, read_summary, summary_version
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
-from shellform.written import clear, refusal, write_arrays
-from shellform.written import folder as made_folder
+from shellform.written import clear, make_folder, refusal, write_arrays
 
 LOCK = "lock"
 DESIGNS = ("unbraced", "initial", "unloaded", "optimised", "rounded", "polished")
@@ -177,7 +176,7 @@ def alone(place: Path, *, wait: bool = False) -> Iterator[None]:
     Raises InputError where another process holds it (or waits until it doesn't), and where the folder can't
     be written.
     """
-    made_folder(place)
+    make_folder(place)
     try:
         held = os.open(place / LOCK, os.O_CREAT | os.O_RDWR | getattr(os, "O_NOFOLLOW", 0), 0o666)
     except OSError as error:

@@ -34,8 +34,7 @@ from shellform.site.scans import Scan, counted_alike, read_points
 from shellform.site.surveys import doubtful, read_survey
 from shellform.structure.elements.state import State
 from shellform.tables import Table, table_text
-from shellform.written import folder as made
-from shellform.written import write_arrays, write_text
+from shellform.written import make_folder, write_arrays, write_text
 
 _Origin = tuple[float, float, float] | None  # (3,), m
 # times the noise: of the hundreds of coordinates of a scan their deviation is told to a few percent
@@ -100,7 +99,7 @@ def _built(
     if source.suffix.lower() != ".toml":
         run = read_run(source)
         name = _design(run, design, "unbraced")
-        folder, origin = made(output or run.folder / "schedules"), run.case.surface.origin
+        folder, origin = make_folder(output or run.folder / "schedules"), run.case.surface.origin
         return run.shell_of(name), run.designs[name], run.loads, origin, folder
     if design not in (None, "unbraced"):
         raise InputError(
@@ -113,7 +112,7 @@ def _built(
     surface = surface_of(case.surface, allow_scripts=allow_scripts)
     net, _, _ = net_of(case, surface)
     shell, loads = gridshell(case, net, surface)
-    return shell, shell.unbraced(), loads, case.surface.origin, made(output or Path.cwd())
+    return shell, shell.unbraced(), loads, case.surface.origin, make_folder(output or Path.cwd())
 
 
 def _scan(text: str, shell: Gridshell, loads: Mapping[str, Reals], unit: str, frame: int | None) -> Scan:
@@ -167,7 +166,7 @@ def survey(folder: Path, measured: Path, options: Survey, output: Path | None = 
     seen = read_survey(measured, shell, belief.state, unit=options.unit, origin=origin)
     learnt = retensioning.learn(shell, belief, seen.nodes, seen.places, noise=options.noise)
     step = retensioning.adjust(shell, learnt, goal, options.crew, noise=options.noise)
-    where = made(output or run.folder / "schedules")
+    where = make_folder(output or run.folder / "schedules")
     files = [where / each for each in ("turns.csv", "predicted.csv", "belief.npz")]
     write_text(files[0], step.schedule(shell))
     write_text(files[1], _predicted(shell, learnt.state, step, goal))
@@ -253,7 +252,7 @@ def replay(
             ),
         )
     )
-    file = made(output or run.folder / "schedules") / "replay.csv"
+    file = make_folder(output or run.folder / "schedules") / "replay.csv"
     write_text(file, text)
     gone = f"{100.0 * played.removed:.0f} % of the misfit is gone after {how_many(len(played.adjustments), 'round', 'rounds')}"
     return SiteResult([*text.splitlines(), gone], [file])
@@ -290,7 +289,7 @@ def erect(
         lift=carried[2],
         step=step,
     )
-    where = made(output or run.folder / "schedules")
+    where = make_folder(output or run.folder / "schedules")
     files = [where / "erection.csv", where / "erection.npz"]
     write_text(files[0], done.table())
     write_arrays(

@@ -50,8 +50,7 @@ from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.target import Surface
 from shellform.work_clock import listening
-from shellform.written import folder as made_folder
-from shellform.written import write_text
+from shellform.written import make_folder, write_text
 
 _T = TypeVar("_T")
 
@@ -170,7 +169,7 @@ def _run_alone(workspace: Workspace, fresh: bool, parts: Parts, began: float) ->
         (folder / FILE).unlink(missing_ok=True)  # which tells of an end that may be none now
     summary = replace(summary, shellform=shellform.__version__, failed={}, sketch=workspace.sketch)
     for part in ("designs", "states", "figures", "schedules"):
-        made_folder(folder / part)
+        make_folder(folder / part)
     workspace.say(
         "run",
         f"shellform {shellform.__version__}, Python {platform.python_version()}, up to {workspace.until}",

@@ -20,7 +20,7 @@ from shellform.records.summary import Summary, read_summary
 from shellform.run.figures import Wish, look_of, panel_of, pictures_possible, titled
 from shellform.run.folder import Run
 from shellform.run.pages import FILE as PAGE
-from shellform.written import folder as made
+from shellform.written import make_folder
 
 STAGES_OF_SKETCH = ("surface", "net", "initial", "optimise", "figures")
 PICTURE = "figures/sketch.png"
@@ -61,7 +61,7 @@ def draw_sketch(run: Run, *, report: Report) -> bool:
     panel = panel_of(run, run.best, "design")
     panel = replace(panel, title=f"sketch, {panel.title}")
     file = run.folder / PICTURE
-    made(file.parent)
+    make_folder(file.parent)
     render.pictures([file], [titled(run, panel)], look_of(run, Wish(size=_SIZE), [panel]))
     return True
 

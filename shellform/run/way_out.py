@@ -19,7 +19,7 @@ from shellform.net.refusal import NoNet, Stalled
 from shellform.surface.readers.reading import read_surface
 from shellform.surface.shape.fairing import Faired, faired
 from shellform.surface.shape.target import Surface
-from shellform.written import folder as made
+from shellform.written import make_folder
 
 SURFACE = "surface.obj"
 BUILDABLE = "buildable"  # folder in a run's
@@ -95,7 +95,7 @@ def _offer(found: Faired, radius: float, folder: Path, options: str) -> str:
     from shellform.output.pictures.plots import plan_map
     from shellform.surface.readers.meshes import write_mesh, write_values
 
-    made(folder)
+    make_folder(folder)
     write_mesh(folder / SURFACE, found.surface)
     cad = _step(folder / "surface.step", found.surface)
     write_values(folder / "change.vtu", found.surface, {"change [m]": found.change})

@@ -30,8 +30,7 @@ from shellform.records.progress import Event
 from shellform.records.summary import Summary, document, read_summary
 from shellform.run.folder import LOCK, NoRunFolder, alone
 from shellform.study.outcome import Outcome, Status, flat
-from shellform.written import folder as made_folder
-from shellform.written import is_partial, whole
+from shellform.written import is_partial, make_folder, whole
 
 _DISK = {errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS}
 _SHARED = (stages.FILE, summary.FILE)
@@ -133,7 +132,7 @@ def ended_where_it_hangs(folder: Path, longest: float) -> Iterator[None]:
     """Ends a worker's process, whatever it is at, where the block takes far longer than it may. Raises
     Overtime where that has happened.
     """
-    trace = made_folder(folder) / _TRACE
+    trace = make_folder(folder) / _TRACE
     if trace.is_file() and trace.stat().st_size:
         trace.unlink()
         raise Overtime(f"took longer than {longest:g} s, and its worker had to be ended")

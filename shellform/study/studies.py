@@ -39,8 +39,7 @@ from shellform.study.outcome import ListedDesign, Outcome, Row, Status, Value
 from shellform.study.page_of_study import write_study_page
 from shellform.study.plan import Plan, changes, length, read_study, resolved
 from shellform.study.store import Log, arrow, designs_of, line_of, picked, write_table
-from shellform.written import folder as made_folder
-from shellform.written import write_text
+from shellform.written import make_folder, write_text
 
 WRITTEN = (
     "study.toml", "designs.jsonl", "results.jsonl", "table.parquet", "table.csv", "seconds.csv", "runs", "stages", "study.html",
@@ -139,7 +138,7 @@ def run_study(
     try:
         with alone(place), Log(place / "results.jsonl") as log:
             for part in ("runs", "stages"):
-                made_folder(place / part)
+                make_folder(place / part)
             write_text(place / "study.toml", Path(file).read_text(encoding="utf-8"))
             front = Front(signed(plan.study.objective), plan.study.limit)
             study = _Studying(plan, place, log, front, StudyProgress(total=length(plan)), show, allow_scripts)

@@ -25,7 +25,7 @@ import numpy as np
 
 from shellform.arrays import Flags, Indices, Reals
 from shellform.errors import InputError, NotConverged, require_file
-from shellform.surface.occ import errors, extent, gmsh, made, mesh_faces, session, silence, to_sew
+from shellform.surface.occ import errors, extent, gmsh, mesh_faces, session, silence, surface_from, to_sew
 from shellform.surface.readers.draft import Draft, require_mesh_size
 from shellform.surface.readers.nurbs import Patch
 from shellform.surface.readers.script import function_of, load_script, named_dimensions
@@ -54,7 +54,7 @@ def build_surface(script: str | Path, *, size: float, **dimensions: float) -> Su
     """
     path = Path(script)
     draft = read_script(path, size=size, dimensions=dimensions)
-    return made(draft.points, draft.triangles, draft.normals, str(path))
+    return surface_from(draft.points, draft.triangles, draft.normals, str(path))
 
 
 def read_script(path: Path, *, size: float | None, dimensions: Mapping[str, float]) -> Draft:
@@ -91,7 +91,7 @@ def import_surface(
     turned_up(np.zeros((0, 3)), up)  # refuses an unknown axis before the work
     draft = read_cad(file, kind, unit=unit, size=size, up=up)
     normals = None if draft.normals is None else turned_up(draft.normals, up)
-    return made(turned_up(draft.points, up), draft.triangles, normals, str(file))
+    return surface_from(turned_up(draft.points, up), draft.triangles, normals, str(file))
 
 
 def read_cad(

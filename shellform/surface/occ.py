@@ -279,7 +279,7 @@ def _add_normals(normals: Reals, points: Reals, triangles: Indices, face: int, n
     normals[rest] += np.where(np.sum(normals[rest] * mine, axis=1, keepdims=True) < 0.0, -mine, mine)
 
 
-def made(points: Reals, triangles: Indices, normals: Reals | None, source: str) -> Surface:
+def surface_from(points: Reals, triangles: Indices, normals: Reals | None, source: str) -> Surface:
     """The surface (target.py: make_surface), which loads Numba: only once there is one to make."""
     from shellform.surface.shape.target import make_surface
 

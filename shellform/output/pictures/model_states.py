@@ -11,7 +11,7 @@ from shellform.output.pictures import render
 from shellform.output.pictures.maps import AMPLITUDE
 from shellform.output.pictures.panel import Look, Panel
 from shellform.structure.answers.analysis import Analysis
-from shellform.written import folder as made
+from shellform.written import make_folder
 
 
 def draw_analysis(analysis: Analysis, folder: str | Path) -> list[Path]:
@@ -20,7 +20,7 @@ def draw_analysis(analysis: Analysis, folder: str | Path) -> list[Path]:
     """
     place = analysis.equilibrium.state.positions
     moved = np.linalg.norm(place - analysis.model.network.nodes, axis=1)
-    target = made(folder)
+    target = make_folder(folder)
     name = "loaded" if analysis.converged else "last state, not in equilibrium"
     files = [
         _draw(

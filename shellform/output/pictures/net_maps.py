@@ -14,12 +14,12 @@ from shellform.net.net import Net
 from shellform.output.pictures import render
 from shellform.output.pictures.maps import DEGREE, along_rods, worst_at_nodes
 from shellform.output.pictures.panel import Look, Panel
-from shellform.written import folder as made
+from shellform.written import make_folder
 
 
 def draw_net(net: Net, folder: str | Path) -> list[Path]:
     """Writes net-distance, net-curvature, net-skew and net-springs, each as .png; returns the files."""
-    target = made(folder)
+    target = make_folder(folder)
     return [draw_map(net, name, target / f"net-{name}.png") for name in _MAPS]
 
 
