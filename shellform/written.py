@@ -161,7 +161,7 @@ def make_folder(path: str | Path) -> Path:
     return place
 
 
-def door(path: str | Path, *endings: str) -> Path:
+def path_to_write(path: str | Path, *endings: str) -> Path:
     """The path of a file to write. Raises InputError for other endings and missing folders."""
     target = Path(path)
     if target.suffix.lower() not in endings:

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from shellform.arrays import Reals, indices, reals
 from shellform.errors import InputError
 from shellform.output.pictures.panel import Panel
-from shellform.written import door, write_text
+from shellform.written import path_to_write, write_text
 
 _TYPES = {"f": ("Float64", "<f8"), "i": ("Int64", "<i8"), "u": ("UInt8", "|u1")}
 
@@ -46,7 +46,7 @@ def write_lines(
     meaning, or m rows, for beams only. The cell array `cable` is added: 0 for beams, 1 for cables. Raises
     InputError for wrong lengths.
     """
-    target = door(path, ".vtp")
+    target = path_to_write(path, ".vtp")
     nodes = reals("positions", positions, (None, 3))
     rods = indices("beams", beams, (None, 2), below=len(nodes))
     ties = indices("cables", cables, (None, 2), below=len(nodes))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from shellform.errors import InputError, not_installed
 from shellform.output.pictures.legend import cable_colours, rod_colours
-from shellform.written import door, whole
+from shellform.written import path_to_write, whole
 
 FILMS = (".gif", ".mp4")
 _COMMON = 8  # of the commonest colours that are kept as they are
@@ -26,7 +26,7 @@ def write_png(path: str | Path, picture: NDArray[np.uint8], *, dots: float = 160
     """Writes a picture (height, width, 3 or 4), `dots` pixels an inch. Raises InputError for another ending
     and where the file can't be written.
     """
-    with whole(door(path, ".png")) as partial:
+    with whole(path_to_write(path, ".png")) as partial:
         partial.write_bytes(png_bytes(picture, dots=dots))
 
 
@@ -63,7 +63,7 @@ def write_film(path: str | Path, frames: Sequence[NDArray[np.uint8]], *, rate: i
 
     Raises InputError for other endings, for no frames, and where the file can't be written.
     """
-    target = door(path, *FILMS)
+    target = path_to_write(path, *FILMS)
     if not frames:
         raise InputError("has no frames", where=str(target), remedy="Draw one picture at least.")
     still = [*frames, *[frames[-1]] * round(_HOLD * rate)]

@@ -29,7 +29,7 @@ from shellform.output.pictures.curves import read_history as read_history
 from shellform.output.pictures.legend import Ramp, Word
 from shellform.output.pictures.panel import FORMATS
 from shellform.records.words import constraint_titles
-from shellform.written import door, whole
+from shellform.written import path_to_write, whole
 
 _COLOURS = ("#0072b2", "#e69f00", "#009e73", "#cc79a7", "#56b4e9", "#d55e00")  # Okabe and Ito's
 _DASHES = ("-", "--", ":")  # taken one by one when the colours are used up
@@ -240,7 +240,7 @@ def plan_map(
     worst = plan[int(np.argmax(values))]
     axes.plot(*worst, marker="o", markersize=14, markerfacecolor="none", color="#b00020")
     figure.colorbar(drawn, label=label)
-    _write(figure, door(path, *FORMATS), 120)
+    _write(figure, path_to_write(path, *FORMATS), 120)
 
 
 def _figure() -> tuple[Figure, Axes]:
@@ -266,7 +266,7 @@ def _curves(axes: Axes, at: Reals, lines: Mapping[str, Reals]) -> None:
 
 def _save(figure: Figure, path: str | Path) -> None:
     """Writes all of the file or nothing; the same history gives the same bytes."""
-    target = door(path, *FORMATS)
+    target = path_to_write(path, *FORMATS)
     figure.legend(loc="outside right upper", frameon=False)
     _write(figure, target, 160)
 
@@ -345,7 +345,7 @@ def save(axes: Axes, path: str | Path) -> None:
     """Writes a page as .svg, .pdf or .png: the same page gives the same bytes."""
     figure = axes.figure
     assert isinstance(figure, Figure)
-    _write(figure, door(path, *FORMATS), figure.dpi)
+    _write(figure, path_to_write(path, *FORMATS), figure.dpi)
 
 
 def pixels(axes: Axes) -> NDArray[np.uint8]:

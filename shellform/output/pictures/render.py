@@ -24,7 +24,7 @@ from shellform.output.pictures.images import FILMS, write_film, write_png
 from shellform.output.pictures.panel import FORMATS, LIMIT, Look, Panel
 from shellform.output.pictures.sheets import Canvas, single, table
 from shellform.structure.elements.state import State
-from shellform.written import door
+from shellform.written import path_to_write
 
 Image = NDArray[np.uint8]
 
@@ -79,7 +79,7 @@ def pictures(paths: Sequence[str | Path], panels: Sequence[Panel], look: Look | 
     by one.
     """
     pages = [single([panel], look or Look())[0] for panel in panels]
-    endings = {door(path, *FORMATS).suffix.lower() for path in paths}
+    endings = {path_to_write(path, *FORMATS).suffix.lower() for path in paths}
     if endings == {".png"}:
         for path, drawn in zip(paths, painter.paint(pages), strict=True):
             write_png(path, drawn, dots=pages[0].look.dots)
@@ -96,7 +96,7 @@ def film(
     """
     require_count(rate, where="rate", give="pictures a second, such as 12")
     for path in paths:
-        door(path, *FILMS)
+        path_to_write(path, *FILMS)
     frames = list(painter.paint(single(panels, look or Look(size=(960, 600)))))
     for path in paths:
         write_film(path, frames, rate=rate)
@@ -104,7 +104,7 @@ def film(
 
 def _written(path: str | Path | None, page: Canvas) -> Image:
     """The page as an array, and in its file; a page of lines is never drawn by VTK."""
-    target = None if path is None else door(path, *FORMATS)
+    target = None if path is None else path_to_write(path, *FORMATS)
     if target is not None and target.suffix.lower() != ".png":
         from shellform.output.pictures import vectors
 
