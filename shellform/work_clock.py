@@ -112,10 +112,10 @@ def listener() -> WorkClock | None:
     return _listener
 
 
-def told(work: Work) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
-    """Of a door: each call of it is work of this kind."""
+def counts_as(work: Work) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Says of a function that each call of it is work of this kind."""
 
-    def door(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    def counted(function: Callable[_P, _R]) -> Callable[_P, _R]:
         @functools.wraps(function)
         def called(*values: _P.args, **named: _P.kwargs) -> _R:
             clock = _listener
@@ -129,9 +129,9 @@ def told(work: Work) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
 
         return called
 
-    return door
+    return counted
 
 
 def measured(work: Work, function: Callable[_P, _R]) -> Callable[_P, _R]:
     """A function whose calls are work of this kind; itself where nobody listens."""
-    return function if _listener is None else told(work)(function)
+    return function if _listener is None else counts_as(work)(function)

@@ -5,19 +5,19 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from shellform.work_clock import Work, listener, listening, measured, told
+from shellform.work_clock import Work, counts_as, listener, listening, measured
 
 
 def busy(steps=20_000):
     return sum(k * k for k in range(steps))
 
 
-@told(Work.SUBSTITUTIONS)
+@counts_as(Work.SUBSTITUTIONS)
 def inner():
     return busy()
 
 
-@told(Work.EIGENVECTORS)
+@counts_as(Work.EIGENVECTORS)
 def outer():
     return busy() + inner() + inner()
 
@@ -48,7 +48,7 @@ def test_threads_side_by_side_each_add_their_own():
 
 
 def test_an_error_ends_its_kind_of_work():
-    @told(Work.CONVEX)
+    @counts_as(Work.CONVEX)
     def fails():
         raise ArithmeticError
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from shellform.arrays import Reals
 from shellform.errors import InputError
-from shellform.work_clock import Work, told
+from shellform.work_clock import Work, counts_as
 
 try:
     import nlopt
@@ -22,7 +22,7 @@ except ImportError as error:  # pragma: no cover
     raise InputError("NLopt can't be loaded", remedy=f"Reinstall it: pip install nlopt ({error})") from error
 
 
-@told(Work.CONVEX)
+@counts_as(Work.CONVEX)
 def minimise(
     evaluate: Callable[[Reals], tuple[float, Reals, Reals, Reals]],
     start: Reals,

@@ -45,7 +45,7 @@ from shellform.problem.evaluation import COUNTS, Evaluated, Evaluator, Linearisa
 from shellform.problem.paths import follow, without_slack
 from shellform.problem.problem import Problem
 from shellform.structure.elements.state import State
-from shellform.work_clock import Work, told
+from shellform.work_clock import Work, counts_as
 
 _NUMBERS = ("stage", "margin", "until", "caution")
 _TOLD = ("variables", "objective", "slope", "rows", "row_slopes")
@@ -227,7 +227,7 @@ def _run(search: _Search) -> None:
         search.status = reason
 
 
-@told(Work.REST)
+@counts_as(Work.REST)
 def _tried(search: _Search, x: Reals) -> _Told:
     """A trial evaluated, noted, and remembered where it is stable."""
     _tell(search)

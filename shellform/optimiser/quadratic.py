@@ -17,7 +17,7 @@ from cvxopt import matrix, solvers
 from scipy.linalg import cho_factor, cho_solve
 
 from shellform.arrays import Reals
-from shellform.work_clock import Work, told
+from shellform.work_clock import Work, counts_as
 
 _REGULAR = 1e-8  # of the mean curvature, where the model has none
 _CORRECTIONS = 2  # of what a small diagonal costs the formula in digits
@@ -42,7 +42,7 @@ class LowRank:
         return LowRank(np.vstack([self.columns, np.zeros((more, self.columns.shape[1]))]))
 
 
-@told(Work.CONVEX)
+@counts_as(Work.CONVEX)
 def minimise_quadratic(
     hessian: Reals | LowRank, slope: Reals, rows: Reals, values: Reals, lower: Reals, upper: Reals
 ) -> Reals | None:

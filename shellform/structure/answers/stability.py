@@ -39,7 +39,7 @@ from shellform.structure.solve.factorisation import NotPositiveDefinite
 from shellform.structure.solve.loading import Drive
 from shellform.structure.solve.path import follow
 from shellform.structure.solve.residual import ResidualNorm, held
-from shellform.work_clock import Work, told
+from shellform.work_clock import Work, counts_as
 
 _LANCZOS = 200  # restarts; an eigenvalue that stands out takes a few
 _SHARP = 1e-9  # relative, of a mode's stiffness; its shape is as good
@@ -107,7 +107,7 @@ def modes(assembly: Assembly, state: State, count: int) -> Modes:
     return Modes(stiffness[order], shapes / largest[:, None, None])
 
 
-@told(Work.EIGENVECTORS)
+@counts_as(Work.EIGENVECTORS)
 def linearised_factor(assembly: Assembly, before: State, after: State, factors: tuple[float, float]) -> float:
     """The critical factor estimated from the equilibria `before` and `after` at two load `factors`, beyond
     the second as seen from the first; infinite where there is none.
@@ -197,7 +197,7 @@ def _start(size: int) -> Reals:
     return np.cos(1.7 * np.arange(size))
 
 
-@told(Work.EIGENVECTORS)
+@counts_as(Work.EIGENVECTORS)
 def _nearest(  # type: ignore[no-untyped-def]
     tangent: sp.csc_array, solve, mass: sp.csc_array, count: int, shift: float = 0.0
 ) -> tuple[Reals, Reals]:

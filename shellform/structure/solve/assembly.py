@@ -24,7 +24,7 @@ from shellform.structure.elements.state import State
 from shellform.structure.elements.threads import share
 from shellform.structure.solve.chords import ChordKeeper
 from shellform.structure.solve.factorisation import Factor, Symmetric
-from shellform.work_clock import Work, told
+from shellform.work_clock import Work, counts_as
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ class Assembly:
         """The second-order correction of steps; `with_parts` keeps it, its weights needn't be up to date."""
         return ChordKeeper(self.count, self.beams, self.free)
 
-    @told(Work.LOOPS)
+    @counts_as(Work.LOOPS)
     def evaluate(self, state: State, *, tangent: bool = True) -> Balance:
         """Energy, internal forces and, if asked for, the tangent at the state."""
         began = time.perf_counter()
@@ -149,7 +149,7 @@ class Assembly:
         """The deformations (m, 7) of each part of beams to which the `motion` (n, 6) leads to first order."""
         return tuple(part.foreseen(state, motion) for part in self.beams)
 
-    @told(Work.LOOPS)
+    @counts_as(Work.LOOPS)
     def tangent_of(self, state: State, deformations: Sequence[Reals]) -> Reals:
         """The tangent's lower values (nnz,) at the state, of beams that have other `deformations` than follow
         from it, part after part. Those of the last step's linear system make Newton's iteration a mixed one,

@@ -33,7 +33,7 @@ from shellform.structure.solve.assembly import Assembly, Balance, add_forces
 from shellform.structure.solve.chords import ChordKeeper
 from shellform.structure.solve.factorisation import Factor, Indefinite, NotPositiveDefinite, Symmetric
 from shellform.structure.solve.refined import RefinedFactor
-from shellform.work_clock import Work, told
+from shellform.work_clock import Work, counts_as
 
 _REFINEMENTS = 3  # each leaves 1e-9 of what there was
 _SMALL = 1e-2  # rad, below which a series of two terms is right to the last digit
@@ -57,7 +57,7 @@ class ExtendedAssembly(Assembly):
         alike = [replace(part, axial=np.ones(len(part.ends))) for part in self.beams]
         return _ExactChords(self.count, alike, self.free)
 
-    @told(Work.LOOPS)
+    @counts_as(Work.LOOPS)
     def evaluate(self, state: State, *, tangent: bool = True) -> Balance:
         """Energy, internal forces and, if asked for, the tangent (nnz, 2) at the state."""
         began = time.perf_counter()
@@ -130,7 +130,7 @@ class ExtendedSymmetric(Symmetric):
         parent, starts = _symbolic(size, indptr, indices)
         return order, indptr, indices, upper.data.astype(np.int64) - 1, parent, starts
 
-    @told(Work.FACTORISATIONS)
+    @counts_as(Work.FACTORISATIONS)
     def _pivots(self, values: Reals) -> ExtendedFactor:
         order, indptr, indices, sources, parent, starts = self._order
         rows, entries, pivots = _numeric(indptr, indices, values[sources], parent, starts)
@@ -214,7 +214,7 @@ class ExtendedFactor:
             _solve(self._order, self._starts, self._rows, self._entries, self.pivots, right, True)
         )
 
-    @told(Work.SUBSTITUTIONS)
+    @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         """The solution for right-hand sides (n,) or (n, k)."""
         columns = right[:, None] if right.ndim == 1 else right

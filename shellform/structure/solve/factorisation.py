@@ -27,7 +27,7 @@ from shellform.compiled import njit
 from shellform.errors import InputError
 from shellform.structure.solve import pardiso
 from shellform.structure.solve.addresses import has_room, take_work_areas
-from shellform.work_clock import Work, told
+from shellform.work_clock import Work, counts_as
 
 try:
     from cvxopt import cholmod, matrix, spmatrix
@@ -110,7 +110,7 @@ class Symmetric:
         self._matrix: Any = None
         self._generation = 0
 
-    @told(Work.FACTORISATIONS)
+    @counts_as(Work.FACTORISATIONS)
     def factor(self, values: Reals) -> Factor:
         """Cholesky factor of the matrix with lower `values` (nnz,). It serves until the next call of
         `factor`.
@@ -146,7 +146,7 @@ class Symmetric:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
         return _Pardiso(self, self._pardiso, self._generation)
 
-    @told(Work.FACTORISATIONS)
+    @counts_as(Work.FACTORISATIONS)
     def solve_kept(self, values: Reals, kept: Indices, right: Reals) -> Reals | None:
         """The solution (k, s) on the degrees of freedom `kept` (k,), ascending, for right-hand sides (k, s)
         on them that are zero elsewhere.
@@ -163,7 +163,7 @@ class Symmetric:
         except pardiso.NotDefinite as error:
             raise NotPositiveDefinite("the matrix is not positive definite") from error
 
-    @told(Work.FACTORISATIONS)
+    @counts_as(Work.FACTORISATIONS)
     def factor_thin(self, values: Reals) -> Factor:
         """L D L' of a matrix whose factor has a few entries a column, as the graph of a gridshell's beams:
         the compiled solve takes a sixth of the time that CHOLMOD's blocks do. It serves for good. Raises
@@ -178,7 +178,7 @@ class Symmetric:
         starts, rows, entries = (np.array(each)[:, 0] for each in cholmod.getfactor(symbolic).CCS)
         return _Thin(np.array(order)[:, 0].astype(np.int64), starts, rows, entries)
 
-    @told(Work.FACTORISATIONS)
+    @counts_as(Work.FACTORISATIONS)
     def factor_indefinite(self, values: Reals) -> Indefinite:
         """L D L' of a matrix that needn't be positive definite, with its number of negative eigenvalues
         (Sylvester's law).
@@ -203,7 +203,7 @@ class Symmetric:
         """How many eigenvalues are negative."""
         return self.factor_indefinite(values).negative
 
-    @told(Work.FACTORISATIONS)
+    @counts_as(Work.FACTORISATIONS)
     def newton(self, values: Reals, right: Reals) -> tuple[Reals, bool]:
         """The solution for `right` (n,) with a matrix that needn't be definite, and whether `right` leaves
         its negative part untouched: whether below 1e-9 of y'|D|y, L D L' = A and L D y = right, comes from
@@ -270,7 +270,7 @@ class _Pardiso:
         self._family, self._factor, self._generation = family, factor, generation
         self.negative = factor.negative
 
-    @told(Work.SUBSTITUTIONS)
+    @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         self._family._check(self._generation)
         return self._factor.solve(right)
@@ -282,7 +282,7 @@ class _Cholmod:
     def __init__(self, family: Symmetric, factor: Any, generation: int) -> None:
         self._family, self._factor, self._generation = family, factor, generation
 
-    @told(Work.SUBSTITUTIONS)
+    @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         self._family._check(self._generation)
         return _by_cholmod(self._factor, right)
@@ -295,7 +295,7 @@ class _Indefinite:
     factor: Any
     negative: int
 
-    @told(Work.SUBSTITUTIONS)
+    @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         return _by_cholmod(self.factor, right)
 
@@ -317,7 +317,7 @@ class _Thin:
     rows: Indices
     entries: Reals
 
-    @told(Work.SUBSTITUTIONS)
+    @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         columns = right[:, None] if right.ndim == 1 else right
         solution = np.asarray(
@@ -365,6 +365,6 @@ class _SuperLU:
         if definite and not (pivots > 0.0).all():
             raise NotPositiveDefinite("the matrix is not positive definite")
 
-    @told(Work.SUBSTITUTIONS)
+    @counts_as(Work.SUBSTITUTIONS)
     def solve(self, right: Reals) -> Reals:
         return np.asarray(self._lu.solve(right))
