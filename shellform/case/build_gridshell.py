@@ -30,7 +30,7 @@ from shellform.gridshell.gridshell import Cable, Gridshell, Joint, Rod, brace, m
 from shellform.gridshell.layers import single
 from shellform.gridshell.loads import Region
 from shellform.net.net import Net
-from shellform.structure.elements.sections import Material, Round
+from shellform.structure.elements.sections import Material, Round, section_area
 from shellform.surface.shape.target import Surface
 
 
@@ -68,7 +68,7 @@ def edge_beam(entry: EdgeBeamEntry, rod: Rod) -> EdgeBeam:
     if section is not None:
         return EdgeBeam(section)
     # The round rod of a lath's or a tube's area stands for it in a bundle.
-    radius = math.sqrt(single(rod.section).constants[0] / math.pi)
+    radius = math.sqrt(section_area(single(rod.section)) / math.pi)
     return EdgeBeam(Bundle(radius, 19 if entry.rods is None else entry.rods, entry.composite, material))
 
 

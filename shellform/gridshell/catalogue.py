@@ -244,8 +244,8 @@ def radius_bounds(net: Net, rod: Rod, catalogue: Catalogue) -> tuple[float, floa
 def radius_as_stiff(rod: Rod, section: Section) -> float:
     """The radius, m, of a rod similar to `rod` that is as stiff as the section: between two of different
     shape the stiffness about the weaker axis counts."""
-    own = np.array(rod.stiffness[2:])
-    return rod.radius * float((np.array(stiffness(section)[2:]) / own).min()) ** 0.25
+    own = np.array(rod.stiffness.bending)
+    return rod.radius * float((np.array(stiffness(section).bending) / own).min()) ** 0.25
 
 
 def rounded_up(shell: Gridshell, design: Design, catalogue: Catalogue) -> tuple[Gridshell, Design]:
@@ -295,15 +295,15 @@ def _stiff_enough(sections: Sequence[Section], least: Section) -> int:
     """The place of the first of the sections that bends about neither axis more easily than `least`; past the
     end if none does.
     """
-    wanted = stiffness(least)[2:]
+    wanted = stiffness(least).bending
     for k, section in enumerate(sections):
         if all(
-            has >= needed * (1.0 - _EQUAL) for has, needed in zip(stiffness(section)[2:], wanted, strict=True)
+            has >= needed * (1.0 - _EQUAL)
+            for has, needed in zip(stiffness(section).bending, wanted, strict=True)
         ):
             return k
     return len(sections)
 
 
 def _order(section: Section) -> tuple[float, float, float]:
-    _, _, bending_y, bending_z = stiffness(section)
-    return bending_y, bending_z, mass_per_length(section)
+    return *stiffness(section).bending, mass_per_length(section)

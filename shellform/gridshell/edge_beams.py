@@ -30,7 +30,14 @@ from shellform.gridshell.loads import GRAVITY
 from shellform.net.net import Net
 from shellform.structure.elements.beam import Beams, built_in, joined
 from shellform.structure.elements.rotation import matrices
-from shellform.structure.elements.sections import Circular, Material, Section, mass_per_length, stiffness
+from shellform.structure.elements.sections import (
+    BeamStiffness,
+    Circular,
+    Material,
+    Section,
+    mass_per_length,
+    stiffness,
+)
 
 EDGE, CLAMP = "edge", "clamp"  # kinds of beams
 _RINGS = 12  # of a bundle, whose rods are counted from the middle: 469 rods
@@ -112,14 +119,14 @@ class EdgeBeam:
     section: Section
 
     @property
-    def stiffness(self) -> tuple[float, float, float, float]:
+    def stiffness(self) -> BeamStiffness:
         """EA, N; GJ, EI_y, EI_z, N·m²."""
         return stiffness(self.section)
 
 
-def edge_beams(net: Net, edge: EdgeBeam | None, rod: tuple[float, float, float, float]) -> Beams | None:
-    """The elements of the net's edge beams, then their clamps, no stiffer than a `rod` (EA, N; GJ, EI_y,
-    EI_z, N·m²) half the gap long; None where it has none. Raises InputError where the net has edge beams, but
+def edge_beams(net: Net, edge: EdgeBeam | None, rod: BeamStiffness) -> Beams | None:
+    """The elements of the net's edge beams, then their clamps, no stiffer than a `rod` half the gap long;
+    None where it has none. Raises InputError where the net has edge beams, but
     nothing is said of what they are."""
     if not net.edges:
         return None

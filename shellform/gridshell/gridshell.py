@@ -18,7 +18,14 @@ from shellform.net.grid import ROD, cells, edge_diagonals, grid_beams
 from shellform.net.net import Net
 from shellform.structure.elements.beam import Beams, joined
 from shellform.structure.elements.cable import Cables, make_cables
-from shellform.structure.elements.sections import Round, Section, isotropic, stiffness, stiffness_by_size
+from shellform.structure.elements.sections import (
+    BeamStiffness,
+    Round,
+    Section,
+    isotropic,
+    stiffness,
+    stiffness_by_size,
+)
 from shellform.structure.elements.state import State
 from shellform.structure.network import Network
 from shellform.surface.shape.locate import Locator
@@ -76,17 +83,15 @@ class Rod:
         return self.section.material.strength
 
     @property
-    def stiffness(self) -> tuple[float, float, float, float]:
+    def stiffness(self) -> BeamStiffness:
         """EA, N; GJ, EI_y, EI_z, N·m²."""
         return stiffness(self.section)
 
     @property
-    def stiffness_by_radius(self) -> tuple[float, float, float, float]:
+    def stiffness_by_radius(self) -> BeamStiffness:
         """Derivatives of EA, GJ, EI_y, EI_z by the radius, all sizes in proportion to it."""
-        axial, torsion, about_y, about_z = (np.array(self.section.sizes) / self.radius) @ stiffness_by_size(
-            self.section
-        )
-        return float(axial), float(torsion), float(about_y), float(about_z)
+        rates = (np.array(self.section.sizes) / self.radius) @ stiffness_by_size(self.section)
+        return BeamStiffness(*rates.tolist())
 
     def resized(self, radius: float) -> Rod:
         """The rod with a similar section of that radius, m."""
@@ -117,9 +122,9 @@ class Joint:
             require_number(getattr(self, name), above=0.0, where=f"joint.{name}", give=unit)
 
     @property
-    def stiffness(self) -> tuple[float, float, float, float]:
-        """EA, GJ, EI_y, EI_z."""
-        return self.axial, self.torsion, self.bending, self.bending
+    def stiffness(self) -> BeamStiffness:
+        """EA, N; GJ, EI_y, EI_z, N·m²."""
+        return BeamStiffness(self.axial, self.torsion, self.bending, self.bending)
 
 
 @dataclass(frozen=True)
@@ -326,8 +331,8 @@ def erection_stress(net: Net, section: Section) -> float:
     curvature in it about z.
     """
     bent = net.quality.curvature
-    _, _, bending_y, bending_z = stiffness(section)
-    return float(section.bending(bending_y * bent[..., 0], bending_z * bent[..., 1]).max())
+    own = stiffness(section)
+    return float(section.bending(own.bending_y * bent[..., 0], own.bending_z * bent[..., 1]).max())
 
 
 def max_radius(net: Net, rod: Rod) -> float:

@@ -39,9 +39,9 @@ def usual_gap(spacing: float) -> float:
 
 def following(rod: Rod) -> Joint:
     """The joint of table 1 that fits the rods."""
-    axial, _, about_y, about_z = rod.stiffness
-    by_axial = axial / _RODS.stiffness[0]
-    by_bending = 0.5 * (about_y + about_z) / _RODS.stiffness[2]
+    own = rod.stiffness
+    by_axial = own.axial / _RODS.stiffness.axial
+    by_bending = 0.5 * (own.bending_y + own.bending_z) / _RODS.stiffness.bending_y
     return Joint(
         _PAPER.axial * by_axial,
         _PAPER.torsion * by_bending,
@@ -60,7 +60,7 @@ def turning_stress(net: Net, material: Material) -> float:
     """To what share of their strength rods of a `material` are bent in the surface by joints that follow
     them, where the net's right angles are sheared most."""
     sheared = 0.5 * math.pi - net.quality.shear_angle_min
-    return 0.25 * (_PAPER.torsion / _RODS.stiffness[2]) * sheared * material.young / material.strength
+    return 0.25 * (_PAPER.torsion / _RODS.stiffness.bending_y) * sheared * material.young / material.strength
 
 
 @dataclass(frozen=True)

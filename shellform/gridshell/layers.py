@@ -35,7 +35,7 @@ from shellform.net.net import Net
 from shellform.structure.answers.results import end_stress
 from shellform.structure.elements.beam import Beams, built_in
 from shellform.structure.elements.rotation import matrices
-from shellform.structure.elements.sections import Material, Section, stiffness
+from shellform.structure.elements.sections import Material, Section, section_area, stiffness
 from shellform.structure.elements.state import State
 
 LOCK = "lock"  # kind of beams
@@ -111,20 +111,20 @@ class TwoLayers:
     @property
     def locking(self) -> float:
         """B, N·m²: bending stiffness about y that shear blocks add. It goes with the sizes' fourth power."""
-        return 0.5 * self.composite * stiffness(self.single)[0] * self.apart**2
+        return 0.5 * self.composite * stiffness(self.single).axial * self.apart**2
 
     def couple_stress(self, moment: Reals) -> Reals:
         """|M| / (a A), Pa, of the laths under moments M, N·m, of what locks them."""
-        return np.asarray(np.abs(moment) / (self.apart * self.single.constants[0]))
+        return np.asarray(np.abs(moment) / (self.apart * section_area(self.single)))
 
     def couple_stress_by_moment(self, moment: Reals) -> Reals:
         """Its derivative, 1/m³; 0 at the kink."""
-        return np.asarray(np.sign(moment) / (self.apart * self.single.constants[0]))
+        return np.asarray(np.sign(moment) / (self.apart * section_area(self.single)))
 
 
 def locked_bending(section: Section) -> tuple[float, float]:
     """EI_y and EI_z, N·m², of rods as they bear loads: of laths in two layers once they are locked."""
-    _, _, about_y, about_z = stiffness(section)
+    about_y, about_z = stiffness(section).bending
     return (about_y + section.locking, about_z) if isinstance(section, TwoLayers) else (about_y, about_z)
 
 

@@ -16,7 +16,7 @@ from shellform.gridshell.catalogue import Catalogue, label, read_catalogue
 from shellform.gridshell.edge_beams import Bundle
 from shellform.gridshell.layers import single
 from shellform.run.sizes import RodChoice
-from shellform.structure.elements.sections import Round, Section, mass_per_length, stiffness
+from shellform.structure.elements.sections import Round, Section, mass_per_length, section_area, stiffness
 
 TUBES = "edge_tubes"
 COMPOSITE = 0.5  # how far the rods of an edge beam act together
@@ -41,7 +41,7 @@ def edge_choices(rods: RodChoice) -> tuple[EdgeChoice, ...]:
     """By rising stiffness, one for each of the bundles: that, or the lightest tube that is so stiff, where it
     is lighter."""
     own = single(rods.section)
-    radius = math.sqrt(own.constants[0] / math.pi)  # the round rod of the same area
+    radius = math.sqrt(section_area(own) / math.pi)  # the round rod of the same area
     bundles = [Bundle(radius, count, COMPOSITE, own.material) for count in _BUNDLES]
     first = _bending(bundles[0])
     return tuple(
@@ -63,7 +63,7 @@ def _lighter(bundle: Bundle, needed: float) -> Section:
 
 def _bending(section: Section) -> float:
     """EI, N·m²."""
-    return stiffness(section)[2]
+    return stiffness(section).bending_y
 
 
 @cache

@@ -69,7 +69,7 @@ def _thicker(
 
 
 def _stiffer(one: Gridshell, other: Gridshell) -> bool:
-    return min(one.rod.stiffness[2:]) > (1.0 + _EQUAL) * min(other.rod.stiffness[2:])
+    return min(one.rod.stiffness.bending) > (1.0 + _EQUAL) * min(other.rod.stiffness.bending)
 
 
 def _standing(

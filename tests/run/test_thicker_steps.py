@@ -11,6 +11,7 @@ from shellform.errors import NotConverged
 from shellform.gridshell.gridshell import Design
 from shellform.records.as_built import AsBuilt
 from shellform.run import thicker
+from shellform.structure.elements.sections import BeamStiffness
 
 ROD = sf.Rod.round(young=40e9, radius=0.01, strength=255e6)
 FIRST = Design(np.array([1.0]), np.array([True]), 0.01)
@@ -47,7 +48,7 @@ def test_rods_become_a_tenth_thicker_each_time_up_to_what_the_net_allows(monkeyp
 
 def test_a_section_is_stiffer_that_bends_less_easily_in_its_softer_direction():
     def rod(y, z):
-        return SimpleNamespace(rod=SimpleNamespace(stiffness=(1.0, 9.0, y, z)))
+        return SimpleNamespace(rod=SimpleNamespace(stiffness=BeamStiffness(1.0, 9.0, y, z)))
 
     assert thicker._stiffer(rod(5.0, 3.0), rod(9.0, 2.0))
     assert not thicker._stiffer(rod(5.0, 3.0), rod(3.0, 3.0))

@@ -21,7 +21,6 @@ from shellform.net.quality import shear_angles
 from shellform.output.pictures.panel import Panel, marked_nodes
 from shellform.problem.paths import deviations
 from shellform.structure.answers.stability import modes
-from shellform.structure.elements.sections import stiffness
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 
@@ -94,10 +93,10 @@ def _utilisation(shell: Gridshell, design: Design, state: State) -> Map:
 
 
 def _curvature(shell: Gridshell, design: Design, state: State) -> Map:
-    _, _, about_y, about_z = stiffness(shell.rod.resized(design.radius).section)
+    bending = shell.rod.resized(design.radius).stiffness.bending
     beams = shell.beams(design.radius)
     own = beams.local_forces(state)[beams.of_kind(ROD)]  # those of the laths: what locks them is bent by less
-    bent = np.linalg.norm(own[:, [[2, 3], [5, 6]]] / [about_y, about_z], axis=2)
+    bent = np.linalg.norm(own[:, [[2, 3], [5, 6]]] / bending, axis=2)
     return Map(worst_at_nodes(shell.net, bent), "curvature of the rods", ("1/m", 1.0), state.positions)
 
 

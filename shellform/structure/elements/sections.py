@@ -17,7 +17,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -94,11 +94,31 @@ class Section(Protocol):
         """Its derivatives, Pa/m, by each size at fixed moments."""
 
 
-def stiffness(section: Section) -> tuple[float, float, float, float]:
-    """EA, N; GJ, EI_y, EI_z, N·m²."""
+class BeamStiffness(NamedTuple):
+    """What a beam resists with, in the order in which equations and files have it: EA, N; GJ, EI_y, EI_z,
+    N·m²."""
+
+    axial: float
+    torsion: float
+    bending_y: float
+    bending_z: float
+
+    @property
+    def bending(self) -> tuple[float, float]:
+        """EI_y and EI_z, N·m²."""
+        return self.bending_y, self.bending_z
+
+
+def stiffness(section: Section) -> BeamStiffness:
+    """With which a rod of the section resists."""
     area, torsion, about_y, about_z = section.constants
     young, shear = section.material.young, section.material.shear
-    return young * area, shear * torsion, young * about_y, young * about_z
+    return BeamStiffness(young * area, shear * torsion, young * about_y, young * about_z)
+
+
+def section_area(section: Section) -> float:
+    """A, m²."""
+    return section.constants[0]
 
 
 def stiffness_by_size(section: Section) -> Reals:
@@ -109,19 +129,19 @@ def stiffness_by_size(section: Section) -> Reals:
 
 def stress(section: Section, axial: Reals, about_y: Reals, about_z: Reals) -> Reals:
     """Largest fibre stress, Pa, under the axial force, N, and the moments, N·m; arrays of one shape."""
-    return np.asarray(np.abs(axial) / section.constants[0] + section.bending(about_y, about_z))
+    return np.asarray(np.abs(axial) / section_area(section) + section.bending(about_y, about_z))
 
 
 def stress_by_force(
     section: Section, axial: Reals, about_y: Reals, about_z: Reals
 ) -> tuple[Reals, Reals, Reals]:
     """Derivatives of `stress` by the axial force, 1/m², and the moments, 1/m³."""
-    return (np.asarray(np.sign(axial) / section.constants[0]), *section.bending_by_moment(about_y, about_z))
+    return (np.asarray(np.sign(axial) / section_area(section)), *section.bending_by_moment(about_y, about_z))
 
 
 def stress_by_size(section: Section, axial: Reals, about_y: Reals, about_z: Reals) -> Reals:
     """Derivatives (k, ...), Pa/m, of `stress` by each of the k sizes at fixed forces."""
-    area = section.constants[0]
+    area = section_area(section)
     by_area = -np.abs(axial) / area**2
     rates = [rate[0] * by_area for rate in section.constants_by_size]
     return np.stack(
@@ -131,7 +151,7 @@ def stress_by_size(section: Section, axial: Reals, about_y: Reals, about_z: Real
 
 def mass_per_length(section: Section) -> float:
     """kg/m."""
-    return section.material.density * section.constants[0]
+    return section.material.density * section_area(section)
 
 
 class Circular(ABC):
