@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from shellform.optimiser.descent import descend
 from shellform.optimiser.going_back import last_sound
-from shellform.optimiser.minding import WORTH, finely, led_by, turned
+from shellform.optimiser.minding import WORTH_A_TURN, finely, led_by, turned
 from shellform.optimiser.optimum import worse
 from shellform.optimiser.search_state import Iterate, Search, accepted_design, taut_count
 from shellform.optimiser.trials import fresh, sound
@@ -76,7 +76,7 @@ def agreed(search: Search, it: Iterate) -> tuple[bool, Iterate]:
             found, before = it.point.objective, it.led_to
             if found < before:
                 it = replace(it, stood=len(it.accepted), led_to=found)
-            if it.mind is None or it.paused or not found < worse(before, -WORTH):
+            if it.mind is None or it.paused or not found < worse(before, -WORTH_A_TURN):
                 break
         least = {} if judged.stands else aims(asked.sample(it.samples), judged)
         it = led_by(search, it, it.accepted[-1].built, least)

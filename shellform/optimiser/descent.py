@@ -23,8 +23,9 @@ from shellform.optimiser.search_state import (
 from shellform.optimiser.trials import accepted, attempt, reach, staged, task
 
 _TINY = -1e-300  # a predicted change that isn't one
-# of the objective, gained by a turn, for which another is made where thinning is to end with what stands
-_WORTH = 0.05
+# of the objective, gained since cables were last let go slack, for which they are let again where thinning is
+# to end with what stands
+_WORTH_LETTING_GO = 0.05
 
 
 def climb(search: Search, it: Iterate) -> Iterate:
@@ -57,7 +58,7 @@ def climb(search: Search, it: Iterate) -> Iterate:
 
 def descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
     """Rounds of model, trial and judgement: first cables may go slack, and where that leads no further, none
-    may; and so in turns as long as a turn improves the objective. A design that keeps every limit leaves the
+    may; and so on as long as both together improve the objective. A design that keeps every limit leaves the
     `least` of the evaluations to what comes next."""
     solver = search.solver
     while search.left() > (least if it.stage == 1.0 and violation(search, it.point) <= 0.0 else 0):
@@ -67,11 +68,11 @@ def descend(search: Search, it: Iterate, *, least: int = 0) -> Iterate:
         status = _settled(search, it, predicted)
         if status:
             it = replace(it, status=status)
-            worth = solver.settled if search.asked is None else _WORTH
-            turned = it.guarded and it.point.objective > worse(it.before, -worth)
+            worth = solver.settled if search.asked is None else _WORTH_LETTING_GO
+            gained_little = it.guarded and it.point.objective > worse(it.before, -worth)
             idle = not it.guarded and it.point.objective == it.before  # guarded it would try the same again
             # without further loads there are no guards
-            if search.always_guarded or turned or idle or len(search.evaluator.problem.used()) == 1:
+            if search.always_guarded or gained_little or idle or len(search.evaluator.problem.used()) == 1:
                 return it
             before = it.point.objective if it.guarded else it.before
             it = replace(it, before=before, guarded=not it.guarded, window=search.first_window)

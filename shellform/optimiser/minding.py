@@ -38,7 +38,7 @@ from shellform.reliability.trial_structures import closer, to_bear
 _SHARE = 0.1  # of all evaluations, for one turn of a descent and a judgement at the most …
 _FEWEST = 4  # … but so many at least
 _LED = 0.5  # … and for all turns
-WORTH = 0.03  # of the objective, gained by a turn, for which another is made
+WORTH_A_TURN = 0.03  # of the objective, gained by a turn, for which another is made
 _WINDOW = 0.05  # mean tensions, of a turn's first step: what falls first changes within larger ones
 _SMALLEST = 0.004  # mean tensions
 _MOST = 12  # structures in mind
@@ -74,7 +74,7 @@ def led(search: Search, it: Iterate) -> Iterate:
             before = it.led_to
             if found.objective < before:
                 it = replace(it, stood=len(it.accepted), led_to=found.objective)
-            if not found.objective < worse(before, -WORTH):
+            if not found.objective < worse(before, -WORTH_A_TURN):
                 break
         if search.evaluator.evaluations >= last:
             break

@@ -124,7 +124,7 @@ class Iterate:
     - `climbing`: whether stability stands in for the objective.
 
     Descending:
-    - `refused`: whether the last trial was; `before`: the objective before this turn.
+    - `refused`: whether the last trial was; `before`: the objective when cables could last go slack.
 
     Thinning:
     - `thrifty`: the objective up to which cables are still taken away.
