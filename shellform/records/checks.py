@@ -51,83 +51,103 @@ class Bounds:
     rods: RodSizes | None = None
 
 
+@dataclass(frozen=True)
+class _Judged:
+    """What is judged: the names of the `designs`, `rows` of those that the summary has, and their `rods`."""
+
+    designs: tuple[str, ...]
+    rows: Mapping[str, DesignRecord]
+    rods: Mapping[str, RodsOf]
+
+    @property
+    def factors(self) -> dict[str, float]:
+        """Of the load cases, in their order, times the design load."""
+        return {load: row.loads[load].factor for row in self.rows.values() for load in row.loads}
+
+    def under(
+        self, title: str, limit: str, cell: Callable[[LoadRecord, RodsOf], Cell], loads: Sequence[str]
+    ) -> list[Check]:
+        """One check under each of the `loads`, its `cell` from a design's record under it and its rods."""
+        return [
+            Check(
+                f"{title} under {load_title(load, self.factors[load])}",
+                limit,
+                {
+                    name: cell(self.rows[name].loads[load], self.rods[name])
+                    if name in self.rows and load in self.rows[name].loads
+                    else UNASKED
+                    for name in self.designs
+                },
+            )
+            for load in loads
+        ]
+
+
 def checks(
     shells: Mapping[str, Gridshell], designs: Mapping[str, Design], summary: Summary, bounds: Bounds
 ) -> list[Check]:
     """Every check of the designs, each on its own shell: standing, as built too, stress, forces, misfit, the
     optimiser's own constraints, equilibrium."""
-    rows = {name: summary.designs[name] for name in designs if name in summary.designs}
-    loads = list(dict.fromkeys(load for row in rows.values() for load in row.loads))
-    factors = {load: row.loads[load].factor for row in rows.values() for load in row.loads}
     largest = {name: max_radius(shells[name].net, shells[name].rod) for name in designs}
     spacing = None if summary.net is None else summary.net.spacing
     rods = {
         name: RodsOf(designs[name].radius, largest[name], spacing, summary.thicker, bounds.rods)
         for name in designs
     }
-
-    def under(
-        title: str, limit: str, cell: Callable[[LoadRecord, RodsOf], Cell], chosen: Sequence[str]
-    ) -> list[Check]:
-        return [
-            Check(
-                f"{title} under {load_title(load, factors[load])}",
-                limit,
-                {
-                    name: cell(rows[name].loads[load], rods[name])
-                    if name in rows and load in rows[name].loads
-                    else UNASKED
-                    for name in designs
-                },
-            )
-            for load in chosen
-        ]
-
+    rows = {name: summary.designs[name] for name in designs if name in summary.designs}
+    judged = _Judged(tuple(designs), rows, rods)
+    factors = judged.factors
+    loads, loaded = list(factors), [load for load in factors if load != "none"]
     bent = {name: _stressed(designs[name].radius / largest[name], rods[name]) for name in designs}
-    beyond = [load for load in loads if load not in ("none", "design")]
-    edged = (
-        loads
-        if any(each.edge_utilisation_max for row in rows.values() for each in row.loads.values())
-        else []
-    )
-    misfit = 1e3 * bounds.misfit
-    deviating = [
-        replace(check, title=f"{check.title}, root mean square (6)")
-        for check in under(
-            "Deviation",
-            f"{number(misfit)} mm",
-            lambda row, rods: below(
-                1e3 * row.deviation_rms,
-                misfit,
-                "mm",
-                allow("optimise.misfit_rms_additional", row.deviation_rms, or_else="take thicker rods"),
-            ),
-            beyond,
-        )
-    ]
     return [
-        *under("Stands", "stable, without snapping through", _stands, loads),
-        *standing_checks(rows, rods, [load for load in loads if load != "none"], factors, bounds.safety),
-        *guide_checks(rows, list(rods), [load for load in loads if load != "none"], factors),
+        *judged.under("Stands", "stable, without snapping through", _stands, loads),
+        *standing_checks(rows, rods, loaded, factors, bounds.safety),
+        *guide_checks(rows, list(rods), loaded, factors),
         *critical_checks(rows, rods, bounds.critical),
-        *under(
+        *judged.under(
             "Rods",
             "stress up to 100 % of the strength",
             lambda row, rods: _stressed(_stress(row), rods),
             loads,
         ),
-        *under("Edge beams", "stress up to 100 % of the strength", lambda row, rods: _edged(row), edged),
+        *_of_edge_beams(judged),
         Check("Rods bent into the shape (1)", "up to 100 % of the curvature they bear", bent),
         *_limited(rows, list(designs), bounds),
-        *deviating,
+        *_deviating(judged, bounds),
         *_of_the_optimiser(summary.optimisation, rows, list(designs)),
-        *under(
+        *judged.under(
             "In equilibrium",
             f"unbalanced force up to {_SETTLED:.0e} of the largest",
             lambda row, rods: _settled(row),
             loads,
         ),
     ]
+
+
+def _of_edge_beams(judged: _Judged) -> list[Check]:
+    """Their stress, where a design has any."""
+    every = [row for design in judged.rows.values() for row in design.loads.values()]
+    if not any(row.edge_utilisation_max for row in every):
+        return []
+    limit = "stress up to 100 % of the strength"
+    return judged.under("Edge beams", limit, lambda row, rods: _edged(row), list(judged.factors))
+
+
+def _deviating(judged: _Judged, bounds: Bounds) -> list[Check]:
+    """Constraint (6), under the loads beyond the design load."""
+    most = 1e3 * bounds.misfit
+    found = judged.under(
+        "Deviation",
+        f"{number(most)} mm",
+        lambda row, rods: below(
+            1e3 * row.deviation_rms,
+            most,
+            "mm",
+            allow("optimise.misfit_rms_additional", row.deviation_rms, or_else="take thicker rods"),
+        ),
+        [load for load in judged.factors if load not in ("none", "design")],
+    )
+    return [replace(check, title=f"{check.title}, root mean square (6)") for check in found]
 
 
 def _stress(row: LoadRecord) -> float:
