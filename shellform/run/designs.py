@@ -17,6 +17,7 @@ from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.net.grid import CONNECTOR
 from shellform.problem.paths import deviations, follow
 from shellform.records.summary import DesignRecord, LoadRecord, Summary, write_summary
+from shellform.run.design_files import design_file, write_design_file
 from shellform.run.figures import write_states
 from shellform.run.workspace import Workspace
 from shellform.structure.answers import results
@@ -27,7 +28,6 @@ from shellform.structure.solve.equilibrium import Equilibrium, find_equilibrium
 from shellform.structure.solve.extended import with_twice_the_digits
 from shellform.structure.solve.loading import Loaded
 from shellform.structure.solve.residual import OF_LOAD
-from shellform.written import write_arrays
 
 
 def followed(shell: Gridshell, design: Design, loads: Mapping[str, Reals]) -> dict[str, Loaded]:
@@ -82,7 +82,7 @@ def forget(folder: Path, names: Sequence[str], summary: Summary) -> Summary:
     of them; returns the summary without them.
     """
     for name in names:
-        for part in (f"designs/{name}.npz", f"designs/{name}.json", f"designs/{name}-drawn.json"):
+        for part in (design_file(name), f"designs/{name}.json", f"designs/{name}-drawn.json"):
             (folder / part).unlink(missing_ok=True)
         pictures = [file for file in folder.glob("figures/*") if name in file.stem.split("-")]
         for file in [*folder.glob(f"states/{name}-*.vtp"), *pictures]:
@@ -106,14 +106,7 @@ def write_design(
     model = Model(network, {each: loads[each] for each in loads if loads[each].any()}, shell.target, supports)
     write_model(folder / f"designs/{name}.json", model)
     states = {each: loaded[each].equilibrium.state for each in loads}
-    write_arrays(
-        folder / f"designs/{name}.npz",
-        rest_length=design.rest_length,
-        present=design.present,
-        radius=np.array(design.radius),
-        **{f"{each}_positions": state.positions for each, state in states.items()},
-        **{f"{each}_quaternions": state.quaternions for each, state in states.items()},
-    )
+    write_design_file(folder, name, design, states)
     pull = shell.cables(design).tension(states["design"])
     weight = loads["design"][:, 2].sum()
     return DesignRecord(

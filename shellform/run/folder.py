@@ -15,17 +15,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import shellform
-from shellform.arrays import Reals, read_arrays, reals
+from shellform.arrays import Reals, read_arrays
 from shellform.case.build_gridshell import gridshell, rounding_catalogue
 from shellform.case.case import Case, load_case
-from shellform.errors import Damaged, InputError
+from shellform.errors import InputError
 from shellform.gridshell.catalogue import named
 from shellform.gridshell.gridshell import Design, Gridshell, Rod
 from shellform.net.net import Net
 from shellform.net.saved import load_net
 from shellform.records import stages
-from shellform.records.files import ANEW
 from shellform.records.summary import Summary, read_summary, summary_version
+from shellform.run.design_files import design_file, read_design, undamaged
 from shellform.structure.elements.state import State
 from shellform.surface.shape.target import Surface
 from shellform.written import clear, make_folder, refusal, write_arrays
@@ -118,52 +118,26 @@ def read_run(folder: str | Path) -> Run:
             where=str(place),
             remedy="Run shellform design on it again: it goes on.",
         )
-    for file in (
-        place / name for name in ("surface.npz", "net.npz", *(f"designs/{each}.npz" for each in ready))
-    ):
-        if not file.is_file():
+    for name in ("surface.npz", "net.npz", *(design_file(each) for each in ready)):
+        if not (place / name).is_file():
             raise InputError(
                 "isn't there: the run is unfinished",
-                where=str(file),
+                where=str(place / name),
                 remedy="Run shellform design on it again: it goes on.",
             )
     case = load_case(place / "case.toml")
     surface = load_surface(place / "surface.npz")
-    with _undamaged(place / "net.npz"):
+    with undamaged(place / "net.npz"):
         shell, loads = gridshell(case, load_net(place / "net.npz"), surface)
-    designs, states = {}, {}
-    for name in ready:
-        data = read_arrays(place / f"designs/{name}.npz")
-        wanted = [
-            "rest_length",
-            "present",
-            "radius",
-            *(f"{each}_{what}" for each in loads for what in ("positions", "quaternions")),
-        ]
-        missing = [each for each in wanted if each not in data]
-        if missing or data["present"].shape != (len(shell.cable_ends),):
-            raise InputError(
-                "belongs to another state of the case: the run is half-finished",
-                where=str(place / f"designs/{name}.npz"),
-                remedy="Run shellform design on it again: it goes on.",
-            )
-        with _undamaged(data.path):
-            designs[name] = Design(data["rest_length"], data["present"], float(data["radius"]))
-            states[name] = {
-                each: State(
-                    reals("positions", data[f"{each}_positions"], (shell.node_count, 3)),
-                    reals("quaternions", data[f"{each}_quaternions"], (shell.node_count, 4)),
-                )
-                for each in loads
-            }
+    read = {name: read_design(place, name, shell, list(loads)) for name in ready}
     return Run(
         folder=place,
         case=case,
         surface=surface,
         shell=shell,
         loads=loads,
-        designs=designs,
-        states=states,
+        designs={name: design for name, (design, _) in read.items()},
+        states={name: states for name, (_, states) in read.items()},
         summary=summary,
     )
 
@@ -265,16 +239,5 @@ def save_surface(path: Path, surface: Surface) -> None:
 def load_surface(path: Path, source: str = "") -> Surface:
     """A saved surface. Raises InputError where the file is missing or damaged."""
     data = read_arrays(path)
-    with _undamaged(path):
+    with undamaged(path):
         return Surface(data["vertices"], data["triangles"], data["normals"], source)
-
-
-@contextlib.contextmanager
-def _undamaged(path: Path) -> Iterator[None]:
-    """Raises Damaged naming the file where what it holds makes no sense: somebody altered it."""
-    try:
-        yield
-    except Damaged:
-        raise
-    except (InputError, ValueError, TypeError, IndexError, AttributeError, OverflowError) as error:
-        raise Damaged(f"is damaged: {error}", where=str(path), remedy=ANEW) from error

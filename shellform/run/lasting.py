@@ -11,6 +11,7 @@ from pathlib import Path
 from shellform.records import history
 from shellform.records.stages import StagesDone
 from shellform.records.summary import Summary
+from shellform.run.design_files import design_file
 from shellform.run.pages import FILE as PAGE
 from shellform.run.sketch import PICTURE
 
@@ -40,7 +41,7 @@ def lasting(folder: Path, done: StagesDone, summary: Summary) -> StagesDone:
 
 def _files(stage: str, summary: Summary) -> tuple[str, ...]:
     """What a stage leaves in any case."""
-    designs = [f"designs/{name}.npz" for name in summary.designs if (name in _BEFORE) == (stage == "initial")]
+    designs = [design_file(name) for name in summary.designs if (name in _BEFORE) == (stage == "initial")]
     named = {
         "surface": ("surface.npz",),
         "net": ("net.npz", "net.json"),

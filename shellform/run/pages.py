@@ -22,6 +22,7 @@ from shellform.records.profile import read_profile
 from shellform.records.progress import Event, Report, unheard
 from shellform.records.stages import read_stages
 from shellform.records.verdict import verdict
+from shellform.run.design_files import design_file
 from shellform.run.folder import DESIGNS, LOCK, Run, read_run
 from shellform.run.judged import broken_off, run_checks
 from shellform.run.keys import stage_keys
@@ -121,7 +122,7 @@ def _notes(run: Run, has_pictures: bool) -> list[str]:
     """What is missing on the page, or to be known."""
     done = _done(run)
     broken_off = [
-        name for name in DESIGNS if name not in run.designs and (run.folder / f"designs/{name}.npz").is_file()
+        name for name in DESIGNS if name not in run.designs and (run.folder / design_file(name)).is_file()
     ]
     notes = [
         f"The design “{name}” is not shown: its stage has not finished. Run shellform design again."
