@@ -10,19 +10,16 @@ to build the most likely failure is told, and where it falls too often, which ro
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from shellform.arrays import Reals
 from shellform.case.build_rod import stock
 from shellform.case.build_safety import case_tolerances, critical_factors_asked
 from shellform.case.case import Case
 from shellform.case.entries import StockRodEntry
 from shellform.errors import NotConverged
-from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.tolerances import Tolerances
 from shellform.records.as_built import EQUAL, falls
 from shellform.records.checks import BUILT
 from shellform.records.drawn import DrawnPath
@@ -52,7 +49,7 @@ from shellform.run.folder import Run, read_run
 from shellform.run.judged import asked_as_built, judged, run_checks
 from shellform.run.pace import time_words
 from shellform.run.rare_failures import rare_of
-from shellform.run.sampling import Clock, drawn_of
+from shellform.run.sampling import Clock, Examined, drawn_of
 from shellform.run.thicker import rods_that_stand
 from shellform.run.workspace import Workspace
 from shellform.structure.elements.threads import side_by_side
@@ -61,17 +58,6 @@ from shellform.written import write_arrays
 _BEYOND = 1.5  # times the factor asked for, up to which a path is followed at least
 _SAME = 1e-9  # relative
 _GUIDED = 0.25  # of the largest load, the steps in which the guide looks along the path
-
-
-@dataclass(frozen=True)
-class _Examined:
-    """One design under examination."""
-
-    name: str
-    shell: Gridshell
-    design: Design
-    loads: Mapping[str, Reals]
-    tolerances: Tolerances
 
 
 def examine(workspace: Workspace) -> Summary:
@@ -83,7 +69,7 @@ def examine(workspace: Workspace) -> Summary:
     summary = fresh = run.summary.unexamined()
     workspace.say("safety", f"critical factors of {len(every)} designs", Kind.BEGAN)
 
-    def examined(each: _Examined) -> DesignRecord:
+    def examined(each: Examined) -> DesignRecord:
         return _critical(workspace.case, each, fresh.designs[each.name])
 
     for each, record in zip(every, side_by_side(examined, every), strict=True):
@@ -117,7 +103,7 @@ def examine(workspace: Workspace) -> Summary:
     return replace(summary, verdict=judged(replace(run, summary=summary)))
 
 
-def _bar(workspace: Workspace, initial: _Examined, summary: Summary, clock: Clock) -> Summary:
+def _bar(workspace: Workspace, initial: Examined, summary: Summary, clock: Clock) -> Summary:
     """With the initial design drawn in full where it falls under a further load: no fewer are to stand under
     that, and a few structures tell their number by a fifth and more."""
     entry = workspace.case.safety
@@ -144,12 +130,12 @@ def _thicker(workspace: Workspace, run: Run) -> ThickerRodsRecord | None:
     )
 
 
-def _of_run(run: Run, name: str) -> _Examined:
+def _of_run(run: Run, name: str) -> Examined:
     shell = run.shell_of(name)
-    return _Examined(name, shell, run.designs[name], run.loads, case_tolerances(run.case, shell))
+    return Examined(name, shell, run.designs[name], run.loads, case_tolerances(run.case, shell))
 
 
-def _critical(case: Case, each: _Examined, record: DesignRecord) -> DesignRecord:
+def _critical(case: Case, each: Examined, record: DesignRecord) -> DesignRecord:
     """The record of a design with its critical factors, and what its numbers are off by the mesh."""
     asked = critical_factors_asked(case)
     rows = dict(record.loads)
@@ -166,7 +152,7 @@ def _critical(case: Case, each: _Examined, record: DesignRecord) -> DesignRecord
 
 def _with_ends(
     rows: Mapping[str, LoadRecord],
-    each: _Examined,
+    each: Examined,
     followed: str,
     shares: Mapping[str, float],
     asked: Mapping[str, float],
@@ -199,7 +185,7 @@ def _with_ends(
     return ended
 
 
-def _stand(workspace: Workspace, each: _Examined, count: int, summary: Summary, clock: Clock) -> Summary:
+def _stand(workspace: Workspace, each: Examined, count: int, summary: Summary, clock: Clock) -> Summary:
     """With how many of a design's structures stand under each load; unchanged where as many were drawn
     before.
     """
@@ -225,7 +211,7 @@ def _stand(workspace: Workspace, each: _Examined, count: int, summary: Summary, 
     return summary
 
 
-def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: Clock) -> DrawnPath | None:
+def _drawn(workspace: Workspace, each: Examined, load: str, count: int, clock: Clock) -> DrawnPath | None:
     """The first structures of a design under a load; None, and a note, where the perfect one has no unloaded
     equilibrium."""
 
@@ -243,9 +229,8 @@ def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: 
     try:
         return drawn_of(
             workspace.folder,
-            each.name,
-            (each.shell, each.design, each.tolerances),
-            (load, each.loads),
+            each,
+            load,
             count=count,
             seed=workspace.case.safety.seed,
             clock=clock,
@@ -256,7 +241,7 @@ def _drawn(workspace: Workspace, each: _Examined, load: str, count: int, clock: 
         return None
 
 
-def _guided(each: _Examined, largest: str, shares: Mapping[str, float], seed: int) -> dict[str, float]:
+def _guided(each: Examined, largest: str, shares: Mapping[str, float], seed: int) -> dict[str, float]:
     """The guide (reliability/guide.py) for the loads, whose `shares` of the largest are given; a load to
     which the perfect path doesn't lead has none."""
     nominal = perfect(each.shell, each.design, each.loads[largest], shapes=0, step=_GUIDED)
@@ -291,7 +276,7 @@ def _standing(path: DrawnPath, share: float, case: Case) -> StandingRecord:
     )
 
 
-def _built_shape(path: DrawnPath, each: _Examined, seed: int) -> BuiltShapeRecord | None:
+def _built_shape(path: DrawnPath, each: Examined, seed: int) -> BuiltShapeRecord | None:
     """The shape under the design load of those structures that were looked at and rest under it."""
     if not path.shapes:
         return None
@@ -307,7 +292,7 @@ def _built_shape(path: DrawnPath, each: _Examined, seed: int) -> BuiltShapeRecor
     )
 
 
-def _rare(workspace: Workspace, each: _Examined) -> tuple[RareRecord, ...] | None:
+def _rare(workspace: Workspace, each: Examined) -> tuple[RareRecord, ...] | None:
     """How rarely a design's structures fall under each load; None, and a note, where the perfect one has no
     unloaded equilibrium."""
     entry = workspace.case.safety
@@ -320,9 +305,8 @@ def _rare(workspace: Workspace, each: _Examined) -> tuple[RareRecord, ...] | Non
         return tuple(
             rare_of(
                 workspace.folder,
-                each.name,
-                (each.shell, each.design, each.tolerances),
-                (load, each.loads),
+                each,
+                load,
                 count=entry.rare,
                 seed=entry.seed,
                 tell=partial(tell, load),
@@ -335,7 +319,7 @@ def _rare(workspace: Workspace, each: _Examined) -> tuple[RareRecord, ...] | Non
         return None
 
 
-def _failure(workspace: Workspace, each: _Examined, count: int) -> FailureRecord | None:
+def _failure(workspace: Workspace, each: Examined, count: int) -> FailureRecord | None:
     """How a design most likely fails, under the smallest load under which one of its structures falls by
     itself; None where none does."""
     workspace.path(FAILURE).unlink(missing_ok=True)

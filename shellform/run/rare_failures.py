@@ -3,37 +3,30 @@ in the run folder, so that it goes on where it stopped."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from shellform.arrays import Reals
-from shellform.gridshell.gridshell import Design, Gridshell
-from shellform.gridshell.tolerances import Tolerances
 from shellform.records.drawn import DrawnPath, read_drawn, write_drawn
 from shellform.records.failures import RareRecord
-from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.rare import rare_failure
 from shellform.reliability.standing import Workshop
-from shellform.run.sampling import key_of
+from shellform.run.sampling import Examined
 
 
 def rare_of(
     folder: Path,
-    name: str,
-    made: tuple[Gridshell, Design, Tolerances],
-    under: tuple[str, Mapping[str, Reals]],
+    examined: Examined,
+    load: str,
     *,
     count: int,
     seed: int,
     tell: Callable[[int], None],
 ) -> RareRecord:
-    """The share of structures of the design `name`, `made` of a shell with tolerances, that fall `under` the
-    load of a name among all, with `count` structures a level; `tell` hears how many there were so far. Raises
-    NotConverged where the perfect structure has no unloaded equilibrium."""
-    shell, design, tolerances = made
-    load, loads = under
-    file = f"{name}-rare"
-    kept = read_drawn(folder, file, f"{key_of(shell, design, tolerances, loads, seed)} {count}")
+    """The share of structures of the design that fall under the `load`, with `count` structures a level;
+    `tell` hears how many there were so far. Raises NotConverged where the perfect structure has no unloaded
+    equilibrium."""
+    file = f"{examined.name}-rare"
+    kept = read_drawn(folder, file, f"{examined.key(seed)} {count}")
 
     def keep(values: Sequence[float]) -> None:
         factors = tuple(1.0 + value for value in values)
@@ -41,8 +34,8 @@ def rare_of(
         tell(len(values))
 
     found = rare_failure(
-        Workshop(perfect(shell, design, loads[load], step=TO_ITS_END)),
-        tolerances,
+        Workshop(examined.nominal(load)),
+        examined.tolerances,
         seed=seed,
         count=count,
         known=[factor - 1.0 for factor in kept.paths.get(load, DrawnPath()).factors],
@@ -50,7 +43,7 @@ def rare_of(
     )
     fell = len(found.found.failed) > 0
     return RareRecord(
-        name,
+        examined.name,
         load,
         found.found.probability if fell else found.found.reached,
         found.found.variation if fell else None,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +17,48 @@ from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.paths import deviations
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn, write_drawn
 from shellform.reliability.path_of_one import DrawnOutcome
-from shellform.reliability.perfect import TO_ITS_END, perfect
+from shellform.reliability.perfect import TO_ITS_END, Perfect, perfect
 from shellform.reliability.safety import paths
 from shellform.reliability.standing import Workshop
 
 _AT_ONCE = 10  # structures, before they are kept
 _SHAPES = 20  # structures of which the shape is looked at: each takes some factorisations more
+
+
+@dataclass(frozen=True)
+class Examined:
+    """A design under examination: its `name`, the `shell` whose `design` it is, the dead `loads` (n, 6) by
+    name, and the `tolerances` with which it is built."""
+
+    name: str
+    shell: Gridshell
+    design: Design
+    loads: Mapping[str, Reals]
+    tolerances: Tolerances
+
+    def nominal(self, load: str) -> Perfect:
+        """The perfect structure on the whole of the load's path. Raises NotConverged where it has no unloaded
+        equilibrium."""
+        return perfect(self.shell, self.design, self.loads[load], step=TO_ITS_END)
+
+    def key(self, seed: int) -> str:
+        """Of all that its drawn structures depend on."""
+        network = self.shell.network(self.design)
+        digest = hashlib.sha256(f"{shellform.__version__} {seed} {asdict(self.tolerances)}".encode())
+        for array in (
+            self.shell.target.positions,
+            network.beams.axial,
+            network.beams.bending_y,
+            network.beams.bending_z,
+            network.beams.torsion,
+            network.beams.rest_length,
+            network.cables.ends,
+            network.cables.rest_length,
+            network.cables.stiffness,
+            *self.loads.values(),
+        ):
+            digest.update(np.ascontiguousarray(array).tobytes())
+        return digest.hexdigest()
 
 
 class Clock:
@@ -51,33 +87,28 @@ class Clock:
 
 def drawn_of(
     folder: Path,
-    name: str,
-    made: tuple[Gridshell, Design, Tolerances],
-    under: tuple[str, Mapping[str, Reals]],
+    examined: Examined,
+    load: str,
     *,
     count: int,
     seed: int,
     clock: Clock,
     tell: Callable[[int], None],
 ) -> DrawnPath:
-    """Structures 0 to `count` of the design `name`, `made` of a shell with tolerances, `under` the load of a
-    name among all; those in the folder are taken from there. Raises NotConverged where the perfect structure
-    has no unloaded equilibrium."""
-    shell, design, tolerances = made
-    load, loads = under
-    key = key_of(shell, design, tolerances, loads, seed)
-    kept = read_drawn(folder, name, key)
+    """Structures 0 to `count` of the design under the `load`; those in the folder are taken from there.
+    Raises NotConverged where the perfect structure has no unloaded equilibrium."""
+    kept = read_drawn(folder, examined.name, examined.key(seed))
     path = kept.paths.get(load, DrawnPath())
     clock.kept(min(len(path.factors), count))
-    own = paths(loads).get(load, {})
+    own = paths(examined.loads).get(load, {})
     workshop = None
     while len(path.factors) < count:
         began = clock_without_compiling()
         if workshop is None:
-            workshop = Workshop(perfect(shell, design, loads[load], step=TO_ITS_END))
+            workshop = Workshop(examined.nominal(load))
         first = len(path.factors)
         some = workshop.load_numbers(
-            tolerances,
+            examined.tolerances,
             seed=seed,
             numbers=range(first, min(first + _AT_ONCE, count)),
             marks=tuple(own.values()),
@@ -90,10 +121,10 @@ def drawn_of(
                 *path.snaps,
                 *(DrawnSnap(each.number, snap.factor, snap.far) for each in some for snap in each.snaps),
             ),
-            (*path.shapes, *_shapes(shell, some)),
+            (*path.shapes, *_shapes(examined.shell, some)),
         )
         kept = kept.also(load, path)
-        write_drawn(folder, name, kept)
+        write_drawn(folder, examined.name, kept)
         clock.took(len(some), clock_without_compiling() - began)
         tell(len(path.factors))
     return DrawnPath(
@@ -110,25 +141,3 @@ def _shapes(shell: Gridshell, outcomes: Sequence[DrawnOutcome]) -> Iterator[Draw
         if each.resting is not None and each.number < _SHAPES:
             far = deviations(shell, each.resting)
             yield DrawnShape(each.number, float(far.max()), float(far.mean()))
-
-
-def key_of(
-    shell: Gridshell, design: Design, tolerances: Tolerances, loads: Mapping[str, Reals], seed: int
-) -> str:
-    """Of all that a design's structures depend on."""
-    network = shell.network(design)
-    digest = hashlib.sha256(f"{shellform.__version__} {seed} {asdict(tolerances)}".encode())
-    for array in (
-        shell.target.positions,
-        network.beams.axial,
-        network.beams.bending_y,
-        network.beams.bending_z,
-        network.beams.torsion,
-        network.beams.rest_length,
-        network.cables.ends,
-        network.cables.rest_length,
-        network.cables.stiffness,
-        *loads.values(),
-    ):
-        digest.update(np.ascontiguousarray(array).tobytes())
-    return digest.hexdigest()

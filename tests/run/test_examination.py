@@ -23,7 +23,7 @@ from shellform.run.examination import _standing
 from shellform.run.folder import read_run
 from shellform.run.judged import run_checks
 from shellform.run.run import run_case
-from shellform.run.sampling import key_of
+from shellform.run.sampling import Examined
 from tests.stubs import CASE
 
 FEW = ["safety.drawn=12", "safety.compared=4", "safety.probability_design=0.9", "optimise.unloaded=false"]
@@ -125,7 +125,9 @@ def test_of_the_shape_as_built_the_median_the_worst_and_what_drives_it_are_told(
         made = workshop.load_numbers(tolerances, seed=0, numbers=range(4), resting=share)
         places = np.array([each.resting.positions for each in made])
         far = np.linalg.norm(places - shell.target.positions, axis=2)
-        drawn = read_drawn(whole[0], name, key_of(shell, run.designs[name], tolerances, run.loads, 0))
+        drawn = read_drawn(
+            whole[0], name, Examined(name, shell, run.designs[name], run.loads, tolerances).key(0)
+        )
         shapes = drawn.paths[largest].shapes
         assert [each.deviation_max for each in shapes[:4]] == pytest.approx(far.max(axis=1), abs=1e-8)
         assert [each.deviation_mean for each in shapes[:4]] == pytest.approx(far.mean(axis=1), abs=1e-8)
@@ -328,8 +330,7 @@ def test_a_design_without_unloaded_equilibrium_is_told_as_not_found(file, whole,
 def test_the_initial_design_is_drawn_in_full_where_no_fewer_are_to_stand_than_of_it(
     file, tmp_path, monkeypatch
 ):
-    def drawn_of(folder, name, made, under, *, count, **_):
-        load, _ = under
+    def drawn_of(folder, examined, load, *, count, **_):
         stand = tuple(not (load == "additional" and number in (2, 7)) for number in range(count))
         return DrawnPath(tuple(1.0 if each else 0.9 for each in stand), stand)
 

@@ -13,7 +13,7 @@ from shellform.records.progress import Kind
 from shellform.records.summary import BuiltShapeRecord, StandingRecord
 from shellform.reliability.path_of_one import SOUGHT
 from shellform.run import examination
-from shellform.run.sampling import Clock
+from shellform.run.sampling import Clock, Examined
 from tests.records.made import design, load, summary
 
 DESIGN = np.array([[0.0, 0.0, -10.0], [0.0, 0.0, -20.0]])
@@ -48,7 +48,7 @@ class Desk:
 
 def examined(name="initial", loads=LOADS, strength=200.0):
     shell = SimpleNamespace(rod=SimpleNamespace(strength=strength))
-    return examination._Examined(name, shell, f"{name} itself", loads, "tolerances")
+    return Examined(name, shell, f"{name} itself", loads, "tolerances")
 
 
 def told(names=("initial", "optimised")):
@@ -298,22 +298,16 @@ def test_the_initial_design_is_drawn_in_full_where_it_falls_under_a_further_load
 def test_structures_that_can_not_be_drawn_are_told_and_others_with_the_time_that_is_left(
     monkeypatch, tmp_path
 ):
-    desk, clock = Desk(tmp_path), Clock(40)
+    desk, clock, initial = Desk(tmp_path), Clock(40), examined()
     clock.took(10, 100.0)
 
-    def drawn(folder, name, made, under, *, count, seed, clock, tell):
-        assert (name, made[1:], under[0], count, seed) == (
-            "initial",
-            ("initial itself", "tolerances"),
-            "wind",
-            12,
-            7,
-        )
+    def drawn(folder, each, load, *, count, seed, clock, tell):
+        assert (each, load, count, seed) == (initial, "wind", 12, 7)
         tell(3)
         return PATH
 
     monkeypatch.setattr(examination, "drawn_of", drawn)
-    assert examination._drawn(desk, examined(), "wind", 12, clock) is PATH
+    assert examination._drawn(desk, initial, "wind", 12, clock) is PATH
     text, left = desk.said[-1]
     assert "structure 3 of 12 under the load “wind”, about 5 min left" in text
     assert left == pytest.approx(300.0)
@@ -376,9 +370,9 @@ def test_of_a_design_that_was_not_drawn_no_failure_is_explained(monkeypatch, tmp
 def test_how_rarely_it_falls_is_told_of_every_load_that_weighs(monkeypatch, tmp_path):
     desk = Desk(tmp_path, rare=20)
 
-    def rare(folder, name, made, under, *, count, seed, tell):
+    def rare(folder, each, load, *, count, seed, tell):
         tell(30)
-        return (name, under[0], count, seed)
+        return (each.name, load, count, seed)
 
     monkeypatch.setattr(examination, "rare_of", rare)
     assert examination._rare(desk, examined()) == tuple(

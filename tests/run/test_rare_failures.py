@@ -14,8 +14,7 @@ def test_how_rarely_it_falls_is_the_probability_or_the_least_share_that_was_reac
     (tmp_path / "designs").mkdir()
     told, known = [], []
     monkeypatch.setattr(rare_failures, "Workshop", lambda nominal: nominal)
-    monkeypatch.setattr(rare_failures, "perfect", lambda *_, **__: None)
-    monkeypatch.setattr(rare_failures, "key_of", lambda *_: "key")
+    one = SimpleNamespace(name="one", tolerances=None, key=lambda seed: "key", nominal=lambda load: None)
 
     def rare(workshop, tolerances, *, seed, count, known, tell):
         asked.append((seed, count, list(known)))
@@ -29,9 +28,7 @@ def test_how_rarely_it_falls_is_the_probability_or_the_least_share_that_was_reac
     monkeypatch.setattr(rare_failures, "rare_failure", rare)
 
     def once():
-        return rare_failures.rare_of(
-            tmp_path, "one", (None, None, None), ("wind", {"wind": 1}), count=20, seed=7, tell=told.append
-        )
+        return rare_failures.rare_of(tmp_path, one, "wind", count=20, seed=7, tell=told.append)
 
     found = once()
     assert (found.design, found.load, found.structures, found.shares) == ("one", "wind", 620, {"marks": 0.7})

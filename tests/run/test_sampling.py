@@ -9,7 +9,7 @@ import pytest
 from shellform.records.drawn import DrawnPath, DrawnShape, DrawnSnap, read_drawn
 from shellform.reliability.perfect import TO_ITS_END
 from shellform.run import sampling
-from shellform.run.sampling import Clock, drawn_of
+from shellform.run.sampling import Clock, Examined, drawn_of
 
 DESIGN = np.array([[0.0, 0.0, -10.0]])
 LOADS = {"design": DESIGN, "additional": 1.25 * DESIGN}
@@ -50,14 +50,14 @@ def draw(monkeypatch, tmp_path):
     monkeypatch.setattr(sampling, "Workshop", Bench)
     monkeypatch.setattr(sampling, "perfect", lambda shell, own, force, **how: (force[0, 2], how))
     monkeypatch.setattr(sampling, "clock_without_compiling", ticking)
-    monkeypatch.setattr(sampling, "key_of", lambda *_: "key")
+    monkeypatch.setattr(Examined, "key", lambda *_: "key")
     monkeypatch.setattr(sampling, "deviations", lambda shell, state: np.array([0.0, 0.002, 0.001 * state]))
     (tmp_path / "designs").mkdir()
 
     def drawn(count, clock, heard):
         return drawn_of(
-            tmp_path, "one", (None, None, "tolerances"), ("additional", LOADS), count=count, seed=7, clock=clock,
-            tell=heard.append,
+            tmp_path, Examined("one", None, None, LOADS, "tolerances"), "additional", count=count, seed=7,
+            clock=clock, tell=heard.append,
         )  # fmt: skip
 
     return drawn
