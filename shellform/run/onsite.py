@@ -7,7 +7,7 @@ tables in the run's folder `schedules`.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -15,9 +15,6 @@ import numpy as np
 import tomli_w
 
 from shellform.arrays import Reals, read_arrays
-from shellform.case.build_gridshell import gridshell
-from shellform.case.build_net import net_of, surface_of
-from shellform.case.case import load_case
 from shellform.errors import (
     Damaged,
     InputError,
@@ -27,16 +24,16 @@ from shellform.errors import (
     require_known,
     require_number,
 )
-from shellform.gridshell.gridshell import Design, Gridshell
+from shellform.gridshell.gridshell import Gridshell
 from shellform.run.folder import Run, read_run
+from shellform.run.site_sources import design_named, load_named, scan_under, scanned
 from shellform.site import calibration, erection, measurements, retensioning
-from shellform.site.scans import Scan, counted_alike, read_points
+from shellform.site.scans import counted_alike
 from shellform.site.surveys import doubtful, read_survey
 from shellform.structure.elements.state import State
 from shellform.tables import Table, table_text
 from shellform.written import make_folder, write_arrays, write_text
 
-_Origin = tuple[float, float, float] | None  # (3,), m
 # times the noise: of the hundreds of coordinates of a scan their deviation is told to a few percent
 _ABOVE = 1.5
 
@@ -67,17 +64,18 @@ def calibrate(
     a case says; LOAD is a load case or a CSV file of forces. Writes calibration.csv and calibration.toml.
     Raises InputError, NotConverged."""
     measurements.check_noise(noise)
-    shell, built, loads, origin, folder = _built(source, design, output, allow_scripts=allow_scripts)
-    pairs = [_scan(each, shell, loads, unit, None if placed else 0) for each in scans]
-    pairs, counted = counted_alike(pairs, shell.target.positions, origin)
+    grid = scanned(source, design, output, allow_scripts=allow_scripts)
+    shell = grid.shell
+    pairs = [scan_under(each, grid, unit, None if placed else 0) for each in scans]
+    pairs, counted = counted_alike(pairs, shell.target.positions, grid.origin)
     nodes = (
         shell.net.grid.crossing_nodes[:, 1] if markers is None else measurements.read_nodes(markers, shell)
     )
     found = calibration.calibrate(
-        shell, built, pairs, nodes, free=free or calibration.PARAMETERS, noise=noise, offsets=offsets
+        shell, grid.design, pairs, nodes, free=free or calibration.PARAMETERS, noise=noise, offsets=offsets
     )
     joint = {name: getattr(found.joint, name) for name in (*calibration.PARAMETERS, "gap")}
-    files = [folder / "calibration.csv", folder / "calibration.toml"]
+    files = [grid.folder / "calibration.csv", grid.folder / "calibration.toml"]
     write_text(files[0], found.table())
     write_text(files[1], tomli_w.dumps({"joint": joint}))
     seen = 1e3 * found.after[np.isfinite(found.after)]
@@ -89,50 +87,6 @@ def calibrate(
             "each scan has the load that it was taken under, and --design the grid that was built"
         )
     return SiteResult(lines, files)
-
-
-def _built(
-    source: Path, design: str | None, output: Path | None, *, allow_scripts: bool
-) -> tuple[Gridshell, Design, Mapping[str, Reals], _Origin, Path]:
-    """The shell, its design, its loads, where its coordinates count from in a survey's, and where results
-    go, from a run folder or a case file."""
-    if source.suffix.lower() != ".toml":
-        run = read_run(source)
-        name = _design(run, design, "unbraced")
-        folder, origin = make_folder(output or run.folder / "schedules"), run.case.surface.origin
-        return run.shell_of(name), run.designs[name], run.loads, origin, folder
-    if design not in (None, "unbraced"):
-        raise InputError(
-            "a case has no designs yet: the grid is taken unbraced",
-            where="--design",
-            value=design,
-            remedy="Give a run folder.",
-        )
-    case = load_case(source)
-    surface = surface_of(case.surface, allow_scripts=allow_scripts)
-    net, _, _ = net_of(case, surface)
-    shell, loads = gridshell(case, net, surface)
-    return shell, shell.unbraced(), loads, case.surface.origin, make_folder(output or Path.cwd())
-
-
-def _scan(text: str, shell: Gridshell, loads: Mapping[str, Reals], unit: str, frame: int | None) -> Scan:
-    """A scan from "POINTS.csv=LOAD"; without a load the grid stood alone."""
-    points, _, load = text.partition("=")
-    return Scan(read_points(points, unit=unit), _load(load or "none", shell, loads), frame)
-
-
-def _load(name: str, shell: Gridshell, loads: Mapping[str, Reals]) -> Reals:
-    """A load case by its name, or from a CSV file."""
-    if name in loads:
-        return loads[name]
-    if Path(name).is_file():
-        return measurements.read_loads(name, shell)
-    raise InputError(
-        "is neither a load case nor a file",
-        where="load",
-        value=name,
-        remedy=f"Load cases: {', '.join(loads)}.",
-    )
 
 
 @dataclass(frozen=True)
@@ -274,9 +228,9 @@ def erect(
     erection.npz with the shapes. Raises InputError, NotConverged.
     """
     run = read_run(folder)
-    name = _design(run, design, run.best)
+    name = design_named(run, design, run.best)
     shell = run.shell_of(name)
-    carried = [None if each is None else _load(each, shell, run.loads) for each in (load, weight, lift)]
+    carried = [None if each is None else load_named(each, shell, run.loads) for each in (load, weight, lift)]
     origin = run.case.surface.origin
     stops, counted = ([], ()) if way is None else measurements.read_way(way, shell, origin)
     done = erection.erect(
@@ -317,7 +271,7 @@ def erect(
 def _believed(run: Run, options: Survey) -> tuple[str, Gridshell, retensioning.Belief]:
     """The design's name, its shell, and what is believed of it: as drawn, or after the round before."""
     measurements.check_noise(options.noise)
-    name = _design(run, options.design, run.best)
+    name = design_named(run, options.design, run.best)
     require_known(options.load, run.loads, where="--load", what="there is no such load case")
     shell, load = run.shell_of(name), run.loads[options.load]
     design, state = run.designs[name], run.states[name][options.load]
@@ -383,14 +337,6 @@ def _predicted(shell: Gridshell, before: State, step: retensioning.Adjustment, g
         rows.append((number, node, *(f"{each:.6f}" for each in after[node]), *away))
     heads = ("crossing", "node", "x", "y", "z", "distance before [mm]", "distance after [mm]")
     return table_text(Table("predicted", heads, tuple(rows)))
-
-
-def _design(run: Run, name: str | None, usual: str) -> str:
-    """The `name` of a design of the run, or where none is given the `usual` one. Raises InputError for an
-    unknown one."""
-    chosen = name or usual
-    require_known(chosen, run.designs, where="--design", what="isn't there")
-    return chosen
 
 
 def _mm(misfit: float, nodes: int) -> str:

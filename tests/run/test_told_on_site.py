@@ -11,6 +11,7 @@ from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.run import onsite
 from shellform.run.onsite import Survey
+from shellform.run.site_sources import Scanned, design_named, load_named
 
 POSITIONS = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0], [3.0, 1.0, 0.5], [4.0, 4.0, 1.0]])
 SHELL = SimpleNamespace(
@@ -163,7 +164,8 @@ def test_a_calibration_that_leaves_more_than_the_noise_is_doubtful(
         sentences=lambda: ["torsion = 2"],
         table=lambda: "",
     )
-    monkeypatch.setattr(onsite, "_built", lambda *_, **__: (SHELL, None, {}, None, tmp_path))
+    grid = Scanned(SHELL, None, {}, None, tmp_path)
+    monkeypatch.setattr(onsite, "scanned", lambda *_, **__: grid)
     monkeypatch.setattr(onsite.calibration, "calibrate", lambda *_, **__: found)
     lines = onsite.calibrate(tmp_path, [], noise=0.2e-3).lines
     assert lines[:2] == ["torsion = 2", "distances to the model: 2.000 mm on average, 3.000 mm at most"]
@@ -172,11 +174,11 @@ def test_a_calibration_that_leaves_more_than_the_noise_is_doubtful(
 
 
 def test_a_design_and_a_load_are_those_named_or_the_usual_and_there(run):
-    assert onsite._design(run, None, "polished") == "polished"
-    assert onsite._design(run, "initial", "polished") == "initial"
+    assert design_named(run, None, "polished") == "polished"
+    assert design_named(run, "initial", "polished") == "initial"
     with pytest.raises(InputError, match=r"isn't there.*initial, polished"):
-        onsite._design(run, "rounded", "polished")
-    assert onsite._load("wet", SHELL, run.loads) == "concrete"
+        design_named(run, "rounded", "polished")
+    assert load_named("wet", SHELL, run.loads) == "concrete"
     with pytest.raises(InputError, match=r"there is no such load case.*none, wet"):
         onsite._believed(run, Survey(load="snow"))
 
