@@ -10,6 +10,7 @@ from shellform.output.exchange import exports
 from shellform.output.workshop import drawings, nesting, schedules
 from shellform.output.workshop.schedules import Built, TitleBlock
 from shellform.output.workshop.splice_schedule import cutting_notes
+from shellform.output.workshop.turnbuckles import cut_counts
 from shellform.records.progress import Event, Kind, Report, unheard
 from shellform.records.summary import DocumentsRecord
 from shellform.run.folder import Run
@@ -61,12 +62,11 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
     exports.write_exports(run.folder / "models", built, run.surface, run.loads)
     if exports.no_step():
         report(Event("documents", f"no STEP file: {exports.no_step()}", Kind.NOTE))
-    notes = (
-        *cutting_notes(cutting, schedules.rod_names(run.net.grid)),
-        *schedules.cutting_of_cables(built)[1:],
-    )
-    for note in notes[1:]:
+    bars, *spliced = cutting_notes(cutting, schedules.rod_names(run.net.grid))
+    doubts = (*spliced, *schedules.turnbuckles_of_cables(built))
+    for note in doubts:
         report(Event("documents", note, Kind.NOTE))
+    cut = cut_counts(built.shell.cables(built.design).rest_length, built.adjustment)
     return DocumentsRecord(
         design=built.name,
         stock_length=cutting.stock,
@@ -74,6 +74,7 @@ def write_documents(run: Run, *, report: Report = unheard) -> DocumentsRecord:
         bars_least=cutting.least,
         waste=cutting.waste,
         spliced=tuple(cutting.spliced),
-        notes=tuple(notes),
-        **schedules.cut_counts(built),
+        notes=(bars, *doubts),
+        rest_lengths=cut.rest_lengths,
+        cut_lengths=cut.cut_lengths,
     )

@@ -215,16 +215,6 @@ def test_turnbuckles_reach_from_the_length_hung_in_to_the_rest_length(read):
         assert float(row["turnbuckle longest [m]"]) == pytest.approx(1.02 * max(rest, hung), abs=2e-6)
 
 
-def test_lengths_that_differ_in_their_last_bits_alone_are_one(built):
-    every_other = np.cumsum(built.design.present) % 2 == 0
-    lengths = np.where(every_other, 0.05, np.nextafter(0.05, 1.0))
-    alike = replace(built, design=replace(built.design, rest_length=lengths))
-    assert schedules.cut_counts(alike)["rest_lengths"] == 1
-    lengths[every_other] += 1e-6
-    apart = replace(built, design=replace(built.design, rest_length=lengths))
-    assert schedules.cut_counts(apart)["rest_lengths"] == 2
-
-
 def test_the_cable_schedule_tells_the_largest_force_at_each_stage_and_what_is_above_the_limit_before_it():
     pulls = {"erected": np.array([20.79, 0.0, 3.0]), "design": np.array([19.8, 7.0, 19.9])}
     assert force_notes(pulls, "erected", 20.0) == (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shellform.output.workshop.turnbuckles import turnbuckle_notes
+from shellform.output.workshop.turnbuckles import cut_counts, cutting_note, turnbuckle_notes
 
 REST = np.array([0.060, 0.063, 0.070])
 
@@ -17,9 +17,21 @@ REST = np.array([0.060, 0.063, 0.070])
     ],
 )
 def test_cables_that_turnbuckles_are_too_short_to_hang_in_are_told(hung, short):
-    cut, *more = turnbuckle_notes(REST, np.array(hung), 0.004, lengths=3)
+    cut, more = cutting_note(REST, 0.004), turnbuckle_notes(REST, np.array(hung), 0.004)
     assert cut.startswith("Cut to 2 different lengths, the fewest for 3 different rest lengths")
     assert "out by 4 mm" in cut
     assert len(more) == 1 + (short is not None)
     assert short is None or short in more[0]
     assert more[-1].startswith("2 turnbuckles are closed at the rest length")
+
+
+def test_lengths_that_differ_in_their_last_bits_alone_are_one():
+    lengths = np.where(np.arange(6) % 2 == 0, 0.05, np.nextafter(0.05, 1.0))
+    assert cut_counts(lengths, None).rest_lengths == 1
+    lengths[::2] += 1e-6
+    assert cut_counts(lengths, None).rest_lengths == 2
+
+
+def test_of_cables_that_are_each_cut_for_itself_no_lengths_to_cut_are_counted():
+    assert cut_counts(REST, None).cut_lengths is None
+    assert cut_counts(REST, 0.004).cut_lengths == 2

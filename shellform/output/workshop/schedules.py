@@ -45,7 +45,7 @@ from shellform.output.workshop.cable_forces import force_notes
 from shellform.output.workshop.edge_schedule import edge_names, edge_table
 from shellform.output.workshop.nesting import Cutting
 from shellform.output.workshop.splice_schedule import cutting_notes, splice_table
-from shellform.output.workshop.turnbuckles import turnbuckle_notes
+from shellform.output.workshop.turnbuckles import cutting_note, turnbuckle_notes
 from shellform.structure.elements.sections import mass_per_length
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
@@ -245,30 +245,25 @@ def cables(built: Built) -> Table:
         "0: slack at that stage.",
         *force_notes(pulls, _stage("none"), built.force_limit),
         *cutting_of_cables(built),
+        *turnbuckles_of_cables(built),
     )
     return Table("cables", ("cable", *columns), rows, notes)
 
 
-def cut_counts(built: Built) -> dict[str, int]:
-    """For the summary: how many different `rest_lengths` the cables have, and to how many `cut_lengths` they
-    are cut, if turnbuckles' range is known."""
-    lengths = built.shell.cables(built.design).rest_length
-    alike = lengths.round(9)  # what symmetry makes alike differs in its last bits
-    found = {"rest_lengths": len(np.unique(alike))}
-    if built.adjustment is not None:
-        found["cut_lengths"] = len(np.unique(cut_lengths(lengths, built.adjustment)))
-    return found
-
-
 def cutting_of_cables(built: Built) -> tuple[str, ...]:
-    """To how many lengths cables are cut, and what their turnbuckles can't reach; nothing where each is cut
-    for itself."""
+    """To how many lengths cables are cut; nothing where each is cut for itself."""
+    if built.adjustment is None or not built.design.present.any():
+        return ()
+    return (cutting_note(built.shell.cables(built.design).rest_length, built.adjustment),)
+
+
+def turnbuckles_of_cables(built: Built) -> tuple[str, ...]:
+    """What their turnbuckles can't do, a sentence each; nothing where each is cut for itself."""
     if built.adjustment is None or not built.design.present.any():
         return ()
     ties = built.shell.cables(built.design)
     hung = ties.lengths(built.hung or built.shell.target)
-    count = cut_counts(built)["rest_lengths"]
-    return turnbuckle_notes(ties.rest_length, hung, built.adjustment, lengths=count)
+    return turnbuckle_notes(ties.rest_length, hung, built.adjustment)
 
 
 def shoe_width(built: Built) -> float:
