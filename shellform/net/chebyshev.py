@@ -1,20 +1,26 @@
-"""From a surface to its Chebyshev net (operation 1 of the framework): lattice, pull, trim, quality."""
+"""From a surface to its Chebyshev net (operation 1 of the framework): lattice, pull, trim, quality.
+
+From an origin on the surface (lattice_origin.py) the compass method (compass.py) tells which crossings of a
+lattice cover it and a margin around, on the surface as it goes on past its edge. The flat grid of these rods
+is pulled onto it by sliding springs (pull.py), or laid as the compass has it, cut at the edge (trim.py) and
+measured (quality.py). A pulled grid draws itself in: where it leaves the rim bare, the margin is made wider
+and everything begins anew; past the widest one no net covers the surface.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from shellform.arrays import Reals, reals
 from shellform.errors import InputError, require_count, require_number
-from shellform.net.compass import Finder, Guide, covering_lattice, raised
+from shellform.net.compass import Finder, covering_lattice
 from shellform.net.grid import Grid, lattice_grid
+from shellform.net.lattice_origin import origin_at, origin_of_guides
 from shellform.net.net import Net
 from shellform.net.notes import NetNote, NoteKind
 from shellform.net.pull import (
@@ -36,7 +42,7 @@ from shellform.net.refusal import NoNet, Reason
 from shellform.net.trim import Limits, Trimmed, Uncovered, bare_rods, trim
 from shellform.structure.elements.threads import dense_on_one
 from shellform.surface.shape.locate import Locator
-from shellform.surface.shape.target import Surface, triangle_areas
+from shellform.surface.shape.target import Surface
 
 MERGE = 0.2  # of the spacing
 _ROUND = 2.0 * np.pi * (1.0 + 1e-9)  # rad, a whole turn
@@ -156,8 +162,14 @@ def net_at(
     density = _densities(settings.spring_density, settings.start)
     for margin in _MARGINS:
         finder = Locator(surface, reach=(margin + _BEYOND) * max(steps))
-        origin, frame, lines = _origin(surface, finder, steps, angle, offset, settings.guides)
-        places, points = covering_lattice(finder, origin, lines, steps, margin=margin * max(steps))
+        origin = (
+            origin_at(surface, finder, steps, angle=angle, offset=offset)
+            if settings.guides is None
+            else origin_of_guides(surface, finder, settings.guides)
+        )
+        places, points = covering_lattice(
+            finder, origin.point, origin.guides, steps, margin=margin * max(steps)
+        )
         grid = lattice_grid(
             places, spacing=steps, gap=settings.gap, elements=settings.elements, tail=tuned.tail
         )
@@ -172,9 +184,9 @@ def net_at(
                 pulled = pull(
                     grid,
                     finder,
-                    begin if settings.start == "compass" else flat_start(grid, origin, frame),
-                    origin,
-                    frame,
+                    begin if settings.start == "compass" else flat_start(grid, origin.point, origin.frame),
+                    origin.point,
+                    origin.frame,
                     spring_density=density,
                     shear_stiffness=settings.shear_stiffness,
                     guided=settings.guides is not None,
@@ -263,103 +275,6 @@ def _densities(given: Sequence[float] | None, start: Start) -> Sequence[float]:
             remedy="For example [0.05, 0.5, 5.0].",
         )
     return given
-
-
-def _origin(
-    surface: Surface,
-    finder: Finder,
-    steps: tuple[float, float],
-    angle: float,
-    offset: tuple[float, float],
-    guides: tuple[ArrayLike, ArrayLike] | None,
-) -> tuple[Reals, Reals, tuple[Guide, Guide, Guide, Guide]]:
-    """The lattice's origin (3,) on the surface, the frame (3, 3) of u, v and normal there, as columns, and
-    the guides from it forwards and backwards along u, then along v."""
-    if guides is not None:
-        along_u, along_v = (reals(f"net.guides[{k}]", each, (None, 2)) for k, each in enumerate(guides))
-        plan, halves = _halves(along_u, along_v)
-    else:
-        heading = np.array([np.cos(angle), np.sin(angle)])
-        shift = offset[0] * steps[0] * heading + offset[1] * steps[1] * np.array([-heading[1], heading[0]])
-        plan = _middle(surface, finder) + shift
-    origin = _above(surface, finder, plan)
-    foot = finder.foot(origin[None])
-    if finder.past_outline(foot)[0] > 0.0:
-        raise InputError(
-            "the net's origin lies off the surface",
-            where="net.offset" if guides is None else "net.guides",
-            value=plan.round(4).tolist(),
-            remedy="Choose a smaller offset, or guides that cross on the surface.",
-        )
-    normal = foot.normal[0]
-
-    def tangent(direction: Reals) -> Reals:
-        flat = np.array([*direction, 0.0])
-        # The direction along the surface whose plan is the given one
-        rise = -(flat @ normal) / normal[2] if abs(normal[2]) > 1e-9 else 0.0
-        flat[2] = rise
-        flat -= (flat @ normal) * normal
-        return np.asarray(flat / np.linalg.norm(flat))
-
-    if guides is not None:
-        lines = tuple(Guide(tangent(half[1] - half[0]), half) for half in halves)
-        along = lines[0].direction
-    else:
-        along = tangent(heading)
-        side = np.cross(normal, along)
-        lines = (Guide(along), Guide(-along), Guide(side), Guide(-side))
-    frame = np.column_stack([along, np.cross(normal, along), normal])
-    return origin, frame, (lines[0], lines[1], lines[2], lines[3])
-
-
-def _middle(surface: Surface, finder: Finder) -> Reals:
-    """The middle of the plan (2,): its centroid, or where that lies off the surface, as in the bend of an L,
-    the place farthest from the edge."""
-    corners = surface.vertices[surface.triangles]
-    areas = triangle_areas(surface.vertices, surface.triangles)
-    centroid = np.asarray(areas @ corners.mean(axis=1) / areas.sum())[:2]
-    if finder.past_outline(finder.foot(_above(surface, finder, centroid)[None]))[0] <= 0.0:
-        return centroid
-    edge = cKDTree(surface.vertices[np.concatenate(surface.boundary)])
-    return surface.vertices[np.argmax(edge.query(surface.vertices)[0]), :2]
-
-
-def _above(surface: Surface, finder: Finder, plan: Reals) -> Reals:
-    """The place (3,) on the surface over a `plan` (2,), sought from the vertex nearest to it there."""
-    away = np.linalg.norm(surface.vertices[:, :2] - plan, axis=1)
-    return raised(finder, plan, surface.vertices[np.argmin(away)])
-
-
-def _halves(along_u: Reals, along_v: Reals) -> tuple[Reals, list[Reals]]:
-    """Where two polylines (k, 2) first cross, (2,), and their four halves from there: forwards and backwards
-    along u, along v.
-    """
-    for i, (a, b) in enumerate(pairwise(along_u)):
-        for j, (c, d) in enumerate(pairwise(along_v)):
-            matrix = np.column_stack([b - a, c - d])
-            if abs(np.linalg.det(matrix)) < 1e-12 * float(np.linalg.norm(b - a) * np.linalg.norm(c - d)):
-                continue
-            s, t = np.linalg.solve(matrix, c - a)
-            if not (0.0 <= s <= 1.0 and 0.0 <= t <= 1.0):
-                continue
-            meet = a + s * (b - a)
-            halves = [
-                np.vstack([meet, along_u[i + 1 :]]),
-                np.vstack([meet, along_u[i::-1]]),
-                np.vstack([meet, along_v[j + 1 :]]),
-                np.vstack([meet, along_v[j::-1]]),
-            ]
-            if all(np.linalg.norm(half[1] - meet) > 0.0 for half in halves):
-                if (
-                    matrix[0, 0] * matrix[1, 1] - matrix[0, 1] * matrix[1, 0] > 0.0
-                ):  # v runs to the right of u: turn it round
-                    halves[2], halves[3] = halves[3], halves[2]
-                return meet, halves
-    raise InputError(
-        "the two guide curves don't cross between their ends",
-        where="net.guides",
-        remedy="Draw them through one point on the surface.",
-    )
 
 
 def _net(surface: Surface, finder: Finder, oversized: Grid, pulled: Pulled, trimmed: Trimmed) -> Net:
