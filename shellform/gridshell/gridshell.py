@@ -1,4 +1,11 @@
-"""The braced gridshell (operation 2 of the framework): rods, joints and candidate cables on a net."""
+"""The braced gridshell (operation 2 of the framework): rods, joints and candidate cables on a net.
+
+Candidates run between the lower rods along both diagonals of every cell whose corners are all joints, but
+those that would rise above the surface below which they have to stay. A design says which of them are there,
+how long each is without force, and the rods' radius; all else is the net's, so that the beams follow from the
+radius alone. How thick rods may be, the net's curvature says: κ E c at the outermost fibre, a distance c from
+the axis, is at most the flexural strength (equation 1).
+"""
 
 from __future__ import annotations
 
