@@ -331,7 +331,9 @@ def _tell(search: _Search) -> None:
 
 
 def _resume(search: _Search, checkpoint: Checkpoint) -> None:
-    """Puts the search where one of the same problem, start and settings stood."""
+    """Puts the search where one of the same problem, start and settings stood. Raises InputError for a
+    checkpoint of another solver."""
+    checkpoint.require(_NUMBERS)
     numbers, arrays, evaluator = checkpoint.numbers, checkpoint.arrays, search.evaluator
     for name in _NUMBERS:
         setattr(search, name, numbers[name])

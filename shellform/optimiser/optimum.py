@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from shellform.errors import InputError
 from shellform.gridshell.gridshell import Design
 from shellform.problem.problem import Problem
 from shellform.reliability.trial_structures import Demand
@@ -47,6 +48,15 @@ class Checkpoint:
     numbers: Mapping[str, Any]
     arrays: Mapping[str, np.ndarray]
     history: tuple[Step, ...]
+
+    def require(self, numbers: Collection[str]) -> None:
+        """Raises InputError where it hasn't these `numbers`: another solver wrote it."""
+        if not set(numbers) <= set(self.numbers):
+            raise InputError(
+                "was written by a search with another solver",
+                where="resume",
+                remedy="Go on with the solver, problem and start that wrote it, or leave resume out.",
+            )
 
 
 @dataclass(frozen=True)

@@ -53,7 +53,9 @@ def tell(search: Search, it: Iterate) -> None:
 
 
 def resumed(search: Search, checkpoint: Checkpoint) -> tuple[Search, Iterate]:
-    """Where a search of the same problem, start and settings stood."""
+    """Where a search of the same problem, start and settings stood. Raises InputError for a checkpoint of
+    another solver."""
+    checkpoint.require(_NUMBERS)
     numbers, arrays = checkpoint.numbers, checkpoint.arrays
     design = Design(arrays["rest_length"], np.array(arrays["present"]), numbers["radius"])
     remembered, mind = None, None

@@ -111,6 +111,19 @@ def test_trials_off_the_branch_are_rejected_and_mma_goes_on(coarse):
     assert best.objective < 0.5
 
 
+def test_a_search_goes_on_from_no_checkpoint_of_the_other_solver(coarse):
+    asked, start, solvers = (
+        problem(coarse, 2.0),
+        coarse.design(),
+        (sf.MovingAsymptotes(), sf.SequentialConvex()),
+    )
+    for one, other in (solvers, solvers[::-1]):
+        kept = []
+        sf.optimise(asked, start, solver=one, evaluations=2, keep=kept.append)
+        with pytest.raises(InputError, match="resume: was written by a search with another solver"):
+            sf.optimise(asked, start, solver=other, evaluations=2, resume=kept[0])
+
+
 @pytest.mark.parametrize("more", [1.2, 1.5])
 def test_a_direct_search_resumed_anywhere_ends_with_the_same_design_and_history_to_the_bit(coarse, more):
     """Of 1.5 times the load the start bears 1.45, so that it is raised in stages."""
