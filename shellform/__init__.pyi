@@ -102,6 +102,7 @@ from shellform.structure.elements.beam import Beams as Beams
 from shellform.structure.elements.cable import Cables as Cables
 from shellform.structure.elements.parts import Evaluation as Evaluation
 from shellform.structure.elements.parts import Part as Part
+from shellform.structure.elements.sections import BeamStiffness as BeamStiffness
 from shellform.structure.elements.sections import Material as Material
 from shellform.structure.elements.sections import Rectangle as Rectangle
 from shellform.structure.elements.sections import Round as Round
