@@ -436,9 +436,11 @@ def test_a_rhinovault_session_gives_its_thrust_diagram_without_openings():
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply", "off", "vtk", "vtu", "msh"])
-def test_a_surface_written_as_a_mesh_comes_back(tmp_path, ending):
+def test_a_surface_written_as_a_mesh_comes_back_and_is_the_same_bytes_each_time(tmp_path, ending):
     surface = cad.build_surface(ROOT / "surfaces/dome.py", size=0.05)
-    write_mesh(tmp_path / f"dome.{ending}", surface)
+    for name in ("dome", "again"):
+        write_mesh(tmp_path / f"{name}.{ending}", surface)
+    assert (tmp_path / f"dome.{ending}").read_bytes() == (tmp_path / f"again.{ending}").read_bytes()
     back = read_surface(tmp_path / f"dome.{ending}")
     np.testing.assert_allclose(back.size, surface.size, atol=1e-6)
     assert len(back.triangles) == len(surface.triangles)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,6 +26,8 @@ _WRITTEN = {
     ".vtu": "vtu",
     ".msh": "gmsh",
 }
+_STAMPED = ("obj", "ply")
+_STAMP = re.compile(rb"(Created by meshio v[^,\n]*), [^\n]*")  # when, which no other file of a run says
 _CORNERS = {"triangle6": 3, "triangle7": 3, "quad8": 4, "quad9": 4}  # of curved elements, which come first
 
 
@@ -55,8 +58,8 @@ def read_msh(file: Path, choice: Choice) -> Draft:
 
 
 def write_mesh(path: str | Path, surface: Surface) -> None:
-    """Writes the triangles in metres, in the format of the path's ending. Raises InputError for an ending
-    that isn't known.
+    """Writes the triangles in metres, in the format of the path's ending: the same bytes each time. Raises
+    InputError for an ending that isn't known.
     """
     kind = _WRITTEN.get(Path(path).suffix.lower())
     if kind is None:
@@ -65,6 +68,9 @@ def write_mesh(path: str | Path, surface: Surface) -> None:
         )
     try:
         meshio.Mesh(surface.vertices, [("triangle", surface.triangles)]).write(path, file_format=kind)
+        if kind in _STAMPED:
+            whole = Path(path).read_bytes()
+            Path(path).write_bytes(_STAMP.sub(rb"\1", whole, count=1))
     except OSError as error:
         raise InputError(
             f"can't be written: {error}", where=str(path), remedy="Choose another folder."
