@@ -88,7 +88,7 @@ class Branch:
         `here` at the `factor` on; `report` is told each one's load factor and state. `heeding`: steps that
         may pass over an unstable stretch are halved (outlook.py)."""
         width, good = step, 0
-        outlook = Outlook(self.assembly, self.load, self.span) if heeding else None
+        outlook = Outlook(self.assembly, self.load, self.span, self.measure.mass_shape) if heeding else None
         view = None if outlook is None else outlook.view(here.state, here.balance, here.factor, factor, None)
         while factor < most:
             goal = most if factor + width > most - 1e-12 else factor + width

@@ -14,10 +14,9 @@ drawn in pairs of opposite ones, so that what is linear in them moves the mean n
 structures' own mean would be made up for, and other structures would lie farther off.
 
 The derivative is exact: with G_j = d(value)/dX_j = 2 (1 + k (q_j - m) / s) (d + X_j) / n of n structures, and
-K L_j = G_j, the terms -L_j'(dK X_j + dF_j) hold the
-third derivative of the energy contracted with the sum of L_j X_j', and the structures' own tangents. Spins
-don't commute: the derivative of a node's moment m has -S(m)/2 beside the symmetric tangent, and the nodes of
-structure j are in no equilibrium.
+K L_j = G_j, the terms -L_j'(dK X_j + dF_j) hold the third derivative of the energy contracted with the sum of
+L_j X_j', and the structures' own tangents. Spins don't commute: the derivative of a node's moment m has
+-S(m)/2 beside the symmetric tangent, and the nodes of structure j are in no equilibrium.
 """
 
 from __future__ import annotations
@@ -28,7 +27,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from shellform.arrays import Reals
-from shellform.errors import NotConverged, require_count, require_number
+from shellform.errors import require_count, require_number
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
 from shellform.problem.problem import LoadCase
@@ -45,7 +44,6 @@ from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.structure.answers.third_derivatives import bilinear, bilinear_by_dof, bilinear_by_rest_length
 from shellform.structure.elements.threads import side_by_side
 from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.factorisation import NotPositiveDefinite
 
 PAIRS = 12  # of structures with opposite errors, by which a mean is told
 PAIRS_OF_DEVIATIONS = 48  # the same where deviations are added, which few structures tell badly
@@ -73,13 +71,7 @@ class BuiltMisfit(Term):
     def measure(self, at: LoadedDesign) -> Measurement:
         """One value, m². Raises NotConverged where the state isn't stable."""
         assembly = at.assembled().beside()
-        try:
-            moved = moved_from(
-                assembly, at.state, at.load, at.design.present, self.errors, self.imperfections
-            )
-        except NotPositiveDefinite as error:
-            what, remedy = "The state isn't a stable equilibrium of the design", "Solve for it first."
-            raise NotConverged(what, state=at.state, remedy=remedy) from error
+        moved = moved_from(assembly, at.state, at.load, at.design.present, self.errors, self.imperfections)
         places = at.state.positions - at.shell.target.positions + moved.translations
         value, shares = self._of(places)
         return Measurement(

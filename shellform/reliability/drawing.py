@@ -25,7 +25,7 @@ G the turn of its chord, so that its forces there are those of the perfect struc
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -139,6 +139,16 @@ def errors_of(members: Members, tolerances: Tolerances, z: Mapping[str, Reals]) 
         load=_load_factors(members, t, z),
         shape=t.shape * members.span * z["shape"],
     )
+
+
+def errors_by_cause(
+    members: Members, tolerances: Tolerances, seed: int, numbers: Iterable[int]
+) -> dict[str, list[Errors]]:
+    """By cause that isn't left out, what structures with these numbers are off by where no other cause is."""
+    z = [variables(members, seed, number) for number in numbers]
+    return {
+        name: [errors_of(members, tolerances.only(name), each) for each in z] for name in tolerances.causes
+    }
 
 
 def draw_errors(members: Members, tolerances: Tolerances, seed: int, number: int) -> Errors:

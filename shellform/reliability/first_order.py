@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Flags, Reals
+from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import (
     Errors,
@@ -20,8 +21,7 @@ from shellform.reliability.drawing import (
     built_beams,
     built_cables,
     built_load,
-    errors_of,
-    variables,
+    errors_by_cause,
 )
 from shellform.reliability.perfect import Perfect
 from shellform.structure.elements.state import State
@@ -58,7 +58,7 @@ def moved_from(
 ) -> Moved:
     """The structures that are a perfect one, with this `assembly` and those of the candidate cables that are
     `present`, but for `some` errors, moved from its equilibrium `state` under the dead `load` (n, 6). Raises
-    NotPositiveDefinite where that isn't stable."""
+    NotConverged where that isn't stable."""
     (beams,), (cables,) = assembly.beams, assembly.cables
 
     def one(errors: Errors) -> tuple[Assembly, Reals]:
@@ -74,7 +74,11 @@ def moved_from(
         return built, more.ravel()
 
     found = side_by_side(one, list(some))
-    motions = solved(assembly, state, np.column_stack([more for _, more in found]))
+    try:
+        motions = solved(assembly, state, np.column_stack([more for _, more in found]))
+    except NotPositiveDefinite as error:
+        what, remedy = "The state isn't a stable equilibrium of the design", "Solve for it first."
+        raise NotConverged(what, state=state, remedy=remedy) from error
     motions += np.column_stack([errors.supports.ravel() for errors in some])
     return Moved(tuple(built for built, _ in found), motions)
 
@@ -94,21 +98,13 @@ def moved_by_cause(
     """By cause of error, the root mean square motion of a node, m, from its place in the perfect structure at
     the end of its path, where no other cause is off; nothing where that structure isn't stable."""
     assembly, state, load = assemble(nominal.network), nominal.states[-1], nominal.factors[-1] * nominal.load
-    causes = tolerances.causes
-    some = [
-        errors_of(
-            nominal.members,
-            tolerances.only(name),
-            variables(nominal.members, seed, number),
-        )
-        for name in causes
-        for number in range(drawn)
-    ]
+    own = errors_by_cause(nominal.members, tolerances, seed, range(drawn))
+    some = [errors for each in own.values() for errors in each]
     if not some:
         return {}
     try:
         found = moved_from(assembly, state, load, nominal.present, some, nominal.imperfections)
-    except NotPositiveDefinite:
+    except NotConverged:
         return {}
-    squares = (found.translations**2).sum(axis=2).mean(axis=1).reshape(len(causes), drawn)
-    return dict(zip(causes, np.sqrt(squares.mean(axis=1)).tolist(), strict=True))
+    squares = (found.translations**2).sum(axis=2).mean(axis=1).reshape(len(own), drawn)
+    return dict(zip(own, np.sqrt(squares.mean(axis=1)).tolist(), strict=True))

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Reals, reals
+from shellform.errors import NotConverged
 from shellform.gridshell.tolerances import Tolerances
 from shellform.reliability.drawing import (
     built_cables,
@@ -29,7 +30,6 @@ from shellform.structure.elements.cable import Cables
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
 from shellform.structure.solve.assembly import Assembly
-from shellform.structure.solve.factorisation import NotPositiveDefinite
 
 DRAWN = 24  # structures from which deviations of stretches are taken: a share of 1/sqrt(2·24) off, 14 %
 _LEAST = 1e-6  # m, the smallest deviation that is counted
@@ -87,7 +87,7 @@ def stretch_deviation(
     ]
     try:
         found = moved_from(assembly, state, none, perfect.present, some, None).translations
-    except NotPositiveDefinite:
+    except NotConverged:
         return own
     a, b = cables.ends.T
     unit, _ = cables.directions(state)

@@ -21,14 +21,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
 from shellform.arrays import Reals
 from shellform.structure.elements.state import State, moved
 from shellform.structure.solve.assembly import Assembly, Balance
 from shellform.structure.solve.factorisation import Factor
 from shellform.structure.solve.loading import turns_between
-from shellform.structure.solve.residual import ResidualNorm
 
 _MODES = 6  # the softest ones, through which the tangent is looked at
 _ROUNDS, _AGAIN = 8, 2  # of inverse iteration, at the beginning and from one state to the next
@@ -50,11 +48,11 @@ class View:
 
 
 class Outlook:
-    """What is to be seen from the states of one structure's path under the dead `load` (n, 6)."""
+    """What is to be seen from the states of one structure's path under the dead `load` (n, 6); `mass` (f,)
+    is what modes are measured by."""
 
-    def __init__(self, assembly: Assembly, load: Reals, span: float) -> None:
-        self.assembly, self.load, self.span = assembly, load, span
-        self.mass = ResidualNorm(assembly).mass_shape[:, None]
+    def __init__(self, assembly: Assembly, load: Reals, span: float, mass: Reals) -> None:
+        self.assembly, self.load, self.span, self.mass = assembly, load, span, mass[:, None]
 
     def view(self, state: State, balance: Balance, factor: Factor, share: float, before: View | None) -> View:
         """From a state with its balance and its tangent's factor at a load factor, `share`, after the one
@@ -95,11 +93,8 @@ class Outlook:
 
     def _lost(self, view: View, change: float) -> bool:
         """Whether the tangent does by a `change` of the load factor."""
-        matrix, soft = self.assembly.matrix, view.soft
-        rate = change * self._rate(view, float(np.sign(change)))
-        lower = sp.csc_array((rate, matrix.indices, matrix.indptr), shape=(matrix.size, matrix.size))
-        half = soft.T @ (lower @ soft)
-        rises = half + half.T - soft.T @ (rate[matrix.diagonal][:, None] * soft)
+        rate = self.assembly.matrix.full(self._rate(view, float(np.sign(change))))
+        rises = change * (view.soft.T @ (rate @ view.soft))
         return bool(np.linalg.eigvalsh(np.diag(view.stiffness) + rises)[0] <= 0.0)
 
     def _rate(self, view: View, side: float) -> Reals:

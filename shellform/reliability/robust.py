@@ -23,20 +23,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from shellform.arrays import Reals
-from shellform.errors import NotConverged, require_count
+from shellform.errors import require_count
 from shellform.gridshell.gridshell import Design, Gridshell
 from shellform.gridshell.tolerances import Tolerances
-from shellform.reliability.drawing import errors_of, variables
+from shellform.reliability.drawing import errors_by_cause
 from shellform.reliability.first_order import moved_from
 from shellform.reliability.perfect import TO_ITS_END, perfect
 from shellform.reliability.standing import Workshop
 from shellform.structure.elements.state import State
 from shellform.structure.network import assemble
-from shellform.structure.solve.factorisation import NotPositiveDefinite
 
 DRAWN = 96  # structures, and as many with opposite errors, by which is predicted
 _TOLD = 0.01  # of the scatter, from which on a cause is told in a sentence
-_AT_ONCE = 24  # of one cause, that are kept at the same time
+_AT_ONCE = 8  # whose motions by all causes are kept at the same time
 
 
 @dataclass(frozen=True)
@@ -98,40 +97,32 @@ def spread(
     nominal, away = perfect(shell, design, load, step=TO_ITS_END), state.positions - shell.target.positions
     assembly, members = assemble(nominal.network), nominal.members
 
-    def motions(name: str, numbers: range) -> Reals:
-        """Of the nodes (k, n, 3) by the errors of one cause."""
-        own = tolerances.only(name)
-        some = [errors_of(members, own, variables(members, seed, number)) for number in numbers]
-        return moved_from(assembly, state, load, design.present, some, nominal.imperfections).translations
-
-    squares = np.zeros((drawn, len(away)))
-    along, shape, variance = np.zeros(drawn), dict.fromkeys(causes, 0.0), dict.fromkeys(causes, 0.0)
-    try:
-        for first in range(0, drawn, _AT_ONCE):
-            numbers = range(first, min(first + _AT_ONCE, drawn))
-            together = np.zeros((len(numbers), *away.shape))
-            for name in causes:
-                own = motions(name, numbers)
-                together += own
-                shape[name] += float((own**2).sum())
-                variance[name] += float((np.einsum("knj,nj->k", own, away) ** 2).sum())
-            squares[numbers] = (together**2).sum(axis=2)
-            along[numbers] = np.einsum("knj,nj->k", together, away)
-    except NotPositiveDefinite as error:
-        what, remedy = "The state isn't a stable equilibrium of the design", "Solve for it first."
-        raise NotConverged(what, state=state, remedy=remedy) from error
+    squares, along = np.zeros((drawn, len(away))), np.zeros(drawn)
+    shape, variance = np.zeros(len(causes)), np.zeros(len(causes))
+    for first in range(0, drawn, _AT_ONCE):
+        numbers = range(first, min(first + _AT_ONCE, drawn))
+        own = errors_by_cause(members, tolerances, seed, numbers)
+        some = [errors for each in own.values() for errors in each]
+        moved = moved_from(assembly, state, load, design.present, some, nominal.imperfections)
+        motions = moved.translations.reshape(len(causes), len(numbers), *away.shape)
+        shape += (motions**2).sum(axis=(1, 2, 3))
+        variance += (np.einsum("cknj,nj->ck", motions, away) ** 2).sum(axis=1)
+        together = motions.sum(axis=0)
+        squares[numbers] = (together**2).sum(axis=2)
+        along[numbers] = np.einsum("knj,nj->k", together, away)
     misfit, even = float((away**2).sum()), squares.sum(axis=1)
     return Spread(
         misfit,
         misfit + float(even.mean()),
         float(np.sqrt(even.var() + 4.0 * (along**2).mean())),
-        {name: (_share(shape, name), _share(variance, name)) for name in causes},
+        dict(zip(causes, zip(_shares(shape), _shares(variance), strict=True), strict=True)),
         np.sqrt(squares.mean(axis=0)),
     )
 
 
-def _share(sums: Mapping[str, float], name: str) -> float:
-    return sums[name] / max(sum(sums.values()), 1e-300)
+def _shares(sums: Reals) -> list[float]:
+    found: list[float] = (sums / max(float(sums.sum()), 1e-300)).tolist()
+    return found
 
 
 def sample(

@@ -18,6 +18,7 @@ from shellform.structure.elements.state import at_rest
 from shellform.structure.network import assemble
 from shellform.structure.solve import path
 from shellform.structure.solve.equilibrium import find_equilibrium
+from shellform.structure.solve.factorisation import Symmetric
 from shellform.structure.solve.loading import forces
 
 
@@ -98,9 +99,7 @@ def outlook():
 
     found = Outlook.__new__(Outlook)
     found.assembly = SimpleNamespace(
-        matrix=SimpleNamespace(
-            size=2, indices=np.array([0, 1, 1]), indptr=np.array([0, 2, 3]), diagonal=np.array([0, 2])
-        ),
+        matrix=Symmetric(np.array([0, 2, 3]), np.array([0, 1, 1])),
         chords=SimpleNamespace(corrected=lambda state, step: step),
         evaluate=evaluate,
     )
@@ -151,7 +150,7 @@ def test_shapes_come_to_be_the_softest_modes_of_what_is_at_hand(nominal):
     assembly = assemble(nominal.network)
     path = Branch(assembly, nominal.load, nominal.members.span)
     here = path.at(nominal.states[-1])
-    outlook, seen = Outlook(assembly, nominal.load, nominal.members.span), None
+    outlook, seen = Outlook(assembly, nominal.load, nominal.members.span, path.measure.mass_shape), None
     for _ in range(12):
         seen = outlook.view(here.state, here.balance, here.factor, 1.0, seen)
     mass = outlook.mass * seen.soft
@@ -173,6 +172,7 @@ class Seen:
         monkeypatch.setattr(branch, "Outlook", lambda *_: outlook)
         self.path = Branch.__new__(Branch)
         self.path.assembly = self.path.load = self.path.span = None
+        self.path.measure = SimpleNamespace(mass_shape=None)
         self.path.step = lambda here, goal, last: Here(f"at {goal}", None, None)
         self.path.at = lambda state: Here(state, None, None)
         self.path._returns = self.back
